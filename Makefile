@@ -1,0 +1,226 @@
+# EMCON. `make help` lists what can be made.
+#
+# MODE=release|debug, WP=real64|real128|real32 (kind of the state; each has its own folder),
+# V=1 shows commands, FFLAGS=... and CFLAGS=... are added to the flags below.
+# Compiler and libraries are looked up once, by .ci/setup, into build/config.mk.
+
+MODE ?= release
+WP ?= real64
+PREFIX ?= /usr/local
+BUILD := build/$(MODE)$(if $(filter-out real64,$(WP)),-$(WP))
+O := $(BUILD)/obj
+ifeq ($(filter $(MODE),release debug),)
+$(error MODE is release or debug, not '$(MODE)')
+endif
+ifeq ($(filter $(WP),real32 real64 real128),)
+$(error WP is real32, real64 or real128, not '$(WP)')
+endif
+
+# make has values of its own for these (f77, cc): `?=` would leave them.
+ifeq ($(origin FC),default)
+FC := gfortran
+endif
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+Q := $(if $(V),,@)
+.DELETE_ON_ERROR:
+.SUFFIXES:
+.DEFAULT_GOAL := help
+.PHONY: run test lib app pywrap kernels lint bench docs install status clean help FORCE
+
+# ---- set-up -------------------------------------------------------------------------------------
+
+# An included makefile is made before anything else: so the set-up comes first, when there is none
+# or when the tree has come from another machine. Help and clean do without.
+ifneq ($(filter-out help clean,$(MAKECMDGOALS)),)
+ifeq ($(shell FC='$(FC)' .ci/setup current && echo yes),)
+build/config.mk: FORCE
+endif
+include build/config.mk
+endif
+
+build/config.mk: .ci/setup
+	@FC='$(FC)' CC='$(CC)' .ci/setup system
+
+.venv/%.stamp: pywrap/pyproject.toml build/config.mk
+	@FC='$(FC)' .ci/setup python $*
+
+PY := .venv/bin/python
+# Our matrices are sparse: threads inside dense kernels cost time here, and two suffice to spin.
+export OPENBLAS_NUM_THREADS ?= 1
+unexport PYTHONHOME PYTHONPATH
+
+# Two runs at a time take turns at building. Parallel, unless the caller has said how.
+BUILDING = +@flock build/.lock $(MAKE) --no-print-directory \
+	$(if $(findstring -j,$(MAKEFLAGS)),,-j$(shell nproc))
+
+# ---- sources ------------------------------------------------------------------------------------
+
+ROOMS := $(wildcard src_f90/*/)
+LIB_SRC := $(wildcard $(addsuffix *.f90,$(filter-out %/app/,$(ROOMS))) \
+	$(addsuffix *.F90,$(filter-out %/app/,$(ROOMS))))
+LIB_C := $(wildcard $(addsuffix *.c,$(ROOMS)))
+APP_SRC := $(wildcard src_f90/app/*.f90)
+KERNEL_SRC := $(wildcard tests/kernels/*.f90)
+SRC := $(LIB_SRC) $(APP_SRC) $(KERNEL_SRC)
+INC := $(wildcard $(addsuffix *.inc,$(ROOMS)))
+vpath %.f90 $(ROOMS) tests/kernels
+vpath %.F90 $(ROOMS)
+vpath %.c $(ROOMS)
+objects = $(addprefix $(O)/,$(addsuffix .o,$(basename $(notdir $(1)))))
+LIB_OBJ := $(call objects,$(LIB_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(LIB_C)))
+
+# ---- flags --------------------------------------------------------------------------------------
+
+# -ffp-contract=off: no fused products, so that every machine gives the same bits.
+# -Wno-maybe-uninitialized: gfortran 12 warns falsely at automatic allocation.
+# -Wno-compare-reals: exact comparisons here are meant.
+# -Wno-unused-dummy-argument: an implementation of an abstract interface need not use all of it.
+FFLAGS_ALL := -std=f2008 -fimplicit-none -pedantic -Wall -Wextra -Wno-maybe-uninitialized \
+	-Wno-compare-reals -Wno-unused-dummy-argument -fPIC -g -ffp-contract=off -DEMCON_WP=$(WP)
+FFLAGS_release := -O2
+FFLAGS_debug := -O0 -fcheck=all,no-array-temps -fbacktrace -ffpe-trap=invalid,zero,overflow \
+	-finit-real=snan -finit-integer=-99999 -Wconversion
+CFLAGS_ALL := -std=c99 -pedantic -Wall -Wextra -fPIC -g -ffp-contract=off
+CFLAGS_release := -O2
+CFLAGS_debug := -O0
+FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(FFLAGS)
+CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(CFLAGS)
+LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(LAPACK_LIBS)
+
+# Kept beside the objects, and written only where they differ: what stands on them is made anew.
+# (All this once the configuration is known; make reads this file again after writing it.)
+ifdef COMPILER
+$(shell mkdir -p $(O) $(BUILD)/mod $(BUILD)/py)
+FLAGS := $(strip $(COMPILER) $(FCOMPILE) $(CCOMPILE) $(LIBS))
+ifneq ($(file <$(BUILD)/flags.txt),$(FLAGS))
+$(file >$(BUILD)/flags.txt,$(FLAGS))
+endif
+ifneq ($(file <$(BUILD)/sources.txt),$(strip $(SRC) $(INC)))
+$(file >$(BUILD)/sources.txt,$(strip $(SRC) $(INC)))
+endif
+
+$(BUILD)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(BUILD)/sources.txt
+	@$(PYTHON) $< $(O) $(SRC) > $@.$$$$ && mv $@.$$$$ $@
+include $(BUILD)/order.mk
+-include $(wildcard $(O)/*.d)
+endif
+
+# ---- library, program, kernel tests -------------------------------------------------------------
+
+$(O)/%.o: %.f90 $(BUILD)/flags.txt
+	@echo "  FC    $<"
+	$(Q)$(FCOMPILE) -J$(BUILD)/mod -c $< -o $@
+
+$(O)/%.o: %.F90 $(BUILD)/flags.txt
+	@echo "  FC    $<"
+	$(Q)$(FCOMPILE) -J$(BUILD)/mod -c $< -o $@
+
+$(O)/%.c.o: %.c $(BUILD)/flags.txt
+	@echo "  CC    $<"
+	$(Q)$(CCOMPILE) -MMD -MP -c $< -o $@
+
+$(BUILD)/libemcon.a: $(LIB_OBJ)
+	@echo "  AR    $@"
+	$(Q)rm -f $@ && ar rcs $@ $^
+
+$(BUILD)/libemcon.so.0: $(LIB_OBJ)
+	@echo "  LINK  $@"
+	$(Q)$(FC) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $^ $(LIBS)
+	$(Q)ln -sf $(@F) $(BUILD)/libemcon.so
+
+$(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
+	@echo "  LINK  $@"
+	$(Q)$(FC) -o $@ $^ $(LIBS)
+
+$(BUILD)/kernels: $(call objects,$(KERNEL_SRC)) $(BUILD)/libemcon.a
+	@echo "  LINK  $@"
+	$(Q)$(FC) -o $@ $^ $(LIBS)
+
+lib: $(BUILD)/libemcon.a $(BUILD)/libemcon.so.0  ## the library, build/release/libemcon.{a,so}
+app: $(BUILD)/emcon  ## the program, build/release/emcon
+kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/kernels [SUITE [TEST]]
+
+# ---- Python extension ---------------------------------------------------------------------------
+
+# f2py writes the wrapper, the rules below compile it: the same way for every version of Python.
+# One run writes both files. A kind that f2py does not know becomes C float without an error.
+P := $(BUILD)/py
+$(P)/_coremodule.c $(P)/_core-f2pywrappers2.f90 $(P)/fortranobject.c $(P)/include.txt &: \
+		src_f90/api/emcon_flat.f90 .venv/run.stamp
+	@echo "  F2PY  $<"
+	$(Q)$(PY) -m numpy.f2py $< -m _core --build-dir $(P) > $(P)/f2py.log 2>&1 \
+		|| { cat $(P)/f2py.log; exit 1; }
+	$(Q)if grep -n 'is mapped to C "float"' $(P)/f2py.log; then exit 1; fi
+	$(Q)cp $$($(PY) -c 'import numpy.f2py as f; print(f.get_include())')/fortranobject.[ch] $(P)
+	$(Q)$(PY) -c 'import numpy; print("-I" + numpy.get_include())' > $(P)/include.txt
+
+$(P)/%.o: $(P)/%.c $(P)/include.txt $(BUILD)/flags.txt
+	@echo "  CC    $<"
+	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) @$(P)/include.txt $(CFLAGS) -c $< -o $@
+
+$(P)/_core-f2pywrappers2.o: $(P)/_core-f2pywrappers2.f90 $(O)/emcon_flat.o
+	@echo "  FC    $<"
+	$(Q)$(FC) -O2 -g -fPIC -I$(BUILD)/mod -J$(P) $(FFLAGS) -c $< -o $@
+
+$(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o _core-f2pywrappers2.o fortranobject.o) \
+		$(BUILD)/libemcon.so.0
+	@echo "  LINK  $@"
+	$(Q)$(FC) -shared -o $@ $^ -Wl,-rpath,'$$ORIGIN'
+
+# The package holds the extension of the mode made last. `install` replaces a file, where `cp`
+# would write into one that a running Python has mapped.
+pywrap: $(P)/_core$(EXT_SUFFIX)  ## the Python package, used as .venv/bin/python -m emcon
+	$(Q)for f in $< $(BUILD)/libemcon.so.0; do \
+		cmp -s $$f pywrap/emcon/$${f##*/} || install -m 755 $$f pywrap/emcon; done
+
+# ---- use ----------------------------------------------------------------------------------------
+
+run:  ## set up, build, run the ring impact, draw build/run/ring.png
+	$(BUILDING) app pywrap
+	@$(BUILD)/emcon input_decks/ring.inp --output build/run
+	@$(PY) -m emcon plot build/run/ring.vtkhdf
+	@$(PY) -m emcon summary build/run/ring
+
+test:  ## set up, build, run all tests
+	$(BUILDING) MODE=release WP=real64 app lib pywrap kernels .venv/test.stamp
+	$(BUILDING) MODE=debug WP=real64 kernels
+	@$(PY) -m pytest tests
+
+lint: .venv/lint.stamp  ## check the Fortran sources against the written rules
+	.venv/bin/fortitude check src_f90 tests/kernels
+	.venv/bin/fortitude check --preview --select no-real-suffix src_f90 tests/kernels
+
+bench:  ## print the timed scenes of tests/bench
+	$(BUILDING) app lib pywrap
+	@set -e; for script in tests/bench/*.py; do $(PY) $$script; done
+
+docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
+	.venv/bin/python -m ford --quiet .ci/ford.md
+	@echo "build/docs/index.html"
+
+VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' pywrap/pyproject.toml)
+TO = $(DESTDIR)$(PREFIX)
+install: app lib  ## program, library, modules, header and emcon.pc below PREFIX= (/usr/local)
+	install -d $(TO)/bin $(TO)/lib/pkgconfig $(TO)/include/emcon
+	install -m 755 $(BUILD)/emcon $(TO)/bin
+	install -m 755 $(BUILD)/libemcon.so.0 $(TO)/lib
+	ln -sf libemcon.so.0 $(TO)/lib/libemcon.so
+	install -m 644 $(BUILD)/libemcon.a $(TO)/lib
+	install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(basename $(notdir $(LIB_SRC)))) \
+		$(wildcard src_f90/api/*.h) $(TO)/include/emcon
+	printf '%s\n' 'prefix=$(abspath $(PREFIX))' 'Name: emcon' 'Version: $(VERSION)' \
+		'Description: energy-momentum conserving contact dynamics' \
+		'Cflags: -I$${prefix}/include/emcon' 'Libs: -L$${prefix}/lib -lemcon' \
+		'Libs.private: $(LIBS) -lgfortran -lm' > $(TO)/lib/pkgconfig/emcon.pc
+
+status:  ## compiler, libraries and Python packages that were found
+	@FC='$(FC)' CC='$(CC)' .ci/setup status
+
+clean:  ## remove build/ and the compiled extension (.venv stays)
+	rm -rf build pywrap/emcon/_core*.so pywrap/emcon/libemcon.so.0
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while IFS='	' read -r name text; do \
+		printf '  make %-9s %s\n' "$$name" "$$text"; done

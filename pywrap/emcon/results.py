@@ -1,0 +1,376 @@
+"""Results of a run: the history `NAME.csv` or `NAME.h5`, and the fields over time `NAME.vtkhdf`.
+
+Files are described in docs/deck.md. A run that was killed leaves files that open: a history row
+or a frame that was not finished is left out.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Columns of the history that count; all others are real numbers.
+COUNTS = ("increment", "active", "newton", "cuts")
+#: What every history has.
+NEEDED = ("increment", "time", "kinetic", "strain", "external_work", "total")
+#: A total energy below this fraction of the largest single energy is taken for zero.
+ZERO_ENERGY = 64.0*float(np.finfo(np.float64).eps)
+
+_SUFFIXES = (".vtkhdf", ".h5", ".csv", ".log", ".png")
+
+
+class ResultError(Exception):
+    """A result that is missing, foreign or broken; the text is for the user."""
+
+
+@dataclass(frozen=True)
+class ResultPaths:
+    """The files of one run: `base` plus a suffix each."""
+
+    base: Path
+
+    def _beside(self, suffix: str) -> Path:
+        return self.base.with_name(self.base.name + suffix)
+
+    @property
+    def field(self) -> Path:
+        return self._beside(".vtkhdf")
+
+    @property
+    def history(self) -> Path:
+        return self._beside(".h5")
+
+    @property
+    def table(self) -> Path:
+        return self._beside(".csv")
+
+    @property
+    def log(self) -> Path:
+        return self._beside(".log")
+
+    @property
+    def restart(self) -> Path:
+        return self._beside(".rst.h5")
+
+    @property
+    def picture(self) -> Path:
+        return self._beside(".png")
+
+
+def locate(result: str | os.PathLike[str]) -> ResultPaths:
+    """The files of the run that `result` names: its base name or any one of its files."""
+    path = Path(result)
+    if path.name.endswith(".rst.h5"):
+        raise ResultError(f"{path} is a restart file; give {str(path)[:-len('.rst.h5')]}")
+    if path.suffix == ".inp":
+        raise ResultError(f"{path} is a deck, not a result; run it first, then give "
+                          f"{path.with_suffix('')}")
+    base = path.with_suffix("") if path.suffix in _SUFFIXES else path
+    paths = ResultPaths(base)
+    if base.name in ("", "..") or not any(
+            p.is_file() for p in (paths.table, paths.history, paths.field)):
+        hint = "; that is a folder, give FOLDER/NAME" if path.is_dir() else ""
+        raise ResultError(f"no result {base}: neither {paths.table.name} nor "
+                          f"{paths.history.name} nor {paths.field.name} is there{hint}")
+    return paths
+
+
+# --- history -----------------------------------------------------------------------------------
+
+def read_history(paths: ResultPaths) -> NDArray[np.void]:
+    """History as a structured array (n_row), one row per increment, the first the initial state.
+
+    Columns as in docs/deck.md: `time` [T], `kinetic` [M L^2/T^2], `px` [M L/T], ... Read from
+    the table NAME.csv, or where that is missing from the group `history` of NAME.h5.
+    """
+    if paths.table.is_file():
+        history, source = _read_table(paths.table), paths.table
+    elif paths.history.is_file():
+        history, source = _read_history_group(paths.history), paths.history
+    else:
+        raise ResultError(f"no history: neither {paths.table} nor {paths.history} is there")
+    missing = [name for name in NEEDED if name not in (history.dtype.names or ())]
+    if missing:
+        raise ResultError(f"{source} is not an EMCON history: no column {', '.join(missing)}")
+    if not len(history):
+        raise ResultError(f"{source} has no rows; the run ended before its first")
+    return history
+
+
+def _history_array(columns: dict[str, Sequence[float] | Array]) -> NDArray[np.void]:
+    """Structured array from columns of the same length."""
+    kind = [(name, np.int64 if name in COUNTS else np.float64) for name in columns]
+    rows = min((len(values) for values in columns.values()), default=0)
+    history = np.empty(rows, dtype=kind)
+    for name, values in columns.items():
+        history[name] = np.asarray(values[:rows])
+    return history
+
+
+def _read_table(path: Path) -> NDArray[np.void]:
+    """NAME.csv; an unfinished last line is left out."""
+    try:
+        text = path.read_text(encoding="ascii")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise ResultError(f"cannot read {path}: {_reason(problem)}") from None
+    finished = text[:text.rfind("\n") + 1].splitlines()
+    names = [word.strip() for word in finished[0].split(",")] if finished else []
+    if "increment" not in names or len(set(names)) != len(names):
+        raise ResultError(f"{path} is not an EMCON history: its first line does not name the "
+                          "columns increment,time,...")
+    rows = np.empty((len(finished) - 1, len(names)))
+    for i, line in enumerate(finished[1:]):
+        words = line.split(",")
+        try:
+            rows[i] = [float(word) for word in words]
+        except ValueError:
+            fault = (f"{len(words)} values where {len(names)} are due"
+                     if len(words) != len(names) else "a value is not a number")
+            raise ResultError(f"{path}:{i + 2}: {fault}") from None
+    counts = [k for k, name in enumerate(names) if name in COUNTS]
+    if not np.isfinite(rows[:, counts]).all():
+        raise ResultError(f"{path}: a count among {', '.join(COUNTS)} is not a whole number")
+    return _history_array({name: rows[:, k] for k, name in enumerate(names)})
+
+
+def _read_history_group(path: Path) -> NDArray[np.void]:
+    """Group `history` of NAME.h5: one data set (n_row) per column."""
+    with _open(path) as file:
+        group = file.get("history")
+        if not isinstance(group, h5py.Group):
+            raise ResultError(f"{path} is not an EMCON history: it has no group /history")
+        return _history_array({name: _read(group, name) for name in group
+                               if isinstance(group[name], h5py.Dataset)
+                               and group[name].ndim == 1})
+
+
+def cpu_seconds(history: NDArray[np.void]) -> float | None:
+    """CPU time of the run [s]; the column `cpu` counts up, from 0 again after a restart."""
+    if "cpu" not in (history.dtype.names or ()):
+        return None
+    cpu = history["cpu"]
+    return float(cpu[:-1][cpu[1:] < cpu[:-1]].sum() + cpu[-1])
+
+
+def energy_drift(history: NDArray[np.void]) -> tuple[Array, float]:
+    """Drift |total - total0|/scale (n_row), and the scale [M L^2/T^2].
+
+    The scale is |total0|; where that is zero (a static run, a start from rest) it is the largest
+    single energy of the run.
+    """
+    total = history["total"]
+    largest = max(float(np.nanmax(np.abs(history[name]), initial=0.0))
+                  for name in ("kinetic", "strain", "external_work"))
+    scale = abs(float(total[0]))
+    if not scale > ZERO_ENERGY*largest:
+        scale = largest
+    change = np.abs(total - total[0])
+    return (change/scale if scale > 0.0 else change), scale
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Mass and momenta of each body, rows as in the history."""
+
+    mass: Array     #: (n_body) [M]
+    px: Array       #: (n_row, n_body) [M L/T]
+    py: Array       #: (n_row, n_body) [M L/T]
+    lz: Array       #: (n_row, n_body) about the origin [M L^2/T]
+
+    def main(self) -> int:
+        """Index of the body with the largest momentum at any time: the one that is thrown."""
+        return int(np.argmax(np.max(np.hypot(self.px, self.py), axis=0)))
+
+    def velocity(self, body: int, row: int) -> tuple[float, float]:
+        """Velocity [L/T] of the centre of mass of `body` in history row `row`."""
+        mass = self.mass[body]
+        return float(self.px[row, body]/mass), float(self.py[row, body]/mass)
+
+
+def read_bodies(paths: ResultPaths) -> Bodies | None:
+    """Group `bodies` of NAME.h5; None if the file or the group is not there."""
+    if not paths.history.is_file():
+        return None
+    with _open(paths.history) as file:
+        group = file.get("bodies")
+        if not isinstance(group, h5py.Group):
+            return None
+        try:
+            mass, px, py, lz = (_read(group, name) for name in ("mass", "px", "py", "lz"))
+        except ResultError:
+            return None
+    rows = min(len(px), len(py), len(lz))
+    fits = all(p.ndim == 2 and p.shape[1] == len(mass) for p in (px, py, lz))
+    if not (fits and rows and len(mass) and (mass > 0.0).all()):
+        return None
+    return Bodies(mass, px[:rows], py[:rows], lz[:rows])
+
+
+def read_contact_force(paths: ResultPaths) -> tuple[Array, Array] | None:
+    """Times (n_time) [T] and resultant of the contact force (n_time, n_dim) [M L/T^2].
+
+    From `*CONTACT PRINT` with CF, that is /sets/<SET>/CF in NAME.h5; None unless just one set
+    has it (forces on slave and master would cancel).
+    """
+    if not paths.history.is_file():
+        return None
+    with _open(paths.history) as file:
+        sets = file.get("sets")
+        found = [group for group in (sets.values() if isinstance(sets, h5py.Group) else ())
+                 if isinstance(group, h5py.Group) and "CF" in group and "CF_time" in group]
+        if len(found) != 1:
+            return None
+        times, force = _read(found[0], "CF_time"), _read(found[0], "CF")
+    rows = min(len(times), len(force))
+    if force.ndim != 3 or rows == 0:
+        return None
+    return times[:rows], force[:rows].sum(axis=1)
+
+
+def read_wall_seconds(paths: ResultPaths) -> float | None:
+    """Wall time of the run [s], /run/wall_seconds in NAME.h5; None if it is not there."""
+    if not paths.history.is_file():
+        return None
+    with _open(paths.history) as file:
+        run = file.get("run")
+        if not isinstance(run, h5py.Group) or "wall_seconds" not in run:
+            return None
+        return float(_read(run, "wall_seconds")[0])
+
+
+# --- fields ------------------------------------------------------------------------------------
+
+class FieldFile:
+    """Fields over time of one run (NAME.vtkhdf), read when asked for.
+
+    Attributes: `times` (n_frame) [T], `points` (n_node, 3) reference positions [L], `cells` list
+    of node numbers (0-based) per element, `point_fields` and `cell_fields` names. Frames are
+    counted from 0; -1 is the last.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self._file = _open(self.path)
+        try:
+            self._read_mesh()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _read_mesh(self) -> None:
+        root = self._file.get("VTKHDF")
+        kind = root.attrs.get("Type", b"") if isinstance(root, h5py.Group) else b""
+        kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+        if kind.strip() != "UnstructuredGrid" or "Steps" not in root:
+            raise ResultError(f"{self.path} is not an EMCON field file: no unstructured grid "
+                              "over time in it")
+        self._root = root
+        steps = root["Steps"]
+        n_frame = int(steps.attrs.get("NSteps", 0))
+        self.times: Array = _read(steps, "Values")[:n_frame]
+        self.points: Array = _read(root, "Points")
+        connectivity = _read(root, "Connectivity").astype(np.int64)
+        offsets = _read(root, "Offsets").astype(np.int64)
+        n_node = len(self.points)
+        if (self.points.ndim != 2 or len(offsets) < 2 or offsets[-1] != len(connectivity)
+                or (np.diff(offsets) <= 0).any() or not len(connectivity)
+                or connectivity.min() < 0 or connectivity.max() >= n_node):
+            raise ResultError(f"{self.path}: the mesh in it is broken")
+        self.cells: list[NDArray[np.int64]] = np.split(connectivity, offsets[1:-1])
+        self.point_fields = self._names("PointData")
+        self.cell_fields = self._names("CellData")
+        if not len(self.times):
+            raise ResultError(f"{self.path} has no frame; the run ended before its first")
+
+    def _names(self, group: str) -> tuple[str, ...]:
+        return tuple(self._root[group]) if group in self._root else ()
+
+    def point(self, name: str, frame: int) -> Array:
+        """Point field `name` at `frame`: (n_node) or (n_node, n_comp)."""
+        return self._frame("PointData", name, frame, len(self.points))
+
+    def cell(self, name: str, frame: int) -> Array:
+        """Cell field `name` at `frame`: (n_element) or (n_element, n_comp)."""
+        return self._frame("CellData", name, frame, len(self.cells))
+
+    def _frame(self, group: str, name: str, frame: int, n: int) -> Array:
+        if name not in self._names(group):
+            raise ResultError(f"{self.path} has no field {name}; it has "
+                              f"{', '.join(self._names(group)) or 'none'}")
+        frame = range(len(self.times))[frame]
+        offsets = self._root["Steps"].get(f"{group}Offsets/{name}")
+        start = int(offsets[frame]) if offsets is not None else frame*n
+        data = self._root[group][name]
+        if start < 0 or start + n > len(data):
+            raise ResultError(f"{self.path}: field {name} ends before frame {frame}")
+        return np.asarray(data[start:start + n], dtype=np.float64)
+
+    def nearest_frame(self, time: float) -> int:
+        """The frame whose time is nearest to `time` [T]."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+    def bodies(self) -> NDArray[np.int64]:
+        """Body number per node (n_node): nodes that elements connect have the same; -1: none."""
+        body = np.full(len(self.points), -1, dtype=np.int64)
+        used = np.concatenate(self.cells)
+        body[used] = used
+        sizes = {len(c) for c in self.cells}
+        groups = [np.array([c for c in self.cells if len(c) == size]) for size in sizes]
+        while True:
+            before = body.copy()
+            for group in groups:
+                lowest = np.repeat(body[group].min(axis=1)[:, None], group.shape[1], axis=1)
+                np.minimum.at(body, group, lowest)
+            body[used] = body[body[used]]
+            if np.array_equal(body, before):
+                break
+        numbers = {root: k for k, root in enumerate(np.unique(body[used]))}
+        return np.array([numbers.get(root, -1) for root in body], dtype=np.int64)
+
+    def close(self) -> None:
+        self._file.close()
+
+    def __enter__(self) -> FieldFile:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+
+# --- HDF5 --------------------------------------------------------------------------------------
+
+def _reason(problem: Exception) -> str:
+    if isinstance(problem, UnicodeDecodeError):
+        return "it is not a text file"
+    return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)
+
+
+def _open(path: Path) -> h5py.File:
+    """Open for reading, without a lock: a run may still be writing."""
+    if not path.is_file():
+        raise ResultError(f"no file {path}")
+    try:
+        return h5py.File(path, "r", locking=False)
+    except OSError as problem:
+        reason = problem.strerror or "it is not an HDF5 file, or it is damaged"
+        raise ResultError(f"cannot read {path}: {reason}") from None
+
+
+def _read(group: h5py.Group, name: str) -> Array:
+    data = group.get(name)
+    if not isinstance(data, h5py.Dataset):
+        raise ResultError(f"{group.file.filename} has no data set {group.name}/{name}")
+    try:
+        return np.atleast_1d(np.asarray(data[()], dtype=np.float64))
+    except (OSError, TypeError, ValueError):
+        raise ResultError(f"{group.file.filename}: cannot read {group.name}/{name}") from None

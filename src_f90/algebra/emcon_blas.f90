@@ -1,0 +1,45 @@
+!> The library below UMFPACK, CHOLMOD and LAPACK: its threads, and its floating-point exceptions.
+module emcon_blas
+   use, intrinsic :: ieee_exceptions, only : ieee_all, ieee_get_status, ieee_set_halting_mode, &
+      ieee_set_status, ieee_status_type
+   use, intrinsic :: iso_c_binding, only : c_int
+   implicit none
+   private
+   public :: blas_single_thread, blas_enter, blas_leave, ieee_status_type
+
+   interface
+      function emcon_blas_set_threads(n) result(done) bind(c)
+         import :: c_int
+         integer(c_int), value :: n
+         integer(c_int) :: done
+      end function emcon_blas_set_threads
+   end interface
+
+contains
+
+   !> Keep BLAS to one thread: fronts here are small, and threads would compete with ours.
+   !>
+   !> `done` is false if the library has no such switch (it is then a plain, serial BLAS).
+   subroutine blas_single_thread(done)
+      logical, intent(out) :: done
+
+      done = emcon_blas_set_threads(1_c_int) == 1_c_int
+   end subroutine blas_single_thread
+
+   !> Before a call: no halting. Vector kernels of OpenBLAS raise exceptions in unused lanes, which
+   !> under `-ffpe-trap` would end the program although all results are right.
+   subroutine blas_enter(status)
+      type(ieee_status_type), intent(out) :: status     !! to be given to `blas_leave`
+
+      call ieee_get_status(status)
+      call ieee_set_halting_mode(ieee_all, .false.)
+   end subroutine blas_enter
+
+   !> After a call: flags and halting as they were.
+   subroutine blas_leave(status)
+      type(ieee_status_type), intent(in) :: status
+
+      call ieee_set_status(status)
+   end subroutine blas_leave
+
+end module emcon_blas

@@ -1,0 +1,176 @@
+!> Sparse Cholesky factorisation by CHOLMOD, for symmetric positive definite matrices.
+!>
+!> The matrix is given in full; only its lower triangle is read. The values are first multiplied by
+!> the power of two that brings the first diagonal entry into [1/2, 1): without it a factor 2 on
+!> the matrix would become sqrt(2) in the factor, and units would change bits.
+module emcon_cholmod
+   use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_int, c_null_ptr, c_ptr
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use emcon_blas, only : blas_enter, blas_leave, ieee_status_type
+   use emcon_csr, only : csr_copy_pattern, csr_find, csr_is_same, csr_t
+   use emcon_errors, only : err_internal, error_t, raise
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_power_scaling, only : power_of_two
+   use emcon_sparse_solver, only : solver_check_square, solver_check_values, solver_raise, &
+      sparse_solver_t
+   implicit none
+   private
+   public :: cholmod_t
+
+   integer(c_int), parameter :: cholmod_ok = 0, cholmod_not_posdef = 1, cholmod_out_of_memory = -2
+
+   type, extends(sparse_solver_t) :: cholmod_t
+      integer, private :: first_slot = 0                     !! of the entry (1, 1); 0: not there
+      type(csr_t), private :: scaled                         !! the pattern, and factor*value
+      real(dp), private :: factor = 1.0_dp                   !! scaled = factor*value
+      real(dp), allocatable, private :: rhs(:), x(:)
+      logical, private :: is_factorised = .false.
+      type(c_ptr), private :: handle = c_null_ptr
+   contains
+      procedure :: analyse => cholmod_analyse
+      procedure :: factorise => cholmod_factorise
+      procedure :: solve => cholmod_solve
+      procedure :: free => cholmod_free
+      final :: cholmod_final
+   end type cholmod_t
+
+   interface
+      function emcon_cholmod_new() result(handle) bind(c)
+         import :: c_ptr
+         type(c_ptr) :: handle
+      end function emcon_cholmod_new
+
+      function emcon_cholmod_analyse(handle, n, ap, ai) result(status) bind(c)
+         import :: c_int, c_ptr
+         type(c_ptr), value :: handle
+         integer(c_int), value :: n
+         integer(c_int), intent(in) :: ap(*), ai(*)
+         integer(c_int) :: status
+      end function emcon_cholmod_analyse
+
+      function emcon_cholmod_factorise(handle, n, ap, ai, ax, rcond, n_factor) &
+         result(status) bind(c)
+         import :: c_double, c_int, c_ptr
+         type(c_ptr), value :: handle
+         integer(c_int), value :: n
+         integer(c_int), intent(in) :: ap(*), ai(*)
+         real(c_double), intent(in) :: ax(*)
+         real(c_double), intent(inout) :: rcond, n_factor
+         integer(c_int) :: status
+      end function emcon_cholmod_factorise
+
+      function emcon_cholmod_solve(handle, n, b, x) result(status) bind(c)
+         import :: c_double, c_int, c_ptr
+         type(c_ptr), value :: handle
+         integer(c_int), value :: n
+         real(c_double), intent(in) :: b(*)
+         real(c_double), intent(inout) :: x(*)
+         integer(c_int) :: status
+      end function emcon_cholmod_solve
+
+      subroutine emcon_cholmod_free(handle) bind(c)
+         import :: c_ptr
+         type(c_ptr), value :: handle
+      end subroutine emcon_cholmod_free
+   end interface
+
+contains
+
+   subroutine cholmod_analyse(self, matrix, error)
+      class(cholmod_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+
+      if (c_associated(self%handle)) then
+         if (csr_is_same(self%scaled, matrix)) return
+      end if
+      call self%free()
+      call solver_check_square(matrix, error)
+      if (allocated(error)) return
+      call csr_copy_pattern(matrix, self%scaled)
+      self%first_slot = csr_find(matrix, 1, 1)
+      allocate(self%rhs(matrix%n_row), self%x(matrix%n_row))
+      self%handle = emcon_cholmod_new()
+      status = cholmod_out_of_memory
+      if (c_associated(self%handle)) then
+         status = emcon_cholmod_analyse(self%handle, int(matrix%n_row, c_int), &
+            self%scaled%row_start, self%scaled%column)
+      end if
+      self%n_analysis = self%n_analysis + 1
+      if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "ordering", int(status), &
+         status == cholmod_out_of_memory, self%scaled)
+      if (allocated(error)) call self%free()
+   end subroutine cholmod_analyse
+
+   subroutine cholmod_factorise(self, value, error)
+      class(cholmod_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+      type(ieee_status_type) :: fp_status
+      real(c_double) :: n_factor
+
+      self%is_singular = .true.
+      self%is_factorised = .false.
+      self%rcond = 0.0_dp
+      call solver_check_values(self%scaled, value, error)
+      if (allocated(error)) return
+      if (self%first_slot == 0 .or. .not. all(ieee_is_finite(value))) return
+      if (value(self%first_slot) <= 0.0_dp) return
+      self%factor = power_of_two(-exponent(value(self%first_slot)))
+      self%scaled%value = self%factor*value
+      call blas_enter(fp_status)
+      associate (a => self%scaled)
+         status = emcon_cholmod_factorise(self%handle, int(a%n_row, c_int), a%row_start, a%column, &
+            a%value, self%rcond, n_factor)
+      end associate
+      call blas_leave(fp_status)
+      if (status == cholmod_not_posdef) return
+      if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "factorisation", int(status), &
+         status == cholmod_out_of_memory, self%scaled)
+      if (allocated(error)) return
+      self%is_singular = .false.
+      self%is_factorised = .true.
+      self%n_factor = int(n_factor, int64)
+   end subroutine cholmod_factorise
+
+   subroutine cholmod_solve(self, rhs, x, error)
+      class(cholmod_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: rhs(:)
+      real(wp), intent(out), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+      type(ieee_status_type) :: fp_status
+
+      if (.not. self%is_factorised) then
+         call raise(error, err_internal, "cholmod_solve: there is no factorisation")
+         return
+      end if
+      self%rhs = self%factor*real(rhs, dp)
+      call blas_enter(fp_status)
+      status = emcon_cholmod_solve(self%handle, int(self%scaled%n_row, c_int), self%rhs, self%x)
+      call blas_leave(fp_status)
+      if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "solution", int(status), &
+         status == cholmod_out_of_memory, self%scaled)
+      x = real(self%x, wp)
+   end subroutine cholmod_solve
+
+   subroutine cholmod_free(self)
+      class(cholmod_t), intent(inout) :: self
+
+      call emcon_cholmod_free(self%handle)
+      self%handle = c_null_ptr
+      if (allocated(self%rhs)) deallocate(self%rhs, self%x)
+      self%scaled = csr_t()
+      self%is_factorised = .false.
+      self%is_singular = .false.
+   end subroutine cholmod_free
+
+   subroutine cholmod_final(self)
+      type(cholmod_t), intent(inout) :: self
+
+      call self%free()
+   end subroutine cholmod_final
+
+end module emcon_cholmod

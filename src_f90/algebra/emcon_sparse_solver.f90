@@ -1,0 +1,108 @@
+!> What every direct solver of sparse systems offers.
+!>
+!> Order of use: `analyse` once per pattern, `factorise` for each set of values, `solve` for each
+!> right-hand side. A matrix that cannot be factorised is a result (`is_singular`), not an error.
+!> An object owns memory of a C library: never assign one to another, and `free` may be called at
+!> any time, also twice.
+module emcon_sparse_solver
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : err_analysis, err_internal, error_t, raise
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: sparse_solver_t, solver_check_square, solver_check_values, solver_raise
+
+   type, abstract :: sparse_solver_t
+      !> The last `factorise` met a zero pivot, or one that is not positive where it must be, or
+      !> values that are not finite: `solve` is then refused.
+      logical :: is_singular = .false.
+      real(dp) :: rcond = 0.0_dp              !! smallest over largest pivot: an indicator only
+      integer(int64) :: n_factor = 0_int64    !! nonzeros of the factors
+      integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
+   contains
+      procedure(analyse_pattern), deferred :: analyse
+      procedure(factorise_values), deferred :: factorise
+      procedure(solve_system), deferred :: solve
+      procedure(free_memory), deferred :: free
+   end type sparse_solver_t
+
+   abstract interface
+      !> Order the pattern of a square matrix; returns at once if it is the one already analysed.
+      subroutine analyse_pattern(self, matrix, error)
+         import :: csr_t, error_t, sparse_solver_t
+         class(sparse_solver_t), intent(inout) :: self
+         type(csr_t), intent(in) :: matrix              !! its values are not read
+         type(error_t), allocatable, intent(out) :: error
+      end subroutine analyse_pattern
+
+      !> Factorise the matrix of the analysed pattern; look at `is_singular` afterwards.
+      subroutine factorise_values(self, value, error)
+         import :: dp, error_t, sparse_solver_t
+         class(sparse_solver_t), intent(inout) :: self
+         real(dp), intent(in), contiguous :: value(:)   !! (n_slot) of the pattern
+         type(error_t), allocatable, intent(out) :: error
+      end subroutine factorise_values
+
+      !> x = A^-1 rhs
+      subroutine solve_system(self, rhs, x, error)
+         import :: error_t, sparse_solver_t, wp
+         class(sparse_solver_t), intent(inout) :: self
+         real(wp), intent(in), contiguous :: rhs(:)     !! (n)
+         real(wp), intent(out), contiguous :: x(:)      !! (n)
+         type(error_t), allocatable, intent(out) :: error
+      end subroutine solve_system
+
+      subroutine free_memory(self)
+         import :: sparse_solver_t
+         class(sparse_solver_t), intent(inout) :: self
+      end subroutine free_memory
+   end interface
+
+contains
+
+   !> An error if the matrix is not square or has no rows.
+   subroutine solver_check_square(matrix, error)
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+
+      if (matrix%n_row == matrix%n_col .and. matrix%n_row > 0) return
+      call raise(error, err_internal, "a solver cannot take a matrix of " &
+         // to_text(matrix%n_row) // " x " // to_text(matrix%n_col))
+   end subroutine solver_check_square
+
+   !> An error if `value` does not belong to the pattern, or none was analysed.
+   subroutine solver_check_values(pattern, value, error)
+      type(csr_t), intent(in) :: pattern
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. allocated(pattern%column)) then
+         call raise(error, err_internal, "a matrix cannot be factorised before its pattern is" &
+            // " analysed")
+      else if (size(value) /= size(pattern%column)) then
+         call raise(error, err_internal, "a solver got " // to_text(size(value)) // " values for " &
+            // to_text(size(pattern%column)) // " entries")
+      end if
+   end subroutine solver_check_values
+
+   !> The error that a library reports by `status`.
+   subroutine solver_raise(error, library, action, status, is_memory, matrix)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), intent(in) :: library, action
+      integer, intent(in) :: status
+      logical, intent(in) :: is_memory             !! the status means: out of memory
+      type(csr_t), intent(in) :: matrix
+      character(len=:), allocatable :: what
+
+      what = action // " of a matrix with " // to_text(matrix%n_row) // " unknowns and " &
+         // to_text(size(matrix%column)) // " entries"
+      if (is_memory) then
+         call raise(error, err_analysis, "out of memory in the " // what)
+      else
+         call raise(error, err_internal, library // " returns " // to_text(status) // " from the " &
+            // what)
+      end if
+   end subroutine solver_raise
+
+end module emcon_sparse_solver

@@ -1,0 +1,206 @@
+!> Sparse LU factorisation by UMFPACK.
+!>
+!> CSR arrays are handed over as they are: UMFPACK reads them as the columns of the transpose, and
+!> solves with the transpose of what it factorised. Before that, rows and columns are scaled by
+!> powers of two, which rounds nothing. UMFPACK's own scaling stays off: it switches between
+!> dividing and multiplying by reciprocals at an absolute 1e-12, so that units would change bits.
+module emcon_umfpack
+   use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_int, c_null_ptr, c_ptr
+   use emcon_blas, only : blas_enter, blas_leave, ieee_status_type
+   use emcon_csr, only : csr_copy_pattern, csr_is_same, csr_t
+   use emcon_errors, only : err_internal, error_t, raise
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_power_scaling, only : power_scaling_t
+   use emcon_sparse_solver, only : solver_check_square, solver_check_values, solver_raise, &
+      sparse_solver_t
+   implicit none
+   private
+   public :: umfpack_t, ordering_amd, ordering_metis
+
+   !> Values of `umfpack_t%ordering`, those of UMFPACK. METIS pays for 3-D meshes only.
+   integer, parameter :: ordering_amd = 1, ordering_metis = 3
+
+   integer(c_int), parameter :: umfpack_ok = 0, umfpack_singular = 1, umfpack_out_of_memory = -1
+   integer(c_int), parameter :: umfpack_aat = 2
+
+   !> Places in UMFPACK's arrays of controls and figures, from 1.
+   integer, parameter :: control_irstep = 8, control_ordering = 11, control_scale = 17
+   integer, parameter :: info_lnz = 44, info_unz = 45, info_rcond = 68
+
+   type, extends(sparse_solver_t) :: umfpack_t
+      integer :: ordering = ordering_amd         !! set before `analyse`
+      integer :: n_refine = 0                    !! steps of iterative refinement at most
+      type(csr_t), private :: scaled             !! the pattern, and the values after scaling
+      type(power_scaling_t), private :: scaling
+      real(dp), allocatable, private :: rhs(:), x(:), work(:)
+      integer(c_int), allocatable, private :: index_work(:)
+      real(c_double), private :: control(20), info(90)
+      type(c_ptr), private :: symbolic = c_null_ptr
+      type(c_ptr), private :: numeric = c_null_ptr
+   contains
+      procedure :: analyse => umfpack_analyse
+      procedure :: factorise => umfpack_factorise
+      procedure :: solve => umfpack_solve
+      procedure :: free => umfpack_free
+      final :: umfpack_final
+   end type umfpack_t
+
+   interface
+      subroutine umfpack_di_defaults(control) bind(c)
+         import :: c_double
+         real(c_double), intent(out) :: control(*)
+      end subroutine umfpack_di_defaults
+
+      function umfpack_di_symbolic(n_row, n_col, ap, ai, ax, symbolic, control, info) &
+         result(status) bind(c)
+         import :: c_double, c_int, c_ptr
+         integer(c_int), value :: n_row, n_col
+         integer(c_int), intent(in) :: ap(*), ai(*)
+         type(c_ptr), value :: ax                            ! null: the pattern alone decides
+         type(c_ptr), intent(out) :: symbolic
+         real(c_double), intent(in) :: control(*)
+         real(c_double), intent(inout) :: info(*)
+         integer(c_int) :: status
+      end function umfpack_di_symbolic
+
+      function umfpack_di_numeric(ap, ai, ax, symbolic, numeric, control, info) &
+         result(status) bind(c)
+         import :: c_double, c_int, c_ptr
+         integer(c_int), intent(in) :: ap(*), ai(*)
+         real(c_double), intent(in) :: ax(*), control(*)
+         type(c_ptr), value :: symbolic
+         type(c_ptr), intent(out) :: numeric
+         real(c_double), intent(inout) :: info(*)
+         integer(c_int) :: status
+      end function umfpack_di_numeric
+
+      function umfpack_di_wsolve(sys, ap, ai, ax, x, b, numeric, control, info, wi, w) &
+         result(status) bind(c)
+         import :: c_double, c_int, c_ptr
+         integer(c_int), value :: sys
+         integer(c_int), intent(in) :: ap(*), ai(*)
+         real(c_double), intent(in) :: ax(*), b(*), control(*)
+         real(c_double), intent(inout) :: x(*), info(*), w(*)
+         type(c_ptr), value :: numeric
+         integer(c_int), intent(inout) :: wi(*)
+         integer(c_int) :: status
+      end function umfpack_di_wsolve
+
+      subroutine umfpack_di_free_symbolic(symbolic) bind(c)
+         import :: c_ptr
+         type(c_ptr), intent(inout) :: symbolic
+      end subroutine umfpack_di_free_symbolic
+
+      subroutine umfpack_di_free_numeric(numeric) bind(c)
+         import :: c_ptr
+         type(c_ptr), intent(inout) :: numeric
+      end subroutine umfpack_di_free_numeric
+   end interface
+
+contains
+
+   subroutine umfpack_analyse(self, matrix, error)
+      class(umfpack_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+      integer :: n
+
+      if (c_associated(self%symbolic)) then
+         if (csr_is_same(self%scaled, matrix)) return
+      end if
+      call self%free()
+      call solver_check_square(matrix, error)
+      if (allocated(error)) return
+      n = matrix%n_row
+      call csr_copy_pattern(matrix, self%scaled)
+      allocate(self%rhs(n), self%x(n), self%work(5*n), self%index_work(n))
+      call self%scaling%init(n, n)
+      call umfpack_di_defaults(self%control)
+      self%control(control_ordering) = real(self%ordering, c_double)
+      self%control(control_scale) = 0.0_c_double
+      associate (a => self%scaled)
+         status = umfpack_di_symbolic(int(n, c_int), int(n, c_int), a%row_start, a%column, &
+            c_null_ptr, self%symbolic, self%control, self%info)
+      end associate
+      self%n_analysis = self%n_analysis + 1
+      if (status /= umfpack_ok) call solver_raise(error, "UMFPACK", "ordering", int(status), &
+         status == umfpack_out_of_memory, self%scaled)
+   end subroutine umfpack_analyse
+
+   subroutine umfpack_factorise(self, value, error)
+      class(umfpack_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+      type(ieee_status_type) :: fp_status
+
+      self%is_singular = .true.
+      self%rcond = 0.0_dp
+      call umfpack_di_free_numeric(self%numeric)
+      call solver_check_values(self%scaled, value, error)
+      if (allocated(error)) return
+      call self%scaling%equilibrate(value, self%scaled)
+      if (.not. self%scaling%is_regular) return
+      call blas_enter(fp_status)
+      associate (a => self%scaled)
+         status = umfpack_di_numeric(a%row_start, a%column, a%value, self%symbolic, &
+            self%numeric, self%control, self%info)
+      end associate
+      call blas_leave(fp_status)
+      if (status == umfpack_singular) return
+      if (status /= umfpack_ok) call solver_raise(error, "UMFPACK", "factorisation", int(status), &
+         status == umfpack_out_of_memory, self%scaled)
+      if (allocated(error)) return
+      self%is_singular = .false.
+      self%rcond = self%info(info_rcond)
+      self%n_factor = int(self%info(info_lnz) + self%info(info_unz), int64)
+   end subroutine umfpack_factorise
+
+   subroutine umfpack_solve(self, rhs, x, error)
+      class(umfpack_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: rhs(:)
+      real(wp), intent(out), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+      type(ieee_status_type) :: fp_status
+      integer :: i
+
+      if (self%is_singular .or. .not. c_associated(self%numeric)) then
+         call raise(error, err_internal, "umfpack_solve: there is no factorisation")
+         return
+      end if
+      do i = 1, self%scaled%n_row
+         self%rhs(i) = self%scaling%row(i)*real(rhs(i), dp)
+      end do
+      self%control(control_irstep) = real(self%n_refine, c_double)
+      call blas_enter(fp_status)
+      associate (a => self%scaled)
+         status = umfpack_di_wsolve(umfpack_aat, a%row_start, a%column, a%value, self%x, &
+            self%rhs, self%numeric, self%control, self%info, self%index_work, self%work)
+      end associate
+      call blas_leave(fp_status)
+      if (status /= umfpack_ok) call solver_raise(error, "UMFPACK", "solution", int(status), &
+         status == umfpack_out_of_memory, self%scaled)
+      do i = 1, self%scaled%n_row
+         x(i) = real(self%scaling%column(i)*self%x(i), wp)
+      end do
+   end subroutine umfpack_solve
+
+   subroutine umfpack_free(self)
+      class(umfpack_t), intent(inout) :: self
+
+      call umfpack_di_free_numeric(self%numeric)
+      call umfpack_di_free_symbolic(self%symbolic)
+      if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%work, self%index_work)
+      self%scaled = csr_t()
+      self%is_singular = .false.
+   end subroutine umfpack_free
+
+   subroutine umfpack_final(self)
+      type(umfpack_t), intent(inout) :: self
+
+      call self%free()
+   end subroutine umfpack_final
+
+end module emcon_umfpack

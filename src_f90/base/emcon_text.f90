@@ -1,0 +1,294 @@
+!> Text: numbers to and from words, upper case, nearest words.
+module emcon_text
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use emcon_kinds, only : int64, wp
+   implicit none
+   private
+   public :: string_t, notes_t, note_add
+   public :: to_upper, squeezed, to_text, read_integer, read_real, nearest_word, joined
+
+   !> A text of its own length, for lists of texts.
+   type :: string_t
+      character(len=:), allocatable :: text
+   end type string_t
+
+   !> Remarks that a lower layer returns to its caller, in order.
+   type :: notes_t
+      integer :: n = 0
+      type(string_t), allocatable :: item(:)
+   end type notes_t
+
+   !> A decimal number taken apart: mantissa times 10**exponent.
+   type :: decimal_t
+      integer(int64) :: mantissa = 0_int64       !! the first 18 digits
+      integer :: n_digit = 0                     !! digits from the first that is not 0
+      integer :: exponent = 0                    !! of the last digit
+      integer :: i_end = 0                       !! last character before the exponent
+      integer :: i_exponent = 0                  !! first character of the exponent's number
+   end type decimal_t
+
+   !> Whole numbers below `largest_exact` and powers of ten up to `largest_power` (5**22 < 2**53)
+   !> have no rounding error in `wp`.
+   integer(int64), parameter :: largest_exact = 2_int64**min(digits(1.0_wp), 60)
+   integer, parameter :: largest_power = min(22, int(0.43*real(digits(1.0_wp))))
+   real(wp), parameter :: power_of_ten(0:22) = [1.0e0_wp, 1.0e1_wp, 1.0e2_wp, 1.0e3_wp, &
+      1.0e4_wp, 1.0e5_wp, 1.0e6_wp, 1.0e7_wp, 1.0e8_wp, 1.0e9_wp, 1.0e10_wp, 1.0e11_wp, &
+      1.0e12_wp, 1.0e13_wp, 1.0e14_wp, 1.0e15_wp, 1.0e16_wp, 1.0e17_wp, 1.0e18_wp, 1.0e19_wp, &
+      1.0e20_wp, 1.0e21_wp, 1.0e22_wp]
+   !> Exponents beyond are no numbers; far outside the range of any kind.
+   integer, parameter :: largest_exponent = 1000000
+
+   !> Shortest text of a number: integers as they are, reals with `digits` significant digits (6).
+   interface to_text
+      module procedure text_of_integer, text_of_real
+   end interface to_text
+
+contains
+
+   !> Append the remark `text`.
+   pure subroutine note_add(notes, text)
+      type(notes_t), intent(inout) :: notes
+      character(len=*), intent(in) :: text
+      type(string_t), allocatable :: grown(:)
+
+      if (.not. allocated(notes%item)) allocate(notes%item(4))
+      if (notes%n == size(notes%item)) then
+         allocate(grown(2*notes%n))
+         grown(:notes%n) = notes%item
+         call move_alloc(grown, notes%item)
+      end if
+      notes%n = notes%n + 1
+      notes%item(notes%n)%text = text
+   end subroutine note_add
+
+   !> `text` with the ASCII letters in upper case.
+   pure function to_upper(text) result(upper)
+      character(len=*), intent(in) :: text
+      character(len=len(text)) :: upper
+      integer :: i, code
+
+      do i = 1, len(text)
+         code = iachar(text(i:i))
+         if (code >= iachar("a") .and. code <= iachar("z")) code = code - 32
+         upper(i:i) = achar(code)
+      end do
+   end function to_upper
+
+   !> `text` in upper case without any blank or tab.
+   pure function squeezed(text) result(word)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: word
+      character(len=len(text)) :: buffer
+      integer :: i, n
+
+      n = 0
+      do i = 1, len(text)
+         if (text(i:i) == " " .or. text(i:i) == achar(9)) cycle
+         n = n + 1
+         buffer(n:n) = text(i:i)
+      end do
+      word = to_upper(buffer(:n))
+   end function squeezed
+
+   pure function text_of_integer(value) result(text)
+      integer, intent(in) :: value
+      character(len=:), allocatable :: text
+      character(len=16) :: buffer
+
+      write(buffer, "(i0)") value
+      text = trim(buffer)
+   end function text_of_integer
+
+   pure function text_of_real(value, digits) result(text)
+      real(wp), intent(in) :: value
+      integer, intent(in), optional :: digits
+      character(len=:), allocatable :: text
+      character(len=48) :: buffer
+      character(len=16) :: form
+      integer :: n, i_exponent, last
+
+      n = 6
+      if (present(digits)) n = digits
+      write(form, "('(g0.', i0, ')')") n
+      if (value == 0.0_wp) then
+         text = "0"
+         return
+      end if
+      if (abs(value) >= 1.0e-3_wp .and. abs(value) < 10.0_wp**min(n, 15)) then
+         write(form, "('(f0.', i0, ')')") max(0, n - 1 - floor(log10(abs(value))))
+      else
+         write(form, "('(es48.', i0, 'e3)')") n - 1
+      end if
+      write(buffer, form) value
+      text = trim(adjustl(buffer))
+      i_exponent = scan(text, "E")
+      if (i_exponent == 0 .and. index(text, ".") > 0) then
+         last = verify(text, "0", back=.true.)
+         text = text(:last)
+         if (text(last:last) == ".") text = text(:last - 1)
+      end if
+      if (text(1:1) == ".") text = "0" // text
+      if (len(text) > 1) then
+         if (text(:2) == "-.") text = "-0" // text(2:)
+      end if
+   end function text_of_real
+
+   !> Read a whole number of at most 2^31 - 1 in size; `ok` tells whether all of `word` was one.
+   pure subroutine read_integer(word, value, ok)
+      character(len=*), intent(in) :: word
+      integer, intent(out) :: value
+      logical, intent(out) :: ok
+      integer(int64) :: wide
+      integer :: i, digit, first
+
+      value = 0
+      wide = 0_int64
+      first = 1
+      if (len(word) > 0) then
+         if (scan(word(1:1), "+-") == 1) first = 2
+      end if
+      ok = len(word) >= first .and. len(word) - first < 18
+      if (.not. ok) return
+      do i = first, len(word)
+         digit = iachar(word(i:i)) - iachar("0")
+         ok = digit >= 0 .and. digit <= 9
+         if (.not. ok) return
+         wide = 10_int64*wide + int(digit, int64)
+      end do
+      ok = wide <= int(huge(value), int64)
+      if (.not. ok) return
+      value = int(wide)
+      if (word(1:1) == "-") value = -value
+   end subroutine read_integer
+
+   !> Read a finite real in any form that Fortran or C writes (`1.`, `.5`, `1e3`, `1D3`, `1.d+3`,
+   !> also `1.0-100`, how Fortran writes an exponent of three digits).
+   !>
+   !> Short numbers, nearly all of a deck, are one product or quotient of exact numbers, hence
+   !> correctly rounded; longer ones go through the run-time library. Values of
+   !> 10**(range + 1) and above are refused before they can overflow; tiny ones become 0.
+   pure subroutine read_real(word, value, ok)
+      character(len=*), intent(in) :: word
+      real(wp), intent(out) :: value
+      logical, intent(out) :: ok
+      type(decimal_t) :: number
+      character(len=len(word) + 1) :: fixed
+      integer :: stat, magnitude
+
+      value = 0.0_wp
+      call scan_decimal(word, number, ok)
+      if (.not. ok .or. number%mantissa == 0_int64) return
+      magnitude = number%n_digit + number%exponent
+      ok = magnitude <= range(1.0_wp) + 1
+      if (.not. ok .or. magnitude < -2*range(1.0_wp)) return
+      if (number%n_digit <= 18 .and. number%mantissa < largest_exact &
+         .and. abs(number%exponent) <= largest_power) then
+         value = real(number%mantissa, wp)
+         if (number%exponent < 0) then
+            value = value/power_of_ten(-number%exponent)
+         else
+            value = value*power_of_ten(number%exponent)
+         end if
+         if (word(1:1) == "-") value = -value
+      else
+         fixed = word(:number%i_end)
+         if (number%i_exponent <= len(word)) then
+            fixed = word(:number%i_end) // "E" // word(number%i_exponent:)
+         end if
+         read(fixed, *, iostat=stat) value
+         ok = stat == 0
+         if (ok) ok = ieee_is_finite(value)
+      end if
+   end subroutine read_real
+
+   !> Take a decimal number apart; `ok` tells whether all of `word` was one.
+   pure subroutine scan_decimal(word, number, ok)
+      character(len=*), intent(in) :: word
+      type(decimal_t), intent(out) :: number
+      logical, intent(out) :: ok
+      integer :: i, digit, exponent
+      logical :: has_point
+
+      has_point = .false.
+      ok = .false.
+      i = 1
+      if (len(word) > 0) then
+         if (scan(word(1:1), "+-") == 1) i = 2
+      end if
+      do i = i, len(word)
+         digit = iachar(word(i:i)) - iachar("0")
+         if (digit >= 0 .and. digit <= 9) then
+            ok = .true.
+            if (number%n_digit > 0 .or. digit > 0) number%n_digit = number%n_digit + 1
+            if (number%n_digit <= 18) number%mantissa = 10_int64*number%mantissa + int(digit, int64)
+            if (has_point) number%exponent = number%exponent - 1
+         else if (word(i:i) == "." .and. .not. has_point) then
+            has_point = .true.
+         else
+            exit
+         end if
+      end do
+      number%i_end = i - 1
+      number%i_exponent = len(word) + 1
+      if (.not. ok .or. i > len(word)) return
+      number%i_exponent = i
+      if (scan(word(i:i), "EeDdQq") == 1) number%i_exponent = i + 1
+      ok = number%i_exponent > i .or. scan(word(i:i), "+-") == 1
+      if (ok) call read_integer(word(number%i_exponent:), exponent, ok)
+      if (ok) ok = abs(exponent) <= largest_exponent
+      if (ok) number%exponent = number%exponent + exponent
+   end subroutine scan_decimal
+
+   !> The entry of `list` that takes the fewest edits to reach from `word`; empty if none is near.
+   pure function nearest_word(word, list) result(nearest)
+      character(len=*), intent(in) :: word
+      type(string_t), intent(in) :: list(:)
+      character(len=:), allocatable :: nearest
+      integer :: i, distance, best
+
+      nearest = ""
+      best = max(1, len(word)/3) + 1
+      do i = 1, size(list)
+         distance = edit_distance(word, list(i)%text)
+         if (distance < best) then
+            best = distance
+            nearest = list(i)%text
+         end if
+      end do
+   end function nearest_word
+
+   !> Levenshtein distance of `a` and `b`.
+   pure integer function edit_distance(a, b)
+      character(len=*), intent(in) :: a, b
+      integer :: row(0:len(b)), i, j, corner, above
+
+      row = [(j, j = 0, len(b))]
+      do i = 1, len(a)
+         corner = row(0)
+         row(0) = i
+         do j = 1, len(b)
+            above = row(j)
+            row(j) = min(above + 1, row(j - 1) + 1, corner + merge(0, 1, a(i:i) == b(j:j)))
+            corner = above
+         end do
+      end do
+      edit_distance = row(len(b))
+   end function edit_distance
+
+   !> The texts of `list` with `separator` between them; after `most` of them "and N more".
+   pure function joined(list, separator, most) result(text)
+      type(string_t), intent(in) :: list(:)
+      character(len=*), intent(in) :: separator
+      integer, intent(in) :: most
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = ""
+      do i = 1, min(size(list), most)
+         if (i > 1) text = text // separator
+         text = text // list(i)%text
+      end do
+      if (size(list) > most) text = text // " and " // to_text(size(list) - most) // " more"
+   end function joined
+
+end module emcon_text

@@ -1,0 +1,302 @@
+!> Node-to-segment contact: one constraint per slave node, gap over the nearest master edge.
+module emcon_nts
+   use emcon_chain, only : chain_init, chain_t, chain_tributary
+   use emcon_contact, only : constraint_t, contact_t, gap_state_t
+   use emcon_dgrad10, only : dg_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_nts_gap, only : nts_gap, nts_gap_value
+   use emcon_scene, only : contact_pair_t, scene_t
+   use emcon_search, only : box_distance, candidates_t, search_candidates
+   implicit none
+   private
+   public :: nts_t, nts_init, nts_nearest
+
+   !> Reach of the candidate search as a fraction of the mean master edge, at least; and as a
+   !> multiple of the largest motion expected in one step, at least.
+   real(wp), parameter :: reach_per_edge = 0.5_wp, reach_per_motion = 8.0_wp
+   !> Corners sharper than this (cosine of the turn) end the surface: the bisector degenerates.
+   real(wp), parameter :: sharpest_cosine = -0.9_wp
+   !> A node counts as outside at the start of a step down to this fraction of an edge.
+   real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
+
+   type, extends(contact_t) :: nts_t
+      type(chain_t) :: slave
+      type(chain_t) :: master
+      integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
+      type(candidates_t) :: candidates
+      real(wp) :: reach = 0.0_wp                      !! of the candidate list; 0: no list yet
+      real(wp), allocatable :: u_slave(:, :)          !! displacements when the list was made
+      real(wp), allocatable :: u_master(:, :)
+   contains
+      procedure :: begin_step => nts_begin_step
+      procedure :: gap_state => nts_gap_state
+      procedure :: evaluate => nts_evaluate
+      procedure :: area => nts_area
+   end type nts_t
+
+contains
+
+   !> Set up the pair `pair` of `scene`.
+   subroutine nts_init(self, scene, pair, error)
+      type(nts_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      call chain_init(self%slave, scene, scene%surface(pair%slave), error)
+      if (allocated(error)) return
+      call chain_init(self%master, scene, scene%surface(pair%master), error)
+      if (allocated(error)) return
+      self%node = self%slave%node
+      self%n_constraint = size(self%node)
+      allocate(self%edge(self%n_constraint), source=0)
+      allocate(self%thickness(self%n_constraint), source=1.0_wp)
+      associate (surface => scene%surface(pair%slave))
+         if (.not. surface%is_nodal) then
+            do i = 1, self%n_constraint
+               self%thickness(i) = scene%section(scene%element_section(surface%element(1)))%thickness
+            end do
+         end if
+      end associate
+      self%u_slave = scene%u0(:, self%slave%node)
+      self%u_master = scene%u0(:, self%master%node)
+   end subroutine nts_init
+
+   !> Choose for each slave node the nearest master edge at the start of the step.
+   pure subroutine nts_begin_step(self, x, u0, du)
+      class(nts_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp) :: step_motion, motion
+      integer :: i, k, e
+      real(wp) :: distance, best
+
+      step_motion = max(largest(du(:, self%slave%node)), largest(du(:, self%master%node)))
+      motion = max(largest(u0(:, self%slave%node) - self%u_slave), &
+         largest(u0(:, self%master%node) - self%u_master)) + step_motion
+      if (.not. 2.0_wp*motion < self%reach) call new_candidates(self, x, u0, step_motion)
+      do i = 1, self%n_constraint
+         self%edge(i) = 0
+         best = huge(best)
+         do k = self%candidates%start(i), self%candidates%start(i + 1) - 1
+            e = self%candidates%edge(k)
+            distance = edge_distance(x, u0, self%node(i), self%master%edge(:, e))
+            if (distance < best) then
+               best = distance
+               self%edge(i) = e
+            end if
+         end do
+      end do
+   end subroutine nts_begin_step
+
+   !> Make the candidate list anew at `u0`. Surfaces far apart get a reach as large as their
+   !> distance and an empty list: then nothing is done until one has moved half of that.
+   pure subroutine new_candidates(self, x, u0, step_motion)
+      type(nts_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp), intent(in) :: step_motion
+      real(wp) :: point(2, self%n_constraint)
+      real(wp) :: low(2, self%master%n_edge), high(2, self%master%n_edge), ends(2, 2), apart
+      integer :: i
+
+      self%u_slave = u0(:, self%slave%node)
+      self%u_master = u0(:, self%master%node)
+      point = x(:, self%slave%node) + self%u_slave
+      do i = 1, self%master%n_edge
+         ends = x(:, self%master%edge(:, i)) + u0(:, self%master%edge(:, i))
+         low(:, i) = min(ends(:, 1), ends(:, 2))
+         high(:, i) = max(ends(:, 1), ends(:, 2))
+      end do
+      apart = box_distance(minval(point, 2), maxval(point, 2), minval(low, 2), maxval(high, 2))
+      self%reach = max(reach_per_edge*sum(high - low)/real(self%master%n_edge, wp), &
+         reach_per_motion*step_motion, 0.99_wp*apart)
+      call search_candidates(point, low, high, self%reach, self%candidates)
+   end subroutine new_candidates
+
+   !> Largest of the lengths of the columns of `v`.
+   pure real(wp) function largest(v)
+      real(wp), intent(in) :: v(:, :)
+      integer :: i
+
+      largest = 0.0_wp
+      do i = 1, size(v, 2)
+         largest = max(largest, v(1, i)**2 + v(2, i)**2)
+      end do
+      largest = sqrt(largest)
+   end function largest
+
+   !> Distance of a node from an edge as a segment.
+   pure real(wp) function edge_distance(x, u, node, edge)
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      integer, intent(in) :: node, edge(2)
+      real(wp) :: a(2), b(2), xi
+
+      a = (x(:, edge(2)) - x(:, edge(1))) + (u(:, edge(2)) - u(:, edge(1)))
+      b = (x(:, node) - x(:, edge(1))) + (u(:, node) - u(:, edge(1)))
+      xi = max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))
+      b = b - xi*a
+      edge_distance = sqrt(dot_product(b, b))
+   end function edge_distance
+
+   !> Nodes of the stencil of constraint `i`: slave, edge, and what is there before and after.
+   pure subroutine stencil(self, i, x, u0, n, node, before, after)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      integer, intent(out) :: n, node(:), before, after
+      integer :: e
+
+      node(1) = self%node(i)
+      node(2:3) = self%master%edge(:, self%edge(i))
+      n = 3
+      before = 0
+      after = 0
+      e = self%master%previous(self%edge(i))
+      if (e > 0) then
+         if (is_smooth(x, u0, self%master%edge(1, e), node(2), node(3))) then
+            n = n + 1
+            before = n
+            node(n) = self%master%edge(1, e)
+         end if
+      end if
+      e = self%master%next(self%edge(i))
+      if (e > 0) then
+         if (is_smooth(x, u0, node(2), node(3), self%master%edge(2, e))) then
+            n = n + 1
+            after = n
+            node(n) = self%master%edge(2, e)
+         end if
+      end if
+   end subroutine stencil
+
+   !> Is the corner a-b-c blunt enough for a bisector?
+   pure logical function is_smooth(x, u, a, b, c)
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      integer, intent(in) :: a, b, c
+      real(wp) :: d(2), e(2)
+
+      d = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
+      e = (x(:, c) - x(:, b)) + (u(:, c) - u(:, b))
+      is_smooth = dot_product(d, e) > sharpest_cosine*sqrt(dot_product(d, d)*dot_product(e, e))
+   end function is_smooth
+
+   !> Positions of the stencil's nodes at the start relative to its edge, and their motion.
+   pure subroutine gather(x, u0, du, n, node, local, dlocal)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer, intent(in) :: n, node(:)
+      real(wp), intent(out) :: local(:, :), dlocal(:, :)
+      integer :: k
+
+      do k = 1, n
+         local(:, k) = (x(:, node(k)) - x(:, node(2))) + (u0(:, node(k)) - u0(:, node(2)))
+         dlocal(:, k) = du(:, node(k))
+      end do
+   end subroutine gather
+
+   pure function nts_gap_state(self, i, x, u0, du) result(state)
+      class(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(gap_state_t) :: state
+      integer :: n, node(5), before, after, k
+      real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1, xi, a(2)
+
+      if (self%edge(i) == 0) return
+      call stencil(self, i, x, u0, n, node, before, after)
+      call gather(x, u0, du, n, node, local, dlocal)
+      a = local(:, 3) - local(:, 2)
+      state%size = sqrt(dot_product(a, a))
+      call nts_gap_value(local(:, :n), before, after, state%gap0, xi0)
+      do k = 1, n
+         local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
+      end do
+      call nts_gap_value(local(:, :n), before, after, state%gap1, xi1)
+      state%is_near = state%gap0 >= -touch_tol*state%size
+      xi = xi0
+      if (state%gap1 < 0.0_wp .and. state%gap0 > 0.0_wp) then
+         xi = xi0 + (state%gap0/(state%gap0 - state%gap1))*(xi1 - xi0)
+      end if
+      state%is_over = (before > 0 .or. xi >= 0.0_wp) .and. (after > 0 .or. xi <= 1.0_wp)
+      state%is_covered = is_covered(self, i, xi1, before, after)
+   end function nts_gap_state
+
+   !> Is the projection at the end of the step still on the edge or one of its neighbours?
+   pure logical function is_covered(self, i, xi, before, after)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i, before, after
+      real(wp), intent(in) :: xi
+      real(wp), parameter :: half = 0.5_wp
+
+      is_covered = .true.
+      if (before > 0 .and. xi < -half) is_covered = &
+         self%master%previous(self%master%previous(self%edge(i))) == 0 .or. xi >= -1.0_wp
+      if (after > 0 .and. xi > 1.0_wp + half) is_covered = &
+         self%master%next(self%master%next(self%edge(i))) == 0 .or. xi <= 2.0_wp
+   end function is_covered
+
+   pure subroutine nts_evaluate(self, i, x, u0, du, constraint)
+      class(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(constraint_t), intent(inout) :: constraint
+      integer :: n, before, after
+      real(wp) :: local(2, 5), dlocal(2, 5), a(2)
+      type(dg_t) :: gap
+
+      call stencil(self, i, x, u0, n, constraint%node, before, after)
+      call gather(x, u0, du, n, constraint%node, local, dlocal)
+      gap = nts_gap(local(:, :n), dlocal(:, :n), before, after)
+      a = local(:, 3) - local(:, 2)
+      constraint%n_node = n
+      constraint%size = sqrt(dot_product(a, a))
+      constraint%gap0 = gap%f0
+      constraint%gap1 = gap%f1
+      constraint%dgap = gap%df
+      constraint%g = reshape(gap%g, [2, 5])
+      constraint%c = reshape(gap%c, [2, 5])
+      constraint%h = gap%h
+   end subroutine nts_evaluate
+
+   pure subroutine nts_area(self, x, u, area)
+      class(nts_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp), intent(out) :: area(:)
+
+      if (self%slave%n_edge == 0) then
+         area = 0.0_wp
+      else
+         call chain_tributary(self%slave, x, u, area)
+         area = area*self%thickness
+      end if
+   end subroutine nts_area
+
+   !> Gap at x + u of slave node `i` over the nearest master edge, searched among all edges.
+   !> For checks before the first step only. `is_over`: not past an end of the surface.
+   pure subroutine nts_nearest(self, i, x, u, gap, is_over)
+      type(nts_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp), intent(out) :: gap
+      logical, intent(out) :: is_over
+      real(wp) :: distance, best
+      real(wp) :: zero(size(x, 1), size(x, 2))
+      type(gap_state_t) :: state
+      integer :: e
+
+      best = huge(best)
+      self%edge(i) = 0
+      do e = 1, self%master%n_edge
+         distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
+         if (distance < best) then
+            best = distance
+            self%edge(i) = e
+         end if
+      end do
+      zero = 0.0_wp
+      state = self%gap_state(i, x, u, zero)
+      gap = state%gap0
+      is_over = state%is_over
+   end subroutine nts_nearest
+
+end module emcon_nts

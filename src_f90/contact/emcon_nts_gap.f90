@@ -1,0 +1,104 @@
+!> Gap of a slave node over a master edge and its neighbours.
+!>
+!> Edge a = x2 - x1, b = xs - x1, outward normal n: gap over the line of the edge
+!> (b x a)/|a|. Where the node passes a corner to a neighbour the gap goes over to the neighbour's
+!> line, so that the gap is one continuous function over three edges: no event when a node slides
+!> over a master node, hence neither energy nor penetration is made there.
+!> Source: docs/theory.md, section 4. Sign: gap > 0 is open.
+module emcon_nts_gap
+   use emcon_dgrad10, only : dg_cross, dg_dot, dg_negative_part, dg_positive_part, dg_sqrt, dg_t, &
+      difference, difference_t, operator(*), operator(+), operator(-), operator(/)
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: nts_gap, nts_gap_value
+
+   !> Local numbers of the nodes; the neighbours' further nodes follow as they are present.
+   integer, parameter :: slave = 1, first = 2, last = 3
+
+contains
+
+   !> The gap over a step, in discrete-gradient arithmetic.
+   pure function nts_gap(x0, dx, before, after) result(gap)
+      real(wp), intent(in) :: x0(:, :)           !! (2, 3 to 5) slave, edge, further nodes; local
+      real(wp), intent(in) :: dx(:, :)           !! their motion
+      integer, intent(in) :: before              !! local number of the node before the edge, or 0
+      integer, intent(in) :: after               !! of the node after it, or 0
+      type(dg_t) :: gap
+      type(difference_t) :: a, b
+      type(dg_t) :: length
+
+      a = difference(last, first, x0, dx)
+      b = difference(slave, first, x0, dx)
+      length = dg_sqrt(dg_dot(a, a))
+      gap = dg_cross(b, a)/length
+      if (before > 0) gap = gap + corner_before(a, b, length, difference(first, before, x0, dx))
+      if (after > 0) gap = gap - corner_after(a, length, difference(slave, last, x0, dx), &
+         difference(after, last, x0, dx))
+   end function nts_gap
+
+   !> kappa min(tau, 0): what the line of the edge before adds on its side of the bisector.
+   pure function corner_before(a, b, length, edge) result(part)
+      type(difference_t), intent(in) :: a, b, edge
+      type(dg_t), intent(in) :: length
+      type(dg_t) :: part, other
+
+      other = dg_sqrt(dg_dot(edge, edge))
+      part = dg_negative_part(dg_dot(b, edge)/other + dg_dot(b, a)/length)
+      part = bend(edge, a, other, length)*part
+   end function corner_before
+
+   !> kappa max(tau, 0), with `b` from the last node of the edge to the slave node.
+   pure function corner_after(a, length, b, edge) result(part)
+      type(difference_t), intent(in) :: a, b, edge
+      type(dg_t), intent(in) :: length
+      type(dg_t) :: part, other
+
+      other = dg_sqrt(dg_dot(edge, edge))
+      part = dg_positive_part(dg_dot(b, a)/length + dg_dot(b, edge)/other)
+      part = bend(a, edge, length, other)*part
+   end function corner_after
+
+   !> kappa = -tan(theta/2), theta the turn from edge `a` to edge `b` (> 0: convex corner).
+   pure function bend(a, b, length_a, length_b) result(kappa)
+      type(difference_t), intent(in) :: a, b
+      type(dg_t), intent(in) :: length_a, length_b
+      type(dg_t) :: kappa
+
+      kappa = (-1.0_wp)*(dg_cross(a, b)/(length_a*length_b + dg_dot(a, b)))
+   end function bend
+
+   !> The same gap for one configuration, and the projection `xi` on the edge (0..1 inside).
+   pure subroutine nts_gap_value(x, before, after, gap, xi)
+      real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
+      integer, intent(in) :: before, after
+      real(wp), intent(out) :: gap, xi
+      real(wp) :: a(2), b(2), edge(2), length, other, tau
+
+      a = x(:, last) - x(:, first)
+      b = x(:, slave) - x(:, first)
+      length = sqrt(dot_product(a, a))
+      gap = cross(b, a)/length
+      xi = dot_product(b, a)/dot_product(a, a)
+      if (before > 0) then
+         edge = x(:, first) - x(:, before)
+         other = sqrt(dot_product(edge, edge))
+         tau = dot_product(b, edge)/other + dot_product(b, a)/length
+         gap = gap - min(tau, 0.0_wp)*cross(edge, a)/(length*other + dot_product(edge, a))
+      end if
+      if (after > 0) then
+         edge = x(:, after) - x(:, last)
+         b = x(:, slave) - x(:, last)
+         other = sqrt(dot_product(edge, edge))
+         tau = dot_product(b, a)/length + dot_product(b, edge)/other
+         gap = gap + max(tau, 0.0_wp)*cross(a, edge)/(length*other + dot_product(a, edge))
+      end if
+   end subroutine nts_gap_value
+
+   pure real(wp) function cross(a, b)
+      real(wp), intent(in) :: a(2), b(2)
+
+      cross = a(1)*b(2) - a(2)*b(1)
+   end function cross
+
+end module emcon_nts_gap

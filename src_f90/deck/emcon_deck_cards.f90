@@ -1,0 +1,370 @@
+!> From lines to cards: keywords and parameters, held against the registry.
+module emcon_deck_cards
+   use emcon_deck_keywords, only : find_keyword, in_model, in_step, keyword_names, keyword_t, &
+      keywords, mark_flag, mark_none, mark_unsupported, mark_value, &
+      mark_without_effect, parameter_mark, parameter_names
+   use emcon_deck_laws, only : law_variants
+   use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
+      substitute_parameters, unused_override
+   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, option_t, reader_t
+   use emcon_diagnostics, only : add_error, add_warning, quoted, suggestion
+   use emcon_scene, only : origin_t
+   use emcon_text, only : squeezed, string_t, to_text
+   implicit none
+   private
+   public :: read_cards
+
+   character(len=*), parameter :: blanks = " " // achar(9) // achar(11) // achar(12)
+   character(len=1), parameter :: end_of_text = achar(26)      !! how old systems end a text
+
+   !> Where the reading of cards stands.
+   type :: place_t
+      integer :: n_card = 0
+      integer :: n_step = 0
+      logical :: in_step = .false.
+      logical :: has_strayed = .false.             !! data before the first keyword were told
+      type(origin_t) :: step_origin
+   end type place_t
+
+contains
+
+   !> Fill `reader%card` from the lines that `reader` looks at.
+   subroutine read_cards(reader, overrides)
+      type(reader_t), intent(inout) :: reader
+      type(string_t), intent(in) :: overrides(:)   !! NAME=VALUE
+      type(parameters_t) :: parameters
+      type(place_t) :: place
+      character(len=:), allocatable :: fault
+      integer :: i
+
+      call parameters_init(parameters, overrides, fault)
+      if (fault /= "") call add_error(reader%log, origin_t(), fault)
+      allocate(reader%card(count_cards(reader)))
+      i = 1
+      do while (i <= size(reader%line))
+         call read_line(reader, parameters, place, i)
+         i = i + 1
+      end do
+      reader%card = reader%card(:place%n_card)
+      if (place%in_step) call add_error(reader%log, place%step_origin, &
+         "*STEP: *END STEP is missing: the deck ends inside this step")
+      do i = 1, size(overrides)
+         fault = unused_override(parameters, i)
+         if (fault /= "") call add_error(reader%log, origin_t(), fault)
+      end do
+      if (place%n_card == 0 .and. reader%log%n_errors == 0) then
+         call add_error(reader%log, origin_t(1, 0), "the deck is empty: it has no keyword")
+      end if
+   end subroutine read_cards
+
+   pure integer function count_cards(reader)
+      type(reader_t), intent(in) :: reader
+      integer :: i
+
+      count_cards = 0
+      do i = 1, size(reader%line)
+         if (is_card(reader%line(i)%text)) count_cards = count_cards + 1
+      end do
+   end function count_cards
+
+   pure logical function is_card(line)
+      character(len=*), intent(in) :: line
+      integer :: first
+
+      first = verify(line, blanks)
+      is_card = first > 0
+      if (is_card) is_card = line(first:first) == "*"
+      if (is_card .and. first < len(line)) is_card = line(first + 1:first + 1) /= "*"
+   end function is_card
+
+   pure logical function is_comment(line)
+      character(len=*), intent(in) :: line
+      integer :: first
+
+      first = verify(line, blanks // end_of_text)
+      is_comment = first == 0
+      if (first > 0 .and. first < len(line)) is_comment = line(first:first + 1) == "**"
+   end function is_comment
+
+   !> Take in the line `i`, for a card also the lines it goes on in: `i` becomes the last of them.
+   subroutine read_line(reader, parameters, place, i)
+      type(reader_t), intent(inout) :: reader
+      type(parameters_t), intent(inout) :: parameters
+      type(place_t), intent(inout) :: place
+      integer, intent(inout) :: i
+      character(len=:), allocatable :: text
+      integer :: i_first
+
+      if (is_card(reader%line(i)%text)) then
+         i_first = i
+         call gather_card(reader, i, text)
+         call put_parameters(reader, parameters, i_first, text)
+         place%n_card = place%n_card + 1
+         call read_card(reader, place, text, i_first, reader%card(place%n_card))
+         reader%card(place%n_card)%first = i + 1
+         reader%card(place%n_card)%last = i
+      else if (is_comment(reader%line(i)%text)) then
+         return
+      else if (place%n_card == 0) then
+         if (.not. place%has_strayed) call add_error(reader%log, line_origin(reader, i), &
+            quoted(reader%line(i)%text) // ": a deck begins with a keyword, such as *NODE")
+         place%has_strayed = .true.
+      else
+         reader%card(place%n_card)%last = i
+         call read_data(reader, parameters, reader%card(place%n_card)%name, i)
+      end if
+   end subroutine read_line
+
+   !> A data line: define a parameter, or put parameters in.
+   subroutine read_data(reader, parameters, keyword, i)
+      type(reader_t), intent(inout) :: reader
+      type(parameters_t), intent(inout) :: parameters
+      character(len=*), intent(in) :: keyword
+      integer, intent(in) :: i
+      character(len=:), allocatable :: text, fault
+
+      if (keyword == "PARAMETER") then
+         call parameter_define(parameters, reader%line(i)%text, fault)
+         if (fault /= "") call add_error(reader%log, line_origin(reader, i), fault)
+      else if (keyword /= "HEADING" .and. keyword /= "") then
+         if (index(reader%line(i)%text, "<") == 0) return
+         text = reader%line(i)%text
+         call put_parameters(reader, parameters, i, text)
+         if (.not. allocated(reader%patched)) allocate(reader%patched(size(reader%line)))
+         call move_alloc(text, reader%patched(i)%text)
+      end if
+   end subroutine read_data
+
+   !> Put the values of parameters into `text`, which stands at line `i`.
+   subroutine put_parameters(reader, parameters, i, text)
+      type(reader_t), intent(inout) :: reader
+      type(parameters_t), intent(in) :: parameters
+      integer, intent(in) :: i
+      character(len=:), allocatable, intent(inout) :: text
+      character(len=:), allocatable :: patched, fault
+
+      if (index(text, "<") == 0) return
+      call substitute_parameters(parameters, text, patched, fault)
+      if (fault /= "") call add_error(reader%log, line_origin(reader, i), fault)
+      call move_alloc(patched, text)
+   end subroutine put_parameters
+
+   !> The keyword line `i` with the lines it goes on in after a comma at its end. A comma before
+   !> another keyword or before a number is only a comma too many.
+   subroutine gather_card(reader, i, text)
+      type(reader_t), intent(in) :: reader
+      integer, intent(inout) :: i
+      character(len=:), allocatable, intent(out) :: text
+      integer :: next, first
+
+      text = bare(reader%line(i)%text)
+      do while (text(len(text):) == ",")
+         next = i + 1
+         do while (next <= size(reader%line))
+            if (.not. is_comment(reader%line(next)%text)) exit
+            next = next + 1
+         end do
+         if (next > size(reader%line)) exit
+         first = verify(reader%line(next)%text, blanks)
+         if (scan(reader%line(next)%text(first:first), "*+-.0123456789,") == 1) exit
+         text = text // bare(reader%line(next)%text)
+         i = next
+      end do
+   end subroutine gather_card
+
+   !> `line` without the blanks around it.
+   pure function bare(line) result(text)
+      character(len=*), intent(in) :: line
+      character(len=:), allocatable :: text
+      integer :: first
+
+      first = verify(line, blanks)
+      text = ""
+      if (first > 0) text = line(first:verify(line, blanks, back=.true.))
+   end function bare
+
+   !> Make a card of `text`. It gets no name if nothing may be read from it.
+   subroutine read_card(reader, place, text, i_line, card)
+      type(reader_t), intent(inout) :: reader
+      type(place_t), intent(inout) :: place
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: i_line
+      type(card_t), intent(out) :: card
+      integer :: i_comma, i
+
+      card%origin = line_origin(reader, i_line)
+      i_comma = index(text, ",")
+      if (i_comma == 0) i_comma = len(text) + 1
+      card%title = quoted(text(:i_comma - 1))
+      card%title = card%title(2:len(card%title) - 1)
+      card%name = squeezed(text(2:i_comma - 1))
+      call split_options(text(i_comma:), card%option)
+      i = find_keyword(card%name)
+      if (i == 0) then
+         call refuse_keyword(reader, card)
+      else if (keywords(i)%reason /= "") then
+         call refuse_unsupported(reader, card, keywords(i))
+      else
+         call check_options(reader, card, trim(keywords(i)%parameters) // law_variants(card%name))
+         call check_place(reader, place, card, keywords(i))
+      end if
+   end subroutine read_card
+
+   !> An unknown keyword. What it would have defined may be missing further on.
+   subroutine refuse_keyword(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(inout) :: card
+      character(len=:), allocatable :: text
+
+      text = "unknown keyword " // quoted(card%title) &
+         // suggestion("*" // card%name, keyword_names())
+      if (reader%is_lenient) then
+         call add_warning(reader%log, card%origin, text // " (left out)")
+      else
+         call add_error(reader%log, card%origin, text)
+         reader%doubt_nodes = .true.
+         reader%doubt_elements = .true.
+         reader%doubt_names = .true.
+      end if
+      card%name = ""
+   end subroutine refuse_keyword
+
+   subroutine refuse_unsupported(reader, card, keyword)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(inout) :: card
+      type(keyword_t), intent(in) :: keyword
+
+      if (reader%is_lenient .and. keyword%is_output) then
+         call card_warning(reader, card, "not supported, left out: " // trim(keyword%reason))
+      else
+         call card_error(reader, card, "known but not supported: " // trim(keyword%reason))
+      end if
+      select case (card%name)
+      case ("NGEN", "NCOPY", "NFILL", "ELGEN", "ELCOPY", "PART", "ASSEMBLY", "INSTANCE", &
+         "SYSTEM")
+         reader%doubt_nodes = .true.
+         reader%doubt_elements = .true.
+         reader%doubt_names = .true.
+      end select
+      card%name = ""
+   end subroutine refuse_unsupported
+
+   !> Take `,NAME=VALUE,NAME` apart.
+   subroutine split_options(text, option)
+      character(len=*), intent(in) :: text
+      type(option_t), allocatable, intent(out) :: option(:)
+      integer :: i, n, first, i_equal
+      character(len=1) :: quote
+      character(len=:), allocatable :: part
+
+      allocate(option(count([(text(i:i) == ",", i = 1, len(text))])))
+      n = 0
+      first = 2
+      quote = " "
+      do i = 2, len(text) + 1
+         if (i <= len(text)) then
+            if (quote /= " ") then
+               if (text(i:i) == quote) quote = " "
+               cycle
+            else if (scan(text(i:i), "'""") == 1 .and. index(text(i + 1:), text(i:i)) > 0) then
+               quote = text(i:i)
+               cycle
+            end if
+            if (text(i:i) /= ",") cycle
+         end if
+         part = bare(text(first:i - 1))
+         first = i + 1
+         if (part == "") cycle
+         n = n + 1
+         i_equal = index(part, "=")
+         option(n)%has_value = i_equal > 0
+         if (i_equal == 0) i_equal = len(part) + 1
+         option(n)%name = squeezed(part(:i_equal - 1))
+         option(n)%value = bare(part(i_equal + 1:))
+      end do
+      option = option(:n)
+   end subroutine split_options
+
+   !> Hold the parameters of a card against the list of the registry.
+   subroutine check_options(reader, card, parameters)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: parameters
+      character(len=:), allocatable :: fault
+      integer :: i, mark
+
+      do i = 1, size(card%option)
+         associate (option => card%option(i))
+            fault = ""
+            mark = parameter_mark(parameters, option%name)
+            if (mark == mark_none) then
+               fault = "unknown parameter " // quoted(option%name) &
+                  // suggestion(option%name, parameter_names(parameters))
+               reader%doubt_names = .true.
+            else if (mark == mark_unsupported) then
+               fault = "parameter " // option%name // " is known but not supported"
+            else if (mark == mark_value .and. option%value == "") then
+               fault = "parameter " // option%name // " needs a value"
+               reader%doubt_names = .true.
+            else if (mark == mark_flag .and. option%has_value) then
+               fault = "parameter " // option%name // " takes no value"
+            else if (mark == mark_without_effect) then
+               call card_warning(reader, card, "parameter " // option%name // " has no effect")
+            else if (is_repeated(card%option(:i))) then
+               fault = "parameter " // option%name // " is given twice"
+            end if
+            if (fault /= "") call card_error(reader, card, fault)
+         end associate
+      end do
+   end subroutine check_options
+
+   !> Whether the last of `option` has the name of an earlier one.
+   pure logical function is_repeated(option)
+      type(option_t), intent(in) :: option(:)
+      integer :: i
+
+      is_repeated = .false.
+      do i = 1, size(option) - 1
+         if (option(i)%name == option(size(option))%name) is_repeated = .true.
+      end do
+   end function is_repeated
+
+   !> Follow the steps, and refuse a card in the wrong place.
+   subroutine check_place(reader, place, card, keyword)
+      type(reader_t), intent(inout) :: reader
+      type(place_t), intent(inout) :: place
+      type(card_t), intent(inout) :: card
+      type(keyword_t), intent(in) :: keyword
+      character(len=:), allocatable :: fault
+
+      fault = ""
+      if (card%name == "STEP") then
+         if (place%in_step) call add_error(reader%log, place%step_origin, &
+            "*STEP: *END STEP is missing before the *STEP of line " // to_text(card%origin%line))
+         place%n_step = place%n_step + 1
+         place%in_step = .true.
+         place%step_origin = card%origin
+      end if
+      card%step = merge(place%n_step, 0, place%in_step)
+      if (card%name == "ENDSTEP") then
+         if (.not. place%in_step) fault = "there is no *STEP to end"
+         place%in_step = .false.
+      else if (keyword%place == in_step .and. .not. place%in_step) then
+         fault = "may stand only inside a step"
+      else if (keyword%place == in_model .and. place%n_step > 0) then
+         fault = "must stand before the first *STEP"
+         reader%doubt_nodes = .true.
+         reader%doubt_elements = .true.
+         reader%doubt_names = .true.
+      else if (place%n_step > 0 .and. .not. place%in_step) then
+         if (card%name /= "PARAMETER" .and. card%name /= "HEADING") then
+            fault = "between *END STEP and the next *STEP nothing may stand"
+            reader%doubt_names = .true.
+         end if
+      end if
+      if (fault == "") return
+      call card_error(reader, card, fault)
+      card%name = ""
+   end subroutine check_place
+
+end module emcon_deck_cards

@@ -1,0 +1,240 @@
+!> The keyword registry: what the deck language knows. One row per keyword.
+module emcon_deck_keywords
+   use emcon_text, only : squeezed, string_t
+   implicit none
+   private
+   public :: keyword_t, keywords, find_keyword, keyword_names, parameter_mark, parameter_names
+   public :: in_model, in_step, in_both
+   public :: mark_none, mark_flag, mark_value, mark_either, mark_unsupported, mark_without_effect
+
+   !> Where a keyword may stand: before the first *STEP, inside a step, or anywhere.
+   integer, parameter :: in_model = 1, in_step = 2, in_both = 3
+
+   !> How a keyword takes a parameter: not at all, without value, with value, either way; known
+   !> but not supported; or taken but, as a warning says, without effect.
+   integer, parameter :: mark_none = 0, mark_flag = 1, mark_value = 2, mark_either = 3, &
+      mark_unsupported = 4, mark_without_effect = 5
+
+   !> One keyword. `parameters` lists them with commas, without blanks inside: `NAME=` takes a
+   !> value, `NAME` none, `NAME?` may; `!NAME` is known but not supported, `~NAME` has no effect.
+   !> A `reason` says why a known keyword is not supported; empty: it is.
+   type :: keyword_t
+      character(len=22) :: name = ""
+      integer :: place = in_both
+      character(len=72) :: parameters = ""
+      character(len=64) :: reason = ""
+      logical :: is_output = .false.         !! --lenient reads on if it is not supported
+   end type keyword_t
+
+   character(len=*), parameter :: no_rods = "only plane strain solids are read", &
+      no_thermal = "there is no temperature", no_couple = "couplings are not in this version"
+   character(len=*), parameter :: no_export = "results go by *NODE FILE, *EL FILE and *... PRINT"
+   character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL"
+   character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT,!POSITION,!USER"
+
+   type(keyword_t), parameter :: keywords(*) = [ &
+      keyword_t("HEADING", in_both), &
+      keyword_t("PREPRINT", in_both, "~ECHO,~MODEL,~HISTORY,~CONTACT"), &
+      keyword_t("PARAMETER", in_both), &
+      keyword_t("INCLUDE", in_both, "INPUT="), &
+      keyword_t("NODE", in_model, "NSET=,!SYSTEM,!INPUT"), &
+      keyword_t("ELEMENT", in_model, "TYPE=,ELSET=,!INPUT,!OFFSET"), &
+      keyword_t("NSET", in_both, "NSET=,GENERATE,!ELSET,~INTERNAL,~UNSORTED,!INSTANCE"), &
+      keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
+      keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM"), &
+      keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,!ORIENTATION,!OFFSET,!CONTROLS"), &
+      keyword_t("MATERIAL", in_model, "NAME="), &
+      keyword_t("DENSITY", in_model), &
+      keyword_t("ELASTIC", in_model, "TYPE="), &
+      keyword_t("HYPERELASTIC", in_model, "!OGDEN,!MOONEY-RIVLIN,!YEOH,!POLYNOMIAL,!N"), &
+      keyword_t("INITIAL CONDITIONS", in_model, "TYPE=,!USER"), &
+      keyword_t("AMPLITUDE", in_both, "NAME=,TIME=,DEFINITION=,!USER,!VALUE,!SMOOTH"), &
+      keyword_t("TIME POINTS", in_both, "NAME=,GENERATE"), &
+      keyword_t("SURFACE INTERACTION", in_model, "NAME="), &
+      keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,!NOSEPARATION,!PENALTY"), &
+      keyword_t("FRICTION", in_model, "~SLIPTOLERANCE,!ROUGH,!LAGRANGE"), &
+      keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,ADJUST=,!SMALLSLIDING,!TIED"), &
+      keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,!TIMEDELAY,!USER,!SUBMODEL"), &
+      keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,!PERTURBATION"), &
+      keyword_t("STATIC", in_step, "DIRECT,~SOLVER,!STABILIZE,!RIKS,!EXPLICIT"), &
+      keyword_t("DYNAMIC", in_step, "DIRECT,~SOLVER,!ALPHA,!EXPLICIT,!APPLICATION,!INITIAL"), &
+      keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY,!USER,!FOLLOWER,!SECTOR"), &
+      keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY,!USER"), &
+      keyword_t("CONSTRAINT METHOD", in_step, "TYPE="), &
+      keyword_t("CONTACT INITIATION", in_step, "TYPE=,GAPTOLERANCE="), &
+      keyword_t("NEWTON", in_step, "TYPE=,TOLERANCE=,MAXIMUM="), &
+      keyword_t("TIME INTEGRATION", in_step, "SCHEME=,!TOLERANCE"), &
+      keyword_t("NODE FILE", in_step, "NSET=," // filed), &
+      keyword_t("EL FILE", in_step, "ELSET=," // filed), &
+      keyword_t("CONTACT FILE", in_step, filed), &
+      keyword_t("NODE PRINT", in_step, "NSET=," // printed), &
+      keyword_t("EL PRINT", in_step, "ELSET=," // printed), &
+      keyword_t("CONTACT PRINT", in_step, "~NSET,~SET," // printed), &
+      keyword_t("ENERGY PRINT", in_step, "~ELSET,FREQUENCY=,TIMEPOINTS="), &
+      keyword_t("RESTART", in_step, "WRITE,FREQUENCY=,~OVERLAY,!READ"), &
+      keyword_t("END STEP", in_step), &
+      keyword_t("MORTAR", in_step, "", "contact is node to surface in this version"), &
+      keyword_t("SURFACE SMOOTHING", in_both, "", "contact surfaces are polygons"), &
+      keyword_t("TIE", in_model, "", "ties are not in this version"), &
+      keyword_t("EQUATION", in_both, "", no_couple), &
+      keyword_t("MPC", in_model, "", no_couple), &
+      keyword_t("COUPLING", in_model, "", no_couple), &
+      keyword_t("KINEMATIC", in_model, "", no_couple), &
+      keyword_t("DISTRIBUTING", in_model, "", no_couple), &
+      keyword_t("EMBEDDED ELEMENT", in_model, "", no_couple), &
+      keyword_t("RIGID BODY", in_model, "", "rigid bodies are not in this version"), &
+      keyword_t("RIGID SURFACE", in_model, "", "rigid bodies are not in this version"), &
+      keyword_t("TRANSFORM", in_model, "", "degrees of freedom are those of the global axes"), &
+      keyword_t("ORIENTATION", in_model, "", "materials are isotropic"), &
+      keyword_t("SYSTEM", in_model, "", "coordinates are those of the global axes"), &
+      keyword_t("NGEN", in_model, "", "nodes are given one by one by *NODE"), &
+      keyword_t("NCOPY", in_model, "", "nodes are given one by one by *NODE"), &
+      keyword_t("NFILL", in_model, "", "nodes are given one by one by *NODE"), &
+      keyword_t("ELGEN", in_model, "", "elements are given one by one by *ELEMENT"), &
+      keyword_t("ELCOPY", in_model, "", "elements are given one by one by *ELEMENT"), &
+      keyword_t("PART", in_model, "", "write a flat deck (no parts and instances)"), &
+      keyword_t("END PART", in_model, "", "write a flat deck (no parts and instances)"), &
+      keyword_t("ASSEMBLY", in_model, "", "write a flat deck (no parts and instances)"), &
+      keyword_t("END ASSEMBLY", in_model, "", "write a flat deck (no parts and instances)"), &
+      keyword_t("INSTANCE", in_model, "", "write a flat deck (no parts and instances)"), &
+      keyword_t("END INSTANCE", in_model, "", "write a flat deck (no parts and instances)"), &
+      keyword_t("PLASTIC", in_model, "", "materials are elastic"), &
+      keyword_t("CYCLIC HARDENING", in_model, "", "materials are elastic"), &
+      keyword_t("CREEP", in_model, "", "materials are elastic"), &
+      keyword_t("VISCOELASTIC", in_model, "", "materials are elastic"), &
+      keyword_t("USER MATERIAL", in_model, "", "materials are elastic"), &
+      keyword_t("HYPERFOAM", in_model, "", "use *HYPERELASTIC, NEO HOOKE"), &
+      keyword_t("DEPVAR", in_model, "", "materials have no state variables"), &
+      keyword_t("DAMPING", in_both, "", "there is no damping: energy is to be conserved"), &
+      keyword_t("EXPANSION", in_model, "", no_thermal), &
+      keyword_t("CONDUCTIVITY", in_model, "", no_thermal), &
+      keyword_t("SPECIFIC HEAT", in_model, "", no_thermal), &
+      keyword_t("PHYSICAL CONSTANTS", in_model, "", no_thermal), &
+      keyword_t("TEMPERATURE", in_step, "", no_thermal), &
+      keyword_t("DFLUX", in_step, "", no_thermal), &
+      keyword_t("FILM", in_step, "", no_thermal), &
+      keyword_t("RADIATE", in_step, "", no_thermal), &
+      keyword_t("HEAT TRANSFER", in_step, "", no_thermal), &
+      keyword_t("SHELL SECTION", in_model, "", no_rods), &
+      keyword_t("BEAM SECTION", in_model, "", no_rods), &
+      keyword_t("MEMBRANE SECTION", in_model, "", no_rods), &
+      keyword_t("SPRING", in_model, "", no_rods), &
+      keyword_t("DASHPOT", in_model, "", no_rods), &
+      keyword_t("MASS", in_model, "", no_rods), &
+      keyword_t("GAP", in_model, "", "use *CONTACT PAIR"), &
+      keyword_t("CONTACT", in_both, "", "name the two surfaces by *CONTACT PAIR"), &
+      keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
+      keyword_t("CONTACT DAMPING", in_model, "", "contact is enforced exactly, without damping"), &
+      keyword_t("CONTACT CONTROLS", in_both, "", "contact is enforced exactly"), &
+      keyword_t("CHANGE FRICTION", in_step, "", "there is no friction"), &
+      keyword_t("MODEL CHANGE", in_step, "", "pairs and elements stay for the whole run"), &
+      keyword_t("DSLOAD", in_step, "", "use *DLOAD with element faces"), &
+      keyword_t("BASE MOTION", in_step, "", "use *BOUNDARY with an amplitude"), &
+      keyword_t("CONTROLS", in_step, "", "use *NEWTON"), &
+      keyword_t("FREQUENCY", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
+      keyword_t("BUCKLE", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
+      keyword_t("MODAL DYNAMIC", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
+      keyword_t("STEADY STATE DYNAMICS", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
+      keyword_t("VISCO", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
+      keyword_t("OUTPUT", in_step, "", no_export, .true.), &
+      keyword_t("NODE OUTPUT", in_step, "", "use *NODE FILE or *NODE PRINT", .true.), &
+      keyword_t("ELEMENT OUTPUT", in_step, "", "use *EL FILE or *EL PRINT", .true.), &
+      keyword_t("CONTACT OUTPUT", in_step, "", "use *CONTACT FILE or *CONTACT PRINT", .true.), &
+      keyword_t("ENERGY OUTPUT", in_step, "", "use *ENERGY PRINT", .true.), &
+      keyword_t("ELEMENT FILE", in_step, "", "use *EL FILE", .true.), &
+      keyword_t("SECTION PRINT", in_step, "", no_export, .true.), &
+      keyword_t("SECTION FILE", in_step, "", no_export, .true.), &
+      keyword_t("FILE FORMAT", in_both, "", no_export, .true.), &
+      keyword_t("MONITOR", in_step, "", no_export, .true.), &
+      keyword_t("PRINT", in_step, "", no_export, .true.)]
+
+contains
+
+   !> Index in `keywords` of `name` (upper case, without blanks); 0: unknown.
+   pure integer function find_keyword(name)
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      do i = 1, size(keywords)
+         if (squeezed(keywords(i)%name) == name) then
+            find_keyword = i
+            return
+         end if
+      end do
+      find_keyword = 0
+   end function find_keyword
+
+   !> All names, with a star, for suggestions.
+   pure function keyword_names() result(list)
+      type(string_t) :: list(size(keywords))
+      integer :: i
+
+      do i = 1, size(keywords)
+         list(i)%text = "*" // trim(keywords(i)%name)
+      end do
+   end function keyword_names
+
+   !> How a keyword with the list `parameters` takes the parameter `name`: one of `mark_`.
+   pure integer function parameter_mark(parameters, name)
+      character(len=*), intent(in) :: parameters, name
+      integer :: first, last
+      character(len=:), allocatable :: entry_text
+
+      parameter_mark = mark_none
+      first = 1
+      do while (first <= len_trim(parameters))
+         last = index(parameters(first:), ",") + first - 2
+         if (last < first) last = len_trim(parameters)
+         entry_text = parameters(first:last)
+         first = last + 2
+         if (bare_name(entry_text) /= name) cycle
+         select case (entry_text(1:1))
+         case ("!")
+            parameter_mark = mark_unsupported
+         case ("~")
+            parameter_mark = mark_without_effect
+         case default
+            select case (entry_text(len(entry_text):))
+            case ("=")
+               parameter_mark = mark_value
+            case ("?")
+               parameter_mark = mark_either
+            case default
+               parameter_mark = mark_flag
+            end select
+         end select
+         return
+      end do
+   end function parameter_mark
+
+   !> The supported parameters of a list, for suggestions.
+   pure function parameter_names(parameters) result(list)
+      character(len=*), intent(in) :: parameters
+      type(string_t), allocatable :: list(:)
+      integer :: first, last, n
+
+      allocate(list(len_trim(parameters)))
+      n = 0
+      first = 1
+      do while (first <= len_trim(parameters))
+         last = index(parameters(first:), ",") + first - 2
+         if (last < first) last = len_trim(parameters)
+         if (scan(parameters(first:first), "!~") == 0) then
+            n = n + 1
+            list(n)%text = bare_name(parameters(first:last))
+         end if
+         first = last + 2
+      end do
+      list = list(:n)
+   end function parameter_names
+
+   pure function bare_name(entry_text) result(name)
+      character(len=*), intent(in) :: entry_text
+      character(len=:), allocatable :: name
+
+      name = entry_text
+      if (scan(name(1:1), "!~") == 1) name = name(2:)
+      if (scan(name(len(name):), "=?") == 1) name = name(:len(name) - 1)
+   end function bare_name
+
+end module emcon_deck_keywords

@@ -1,0 +1,276 @@
+!> *NODE and *ELEMENT.
+module emcon_deck_mesh
+   use emcon_deck_labels, only : find_label, label_map_init
+   use emcon_deck_reader, only : card_error, card_t, check_count, data_error, data_open, data_t, &
+      data_warning, get_integer, get_real, line_origin, need_name, next_line, reader_t
+   use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
+   use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
+   use emcon_kinds, only : wp
+   use emcon_scene, only : origin_t, scene_t, where_text
+   use emcon_text, only : string_t, to_text
+   implicit none
+   private
+   public :: read_nodes, read_elements
+
+   !> Element types of Abaqus and CalculiX that are not read.
+   character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
+      "CPE4R", "CPE4H", "CPE4RH", "CPE4I", "CPE3H", "CPE6", "CPE6M", "CPE8", "CPE8R", "CPS3", &
+      "CPS4", "CPS4R", "CPS4I", "CPS6", "CPS8", "CPS8R", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
+      "CAX8R", "C3D4", "C3D4H", "C3D6", "C3D8", "C3D8R", "C3D8I", "C3D8H", "C3D10", "C3D10M", &
+      "C3D15", "C3D20", "C3D20R", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
+      "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
+      "T2D2", "T3D2", "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
+      "DASHPTA", "GAPUNI", "DCOUP3D", "U1"]
+
+contains
+
+   !> Number of data lines of the cards called `name`: no fewer than what they define.
+   pure integer function count_lines(reader, name)
+      type(reader_t), intent(in) :: reader
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      count_lines = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == name) then
+            count_lines = count_lines + reader%card(i)%last - reader%card(i)%first + 1
+         end if
+      end do
+   end function count_lines
+
+   !> All *NODE cards.
+   subroutine read_nodes(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      integer, allocatable :: repeated(:)
+      logical :: is_solid_told
+      integer :: i, n, most
+
+      most = count_lines(reader, "NODE")
+      allocate(scene%node_label(most), scene%node_origin(most), scene%x(scene%n_dim, most))
+      n = 0
+      is_solid_told = .false.
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "NODE") cycle
+         reader%card(i)%first_item = n + 1
+         call read_node_card(reader, reader%card(i), scene, n, is_solid_told)
+         reader%card(i)%last_item = n
+      end do
+      scene%node_label = scene%node_label(:n)
+      scene%node_origin = scene%node_origin(:n)
+      scene%x = scene%x(:, :n)
+      call label_map_init(reader%node_map, scene%node_label, repeated)
+      do i = 1, size(repeated)
+         call tell_repeated(reader, scene, "node", scene%node_label(repeated(i)), &
+            scene%node_origin(repeated(i)), scene%node_origin( &
+            find_label(reader%node_map, scene%node_label(repeated(i)))))
+      end do
+      if (n == 0 .and. .not. reader%doubt_nodes) then
+         call add_error(reader%log, origin_t(1, 0), "the deck has no node")
+      end if
+   end subroutine read_nodes
+
+   subroutine read_node_card(reader, card, scene, n, is_solid_told)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(inout) :: scene
+      integer, intent(inout) :: n                  !! nodes so far
+      logical, intent(inout) :: is_solid_told      !! a third coordinate was told
+      character(len=1), parameter :: axis(3) = ["x", "y", "z"]
+      type(data_t) :: data
+      real(wp) :: position(3)
+      integer :: label, k
+
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call get_integer(reader, data, 1, "node label", label)
+         if (.not. data%ok) then
+            reader%doubt_nodes = .true.
+            cycle
+         end if
+         call check_count(reader, data, 1, 4, "label, x, y, z")
+         position = 0.0_wp
+         do k = 1, 3
+            call get_real(reader, data, k + 1, "coordinate " // axis(k) // " of node " &
+               // to_text(label), position(k))
+         end do
+         ! A node with a bad coordinate stays, so that what names it is not an error too.
+         n = n + 1
+         scene%node_label(n) = label
+         scene%node_origin(n) = line_origin(reader, data%i_line)
+         scene%x(:, n) = position(:scene%n_dim)
+         if (position(3) /= 0.0_wp .and. .not. is_solid_told) then
+            call data_warning(reader, data, "z of node " // to_text(label) &
+               // " is not 0; the model is plane, z is left out (told once)")
+            is_solid_told = .true.
+         end if
+      end do
+   end subroutine read_node_card
+
+   subroutine tell_repeated(reader, scene, what, label, again, first)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      character(len=*), intent(in) :: what
+      integer, intent(in) :: label
+      type(origin_t), intent(in) :: again, first
+
+      call add_error(reader%log, again, what // " " // to_text(label) &
+         // " is defined twice; first at " // where_text(scene, first))
+   end subroutine tell_repeated
+
+   !> All *ELEMENT cards.
+   subroutine read_elements(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      integer, allocatable :: repeated(:)
+      integer :: i, n, most
+
+      most = count_lines(reader, "ELEMENT")
+      allocate(scene%element_label(most), scene%element_origin(most), scene%element_kind(most), &
+         scene%element_node(max_element_nodes, most))
+      n = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "ELEMENT") cycle
+         reader%card(i)%first_item = n + 1
+         call read_element_card(reader, reader%card(i), scene, n)
+         reader%card(i)%last_item = n
+      end do
+      scene%element_label = scene%element_label(:n)
+      scene%element_origin = scene%element_origin(:n)
+      scene%element_kind = scene%element_kind(:n)
+      scene%element_node = scene%element_node(:, :n)
+      allocate(scene%element_section(n), source=0)
+      call label_map_init(reader%element_map, scene%element_label, repeated)
+      do i = 1, size(repeated)
+         call tell_repeated(reader, scene, "element", scene%element_label(repeated(i)), &
+            scene%element_origin(repeated(i)), scene%element_origin( &
+            find_label(reader%element_map, scene%element_label(repeated(i)))))
+      end do
+      if (n == 0 .and. .not. reader%doubt_elements) then
+         call add_error(reader%log, origin_t(1, 0), "the deck has no element")
+      end if
+   end subroutine read_elements
+
+   subroutine read_element_card(reader, card, scene, n)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(inout) :: scene
+      integer, intent(inout) :: n                  !! elements so far
+      type(data_t) :: data
+      integer :: kind, n_node, label
+      integer :: node(max_element_nodes)
+      character(len=:), allocatable :: type_name
+
+      call need_name(reader, card, "TYPE", type_name)
+      kind = 0
+      if (type_name /= "") kind = find_element_kind(type_name)
+      if (kind == 0) then
+         if (type_name /= "") call refuse_type(reader, card, type_name)
+         reader%doubt_elements = .true.
+         reader%doubt_names = .true.
+         return
+      end if
+      n_node = element_kinds(kind)%n_node
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call get_integer(reader, data, 1, "element label", label)
+         if (.not. data%ok) then
+            reader%doubt_elements = .true.
+            cycle
+         end if
+         call read_connectivity(reader, data, label, n_node, node)
+         n = n + 1
+         scene%element_label(n) = label
+         scene%element_origin(n) = line_origin(reader, data%i_line)
+         scene%element_kind(n) = kind
+         scene%element_node(:, n) = node
+      end do
+   end subroutine read_element_card
+
+   subroutine refuse_type(reader, card, type_name)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: type_name
+      type(string_t) :: known(size(element_kinds))
+      character(len=:), allocatable :: list
+      integer :: i
+
+      list = ""
+      do i = 1, size(element_kinds)
+         known(i)%text = trim(element_kinds(i)%name)
+         list = list // " " // known(i)%text
+      end do
+      if (any(foreign_types == type_name)) then
+         call card_error(reader, card, "element type " // type_name &
+            // " is known but not supported by this version; supported:" // list)
+      else
+         call card_error(reader, card, "unknown element type " // quoted(type_name) &
+            // "; supported:" // list)
+      end if
+   end subroutine refuse_type
+
+   !> The nodes of one element, 0 throughout if any is wrong. The list goes on in the next line
+   !> after a comma at the end of a line.
+   subroutine read_connectivity(reader, data, label, n_node, node)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: label, n_node
+      integer, intent(out) :: node(max_element_nodes)
+      integer :: node_label(max_element_nodes), n_read, k
+      character(len=:), allocatable :: title
+
+      title = "element " // to_text(label)
+      node = 0
+      n_read = 0
+      k = 2
+      do while (n_read < n_node .and. data%ok)
+         if (k > data%n) then
+            if (n_read < n_node .and. data%ends_in_comma) then
+               if (.not. next_line(reader, data)) exit
+               k = 1
+               cycle
+            end if
+            exit
+         end if
+         call get_integer(reader, data, k, "node of " // title, node_label(n_read + 1))
+         n_read = n_read + 1
+         k = k + 1
+      end do
+      if (.not. data%ok) return
+      if (n_read < n_node) then
+         call data_error(reader, data, title // " needs " // to_text(n_node) // " nodes, found " &
+            // to_text(n_read))
+      else if (data%n >= k) then
+         call data_error(reader, data, title // " needs " // to_text(n_node) // " nodes: " &
+            // quoted(data%text(data%from(k):data%to(data%n))) // " is too much")
+      end if
+      if (.not. data%ok) return
+      do k = 1, n_node
+         node(k) = find_label(reader%node_map, node_label(k))
+      end do
+      call check_nodes(reader, data, title, node_label(:n_node), node(:n_node))
+   end subroutine read_connectivity
+
+   subroutine check_nodes(reader, data, title, label, node)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      character(len=*), intent(in) :: title
+      integer, intent(in) :: label(:)
+      integer, intent(inout) :: node(:)            !! index of each label, 0: unknown
+      integer :: k
+
+      if (any(node == 0)) then
+         if (.not. reader%doubt_nodes) call data_error(reader, data, title // " names node " &
+            // label_list(pack(label, node == 0)) // ", which does not exist")
+         node = 0
+         return
+      end if
+      do k = 2, size(node)
+         if (all(node(:k - 1) /= node(k))) cycle
+         call data_error(reader, data, title // " names node " // to_text(label(k)) // " twice")
+         node = 0
+         return
+      end do
+   end subroutine check_nodes
+
+end module emcon_deck_mesh

@@ -1,0 +1,326 @@
+!> Node and element sets, and what stands for nodes or elements elsewhere: a label or a set.
+module emcon_deck_sets
+   use emcon_deck_labels, only : find_label, label_map_t, label_range
+   use emcon_deck_reader, only : card_t, check_count, data_error, data_open, data_t, data_warning, &
+      get_integer, get_name, has_option, is_label, max_name, need_name, next_line, option_name, &
+      reader_t
+   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_scene, only : named_set_t, scene_t
+   use emcon_sort, only : unique_sorted
+   use emcon_text, only : string_t, to_text
+   implicit none
+   private
+   public :: read_sets, find_set, set_names, get_nodes, get_elements
+
+   !> A list that grows by doubling.
+   type :: growing_t
+      integer :: n = 0
+      integer, allocatable :: item(:)
+   end type growing_t
+
+   !> The sets of one kind while they grow.
+   type :: builder_t
+      character(len=7) :: what = ""                !! "node" or "element"
+      character(len=5) :: keyword = ""             !! "NSET" or "ELSET", also the parameter
+      integer :: n = 0
+      type(named_set_t), allocatable :: set(:)     !! names and origins
+      type(growing_t), allocatable :: list(:)
+   end type builder_t
+
+contains
+
+   !> All node sets and element sets, in the order of the deck.
+   subroutine read_sets(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(builder_t) :: nodes, elements
+
+      nodes%what = "node"
+      nodes%keyword = "NSET"
+      call build_sets(reader, nodes, "NODE", reader%node_map, reader%doubt_nodes)
+      call finish(nodes, scene%node_set)
+      elements%what = "element"
+      elements%keyword = "ELSET"
+      call build_sets(reader, elements, "ELEMENT", reader%element_map, reader%doubt_elements)
+      call finish(elements, scene%element_set)
+   end subroutine read_sets
+
+   subroutine build_sets(reader, builder, maker, map, is_doubted)
+      type(reader_t), intent(inout) :: reader
+      type(builder_t), intent(inout) :: builder
+      character(len=*), intent(in) :: maker        !! the keyword that defines the items
+      type(label_map_t), intent(in) :: map
+      logical, intent(in) :: is_doubted            !! labels may be missing after other errors
+      character(len=:), allocatable :: name
+      integer :: i, k, i_set
+      type(card_t) :: card
+
+      allocate(builder%set(8), builder%list(8))
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == maker) then
+            if (.not. has_option(reader%card(i), trim(builder%keyword))) cycle
+         else if (reader%card(i)%name /= builder%keyword) then
+            cycle
+         end if
+         card = reader%card(i)
+         call need_name(reader, card, trim(builder%keyword), name)
+         if (name == "") cycle
+         call find_or_add(builder, name, card, i_set)
+         if (card%name == maker) then
+            do k = card%first_item, card%last_item
+               call append(builder%list(i_set), k)
+            end do
+         else if (has_option(card, "GENERATE")) then
+            call read_generated(reader, card, builder, i_set, map)
+         else
+            call read_entries(reader, card, builder, i_set, map, is_doubted)
+         end if
+      end do
+   end subroutine build_sets
+
+   subroutine find_or_add(builder, name, card, i_set)
+      type(builder_t), intent(inout) :: builder
+      character(len=*), intent(in) :: name
+      type(card_t), intent(in) :: card
+      integer, intent(out) :: i_set
+      type(named_set_t), allocatable :: set(:)
+      type(growing_t), allocatable :: list(:)
+      integer :: n
+
+      i_set = find_set(builder%set(:builder%n), name)
+      if (i_set > 0) return
+      n = builder%n
+      if (n == size(builder%set)) then
+         allocate(set(2*n), list(2*n))
+         set(:n) = builder%set
+         list(:n) = builder%list
+         call move_alloc(set, builder%set)
+         call move_alloc(list, builder%list)
+      end if
+      i_set = n + 1
+      builder%n = i_set
+      builder%set(i_set)%name = name
+      builder%set(i_set)%origin = card%origin
+      allocate(builder%list(i_set)%item(8))
+   end subroutine find_or_add
+
+   pure subroutine append(list, item)
+      type(growing_t), intent(inout) :: list
+      integer, intent(in) :: item
+      integer, allocatable :: grown(:)
+
+      if (list%n == size(list%item)) then
+         allocate(grown(2*list%n))
+         grown(:list%n) = list%item
+         call move_alloc(grown, list%item)
+      end if
+      list%n = list%n + 1
+      list%item(list%n) = item
+   end subroutine append
+
+   !> Data lines of labels and names of sets defined before.
+   subroutine read_entries(reader, card, builder, i_set, map, is_doubted)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(builder_t), intent(inout) :: builder
+      integer, intent(in) :: i_set
+      type(label_map_t), intent(in) :: map
+      logical, intent(in) :: is_doubted
+      type(data_t) :: data
+      integer :: k, j, label, item, other
+      character(len=:), allocatable :: name
+
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         do k = 1, data%n
+            if (data%to(k) < data%from(k)) cycle
+            data%ok = .true.
+            if (is_label(data, k)) then
+               call get_integer(reader, data, k, trim(builder%what) // " label", label)
+               if (.not. data%ok) cycle
+               item = find_label(map, label)
+               if (item > 0) then
+                  call append(builder%list(i_set), item)
+               else if (.not. is_doubted) then
+                  call data_error(reader, data, trim(builder%what) // " " // to_text(label) &
+                     // " does not exist")
+               end if
+            else
+               call get_name(reader, data, k, "name", name)
+               other = find_set(builder%set(:builder%n), name)
+               if (other > 0) then
+                  do j = 1, builder%list(other)%n
+                     call append(builder%list(i_set), builder%list(other)%item(j))
+                  end do
+               else
+                  call refuse_name(reader, data, trim(builder%what) // " set", name, &
+                     set_names(builder%set(:builder%n)))
+               end if
+            end if
+         end do
+      end do
+   end subroutine read_entries
+
+   !> Data lines `first, last, step`.
+   subroutine read_generated(reader, card, builder, i_set, map)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(builder_t), intent(inout) :: builder
+      integer, intent(in) :: i_set
+      type(label_map_t), intent(in) :: map
+      type(data_t) :: data
+      integer :: first, last, step, low, high, i, n_found, n_expected
+
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, 1, 3, "first, last, step")
+         call get_integer(reader, data, 1, "first label", first)
+         last = first
+         step = 1
+         if (data%n > 1) call get_integer(reader, data, 2, "last label", last)
+         if (data%n > 2) call get_integer(reader, data, 3, "step", step)
+         if (.not. data%ok) cycle
+         if (last < first) then
+            call data_error(reader, data, "the last label " // to_text(last) &
+               // " is below the first, " // to_text(first))
+            cycle
+         end if
+         n_expected = (last - first)/step + 1
+         n_found = 0
+         call label_range(map, first, last, low, high)
+         do i = low, high
+            if (mod(map%label(i) - first, step) /= 0) cycle
+            call append(builder%list(i_set), map%index(i))
+            n_found = n_found + 1
+         end do
+         if (n_found == n_expected .or. reader%doubt_nodes .or. reader%doubt_elements) cycle
+         if (n_found == 0) then
+            call data_error(reader, data, "no " // trim(builder%what) // " has any of these labels")
+         else
+            call data_warning(reader, data, to_text(n_expected - n_found) // " of the " &
+               // to_text(n_expected) // " labels are no " // trim(builder%what))
+         end if
+      end do
+   end subroutine read_generated
+
+   subroutine finish(builder, set)
+      type(builder_t), intent(inout) :: builder
+      type(named_set_t), allocatable, intent(out) :: set(:)
+      integer :: i
+
+      set = builder%set(:builder%n)
+      do i = 1, builder%n
+         associate (list => builder%list(i))
+            if (all(list%item(2:list%n) > list%item(:list%n - 1))) then
+               set(i)%item = list%item(:list%n)
+            else
+               set(i)%item = unique_sorted(list%item(:list%n))
+            end if
+         end associate
+      end do
+   end subroutine finish
+
+   !> Index of the set called `name`, 0 if there is none.
+   pure integer function find_set(set, name)
+      type(named_set_t), intent(in) :: set(:)
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      do i = 1, size(set)
+         if (len(set(i)%name) /= len(name)) cycle
+         if (set(i)%name == name) then
+            find_set = i
+            return
+         end if
+      end do
+      find_set = 0
+   end function find_set
+
+   pure function set_names(set) result(list)
+      type(named_set_t), intent(in) :: set(:)
+      type(string_t) :: list(size(set))
+      integer :: i
+
+      do i = 1, size(set)
+         list(i)%text = set(i)%name
+      end do
+   end function set_names
+
+   subroutine refuse_name(reader, data, what, name, known)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      character(len=*), intent(in) :: what, name
+      type(string_t), intent(in) :: known(:)
+
+      if (reader%doubt_names) then
+         data%ok = .false.
+      else
+         call data_error(reader, data, "unknown " // what // " " // quoted(name) &
+            // suggestion(name, known))
+      end if
+   end subroutine refuse_name
+
+   !> The nodes that field `k` names by label or set; none, with `data%ok` false, if it is wrong.
+   subroutine get_nodes(reader, data, k, scene, item)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: k
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: item(:)
+
+      call get_items(reader, data, k, "node", scene%node_set, item)
+   end subroutine get_nodes
+
+   !> The elements that field `k` names by label or set.
+   subroutine get_elements(reader, data, k, scene, item)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: k
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: item(:)
+
+      call get_items(reader, data, k, "element", scene%element_set, item)
+   end subroutine get_elements
+
+   subroutine get_items(reader, data, k, what, set, item)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: k
+      character(len=*), intent(in) :: what         !! "node" or "element"
+      type(named_set_t), intent(in) :: set(:)
+      integer, allocatable, intent(out) :: item(:)
+      character(len=:), allocatable :: name
+      integer :: label, i
+      logical :: is_doubted
+
+      allocate(item(0))
+      if (is_label(data, k)) then
+         call get_integer(reader, data, k, what // " label", label)
+         if (.not. data%ok) return
+         if (what == "node") then
+            i = find_label(reader%node_map, label)
+            is_doubted = reader%doubt_nodes
+         else
+            i = find_label(reader%element_map, label)
+            is_doubted = reader%doubt_elements
+         end if
+         if (i > 0) then
+            item = [i]
+         else if (is_doubted) then
+            data%ok = .false.
+         else
+            call data_error(reader, data, what // " " // to_text(label) // " does not exist")
+         end if
+      else
+         call get_name(reader, data, k, what // " label or set", name)
+         if (.not. data%ok) return
+         i = find_set(set, name)
+         if (i > 0) then
+            item = set(i)%item
+         else
+            call refuse_name(reader, data, what // " set", name, set_names(set))
+         end if
+      end if
+   end subroutine get_items
+
+end module emcon_deck_sets

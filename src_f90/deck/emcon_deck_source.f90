@@ -1,0 +1,325 @@
+!> The text of a deck: the file and all it includes, as one list of lines that know their origin.
+module emcon_deck_source
+   use, intrinsic :: iso_fortran_env, only : iostat_end
+   use emcon_diagnostics, only : add_error, diagnostics_t, quoted
+   use emcon_kinds, only : int64
+   use emcon_scene, only : origin_t
+   use emcon_text, only : squeezed, string_t, to_text
+   implicit none
+   private
+   public :: deck_source_t, deck_open
+
+   integer, parameter :: max_depth = 20            !! of files that include files
+   integer, parameter :: max_includes = 10000      !! in all: files can include each other in powers
+   character(len=3), parameter :: utf8_mark = char(239) // char(187) // char(191)
+   character(len=*), parameter :: blanks = " " // achar(9)
+
+   !> A deck as it was read, before it was understood. A restart file carries this.
+   type :: deck_source_t
+      type(string_t), allocatable :: line(:)
+      integer, allocatable :: file(:)              !! (n_line) index into `file_name`
+      integer, allocatable :: number(:)            !! (n_line) line number in that file
+      type(string_t), allocatable :: file_name(:)  !! as typed; included ones as resolved
+      logical :: is_whole = .true.                 !! false: some included file could not be read
+   end type deck_source_t
+
+   !> A deck source while it grows.
+   type :: builder_t
+      type(deck_source_t) :: source
+      type(diagnostics_t) :: log
+      integer :: n_line = 0
+      integer :: n_file = 0
+      integer :: open_file(max_depth) = 0          !! the chain of files that are being read
+      integer :: depth = 0
+   end type builder_t
+
+contains
+
+   !> Read the deck at `path` and the files it includes. Failures are in `diagnostics`.
+   subroutine deck_open(path, source, diagnostics)
+      character(len=*), intent(in) :: path
+      type(deck_source_t), intent(out) :: source
+      type(diagnostics_t), intent(out) :: diagnostics
+      type(builder_t) :: builder
+      integer :: n
+
+      allocate(builder%source%line(0), builder%source%file(0), builder%source%number(0))
+      allocate(builder%source%file_name(4))
+      call append_file(builder, path, origin_t())
+      n = builder%n_line
+      call resize(builder, n)
+      builder%source%file_name = builder%source%file_name(:builder%n_file)
+      call move_alloc(builder%source%line, source%line)
+      call move_alloc(builder%source%file, source%file)
+      call move_alloc(builder%source%number, source%number)
+      call move_alloc(builder%source%file_name, source%file_name)
+      source%is_whole = builder%source%is_whole
+      diagnostics = builder%log
+      diagnostics%file_name = source%file_name
+      if (n == 0 .and. diagnostics%n_errors == 0) then
+         call add_error(diagnostics, origin_t(1, 0), "the deck is empty")
+      end if
+   end subroutine deck_open
+
+   !> Append the lines of one file; `origin` is the line that includes it (file 0: none).
+   recursive subroutine append_file(builder, path, origin)
+      type(builder_t), intent(inout) :: builder
+      character(len=*), intent(in) :: path
+      type(origin_t), intent(in) :: origin
+      character(len=:), allocatable :: text, fault
+      type(origin_t) :: here
+
+      fault = include_fault(builder, path)
+      if (fault == "") call load_text(path, text, fault)
+      here = origin
+      if (fault == "" .or. origin%file == 0) then
+         call add_file_name(builder, path)
+         if (origin%file == 0) here = origin_t(builder%n_file, 0)
+      end if
+      if (fault /= "") then
+         if (origin%file > 0) fault = "*INCLUDE " // quoted(path) // ": " // fault
+         call add_error(builder%log, here, fault)
+         builder%source%is_whole = .false.
+         return
+      end if
+      builder%depth = builder%depth + 1
+      builder%open_file(builder%depth) = builder%n_file
+      call append_text(builder, text, builder%n_file)
+      builder%depth = builder%depth - 1
+   end subroutine append_file
+
+   !> Why `path` may not be included here; empty if it may.
+   pure function include_fault(builder, path) result(fault)
+      type(builder_t), intent(in) :: builder
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: fault
+      integer :: i
+
+      fault = ""
+      do i = 1, builder%depth
+         if (builder%source%file_name(builder%open_file(i))%text == path) then
+            fault = "the file includes itself"
+            return
+         end if
+      end do
+      if (builder%depth == max_depth) then
+         fault = "files are nested more than " // to_text(max_depth) // " deep"
+      else if (builder%n_file == max_includes) then
+         fault = "more than " // to_text(max_includes) // " files are included"
+      end if
+   end function include_fault
+
+   !> The bytes of a text file, or the reason why there are none.
+   subroutine load_text(path, text, fault)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable, intent(out) :: fault
+      integer(int64) :: n_byte
+      integer :: unit, stat
+      logical :: exists
+      character(len=256) :: message
+
+      fault = ""
+      inquire(file=path, exist=exists, size=n_byte)
+      if (len_trim(path) == 0) then
+         fault = "no file is named"
+      else if (.not. exists) then
+         fault = "no such file"
+      else if (n_byte > int(huge(1), int64)) then
+         fault = "the file is larger than 2 GB; split it by *INCLUDE"
+      end if
+      if (fault /= "") return
+      ! A file without size may be a pipe: opening it would wait for ever.
+      if (n_byte <= 0) then
+         text = ""
+         fault = "the file is empty (or not a regular file)"
+         return
+      end if
+      open(newunit=unit, file=path, access="stream", form="unformatted", action="read", &
+         status="old", iostat=stat, iomsg=message)
+      if (stat == 0) then
+         allocate(character(len=n_byte) :: text)
+         read(unit, iostat=stat, iomsg=message) text
+         if (stat == iostat_end) message = "the file ended while it was read"
+         close(unit)
+      end if
+      if (stat /= 0) then
+         fault = "cannot be read: " // trim(message)
+         if (index(message, "directory") > 0 .and. index(message, "Is a") > 0) &
+            fault = "is a directory, not a deck"
+      else
+         fault = binary_fault(text)
+      end if
+   end subroutine load_text
+
+   !> Says so if `text` holds bytes that no text has.
+   pure function binary_fault(text) result(fault)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: fault
+      integer :: i, code
+
+      fault = ""
+      do i = 1, len(text)
+         code = iachar(text(i:i))
+         if (code >= 32 .and. code /= 127) cycle
+         if (code >= 9 .and. code <= 13) cycle
+         ! Control-Z ends text files of old systems.
+         if (code == 26 .and. i == len(text)) cycle
+         fault = "not a text file: byte " // to_text(i) // " has code " // to_text(code)
+         return
+      end do
+   end function binary_fault
+
+   !> Append the lines of `text`; line ends are LF, CR LF or CR.
+   recursive subroutine append_text(builder, text, i_file)
+      type(builder_t), intent(inout) :: builder
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: i_file
+      character(len=:), allocatable :: include_card
+      integer :: first, last, i, number
+      type(origin_t) :: origin
+
+      call resize(builder, max(builder%n_line + count_lines(text), (3*size(builder%source%file))/2))
+      include_card = ""
+      number = 0
+      first = 1
+      if (index(text, utf8_mark) == 1) first = 4
+      do while (first <= len(text))
+         last = first
+         do last = first, len(text)
+            if (text(last:last) == achar(10) .or. text(last:last) == achar(13)) exit
+         end do
+         number = number + 1
+         i = first
+         first = last + 1
+         if (first <= len(text)) then
+            if (text(first - 1:first) == achar(13) // achar(10)) first = first + 1
+         end if
+         if (last > len(text)) last = len(text) + 1
+         if (include_card == "") origin = origin_t(i_file, number)
+         if (include_card /= "" .or. is_include(text(i:last - 1))) then
+            include_card = include_card // clean(text(i:last - 1))
+            if (include_card(len(include_card):) == "," .and. first <= len(text)) cycle
+            call append_included(builder, include_card, origin)
+            include_card = ""
+         else
+            call append_line(builder, text(i:last - 1), origin_t(i_file, number))
+         end if
+      end do
+   end subroutine append_text
+
+   pure integer function count_lines(text)
+      character(len=*), intent(in) :: text
+      integer :: i
+
+      count_lines = 1
+      do i = 1, len(text)
+         if (text(i:i) == achar(10)) count_lines = count_lines + 1
+      end do
+   end function count_lines
+
+   pure logical function is_include(line)
+      character(len=*), intent(in) :: line
+      character(len=:), allocatable :: word
+      integer :: first
+
+      is_include = .false.
+      first = verify(line, blanks)
+      if (first == 0) return
+      if (line(first:first) /= "*") return
+      word = squeezed(line(first:))
+      is_include = word == "*INCLUDE" .or. index(word, "*INCLUDE,") == 1
+   end function is_include
+
+   !> `line` without the blanks and tabs around it.
+   pure function clean(line) result(text)
+      character(len=*), intent(in) :: line
+      character(len=:), allocatable :: text
+      integer :: first
+
+      first = verify(line, blanks)
+      if (first == 0) then
+         text = ""
+      else
+         text = line(first:verify(line, blanks, back=.true.))
+      end if
+   end function clean
+
+   !> Follow `*INCLUDE, INPUT=file`; the file is sought beside the file that names it.
+   recursive subroutine append_included(builder, card, origin)
+      type(builder_t), intent(inout) :: builder
+      character(len=*), intent(in) :: card
+      type(origin_t), intent(in) :: origin
+      character(len=:), allocatable :: name, folder
+      integer :: i_equal, i_comma
+
+      i_comma = index(card, ",")
+      i_equal = index(card, "=")
+      name = ""
+      if (i_comma > 0 .and. i_equal > i_comma) then
+         if (squeezed(card(i_comma + 1:i_equal - 1)) == "INPUT") name = clean(card(i_equal + 1:))
+      end if
+      if (len(name) > 0) then
+         if (name(len(name):) == ",") name = clean(name(:len(name) - 1))
+      end if
+      if (len(name) > 1) then
+         if (scan(name(1:1), """'") == 1 .and. name(1:1) == name(len(name):)) &
+            name = name(2:len(name) - 1)
+      end if
+      if (len(name) == 0) then
+         call add_error(builder%log, origin, "*INCLUDE needs INPUT=file")
+         builder%source%is_whole = .false.
+         return
+      end if
+      folder = builder%source%file_name(origin%file)%text
+      folder = folder(:index(folder, "/", back=.true.))
+      if (name(1:1) == "/") folder = ""
+      call append_file(builder, folder // name, origin)
+   end subroutine append_included
+
+   subroutine append_line(builder, line, origin)
+      type(builder_t), intent(inout) :: builder
+      character(len=*), intent(in) :: line
+      type(origin_t), intent(in) :: origin
+
+      if (builder%n_line == size(builder%source%file)) call resize(builder, 2*builder%n_line + 8)
+      builder%n_line = builder%n_line + 1
+      builder%source%line(builder%n_line)%text = line
+      builder%source%file(builder%n_line) = origin%file
+      builder%source%number(builder%n_line) = origin%line
+   end subroutine append_line
+
+   !> Give the lists of lines the length `n`; texts are moved, not copied.
+   subroutine resize(builder, n)
+      type(builder_t), intent(inout) :: builder
+      integer, intent(in) :: n
+      type(string_t), allocatable :: line(:)
+      integer, allocatable :: file(:), number(:)
+      integer :: i
+
+      allocate(line(n), file(n), number(n))
+      do i = 1, min(n, builder%n_line)
+         call move_alloc(builder%source%line(i)%text, line(i)%text)
+      end do
+      file(:i - 1) = builder%source%file(:i - 1)
+      number(:i - 1) = builder%source%number(:i - 1)
+      call move_alloc(line, builder%source%line)
+      call move_alloc(file, builder%source%file)
+      call move_alloc(number, builder%source%number)
+   end subroutine resize
+
+   subroutine add_file_name(builder, path)
+      type(builder_t), intent(inout) :: builder
+      character(len=*), intent(in) :: path
+      type(string_t), allocatable :: grown(:)
+
+      if (builder%n_file == size(builder%source%file_name)) then
+         allocate(grown(2*builder%n_file))
+         grown(:builder%n_file) = builder%source%file_name
+         call move_alloc(grown, builder%source%file_name)
+      end if
+      builder%n_file = builder%n_file + 1
+      builder%source%file_name(builder%n_file)%text = path
+   end subroutine add_file_name
+
+end module emcon_deck_source

@@ -1,0 +1,163 @@
+!> What is wrong with a deck: errors and warnings with file and line, collected, then told sorted.
+module emcon_diagnostics
+   use emcon_kinds, only : dp
+   use emcon_scene, only : origin_t
+   use emcon_sort, only : sort_order
+   use emcon_text, only : nearest_word, string_t, to_text
+   implicit none
+   private
+   public :: diagnostics_t, add_error, add_warning, diagnostics_texts
+   public :: quoted, suggestion, label_list
+
+   !> So many errors (and as many warnings) are told; the others are counted.
+   integer, parameter :: max_told = 50
+   !> So many labels of a list are named; the others are counted.
+   integer, parameter :: max_labels = 10
+   !> Longer words are cut in messages.
+   integer, parameter :: max_word = 60
+
+   type :: diagnostic_t
+      type(origin_t) :: origin               !! file 0: not from a deck; line 0: the whole file
+      logical :: is_error = .true.
+      character(len=:), allocatable :: text
+   end type diagnostic_t
+
+   type :: diagnostics_t
+      integer :: n_errors = 0
+      integer :: n_warnings = 0
+      type(string_t), allocatable :: file_name(:)        !! as the user typed them
+      type(diagnostic_t), allocatable, private :: item(:)
+   end type diagnostics_t
+
+contains
+
+   subroutine add_error(self, origin, text)
+      type(diagnostics_t), intent(inout) :: self
+      type(origin_t), intent(in) :: origin
+      character(len=*), intent(in) :: text
+
+      call add(self, diagnostic_t(origin, .true., trim(text)))
+      self%n_errors = self%n_errors + 1
+   end subroutine add_error
+
+   subroutine add_warning(self, origin, text)
+      type(diagnostics_t), intent(inout) :: self
+      type(origin_t), intent(in) :: origin
+      character(len=*), intent(in) :: text
+
+      call add(self, diagnostic_t(origin, .false., trim(text)))
+      self%n_warnings = self%n_warnings + 1
+   end subroutine add_warning
+
+   subroutine add(self, item)
+      type(diagnostics_t), intent(inout) :: self
+      type(diagnostic_t), intent(in) :: item
+      type(diagnostic_t), allocatable :: grown(:)
+      integer :: n
+
+      n = self%n_errors + self%n_warnings
+      if (.not. allocated(self%item)) allocate(self%item(16))
+      if (n == size(self%item)) then
+         allocate(grown(2*n))
+         grown(:n) = self%item
+         call move_alloc(grown, self%item)
+      end if
+      self%item(n + 1) = item
+   end subroutine add
+
+   !> All messages, one line each, in the order of files and lines: `file:line: error: ...`.
+   function diagnostics_texts(self) result(text)
+      type(diagnostics_t), intent(in) :: self
+      type(string_t), allocatable :: text(:)
+      integer, allocatable :: order(:)
+      real(dp), allocatable :: key(:)
+      integer :: i, n, n_text, told(2), k
+
+      n = self%n_errors + self%n_warnings
+      allocate(key(n))
+      do i = 1, n
+         key(i) = real(self%item(i)%origin%file, dp)*2.0_dp**32 + real(self%item(i)%origin%line, dp)
+      end do
+      order = sort_order(key)
+      allocate(text(min(n, 2*max_told + 2)))
+      told = 0
+      n_text = 0
+      do i = 1, n
+         k = merge(1, 2, self%item(order(i))%is_error)
+         told(k) = told(k) + 1
+         if (told(k) > max_told) cycle
+         n_text = n_text + 1
+         text(n_text)%text = line_text(self, self%item(order(i)))
+      end do
+      if (told(1) > max_told) then
+         n_text = n_text + 1
+         text(n_text)%text = "and " // to_text(told(1) - max_told) // " more errors"
+      end if
+      if (told(2) > max_told) then
+         n_text = n_text + 1
+         text(n_text)%text = "and " // to_text(told(2) - max_told) // " more warnings"
+      end if
+      text = text(:n_text)
+   end function diagnostics_texts
+
+   pure function line_text(self, item) result(text)
+      type(diagnostics_t), intent(in) :: self
+      type(diagnostic_t), intent(in) :: item
+      character(len=:), allocatable :: text
+
+      text = ""
+      if (item%origin%file > 0) then
+         text = self%file_name(item%origin%file)%text // ":"
+         if (item%origin%line > 0) text = text // to_text(item%origin%line) // ":"
+         text = text // " "
+      end if
+      if (item%is_error) then
+         text = text // "error: " // item%text
+      else
+         text = text // "warning: " // item%text
+      end if
+   end function line_text
+
+   !> `word` in quotes, for a message: cut if long, without what would upset a terminal.
+   pure function quoted(word) result(text)
+      character(len=*), intent(in) :: word
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = trim(adjustl(word))
+      if (len(text) > max_word) text = text(:max_word) // "..."
+      do i = 1, len(text)
+         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127) text(i:i) = "?"
+      end do
+      text = "'" // text // "'"
+   end function quoted
+
+   !> "; did you mean X?" if an entry of `known` is near to `word` (both upper case), else nothing.
+   pure function suggestion(word, known) result(text)
+      character(len=*), intent(in) :: word
+      type(string_t), intent(in) :: known(:)
+      character(len=:), allocatable :: text
+
+      text = ""
+      if (len(word) > max_word) return
+      text = nearest_word(word, known)
+      if (text /= "") text = "; did you mean " // text // "?"
+   end function suggestion
+
+   !> "5, 7, 12 and 4 more"
+   pure function label_list(label) result(text)
+      integer, intent(in) :: label(:)
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = ""
+      do i = 1, min(size(label), max_labels)
+         if (i > 1) text = text // ", "
+         text = text // to_text(label(i))
+      end do
+      if (size(label) > max_labels) then
+         text = text // " and " // to_text(size(label) - max_labels) // " more"
+      end if
+   end function label_list
+
+end module emcon_diagnostics

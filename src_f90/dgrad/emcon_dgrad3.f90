@@ -1,0 +1,14 @@
+!> Discrete-gradient arithmetic over 3 variables: the three strain invariants of a constitutive law.
+!>
+!> Source: docs/theory.md, section 2.
+module emcon_dgrad3
+   use emcon_dgrad_series, only : atanh_excess, expm1_of, log1p_excess, log1p_of, sinh_ratio
+   use emcon_kinds, only : wp
+   implicit none
+   private
+
+   integer, parameter :: n_var = 3
+
+   include "emcon_dgrad.inc"
+
+end module emcon_dgrad3

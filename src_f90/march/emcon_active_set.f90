@@ -1,0 +1,208 @@
+!> Which constraints act in a step: a primal-dual active set around Newton's method.
+!>
+!> A constraint is taken in when its gap would be negative at the end of the step, and let go when
+!> its multiplier is. If a set comes back, constraints are only added from then on; if that does
+!> not end either, the step has failed and is cut.
+module emcon_active_set
+   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
+   use emcon_contact, only : gap_state_t
+   use emcon_correction, only : correction_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_newton, only : newton_converged, newton_solve, newton_t
+   use emcon_scene, only : scene_t
+   use emcon_system, only : pose_t, system_t
+   implicit none
+   private
+   public :: active_set_t, active_set_init, active_set_solve
+   public :: step_done, step_inverted, step_diverged, step_singular, step_cycling, step_too_far, &
+      step_stands_off
+
+   !> How a step ended; the first four are those of Newton's method.
+   integer, parameter :: step_done = 0, step_inverted = 1, step_diverged = 2, step_singular = 3, &
+      step_cycling = 4, step_too_far = 5, step_stands_off = 6
+
+   !> Penetration and tension below these multiples of epsilon are round-off.
+   real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp), force_noise = 1.0e3_wp*epsilon(1.0_wp)
+   !> Sets tried in one step at most.
+   integer, parameter :: most_sets = 40
+
+   type :: active_set_t
+      logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start
+      real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
+      type(constraint_set_t) :: set
+      logical, allocatable :: is_active(:)       !! (n_constraint)
+      logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
+      integer :: n_tried = 0
+      integer :: n_newton = 0                    !! iterations over all sets of the last step
+      integer :: cycling_node = 0                !! slave node of a constraint that comes and goes
+   end type active_set_t
+
+contains
+
+   !> Set up for the constraints of `system`.
+   subroutine active_set_init(self, system)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+
+      if (allocated(self%is_active)) deallocate(self%is_active, self%tried)
+      allocate(self%is_active(system%n_constraint), source=.false.)
+      allocate(self%tried(system%n_constraint, most_sets), source=.false.)
+   end subroutine active_set_init
+
+   !> Solve the step from `u0`, `v0`; `du` is the first guess and the result. `was_active` are the
+   !> constraints that acted at its start.
+   subroutine active_set_solve(self, system, scene, newton, correction, pose, u0, v0, offset, &
+      was_active, du, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(correction_t), intent(inout) :: correction
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), offset(:, :)
+      logical, intent(in) :: was_active(:)
+      real(wp), intent(inout), contiguous :: du(:, :)
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: only_adds, has_changed
+
+      call begin_contact(self, system, scene, u0, du, was_active)
+      self%n_newton = 0
+      self%n_tried = 0
+      only_adds = .false.
+      do
+         call remember(self)
+         call select_active(self, system, scene, u0, du)
+         call newton_solve(newton, system, scene, correction, self%set, pose, u0, v0, offset, du, &
+            status, error)
+         if (allocated(error)) return
+         self%n_newton = self%n_newton + newton%n_iteration
+         if (status /= newton_converged .or. system%n_constraint == 0) return
+         call update(self, system, scene, u0, du, was_active, only_adds, has_changed, status)
+         if (status /= step_done .or. .not. has_changed) return
+         if (was_tried(self)) then
+            if (only_adds .or. .not. self%holds_gap) status = step_cycling
+            if (status /= step_done) return
+            only_adds = .true.
+            self%is_active = self%is_active .or. any(self%tried(:, :self%n_tried), dim=2)
+            if (was_tried(self)) status = step_cycling
+         end if
+         if (self%n_tried == most_sets) status = step_cycling
+         if (status /= step_done) return
+      end do
+   end subroutine active_set_solve
+
+   !> Choose stencils; start from the constraints that acted before and still can.
+   subroutine begin_contact(self, system, scene, u0, du, was_active)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      logical, intent(in) :: was_active(:)
+      type(gap_state_t) :: state
+      integer :: pair, i, id
+
+      self%is_active = .false.
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact)
+            call contact%begin_step(scene%x, u0, du)
+            do i = 1, contact%n_constraint
+               id = system%first_constraint(pair) + i
+               if (.not. was_active(id)) cycle
+               state = contact%gap_state(i, scene%x, u0, system%zero)
+               self%is_active(id) = state%is_near .and. state%is_over
+            end do
+         end associate
+      end do
+   end subroutine begin_contact
+
+   !> Hand the present set to the constraints, with the gaps to hold; multipliers carry over.
+   subroutine select_active(self, system, scene, u0, du)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      integer, allocatable :: old_id(:)
+      real(wp), allocatable :: old_lam(:)
+      type(gap_state_t) :: state
+      integer :: k, pair, i
+
+      if (self%set%n == 0 .and. .not. any(self%is_active)) then
+         call constraints_select(self%set, [integer ::])
+         return
+      end if
+      old_id = self%set%id
+      old_lam = self%set%lam
+      call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
+      do k = 1, self%set%n
+         self%set%lam(k) = sum(old_lam, old_id == self%set%id(k))
+         if (.not. self%holds_gap) cycle
+         call constraint_place(system, self%set%id(k), pair, i)
+         state = system%contact(pair)%contact%gap_state(i, scene%x, u0, du)
+         self%set%target(k) = state%gap0
+         self%set%is_kept(k) = .true.
+      end do
+   end subroutine select_active
+
+   !> The next set, from the gaps and multipliers of the converged one.
+   subroutine update(self, system, scene, u0, du, was_active, only_adds, has_changed, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      logical, intent(in) :: was_active(:), only_adds
+      logical, intent(out) :: has_changed
+      integer, intent(out) :: status
+      type(gap_state_t) :: state
+      integer :: pair, i, id, k
+      real(wp) :: noise
+
+      status = step_done
+      has_changed = .false.
+      k = 0
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact)
+            do i = 1, contact%n_constraint
+               id = system%first_constraint(pair) + i
+               if (self%is_active(id)) then
+                  k = k + 1
+                  state = contact%gap_state(i, scene%x, u0, du)
+                  if (.not. state%is_covered) status = step_too_far
+                  if (self%gap_tolerance > 0.0_wp .and. self%holds_gap .and. .not. was_active(id) &
+                     .and. state%gap0 > self%gap_tolerance*state%size) status = step_stands_off
+                  noise = force_noise*sum(system%magnitude(:, contact%node(i)))
+                  if (only_adds .or. self%set%lam(k) >= -noise) cycle
+                  self%is_active(id) = .false.
+               else
+                  state = contact%gap_state(i, scene%x, u0, du)
+                  if (.not. (state%is_near .and. state%is_over)) cycle
+                  if (state%gap1 >= -gap_noise*state%size) cycle
+                  if (.not. state%is_covered) status = step_too_far
+                  self%is_active(id) = .true.
+               end if
+               has_changed = .true.
+               self%cycling_node = contact%node(i)
+            end do
+         end associate
+      end do
+   end subroutine update
+
+   subroutine remember(self)
+      type(active_set_t), intent(inout) :: self
+
+      self%n_tried = self%n_tried + 1
+      self%tried(:, self%n_tried) = self%is_active
+   end subroutine remember
+
+   pure logical function was_tried(self)
+      type(active_set_t), intent(in) :: self
+      integer :: i
+
+      was_tried = .false.
+      do i = 1, self%n_tried
+         was_tried = was_tried .or. all(self%tried(:, i) .eqv. self%is_active)
+      end do
+   end function was_tried
+
+end module emcon_active_set

@@ -1,0 +1,65 @@
+!> The energy and momentum ledger: what the system holds and what was done to it.
+module emcon_ledger
+   use emcon_kinds, only : wp
+   use emcon_state, only : state_t
+   use emcon_system, only : mass_times, system_t
+   implicit none
+   private
+   public :: ledger_t, ledger_measure, body_momenta
+
+   !> total = kinetic + strain - external_work stays constant up to the work of contact.
+   type :: ledger_t
+      real(wp) :: kinetic = 0.0_wp               !! [M L^2/T^2]
+      real(wp) :: strain = 0.0_wp
+      real(wp) :: external_work = 0.0_wp         !! of loads and prescribed motion, since the start
+      real(wp) :: contact_work = 0.0_wp          !! of contact forces, since the start
+      real(wp) :: total = 0.0_wp
+      real(wp) :: momentum(2) = 0.0_wp           !! [M L/T]
+      real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]
+   end type ledger_t
+
+contains
+
+   !> Energies and momenta of `state`; the works stand.
+   subroutine ledger_measure(self, system, x, state)
+      type(ledger_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:, :)
+      type(state_t), intent(in) :: state
+      integer :: i
+
+      call mass_times(system, state%v, system%f_work)
+      self%kinetic = 0.5_wp*sum(state%v*system%f_work)
+      self%strain = sum(state%energy)
+      self%total = self%kinetic + self%strain - self%external_work
+      self%momentum = sum(system%f_work, dim=2)
+      self%angular = 0.0_wp
+      do i = 1, size(x, 2)
+         self%angular = self%angular + moment(x(:, i), state%u(:, i), system%f_work(:, i))
+      end do
+   end subroutine ledger_measure
+
+   pure real(wp) function moment(x, u, p)
+      real(wp), intent(in) :: x(2), u(2), p(2)
+
+      moment = (x(1) + u(1))*p(2) - (x(2) + u(2))*p(1)
+   end function moment
+
+   !> Linear and angular momentum of each body: rows px, py, lz.
+   subroutine body_momenta(system, x, state, momenta)
+      type(system_t), intent(inout) :: system
+      real(wp), intent(in), contiguous :: x(:, :)
+      type(state_t), intent(in) :: state
+      real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
+      integer :: i
+
+      call mass_times(system, state%v, system%f_work)
+      momenta = 0.0_wp
+      do i = 1, size(x, 2)
+         if (system%body(i) == 0) cycle
+         momenta(:, system%body(i)) = momenta(:, system%body(i)) + [system%f_work(:, i), &
+            moment(x(:, i), state%u(:, i), system%f_work(:, i))]
+      end do
+   end subroutine body_momenta
+
+end module emcon_ledger

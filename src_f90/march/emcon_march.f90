@@ -1,0 +1,452 @@
+!> The march through time: increments on a grid, cut where a step fails, back on the grid exactly.
+!>
+!> Times are counted in integers: grid increments of h, and dyadic fractions of one when it is cut.
+module emcon_march
+   use emcon_active_set, only : active_set_init, active_set_solve, active_set_t, step_cycling, &
+      step_diverged, step_done, step_inverted, step_singular, step_stands_off, step_too_far
+   use emcon_correction, only : correction_reset, correction_t
+   use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_measure, ledger_t
+   use emcon_loads, only : instant_t, prescribed_motion
+   use emcon_newton, only : newton_init, newton_t
+   use emcon_rigid_motion, only : free_motion_text
+   use emcon_scene, only : initiation_persistent, initiation_velocity_update, procedure_dynamic, &
+      procedure_static, scene_t, step_t
+   use emcon_scheme, only : scheme_t
+   use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_scheme_static, only : scheme_static_t
+   use emcon_state, only : state_t
+   use emcon_system, only : pose_t, system_begin_step, system_init, system_respond, system_t
+   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_velocity_update, only : velocity_update_apply, velocity_update_reset, &
+      velocity_update_t
+   implicit none
+   private
+   public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
+      march_resume
+
+   !> An increment is halved so often at most, unless the deck gives h_min.
+   integer, parameter :: default_levels = 12, most_levels = 24
+   !> Increments without a cut after which an automatic increment is doubled.
+   integer, parameter :: easy_increments = 5
+   !> Closer than this a step's duration counts as a whole number of increments.
+   real(wp), parameter :: whole = 1.0e3_wp*epsilon(1.0_wp)
+
+   !> What one increment took.
+   type :: increment_t
+      real(wp) :: h = 0.0_wp
+      integer :: n_newton = 0                    !! iterations, over all cuts and active sets
+      integer :: n_cut = 0
+      integer :: n_active = 0
+      type(notes_t) :: notes
+   end type increment_t
+
+   type :: march_t
+      type(system_t) :: system
+      type(state_t) :: state
+      type(ledger_t) :: ledger
+      class(scheme_t), allocatable :: scheme
+      type(newton_t) :: newton
+      type(active_set_t) :: active
+      type(correction_t) :: correction
+      type(velocity_update_t) :: velocity_update
+      integer :: n_grid = 0                      !! grid increments in the step
+      integer :: most_stride = 1                 !! largest increment, in grid increments
+      integer :: n_level = default_levels        !! halvings allowed
+      real(wp), allocatable :: du(:, :), v1(:, :), offset(:, :)   !! (2, n_node)
+   end type march_t
+
+contains
+
+   !> Build the system of `scene` and put it into its initial state.
+   subroutine march_init(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer :: n
+
+      call system_init(self%system, scene, error)
+      if (allocated(error)) return
+      n = size(scene%x, 2)
+      allocate(self%du(2, n), self%v1(2, n), self%offset(2, n), source=0.0_wp)
+      associate (state => self%state)
+         state%u = scene%u0
+         state%v = scene%v0
+         allocate(state%u_start(2, n), state%contact(2, n), state%reaction(2, n), source=0.0_wp)
+         allocate(state%internal(2, n), source=0.0_wp)
+         allocate(state%is_active(self%system%n_constraint), source=.false.)
+         allocate(state%lam(self%system%n_constraint), source=0.0_wp)
+         allocate(state%energy(self%system%solid%n_element), source=0.0_wp)
+      end associate
+      call active_set_init(self%active, self%system)
+   end subroutine march_init
+
+   !> Begin step `i_step` of the deck from the present state.
+   subroutine march_begin_step(self, scene, i_step, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: text
+
+      self%state%i_step = i_step
+      self%state%n_grid = 0
+      self%state%grid_stride = 1
+      self%state%n_easy = 0
+      self%state%start_time = self%state%time
+      self%state%u_start = self%state%u
+      if (scene%step(i_step)%procedure == procedure_static) then
+         text = free_motion_text(self%system, scene, scene%step(i_step)%prescribed)
+         if (len(text) > 0) then
+            call raise(error, err_analysis, text)
+            return
+         end if
+         self%state%v = 0.0_wp
+      end if
+      call march_resume(self, scene, error)
+   end subroutine march_begin_step
+
+   !> Set up for the step that the state is in.
+   subroutine march_resume(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(pose_t) :: rest
+
+      associate (step => scene%step(self%state%i_step), state => self%state)
+         call system_begin_step(self%system, scene, state%i_step, error)
+         if (allocated(error)) return
+         if (allocated(self%scheme)) deallocate(self%scheme)
+         if (step%procedure == procedure_dynamic) then
+            allocate(scheme_energy_momentum_t :: self%scheme)
+         else
+            allocate(scheme_static_t :: self%scheme)
+            self%scheme%has_inertia = .false.
+         end if
+         call newton_init(self%newton, self%system%numbering%n_unknown, &
+            self%system%solid%n_node, step%newton_tolerance, step%newton_maximum)
+         call correction_reset(self%correction, step%constraint_method)
+         call velocity_update_reset(self%velocity_update)
+         self%active%holds_gap = step%initiation == initiation_persistent &
+            .and. self%scheme%has_inertia
+         self%active%gap_tolerance = step%gap_tolerance
+         call count_grid(self, step)
+         self%du = 0.0_wp
+         rest%is_end = .true.
+         call system_respond(self%system, scene, rest, state%u, state%v, self%du, self%du, .false.)
+         if (self%system%response%inverted_element > 0) then
+            call raise(error, err_analysis, "element " // to_text(scene%element_label( &
+               self%system%response%inverted_element)) // &
+               " is inverted by the displacements at the start of the step")
+            return
+         end if
+         state%internal = self%system%response%force
+         state%energy = self%system%response%energy
+      end associate
+      call ledger_measure(self%ledger, self%system, scene%x, self%state)
+   end subroutine march_resume
+
+   !> Grid increments in the step, and by how much they may grow and shrink.
+   subroutine count_grid(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      real(wp) :: ratio, h_max
+
+      ratio = step%duration/step%h
+      self%n_grid = nint(ratio)
+      if (abs(ratio - real(self%n_grid, wp)) > whole*ratio) self%n_grid = ceiling(ratio)
+      self%n_grid = max(1, self%n_grid)
+      h_max = step%h_max
+      if (.not. h_max > 0.0_wp) then
+         h_max = merge(step%duration, step%h, step%procedure == procedure_static)
+      end if
+      self%most_stride = 1
+      if (.not. step%is_direct) then
+         do while (2*self%most_stride*step%h <= h_max .and. self%most_stride < self%n_grid)
+            self%most_stride = 2*self%most_stride
+         end do
+      end if
+      self%n_level = default_levels
+      if (step%h_min > 0.0_wp) then
+         self%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
+      end if
+   end subroutine count_grid
+
+   pure logical function march_is_done(self)
+      type(march_t), intent(in) :: self
+
+      march_is_done = self%state%n_grid >= self%n_grid
+   end function march_is_done
+
+   !> Time since the start of the step at grid point `n`.
+   pure real(wp) function grid_time(self, step, n)
+      type(march_t), intent(in) :: self
+      type(step_t), intent(in) :: step
+      integer, intent(in) :: n
+
+      grid_time = real(n, wp)*step%h
+      if (n >= self%n_grid) grid_time = step%duration
+   end function grid_time
+
+   !> Advance by one increment; on failure the state is that of the last part that succeeded.
+   subroutine march_increment(self, scene, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(increment_t), intent(out) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      integer :: stride
+
+      associate (state => self%state, step => scene%step(self%state%i_step))
+         if (step%max_increments > 0 .and. state%n_grid >= step%max_increments &
+            .and. self%most_stride == 1) then
+            call raise(error, err_analysis, "the " // to_text(step%max_increments) // &
+               " increments of *STEP, INC= are used up at time " // to_text(state%time))
+            return
+         end if
+         stride = min(state%grid_stride, self%n_grid - state%n_grid)
+         call cross_grid(self, scene, state%n_grid + stride, increment, error)
+         if (allocated(error)) return
+         state%n_grid = state%n_grid + stride
+         state%increment = state%increment + 1
+         state%time = state%start_time + grid_time(self, step, state%n_grid)
+         increment%n_active = count(state%is_active)
+         if (increment%n_cut > 0) then
+            state%n_easy = 0
+            state%grid_stride = max(1, state%grid_stride/2)
+         else
+            state%n_easy = state%n_easy + 1
+            if (state%n_easy >= easy_increments .and. 2*state%grid_stride <= self%most_stride) then
+               state%grid_stride = 2*state%grid_stride
+               state%n_easy = 0
+            end if
+         end if
+      end associate
+      call ledger_measure(self%ledger, self%system, scene%x, self%state)
+   end subroutine march_increment
+
+   !> Go to grid point `n_end` in one step, or in dyadic parts of one.
+   subroutine cross_grid(self, scene, n_end, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: n_end
+      type(increment_t), intent(inout) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      type(instant_t) :: start
+      real(wp) :: t0, h
+      integer :: level, place, status
+
+      associate (step => scene%step(self%state%i_step))
+         t0 = grid_time(self, step, self%state%n_grid)
+         increment%h = grid_time(self, step, n_end) - t0
+         if (n_end < self%n_grid .or. abs(real(n_end, wp)*step%h - step%duration) &
+            <= whole*step%duration) increment%h = real(n_end - self%state%n_grid, wp)*step%h
+         level = 0
+         place = 0
+         do while (place < 2**self%n_level)
+            h = scale(increment%h, -level)
+            start%step_time = t0 + scale(real(place, wp), -self%n_level)*increment%h
+            start%total_time = self%state%start_time + start%step_time
+            call try_step(self, scene, start, h, level < self%n_level, increment, status, error)
+            if (allocated(error)) return
+            if (status == step_done) then
+               place = place + 2**(self%n_level - level)
+               if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
+               cycle
+            end if
+            call note_add(increment%notes, "increment cut at time " // &
+               to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // &
+               reason_text(self, scene, status))
+            increment%n_cut = increment%n_cut + 1
+            level = level + 1
+            if (level > self%n_level) then
+               call raise(error, err_analysis, failure_text(self, scene, start, h, status))
+               return
+            end if
+         end do
+      end associate
+   end subroutine cross_grid
+
+   !> Why a step failed.
+   function reason_text(self, scene, status) result(text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: status
+      character(len=:), allocatable :: text
+
+      select case (status)
+      case (step_inverted)
+         text = "element " // to_text(scene%element_label(max(1, self%newton%inverted_element))) &
+            // " is inverted"
+      case (step_diverged)
+         text = "Newton's method does not converge (relative residual " // &
+            to_text(self%newton%history(max(1, self%newton%n_history))) // " after " // &
+            to_text(self%newton%n_iteration) // " iterations)"
+      case (step_singular)
+         text = "the system is singular"
+      case (step_cycling)
+         text = "the contact at slave node " // &
+            to_text(scene%node_label(max(1, self%active%cycling_node))) // " opens and closes in turn"
+      case (step_too_far)
+         text = "a slave node slides over more than two master edges"
+      case (step_stands_off)
+         text = "a contact would close over more than the gap tolerance"
+      case default
+         text = "reason " // to_text(status)
+      end select
+   end function reason_text
+
+   !> Text of the error that ends an analysis.
+   function failure_text(self, scene, start, h, status) result(text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      integer, intent(in) :: status
+      character(len=:), allocatable :: text, motion
+
+      text = "the analysis stops at time " // to_text(start%total_time, 9) // ": with h = " // &
+         to_text(h) // ", the smallest allowed, " // reason_text(self, scene, status)
+      if (status == step_singular .and. .not. self%scheme%has_inertia) then
+         motion = free_motion_text(self%system, scene, &
+            scene%step(self%state%i_step)%prescribed, with_contact=.true.)
+         if (len(motion) > 0) text = text // "; " // motion
+      end if
+   end function failure_text
+
+   !> One step of size `h`; if it succeeds the state and the works are moved on.
+   subroutine try_step(self, scene, start, h, may_cut, increment, status, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      logical, intent(in) :: may_cut
+      type(increment_t), intent(inout) :: increment
+      integer, intent(out) :: status
+      type(error_t), allocatable, intent(out) :: error
+      integer :: attempt
+
+      self%active%gap_tolerance = 0.0_wp
+      if (may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
+      do attempt = 1, 2
+         call guess(self, scene, start, h, is_at_rest=attempt == 2)
+         call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
+            self%scheme%pose(start, h), self%state%u, self%state%v, self%offset, &
+            self%state%is_active, self%du, status, error)
+         if (allocated(error)) return
+         increment%n_newton = increment%n_newton + self%active%n_newton
+         if (status /= step_inverted .or. self%active%n_newton > 0) exit
+      end do
+      if (status == step_done) call commit(self, scene, h, increment, error)
+   end subroutine try_step
+
+   !> First guess of the motion, and the motion and velocity of prescribed freedoms.
+   subroutine guess(self, scene, start, h, is_at_rest)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      logical, intent(in) :: is_at_rest          !! free nodes do not move in the guess
+      type(instant_t) :: finish
+      real(wp) :: u, v
+      integer :: k
+
+      finish = instant_t(start%step_time + h, start%total_time + h)
+      self%offset = 0.0_wp
+      self%du = 0.0_wp
+      if (self%scheme%has_inertia .and. .not. is_at_rest) self%du = h*self%state%v
+      associate (state => self%state, step => scene%step(self%state%i_step))
+         do k = 1, size(step%prescribed)
+            associate (a => step%prescribed(k)%dof, i => step%prescribed(k)%node)
+               call prescribed_motion(scene, step, step%prescribed(k), finish, &
+                  state%u_start(a, i), u, v)
+               self%du(a, i) = u - state%u(a, i)
+               self%v1(a, i) = v
+               if (self%scheme%has_inertia) then
+                  self%offset(a, i) = 0.5_wp*h*(state%v(a, i) + v) - self%du(a, i)
+               end if
+            end associate
+         end do
+      end associate
+   end subroutine guess
+
+   !> Take over the solved step: works, velocities, contact and reaction forces.
+   subroutine commit(self, scene, h, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h
+      type(increment_t), intent(inout) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: restored
+      logical :: has_root, is_free
+      integer :: i, a, k
+
+      associate (state => self%state, system => self%system, set => self%active%set, &
+            step => scene%step(self%state%i_step))
+         system%residual = system%residual - self%newton%contact
+         do i = 1, size(state%v, 2)
+            do a = 1, 2
+               is_free = system%numbering%unknown(a, i) > 0
+               if (is_free) self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), self%du(a, i))
+               state%reaction(a, i) = merge(0.0_wp, system%residual(a, i), is_free)
+            end do
+         end do
+         call book_work(self, h)
+         restored = 0.0_wp
+         if (step%initiation == initiation_velocity_update .and. self%scheme%has_inertia) then
+            call velocity_update_apply(self%velocity_update, system, set, self%v1, restored, &
+               has_root, error)
+            if (allocated(error)) return
+            self%ledger%contact_work = self%ledger%contact_work + restored
+            if (restored > 0.0_wp) call note_add(increment%notes, &
+               "velocity update restores an energy of " // to_text(restored))
+            if (.not. has_root) call note_add(increment%notes, &
+               "velocity update: no root, the energy lost in this step is not restored")
+         end if
+         state%u = state%u + self%du
+         state%v = self%v1
+         state%contact = self%newton%contact
+         state%internal = system%response%force
+         state%energy = system%response%energy
+         state%is_active = .false.
+         state%lam = 0.0_wp
+         do k = 1, set%n
+            state%is_active(set%id(k)) = .true.
+            state%lam(set%id(k)) = set%lam(k)
+         end do
+      end associate
+   end subroutine commit
+
+   !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
+   !> docs/theory.md, section 7); in statics forces are taken as linear over the step.
+   subroutine book_work(self, h)
+      type(march_t), intent(inout) :: self
+      real(wp), intent(in) :: h
+      real(wp) :: contact_work, inner
+      integer :: k, i, a
+
+      associate (state => self%state, system => self%system, set => self%active%set)
+         contact_work = 0.0_wp
+         if (self%scheme%has_inertia) then
+            do k = 1, set%n
+               contact_work = contact_work + set%lam(k)*set%item(k)%dgap
+            end do
+            self%ledger%external_work = self%ledger%external_work + sum(system%external*self%du)
+            do i = 1, size(self%du, 2)
+               do a = 1, 2
+                  if (system%numbering%unknown(a, i) > 0) cycle
+                  inner = state%reaction(a, i) - system%inertia(a, i)
+                  self%ledger%external_work = self%ledger%external_work + inner*self%du(a, i) &
+                     + system%inertia(a, i)*0.5_wp*h*(state%v(a, i) + self%v1(a, i))
+               end do
+            end do
+         else
+            contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*self%du)
+            self%ledger%external_work = self%ledger%external_work - contact_work &
+               + 0.5_wp*sum((state%internal + system%response%force)*self%du)
+         end if
+         self%ledger%contact_work = self%ledger%contact_work + contact_work
+      end associate
+   end subroutine book_work
+
+end module emcon_march

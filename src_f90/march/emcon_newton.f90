@@ -1,0 +1,215 @@
+!> Newton's method for one step with a given set of active constraints.
+!>
+!> Forces are measured against the sum of their contributions before these cancel, so that no
+!> unit and no absolute size enters. After the tolerance is met, corrections with the last
+!> factorisation go on down to round-off: energy is lost to what the residual leaves.
+module emcon_newton
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
+      constraints_rows
+   use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
+      correction_solve, correction_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_scene, only : scene_t
+   use emcon_system, only : pose_t, system_respond, system_t
+   implicit none
+   private
+   public :: newton_t, newton_init, newton_solve
+   public :: newton_converged, newton_inverted, newton_diverged, newton_singular
+
+   integer, parameter :: newton_converged = 0, newton_inverted = 1, newton_diverged = 2, &
+      newton_singular = 3
+
+   !> A residual below this multiple of epsilon is round-off.
+   real(wp), parameter :: floor = 4.0_wp*epsilon(1.0_wp)
+   !> Corrections with an old factorisation at most, and the factor each has to gain.
+   integer, parameter :: most_polish = 3
+   real(wp), parameter :: polish_gain = 0.5_wp
+   !> A correction that inverts an element is halved so often at most.
+   integer, parameter :: most_halvings = 6
+   !> Iterations without a new smallest residual after which the step has failed.
+   integer, parameter :: most_stalls = 6
+   !> A residual that stalls below this multiple of epsilon has converged.
+   real(wp), parameter :: stall_floor = 1.0e4_wp*epsilon(1.0_wp)
+
+   !> Settings, work space and report of the solver.
+   type :: newton_t
+      real(wp) :: tolerance = 0.0_wp             !! relative
+      integer :: maximum = 0                     !! iterations
+      integer :: n_iteration = 0                 !! tangents factorised in the last solve
+      integer :: n_solve = 0                     !! linear systems solved in the last solve
+      integer :: n_history = 0
+      real(wp), allocatable :: history(:)        !! relative residuals of the last solve
+      integer :: inverted_element = 0
+      real(wp), allocatable :: residual(:), scale(:), correction(:)   !! (n_unknown)
+      real(wp), allocatable :: dlam(:)
+      real(wp), allocatable :: contact(:, :)     !! (2, n_node) contact forces
+   end type newton_t
+
+contains
+
+   !> Set up for `n_unknown` unknowns.
+   subroutine newton_init(self, n_unknown, n_node, tolerance, maximum)
+      type(newton_t), intent(out) :: self
+      integer, intent(in) :: n_unknown, n_node
+      real(wp), intent(in) :: tolerance
+      integer, intent(in) :: maximum
+
+      self%tolerance = tolerance
+      self%maximum = maximum
+      allocate(self%residual(n_unknown), self%scale(n_unknown), self%correction(n_unknown))
+      allocate(self%contact(2, n_node), source=0.0_wp)
+      allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
+   end subroutine newton_init
+
+   !> Solve for `du`, whose prescribed entries stand; on entry a first guess. The multipliers of
+   !> `set` start from what they are.
+   subroutine newton_solve(self, system, scene, correction, set, pose, u0, v0, offset, du, status, &
+      error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(correction_t), intent(inout) :: correction
+      type(constraint_set_t), intent(inout) :: set
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), offset(:, :)
+      real(wp), intent(inout), contiguous :: du(:, :)
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: norm, last, best, defect
+      logical :: with_tangent, is_polish, is_singular
+      integer :: n_polish, n_stall
+
+      if (allocated(self%dlam)) deallocate(self%dlam)
+      allocate(self%dlam(set%n))
+      self%n_iteration = 0
+      self%n_solve = 0
+      self%n_history = 0
+      n_polish = 0
+      n_stall = 0
+      is_polish = .false.
+      best = huge(best)
+      last = huge(last)
+      do
+         with_tangent = .not. is_polish
+         call evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, &
+            with_tangent, du, norm, defect, status, error)
+         if (allocated(error) .or. status /= newton_converged) return
+         self%n_history = self%n_history + 1
+         self%history(self%n_history) = max(norm, defect)
+
+         if (max(norm, defect) <= floor) return
+         if (is_polish .and. max(norm, defect) > polish_gain*last) return
+         if (n_polish == most_polish) return
+         last = max(norm, defect)
+         is_polish = is_polish .or. last <= self%tolerance
+         if (last < 0.9_wp*best) then
+            n_stall = 0
+            best = last
+         else
+            n_stall = n_stall + 1
+         end if
+         status = newton_diverged
+         if (.not. is_polish) then
+            if (n_stall > 2 .and. last <= stall_floor) then
+               status = newton_converged
+               return
+            end if
+            if (n_stall > most_stalls .or. self%n_iteration == self%maximum) return
+         end if
+         if (.not. last < huge(last)) return
+
+         if (is_polish .and. self%n_iteration > 0) then
+            n_polish = n_polish + 1
+         else
+            call correction_factorise(correction, system, set, is_singular, error)
+            if (allocated(error)) return
+            self%n_iteration = self%n_iteration + 1
+            if (is_singular) then
+               status = newton_singular
+               return
+            end if
+         end if
+         call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
+         if (allocated(error)) return
+         self%n_solve = self%n_solve + 1
+         call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
+         set%lam = set%lam + self%dlam
+      end do
+   end subroutine newton_solve
+
+   !> Residual at `du`; the last correction is halved as long as an element is inverted.
+   subroutine evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, &
+      with_tangent, du, norm, defect, status, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(correction_t), intent(inout) :: correction
+      type(constraint_set_t), intent(inout) :: set
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), offset(:, :)
+      logical, intent(in) :: with_tangent
+      real(wp), intent(inout), contiguous :: du(:, :)
+      real(wp), intent(out) :: norm, defect
+      integer, intent(out) :: status
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      status = newton_inverted
+      norm = huge(norm)
+      defect = huge(defect)
+      do i = 0, most_halvings
+         call system_respond(system, scene, pose, u0, v0, du, offset, with_tangent)
+         self%inverted_element = system%response%inverted_element
+         if (self%inverted_element == 0) exit
+         if (i == most_halvings .or. self%n_solve == 0) return
+         self%correction = 0.5_wp*self%correction
+         call add_to_dofs(system%numbering, self%correction, -1.0_wp, du)
+      end do
+      status = newton_converged
+      call constraints_evaluate(set, system, scene, pose, u0, du)
+      if (set%n > 0) call constraints_rows(set, system%numbering)
+      call correction_lay_out(correction, system, set, error)
+      if (allocated(error)) return
+      call measure(self, system, correction, set, norm, defect)
+   end subroutine evaluate_damped
+
+   !> Residual with contact forces, its relative size, and the largest relative gap defect.
+   subroutine measure(self, system, correction, set, norm, defect)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(correction_t), intent(in) :: correction
+      type(constraint_set_t), intent(inout) :: set
+      real(wp), intent(out) :: norm, defect
+      integer :: k
+
+      call pick_unknowns(system%numbering, system%residual, self%residual)
+      call correction_multipliers(correction, set, self%residual)
+      call constraints_force(set, self%contact, system%magnitude)
+      if (set%n > 0) then
+         system%f_work = system%residual - self%contact
+         call pick_unknowns(system%numbering, system%f_work, self%residual)
+      end if
+      call pick_unknowns(system%numbering, system%magnitude, self%scale)
+      norm = relative_size(self%residual, self%scale)
+      defect = 0.0_wp
+      do k = 1, set%n
+         defect = max(defect, abs(set%defect(k))/set%item(k)%size)
+      end do
+   end subroutine measure
+
+   !> |v| / |scale|, 0 where both vanish, without overflow on the way.
+   pure real(wp) function relative_size(v, scale)
+      real(wp), intent(in) :: v(:), scale(:)
+      real(wp) :: largest
+
+      relative_size = 0.0_wp
+      if (size(v) == 0) return
+      largest = maxval(scale)
+      if (.not. largest > 0.0_wp) return
+      largest = real(radix(largest), wp)**exponent(largest)
+      relative_size = sqrt(sum((v/largest)**2)/sum((scale/largest)**2))
+   end function relative_size
+
+end module emcon_newton

@@ -1,0 +1,39 @@
+!> The energy-momentum scheme, paper eq. (4): discrete gradients, mid-point inertia.
+module emcon_scheme_energy_momentum
+   use emcon_kinds, only : wp
+   use emcon_loads, only : instant_t
+   use emcon_scheme, only : scheme_t
+   use emcon_system, only : pose_t
+   implicit none
+   private
+   public :: scheme_energy_momentum_t
+
+   type, extends(scheme_t) :: scheme_energy_momentum_t
+   contains
+      procedure :: pose => energy_momentum_pose
+      procedure :: velocity => energy_momentum_velocity
+   end type scheme_energy_momentum_t
+
+contains
+
+   !> r = M (2/h^2 du - 2/h v0) + forces; loads at mid-time on the mid-configuration.
+   pure function energy_momentum_pose(self, start, h) result(pose)
+      class(scheme_energy_momentum_t), intent(in) :: self
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      type(pose_t) :: pose
+
+      pose%mass_du = 2.0_wp/(h*h)
+      pose%mass_v = 2.0_wp/h
+      pose%load_instant = instant_t(start%step_time + 0.5_wp*h, start%total_time + 0.5_wp*h)
+   end function energy_momentum_pose
+
+   elemental function energy_momentum_velocity(self, h, v0, du) result(v1)
+      class(scheme_energy_momentum_t), intent(in) :: self
+      real(wp), intent(in) :: h, v0, du
+      real(wp) :: v1
+
+      v1 = (2.0_wp/h)*du - v0
+   end function energy_momentum_velocity
+
+end module emcon_scheme_energy_momentum

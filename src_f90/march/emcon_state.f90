@@ -1,0 +1,27 @@
+!> Where an analysis stands: all that the next increment depends on.
+module emcon_state
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: state_t
+
+   type :: state_t
+      integer :: i_step = 0                      !! step of the deck, from 1
+      integer :: n_grid = 0                      !! grid increments of h done in this step
+      integer :: grid_stride = 1                 !! grid increments per increment, a power of two
+      integer :: n_easy = 0                      !! increments in a row without a cut
+      integer :: increment = 0                   !! increments done over all steps
+      real(wp) :: start_time = 0.0_wp            !! total time at the start of the step [T]
+      real(wp) :: time = 0.0_wp                  !! total time [T]
+      real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement [L]
+      real(wp), allocatable :: v(:, :)           !! (2, n_node) velocity [L/T]
+      real(wp), allocatable :: u_start(:, :)     !! (2, n_node) displacement at the step's start
+      logical, allocatable :: is_active(:)       !! (n_constraint)
+      real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
+      real(wp), allocatable :: contact(:, :)     !! (2, n_node) nodal contact forces
+      real(wp), allocatable :: reaction(:, :)    !! (2, n_node) forces at prescribed freedoms
+      real(wp), allocatable :: internal(:, :)    !! (2, n_node) internal forces
+      real(wp), allocatable :: energy(:)         !! (n_element) strain energy
+   end type state_t
+
+end module emcon_state

@@ -1,0 +1,115 @@
+!> Velocity jump at the end of a step that gives back the energy lost in closing contacts.
+!>
+!> Along p = M^-1 sum w_k grad gap_k, w_k = lam_k gap_k(q0) >= 0, the kinetic energy changes by
+!> s b + s^2 a/2; the positive root of s b + s^2 a/2 = lost energy is taken. The jump pushes the
+!> bodies apart and keeps the momenta. Source: Laursen & Love (2002); docs/theory.md, section 6.
+module emcon_velocity_update
+   use emcon_cholmod, only : cholmod_t
+   use emcon_constraints, only : constraint_set_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: velocity_update_t, velocity_update_reset, velocity_update_apply
+
+   type :: velocity_update_t
+      logical :: is_ready = .false.              !! mass factorised for the present numbering
+      type(cholmod_t) :: mass
+      real(wp), allocatable :: push(:), jump(:)  !! (n_unknown)
+   end type velocity_update_t
+
+contains
+
+   !> The numbering has changed.
+   subroutine velocity_update_reset(self)
+      type(velocity_update_t), intent(inout) :: self
+
+      self%is_ready = .false.
+   end subroutine velocity_update_reset
+
+   !> Add the jump to `v`. `restored` is the energy given back, 0 if there was none to give or no
+   !> root (`has_root`).
+   subroutine velocity_update_apply(self, system, set, v, restored, has_root, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(inout), contiguous :: v(:, :)     !! (2, n_node)
+      real(wp), intent(out) :: restored
+      logical, intent(out) :: has_root
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: lost, a, b, root
+      integer :: k
+
+      restored = 0.0_wp
+      has_root = .true.
+      lost = 0.0_wp
+      do k = 1, set%n
+         lost = lost - set%lam(k)*set%item(k)%dgap
+      end do
+      call push_forces(set, system%f_work)
+      if (.not. any(abs(system%f_work) > 0.0_wp)) return
+      if (.not. self%is_ready) call factorise_mass(self, system, error)
+      if (allocated(error)) return
+      has_root = .not. self%mass%is_singular
+      if (.not. has_root) return
+      call pick_unknowns(system%numbering, system%f_work, self%push)
+      call self%mass%solve(self%push, self%jump, error)
+      if (allocated(error)) return
+      a = dot_product(self%push, self%jump)
+      call pick_unknowns(system%numbering, v, self%push)
+      b = dot_unknown(system, self%push)
+      has_root = a > 0.0_wp .and. lost > 0.0_wp
+      if (.not. has_root) return
+      root = sqrt(b*b + 2.0_wp*a*lost)
+      if (b > 0.0_wp) then
+         root = 2.0_wp*lost/(b + root)
+      else
+         root = (root - b)/a
+      end if
+      call add_to_dofs(system%numbering, self%jump, root, v)
+      restored = lost
+   end subroutine velocity_update_apply
+
+   !> Product of the velocities `v` of the unknowns with the forces in `f_work`.
+   real(wp) function dot_unknown(system, v)
+      type(system_t), intent(in) :: system
+      real(wp), intent(in) :: v(:)
+      real(wp) :: force(size(v))
+
+      call pick_unknowns(system%numbering, system%f_work, force)
+      dot_unknown = dot_product(v, force)
+   end function dot_unknown
+
+   !> Sum of w_k grad gap_k at the end of the step.
+   pure subroutine push_forces(set, force)
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(out) :: force(:, :)
+      real(wp) :: weight
+      integer :: k, i, node
+
+      force = 0.0_wp
+      do k = 1, set%n
+         weight = max(0.0_wp, set%lam(k))*max(0.0_wp, set%item(k)%gap0)
+         do i = 1, set%item(k)%n_node
+            node = set%item(k)%node(i)
+            force(:, node) = force(:, node) + weight*set%item(k)%c(:, i)
+         end do
+      end do
+   end subroutine push_forces
+
+   subroutine factorise_mass(self, system, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(error_t), allocatable, intent(out) :: error
+
+      if (allocated(self%push)) deallocate(self%push, self%jump)
+      allocate(self%push(system%numbering%n_unknown), self%jump(system%numbering%n_unknown))
+      call self%mass%analyse(system%matrix, error)
+      if (allocated(error)) return
+      call self%mass%factorise(system%mass_value, error)
+      self%is_ready = .not. allocated(error)
+   end subroutine factorise_mass
+
+end module emcon_velocity_update

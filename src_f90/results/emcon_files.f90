@@ -1,0 +1,261 @@
+!> Files with the guarantees that Fortran's own input and output does not give: one system call per
+!> text, every failure reported (a full disk too), atomic replacement, locks.
+module emcon_files
+   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_int64_t, &
+      c_intptr_t, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use emcon_errors, only : error_t, raise, err_file
+   use emcon_posix, only : c_access, c_close, c_dup2, c_errno, c_fclose, c_fileno, c_flock, &
+      c_fopen, c_fsync, c_ftruncate, c_isatty, c_lseek, c_memfd_create, c_mkdir, c_read, &
+      c_rename, c_signal, c_strerror, c_strlen, c_unlink, c_write, &
+      lock_exclusive, lock_no_wait, errno_exists, errno_missing, errno_again, signal_file_size
+   implicit none
+   private
+   public :: file_t, file_open, file_lock, file_put, file_sync, file_truncate, file_close
+   public :: file_exists, file_rename, file_remove, file_copy, file_discard, make_directory
+   public :: is_terminal, survive_file_size_limit, clear_system_reason, system_reason
+
+   !> An open file. Nothing is buffered: what `file_put` has taken, a kill cannot lose.
+   type :: file_t
+      private
+      type(c_ptr) :: stream = c_null_ptr
+      character(len=:), allocatable :: path
+   contains
+      final :: file_final
+   end type file_t
+
+   integer, parameter :: block_size = 1048576     !! of `file_copy` [byte]
+
+contains
+
+   !> Open `path`: "r" to read, "w" to write anew, "a" to append (made if missing).
+   subroutine file_open(self, path, mode, error)
+      type(file_t), intent(out) :: self
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: mode
+      type(error_t), allocatable, intent(out) :: error
+
+      self%path = path
+      ! "e": child processes of a host program must not inherit the file, and with it the lock.
+      self%stream = c_fopen(path // c_null_char, mode // "e" // c_null_char)
+      if (.not. c_associated(self%stream)) call raise_system(error, "open", path)
+   end subroutine file_open
+
+   !> Take the exclusive lock on the file; fails at once if another open file holds it.
+   !>
+   !> The system drops the lock with the last descriptor, hence also when the run is killed. On a
+   !> file system without locks nothing is refused.
+   subroutine file_lock(self, error)
+      type(file_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (c_flock(c_fileno(self%stream), lock_exclusive + lock_no_wait) == 0) return
+      if (system_errno() /= errno_again) return
+      call raise(error, err_file, self%path // ": another run writes to the same output. Wait " &
+         // "until it ends, stop it, or choose another output directory")
+   end subroutine file_lock
+
+   !> Write `text` at the end of the file, by one system call if the system takes it whole.
+   !>
+   !> On failure the part that was taken is cut off again: lines stay whole.
+   subroutine file_put(self, text, error)
+      type(file_t), intent(in) :: self
+      character(len=*), intent(in) :: text
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_intptr_t) :: n_done, n
+      integer(c_int) :: fd, ignored
+
+      fd = c_fileno(self%stream)
+      n_done = 0
+      do while (n_done < len(text, c_intptr_t))
+         n = c_write(fd, text(n_done + 1:), len(text, c_size_t) - n_done)
+         if (n < 1) then
+            call raise_system(error, "write", self%path)
+            ignored = c_ftruncate(fd, c_lseek(fd, 0_c_int64_t, 1_c_int) - n_done)
+            return
+         end if
+         n_done = n_done + n
+      end do
+   end subroutine file_put
+
+   !> Wait until all that was written is on the disk.
+   subroutine file_sync(self, error)
+      type(file_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (c_fsync(c_fileno(self%stream)) /= 0) call raise_system(error, "write", self%path)
+   end subroutine file_sync
+
+   !> Make the file empty.
+   subroutine file_truncate(self, error)
+      type(file_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (c_ftruncate(c_fileno(self%stream), 0_c_int64_t) /= 0) then
+         call raise_system(error, "empty", self%path)
+      end if
+   end subroutine file_truncate
+
+   !> Close the file; harmless if it is not open.
+   subroutine file_close(self, error)
+      type(file_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: stat
+
+      if (.not. c_associated(self%stream)) return
+      stat = c_fclose(self%stream)
+      self%stream = c_null_ptr
+      if (stat /= 0) call raise_system(error, "close", self%path)
+   end subroutine file_close
+
+   subroutine file_final(self)
+      type(file_t), intent(inout) :: self
+      type(error_t), allocatable :: ignored
+
+      call file_close(self, ignored)
+   end subroutine file_final
+
+   !> Whether there is a file or folder called `path`.
+   logical function file_exists(path)
+      character(len=*), intent(in) :: path
+
+      file_exists = c_access(path // c_null_char, 0_c_int) == 0
+   end function file_exists
+
+   !> Give `from` the name `to`, in one instant; what was called `to` is gone then.
+   subroutine file_rename(from, to, error)
+      character(len=*), intent(in) :: from, to
+      type(error_t), allocatable, intent(out) :: error
+
+      if (c_rename(from // c_null_char, to // c_null_char) /= 0) then
+         call raise_system(error, "replace", to)
+      end if
+   end subroutine file_rename
+
+   !> Remove `path` if it is there.
+   subroutine file_remove(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(out) :: error
+
+      if (c_unlink(path // c_null_char) == 0) return
+      if (system_errno() /= errno_missing) call raise_system(error, "remove", path)
+   end subroutine file_remove
+
+   !> Copy the contents of `from` to `to` and wait until they are on the disk.
+   subroutine file_copy(from, to, error)
+      character(len=*), intent(in) :: from, to
+      type(error_t), allocatable, intent(out) :: error
+      type(file_t) :: source, target
+      character(len=block_size), allocatable :: block
+      type(error_t), allocatable :: ignored
+      integer(c_intptr_t) :: n
+
+      call file_open(source, from, "r", error)
+      if (.not. allocated(error)) call file_open(target, to, "w", error)
+      if (.not. allocated(error)) then
+         allocate(block)
+         do
+            n = c_read(c_fileno(source%stream), block, int(block_size, c_size_t))
+            if (n < 0) call raise_system(error, "read", from)
+            if (n < 1) exit
+            call file_put(target, block(:n), error)
+            if (allocated(error)) exit
+         end do
+      end if
+      if (.not. allocated(error)) call file_sync(target, error)
+      if (.not. allocated(error)) call file_close(target, error)
+      call file_close(target, ignored)
+      call file_close(source, ignored)
+   end subroutine file_copy
+
+   !> Point the descriptor `fd`, owned by a library, at a file in memory: the library can then close
+   !> a file that could not be written without further failures.
+   subroutine file_discard(fd)
+      integer(c_int), intent(in) :: fd
+      integer(c_int) :: sink, ignored
+      integer(c_int), parameter :: close_on_exec = 1
+
+      sink = c_memfd_create("discarded" // c_null_char, close_on_exec)
+      if (sink < 0) return
+      ignored = c_dup2(sink, fd)
+      ignored = c_close(sink)
+   end subroutine file_discard
+
+   !> Make the folder `path` and those above it; it may be there already.
+   subroutine make_directory(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+      integer(c_int) :: stat
+      integer(c_int), parameter :: all_rights = int(o"777", c_int)   ! less those of the umask
+
+      stat = 0
+      do i = 2, len(path) + 1
+         if (i <= len(path)) then
+            if (path(i:i) /= "/") cycle
+         end if
+         stat = c_mkdir(path(:i - 1) // c_null_char, all_rights)
+         if (stat /= 0) then
+            if (system_errno() == errno_exists) stat = 0
+         end if
+      end do
+      if (stat /= 0) then
+         call raise_system(error, "make the folder", path)
+      else if (.not. file_exists(path // "/.")) then
+         call raise(error, err_file, "cannot make the folder " // path // ": a file has that name")
+      end if
+   end subroutine make_directory
+
+   !> Whether standard output is a terminal.
+   logical function is_terminal()
+      is_terminal = c_isatty(1_c_int) == 1
+   end function is_terminal
+
+   !> Let a write beyond the size limit of the process fail like one on a full disk, not kill it.
+   subroutine survive_file_size_limit()
+      integer(c_intptr_t) :: old
+      integer(c_intptr_t), parameter :: ignore = 1       ! SIG_IGN
+
+      old = c_signal(signal_file_size, ignore)
+   end subroutine survive_file_size_limit
+
+   !> Forget the last failure of the system, so that `system_reason` tells of a later one.
+   subroutine clear_system_reason()
+      integer(c_int), pointer :: errno
+
+      call c_f_pointer(c_errno(), errno)
+      errno = 0
+   end subroutine clear_system_reason
+
+   !> The system's words for its last failure, for instance "No space left on device"; or "".
+   function system_reason() result(text)
+      character(len=:), allocatable :: text
+      character(kind=c_char), pointer :: letter(:)
+      type(c_ptr) :: words
+      integer :: i
+      integer(c_int) :: number
+
+      number = system_errno()
+      text = ""
+      if (number == 0) return
+      words = c_strerror(number)
+      call c_f_pointer(words, letter, [c_strlen(words)])
+      do i = 1, size(letter)
+         text = text // letter(i)
+      end do
+   end function system_reason
+
+   integer(c_int) function system_errno()
+      integer(c_int), pointer :: errno
+
+      call c_f_pointer(c_errno(), errno)
+      system_errno = errno
+   end function system_errno
+
+   subroutine raise_system(error, action, path)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), intent(in) :: action, path
+
+      call raise(error, err_file, "cannot " // action // " " // path // ": " // system_reason())
+   end subroutine raise_system
+
+end module emcon_files

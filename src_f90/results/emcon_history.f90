@@ -1,0 +1,363 @@
+!> The history of a run: one row per increment, to NAME.csv for people and scripts and to NAME.h5.
+!>
+!> NAME.h5: `/history/<column>` (n_row); for each requested set and variable
+!> `/sets/<SET>/<VARIABLE>` (n_time, n_item[, n_component]), `<VARIABLE>_time` (n_time) and
+!> `<VARIABLE>_label` (n_item); the deck and the version under `/run`.
+module emcon_history
+   use emcon_errors, only : error_t, raise, err_internal
+   use emcon_files, only : file_close, file_open, file_put, file_remove, file_rename, file_t
+   use emcon_hdf5, only : hdf5_has, hdf5_make_group
+   use emcon_hdf5_data, only : hdf5_read_reals, hdf5_write_integers, hdf5_write_texts
+   use emcon_hdf5_series, only : hdf5_series_t, series_append, series_begin, series_truncate
+   use emcon_kinds, only : dp, int64
+   use emcon_published, only : publication_is_due, published_abandon, published_close, &
+      published_create, published_publish, published_resume, published_t
+   use emcon_text, only : string_t
+   implicit none
+   private
+   public :: column_t, history_t, history_create, history_resume, history_append
+   public :: history_set_define, history_set_append, history_put_run
+   public :: history_publish, history_close
+
+   !> One column of the history.
+   type :: column_t
+      character(len=32) :: name = ""
+      logical :: is_integer = .false.
+   end type column_t
+
+   !> What one output request writes of one set.
+   type :: set_series_t
+      integer :: n_value = 0                         !! per time
+      type(hdf5_series_t) :: time
+      type(hdf5_series_t) :: values
+   end type set_series_t
+
+   !> A history being written.
+   type :: history_t
+      integer :: n_row = 0
+      type(published_t), private :: store
+      type(file_t), private :: csv
+      type(column_t), allocatable, private :: column(:)
+      type(hdf5_series_t), allocatable, private :: series(:)
+      real(dp), allocatable, private :: waiting(:, :)   !! (n_wait, n_column) not yet in NAME.h5
+      integer, private :: n_waiting = 0
+      type(set_series_t), allocatable, private :: set(:)
+      logical, private :: is_resumed = .false.
+      real(dp), private :: time_resumed = 0.0_dp     !! of the last row that was kept [T]
+   end type history_t
+
+   integer, parameter :: n_wait = 64                 !! rows gathered before they go to NAME.h5
+   integer, parameter :: chunk_rows = 256
+   integer, parameter :: number_width = 24           !! of a real with 17 significant digits
+   character(len=*), parameter :: line_end = achar(10)
+   integer, parameter :: one_value(0) = [integer ::] !! shape of a row of one value
+
+contains
+
+   !> Begin the history `base`.csv, `base`.h5.
+   subroutine history_create(self, base, columns, error)
+      type(history_t), intent(out) :: self
+      character(len=*), intent(in) :: base           !! output path without extension
+      type(column_t), intent(in) :: columns(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      call published_create(self%store, base // ".h5", error)
+      if (.not. allocated(error)) call hdf5_make_group(self%store%file, "/history", error)
+      if (.not. allocated(error)) call hdf5_make_group(self%store%file, "/sets", error)
+      if (.not. allocated(error)) call begin_series(self, columns, error)
+      if (.not. allocated(error)) call begin_csv(self, base, error)
+      if (allocated(error)) call published_abandon(self%store)
+   end subroutine history_create
+
+   !> Go on after the first `n_row` rows; later ones are dropped.
+   !>
+   !> Sets are defined again by the caller; what they hold of later times is dropped then.
+   subroutine history_resume(self, base, columns, n_row, error)
+      type(history_t), intent(out) :: self
+      character(len=*), intent(in) :: base
+      type(column_t), intent(in) :: columns(:)       !! as the history was created with
+      integer, intent(in) :: n_row
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      call published_resume(self%store, base // ".h5", error)
+      if (.not. allocated(error)) call begin_series(self, columns, error)
+      do i = 1, size(columns)
+         if (allocated(error)) exit
+         call series_truncate(self%series(i), self%store%file, int(n_row, int64), error)
+      end do
+      self%n_row = n_row
+      self%is_resumed = .true.
+      if (.not. allocated(error)) call begin_csv(self, base, error)
+      if (allocated(error)) call published_abandon(self%store)
+   end subroutine history_resume
+
+   subroutine begin_series(self, columns, error)
+      type(history_t), intent(inout) :: self
+      type(column_t), intent(in) :: columns(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      if (.not. any(columns%name == "time")) then
+         call raise(error, err_internal, "history: no column is called time")
+         return
+      end if
+      self%column = columns
+      allocate(self%series(size(columns)), self%set(0))
+      allocate(self%waiting(n_wait, size(columns)), source=0.0_dp)
+      do i = 1, size(columns)
+         call series_begin(self%series(i), self%store%file, column_path(columns(i)), one_value, &
+            chunk_rows, columns(i)%is_integer, error)
+         if (allocated(error)) return
+      end do
+   end subroutine begin_series
+
+   pure function column_path(column) result(path)
+      type(column_t), intent(in) :: column
+      character(len=:), allocatable :: path
+
+      path = "/history/" // trim(column%name)
+   end function column_path
+
+   !> Write NAME.csv anew: the header, and after a resumption the rows kept in NAME.h5.
+   subroutine begin_csv(self, base, error)
+      type(history_t), intent(inout) :: self
+      character(len=*), intent(in) :: base
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: ignored
+      real(dp), allocatable :: kept(:, :), values(:)
+      character(len=:), allocatable :: header
+      integer :: i
+
+      header = trim(self%column(1)%name)
+      do i = 2, size(self%column)
+         header = header // "," // trim(self%column(i)%name)
+      end do
+      allocate(kept(self%n_row, size(self%column)))
+      do i = 1, size(self%column)
+         if (.not. self%is_resumed) exit
+         call hdf5_read_reals(self%store%file, column_path(self%column(i)), values, error)
+         if (allocated(error)) return
+         kept(:, i) = values
+         if (self%column(i)%name == "time" .and. self%n_row > 0) then
+            self%time_resumed = values(self%n_row)
+         end if
+      end do
+      ! Renamed while open: what had the name before is replaced in one instant, by a whole file.
+      call file_open(self%csv, base // ".csv.tmp", "w", error)
+      if (.not. allocated(error)) call file_put(self%csv, header // line_end, error)
+      do i = 1, self%n_row
+         if (allocated(error)) exit
+         call file_put(self%csv, csv_row(self%column, kept(i, :)), error)
+      end do
+      if (.not. allocated(error)) call file_rename(base // ".csv.tmp", base // ".csv", error)
+      if (allocated(error)) call file_remove(base // ".csv.tmp", ignored)
+   end subroutine begin_csv
+
+   !> A line of NAME.csv: reals that read back to the same bits, integers as such.
+   function csv_row(column, values) result(line)
+      type(column_t), intent(in) :: column(:)
+      real(dp), intent(in) :: values(:)
+      character(len=:), allocatable :: line
+      character(len=(number_width + 1)*size(values)) :: buffer
+      character(len=number_width) :: word
+      integer :: i, n
+
+      n = 0
+      do i = 1, size(values)
+         if (column(i)%is_integer) then
+            write(word, "(i0)") nint(values(i), int64)
+         else
+            write(word, "(es24.16e3)") values(i)
+         end if
+         word = adjustl(word)
+         buffer(n + 1:) = trim(word) // ","
+         n = n + len_trim(word) + 1
+      end do
+      line = buffer(:n - 1) // line_end
+   end function csv_row
+
+   !> Append a row; it is in NAME.csv when this returns.
+   subroutine history_append(self, values, error)
+      type(history_t), intent(inout) :: self
+      real(dp), intent(in) :: values(:)              !! (n_column); whole numbers where integer
+      type(error_t), allocatable, intent(out) :: error
+
+      if (size(values) /= size(self%column)) then
+         call raise(error, err_internal, "history_append: wrong number of values")
+         return
+      end if
+      call file_put(self%csv, csv_row(self%column, values), error)
+      if (allocated(error)) return
+      if (self%n_waiting == n_wait) call write_waiting(self, error)
+      if (allocated(error)) return
+      self%n_waiting = self%n_waiting + 1
+      self%waiting(self%n_waiting, :) = values
+      self%n_row = self%n_row + 1
+      self%store%is_changed = .true.
+   end subroutine history_append
+
+   !> Move the gathered rows to NAME.h5.
+   subroutine write_waiting(self, error)
+      type(history_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 1, size(self%series)
+         if (self%n_waiting == 0) exit
+         call series_append(self%series(i), self%store%file, self%waiting(:, i), self%n_waiting, &
+            error)
+         if (allocated(error)) return
+      end do
+      self%n_waiting = 0
+   end subroutine write_waiting
+
+   !> Declare that `variable` of the set `set` will be written; `i_set` is what to append it by.
+   subroutine history_set_define(self, set, variable, label, n_component, i_set, error)
+      type(history_t), intent(inout) :: self
+      character(len=*), intent(in) :: set
+      character(len=*), intent(in) :: variable
+      integer, intent(in) :: label(:)                !! (n_item) the user's numbers of its members
+      integer, intent(in) :: n_component
+      integer, intent(out) :: i_set
+      type(error_t), allocatable, intent(out) :: error
+      type(set_series_t), allocatable :: grown(:)
+      type(set_series_t) :: new
+      character(len=:), allocatable :: group, path
+      integer :: row_shape(2)
+
+      group = "/sets/" // link_name(set)
+      path = group // "/" // link_name(variable)
+      i_set = size(self%set) + 1
+      if (.not. hdf5_has(self%store%file, group)) then
+         call hdf5_make_group(self%store%file, group, error)
+         if (allocated(error)) return
+      end if
+      if (.not. hdf5_has(self%store%file, path // "_label")) then
+         call hdf5_write_integers(self%store%file, path // "_label", label, error)
+         if (allocated(error)) return
+      end if
+      new%n_value = n_component*size(label)
+      row_shape = [n_component, size(label)]
+      call series_begin(new%time, self%store%file, path // "_time", one_value, chunk_rows, &
+         .false., error)
+      if (allocated(error)) return
+      call series_begin(new%values, self%store%file, path, &
+         row_shape(merge(2, 1, n_component == 1):), rows_per_chunk(new%n_value), .false., error)
+      if (allocated(error)) return
+      if (self%is_resumed) call drop_later(self, new, path, error)
+      if (allocated(error)) return
+      allocate(grown(i_set))
+      grown(:i_set - 1) = self%set
+      grown(i_set) = new
+      call move_alloc(grown, self%set)
+   end subroutine history_set_define
+
+   !> Rows of `n_value` values that make up some 32 kilobytes.
+   pure integer function rows_per_chunk(n_value)
+      integer, intent(in) :: n_value
+
+      rows_per_chunk = max(1, min(chunk_rows, 4096/max(1, n_value)))
+   end function rows_per_chunk
+
+   !> Drop what a set of a resumed history holds of times after the resumption.
+   subroutine drop_later(self, set, path, error)
+      type(history_t), intent(inout) :: self
+      type(set_series_t), intent(inout) :: set
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(out) :: error
+      real(dp), allocatable :: time(:)
+      integer(int64) :: n_kept
+
+      call hdf5_read_reals(self%store%file, path // "_time", time, error)
+      if (allocated(error)) return
+      n_kept = count(time <= self%time_resumed, kind=int64)
+      call series_truncate(set%time, self%store%file, n_kept, error)
+      if (.not. allocated(error)) then
+         call series_truncate(set%values, self%store%file, n_kept, error)
+      end if
+   end subroutine drop_later
+
+   !> `name` as HDF5 can hold it: a slash would part it.
+   pure function link_name(name) result(link)
+      character(len=*), intent(in) :: name
+      character(len=len(name)) :: link
+      integer :: i
+
+      link = name
+      do i = 1, len(name)
+         if (link(i:i) == "/") link(i:i) = "_"
+      end do
+      if (link == ".") link = "_"
+   end function link_name
+
+   !> Append the values of the set `i_set` at `time`.
+   subroutine history_set_append(self, i_set, time, values, error)
+      type(history_t), intent(inout) :: self
+      integer, intent(in) :: i_set
+      real(dp), intent(in) :: time                   !! [T]
+      real(dp), intent(in), contiguous :: values(:, :)   !! (n_component, n_item)
+      type(error_t), allocatable, intent(out) :: error
+
+      associate (set => self%set(i_set))
+         if (size(values) /= set%n_value) then
+            call raise(error, err_internal, "history_set_append: wrong number of values")
+            return
+         end if
+         call series_append(set%values, self%store%file, values, 1, error)
+         if (.not. allocated(error)) then
+            call series_append(set%time, self%store%file, [time], 1, error)
+         end if
+      end associate
+      self%store%is_changed = .true.
+   end subroutine history_set_append
+
+   !> Keep with the results what made them: the text of the deck and the version of the program.
+   subroutine history_put_run(self, deck, version, error)
+      type(history_t), intent(inout) :: self
+      type(string_t), intent(in) :: deck(:)          !! (n_line)
+      character(len=*), intent(in) :: version
+      type(error_t), allocatable, intent(out) :: error
+      type(string_t) :: version_text(1)
+
+      version_text(1)%text = version
+      call hdf5_make_group(self%store%file, "/run", error)
+      if (.not. allocated(error)) then
+         call hdf5_write_texts(self%store%file, "/run/deck", deck, error)
+      end if
+      if (.not. allocated(error)) then
+         call hdf5_write_texts(self%store%file, "/run/version", version_text, error)
+      end if
+   end subroutine history_put_run
+
+   !> Make all rows visible in NAME.h5, if it is time or `is_forced`; call it often.
+   subroutine history_publish(self, is_forced, error)
+      type(history_t), intent(inout) :: self
+      logical, intent(in) :: is_forced
+      type(error_t), allocatable, intent(out) :: error
+
+      if (publication_is_due(self%store, is_forced)) then
+         call write_waiting(self, error)
+         if (.not. allocated(error)) call published_publish(self%store, error)
+      end if
+   end subroutine history_publish
+
+   !> Complete both files; harmless if they are not open.
+   subroutine history_close(self, error)
+      type(history_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: csv_error
+
+      if (self%store%file%id >= 0 .and. .not. self%store%file%has_failed) then
+         call write_waiting(self, error)
+      end if
+      call file_close(self%csv, csv_error)
+      if (allocated(error)) then
+         call published_abandon(self%store)
+      else
+         call published_close(self%store, error)
+      end if
+      if (.not. allocated(error)) call move_alloc(csv_error, error)
+   end subroutine history_close
+
+end module emcon_history

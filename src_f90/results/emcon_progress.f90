@@ -1,0 +1,118 @@
+!> How far a run is, on standard output: one line that renews itself on a terminal, else a plain
+!> line every few seconds.
+module emcon_progress
+   use, intrinsic :: iso_fortran_env, only : output_unit
+   use emcon_files, only : is_terminal
+   use emcon_kinds, only : dp
+   use emcon_text, only : to_text
+   use emcon_timer, only : wall_seconds
+   implicit none
+   private
+   public :: progress_t, progress_start, progress_show, progress_end
+
+   !> Where the display stands.
+   type :: progress_t
+      private
+      logical :: is_quiet = .true.
+      logical :: is_terminal = .false.
+      integer :: n_shown = 0             !! letters of the line on the terminal
+      real(dp) :: time_started = 0.0_dp  !! wall clock [s]
+      real(dp) :: time_shown = 0.0_dp
+      real(dp) :: fraction_started = 0.0_dp
+   end type progress_t
+
+   real(dp), parameter :: terminal_interval = 0.1_dp, plain_interval = 5.0_dp   ! [s]
+
+contains
+
+   !> Begin at the part `fraction` of the run; show nothing ever if `is_quiet`.
+   subroutine progress_start(self, fraction, is_quiet)
+      type(progress_t), intent(out) :: self
+      real(dp), intent(in) :: fraction               !! 0 unless the run is continued
+      logical, intent(in) :: is_quiet
+
+      self%is_quiet = is_quiet
+      self%is_terminal = is_terminal()
+      self%fraction_started = fraction
+      self%time_started = wall_seconds()
+      self%time_shown = self%time_started
+      if (self%is_terminal) self%time_shown = self%time_started - terminal_interval
+   end subroutine progress_start
+
+   !> Show where the run is, if it is time to; call it after each increment.
+   subroutine progress_show(self, fraction, time, h, n_newton, n_active)
+      type(progress_t), intent(inout) :: self
+      real(dp), intent(in) :: fraction               !! done, 0..1
+      real(dp), intent(in) :: time, h                !! [T]
+      integer, intent(in) :: n_newton                !! iterations of the increment
+      integer, intent(in) :: n_active                !! active constraints
+      character(len=160) :: line
+      real(dp) :: now
+      integer :: ignored
+
+      if (self%is_quiet) return
+      now = wall_seconds()
+      if (now - self%time_shown < merge(terminal_interval, plain_interval, self%is_terminal)) return
+      self%time_shown = now
+      write(line, "(f5.1, '%  t = ', a, '  h = ', a, '  Newton ', i0, '  active ', i0, a)") &
+         100.0_dp*fraction, short(time), short(h), n_newton, n_active, &
+         time_left(self, now, fraction)
+      if (self%is_terminal) then
+         ! Blanks wipe what a longer line left.
+         write(output_unit, "(a)", advance="no", iostat=ignored) achar(13) &
+            // line(:max(len_trim(line), self%n_shown))
+         self%n_shown = len_trim(line)
+      else
+         write(output_unit, "(a)", iostat=ignored) trim(line)
+      end if
+      flush(output_unit, iostat=ignored)
+   end subroutine progress_show
+
+   !> ", 1:05 left", from the pace so far; nothing while there is none.
+   function time_left(self, now, fraction) result(text)
+      type(progress_t), intent(in) :: self
+      real(dp), intent(in) :: now                    !! wall clock [s]
+      real(dp), intent(in) :: fraction
+      character(len=:), allocatable :: text
+      character(len=24) :: buffer
+      real(dp) :: seconds, done
+      integer :: n
+
+      text = ""
+      done = fraction - self%fraction_started
+      if (done <= 0.0_dp) return
+      seconds = (now - self%time_started)*(1.0_dp - fraction)/done
+      if (seconds >= 1.0e8_dp) return
+      n = nint(max(seconds, 0.0_dp))
+      if (n >= 3600) then
+         write(buffer, "(i0, ':', i2.2, ':', i2.2)") n/3600, mod(n/60, 60), mod(n, 60)
+      else
+         write(buffer, "(i0, ':', i2.2)") n/60, mod(n, 60)
+      end if
+      text = "  " // trim(buffer) // " left"
+   end function time_left
+
+   !> `value` with five significant digits.
+   function short(value) result(text)
+      real(dp), intent(in) :: value
+      character(len=:), allocatable :: text
+      character(len=24) :: buffer
+
+      write(buffer, "(g0.5)") value
+      text = trim(buffer)
+   end function short
+
+   !> Wipe the line on the terminal: what comes next begins on a fresh one.
+   subroutine progress_end(self)
+      type(progress_t), intent(inout) :: self
+      integer :: ignored
+
+      if (self%n_shown > 0) then
+         write(output_unit, "(a)", advance="no", iostat=ignored) achar(13) &
+            // repeat(" ", self%n_shown) // achar(13)
+         flush(output_unit, iostat=ignored)
+      end if
+      self%n_shown = 0
+   end subroutine progress_end
+
+end module emcon_progress

@@ -1,0 +1,206 @@
+!> The scene: all that a deck says, as plain data. Nothing here computes.
+!>
+!> Nodes, elements and so on are numbered 1..n in the order of the deck; the user's numbers are
+!> kept as labels. Units are the user's own, consistent: length [L], mass [M], time [T].
+module emcon_scene
+   use emcon_kinds, only : wp
+   use emcon_text, only : string_t, to_text
+   implicit none
+   private
+   public :: origin_t, named_set_t, surface_t, material_t, section_t, amplitude_t
+   public :: contact_pair_t, prescribed_t, load_t, output_t, step_t, scene_t
+   public :: where_text, find_amplitude_value
+   public :: law_linear, law_neo_hooke, law_coupled_neo_hooke
+   public :: load_point, load_pressure, load_gravity
+   public :: formulation_nts
+   public :: procedure_static, procedure_dynamic
+   public :: initiation_persistent, initiation_admissible, initiation_velocity_update
+   public :: method_null_space, method_saddle_point
+   public :: output_node_file, output_element_file, output_contact_file
+   public :: output_node_print, output_element_print, output_contact_print, output_energy_print
+
+   !> Constitutive laws. `law_linear` is linear elasticity, under NLGEOM St. Venant-Kirchhoff.
+   integer, parameter :: law_linear = 1, law_neo_hooke = 2, law_coupled_neo_hooke = 3
+   integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3
+   integer, parameter :: formulation_nts = 1
+   integer, parameter :: procedure_static = 1, procedure_dynamic = 2
+   integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
+      initiation_velocity_update = 3
+   integer, parameter :: method_null_space = 1, method_saddle_point = 2
+   integer, parameter :: output_node_file = 1, output_element_file = 2, output_contact_file = 3, &
+      output_node_print = 4, output_element_print = 5, output_contact_print = 6, &
+      output_energy_print = 7
+
+   !> Where in the deck something was said.
+   type :: origin_t
+      integer :: file = 0      !! index into `scene_t%file`, 0: not from a deck
+      integer :: line = 0
+   end type origin_t
+
+   !> A node set or an element set.
+   type :: named_set_t
+      character(len=:), allocatable :: name          !! upper case
+      type(origin_t) :: origin
+      integer, allocatable :: item(:)                !! ascending, distinct indices
+   end type named_set_t
+
+   !> A surface: element faces in the order of the deck, or nodes.
+   type :: surface_t
+      character(len=:), allocatable :: name
+      type(origin_t) :: origin
+      logical :: is_nodal = .false.
+      integer, allocatable :: element(:)             !! (n_face)
+      integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind
+      integer, allocatable :: node(:)                !! (n_node), only if `is_nodal`
+   end type surface_t
+
+   type :: material_t
+      character(len=:), allocatable :: name
+      type(origin_t) :: origin
+      integer :: law = 0                             !! one of `law_`; 0: none was given
+      real(wp), allocatable :: constant(:)           !! as in the deck: E, nu | C10, D1
+      real(wp) :: density = 0.0_wp                   !! [M/L^3]
+   end type material_t
+
+   type :: section_t
+      type(origin_t) :: origin
+      character(len=:), allocatable :: set           !! element set
+      integer :: material = 0
+      real(wp) :: thickness = 1.0_wp                 !! [L]
+   end type section_t
+
+   !> Factor over time: linear between the points, constant outside.
+   type :: amplitude_t
+      character(len=:), allocatable :: name
+      type(origin_t) :: origin
+      logical :: is_total_time = .false.             !! else time since the start of the step
+      real(wp), allocatable :: time(:)               !! ascending [T]
+      real(wp), allocatable :: value(:)
+   end type amplitude_t
+
+   type :: contact_pair_t
+      type(origin_t) :: origin
+      integer :: slave = 0                           !! index into `scene_t%surface`
+      integer :: master = 0
+      integer :: formulation = formulation_nts
+      real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
+      integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
+   end type contact_pair_t
+
+   !> One prescribed degree of freedom: u = `value` times the amplitude.
+   !>
+   !> Without amplitude: in a static step u runs linearly from what it is at the start of the step
+   !> to `value` at its end; in a dynamic step it is `value` from the first increment on.
+   type :: prescribed_t
+      type(origin_t) :: origin
+      integer :: node = 0
+      integer :: dof = 0                             !! 1..n_dim
+      real(wp) :: value = 0.0_wp                     !! [L]
+      integer :: amplitude = 0                       !! index, 0: none
+      logical :: is_frozen = .false.                 !! FIXED: stays where the step found it
+   end type prescribed_t
+
+   !> One load. Without amplitude: `value`; in a static step a linear run from `value_start`.
+   type :: load_t
+      type(origin_t) :: origin
+      integer :: kind = 0                            !! one of `load_`
+      integer :: target = 0                          !! node (point) or element (pressure, gravity)
+      integer :: place = 0                           !! dof (point) or face (pressure)
+      real(wp) :: value = 0.0_wp                     !! force | pressure, > 0 inwards | acceleration
+      real(wp) :: value_start = 0.0_wp               !! its value at the end of the step before
+      real(wp) :: direction(3) = 0.0_wp              !! gravity: unit vector
+      integer :: amplitude = 0
+   end type load_t
+
+   !> One output request.
+   type :: output_t
+      type(origin_t) :: origin
+      integer :: kind = 0                            !! one of `output_`
+      type(string_t), allocatable :: variable(:)     !! "U", "S", ... upper case, short Abaqus forms
+      integer :: set = 0                             !! node or element set; 0: all
+      integer :: frequency = 1                       !! every so many increments, 0: never
+      real(wp), allocatable :: time(:)               !! TIME POINTS, ascending; none: by frequency
+      logical :: totals = .false.                    !! TOTALS=YES or ONLY
+      logical :: only_totals = .false.
+   end type output_t
+
+   type :: step_t
+      type(origin_t) :: origin
+      integer :: procedure = 0                       !! one of `procedure_`
+      logical :: nlgeom = .false.
+      integer :: max_increments = 0                  !! INC; 0: not limited
+      logical :: is_direct = .false.                 !! increments as given
+      real(wp) :: h = 1.0_wp                         !! first, or fixed, increment [T]
+      real(wp) :: duration = 1.0_wp                  !! [T]
+      real(wp) :: h_min = 0.0_wp                     !! 0: not given
+      real(wp) :: h_max = 0.0_wp                     !! 0: not given
+      integer :: constraint_method = method_null_space
+      integer :: initiation = initiation_persistent
+      real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
+      real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
+      integer :: newton_maximum = 20
+      integer :: restart_frequency = 0               !! 0: no restart file
+      type(prescribed_t), allocatable :: prescribed(:)   !! all that hold in this step
+      type(load_t), allocatable :: load(:)               !! all that act in this step
+      type(output_t), allocatable :: output(:)           !! all that hold in this step
+   end type step_t
+
+   type :: scene_t
+      type(string_t), allocatable :: file(:)         !! names of the deck files
+      character(len=:), allocatable :: heading
+      integer :: n_dim = 2
+      integer, allocatable :: node_label(:)          !! (n_node)
+      type(origin_t), allocatable :: node_origin(:)  !! (n_node)
+      real(wp), allocatable :: x(:, :)               !! (n_dim, n_node) reference positions [L]
+      integer, allocatable :: element_label(:)       !! (n_element)
+      type(origin_t), allocatable :: element_origin(:)
+      integer, allocatable :: element_kind(:)        !! (n_element) index into `element_kinds`
+      integer, allocatable :: element_node(:, :)     !! (max_element_nodes, n_element), 0: no node
+      integer, allocatable :: element_section(:)     !! (n_element)
+      type(named_set_t), allocatable :: node_set(:)
+      type(named_set_t), allocatable :: element_set(:)
+      type(surface_t), allocatable :: surface(:)
+      type(material_t), allocatable :: material(:)
+      type(section_t), allocatable :: section(:)
+      type(amplitude_t), allocatable :: amplitude(:)
+      type(contact_pair_t), allocatable :: pair(:)
+      real(wp), allocatable :: u0(:, :)              !! (n_dim, n_node) initial displacement [L]
+      real(wp), allocatable :: v0(:, :)              !! (n_dim, n_node) initial velocity [L/T]
+      type(step_t), allocatable :: step(:)
+   end type scene_t
+
+contains
+
+   !> "file:line" of `origin`, for messages.
+   pure function where_text(scene, origin) result(text)
+      type(scene_t), intent(in) :: scene
+      type(origin_t), intent(in) :: origin
+      character(len=:), allocatable :: text
+
+      text = "(no deck)"
+      if (origin%file > 0) text = scene%file(origin%file)%text // ":" // to_text(origin%line)
+   end function where_text
+
+   !> Value and slope of an amplitude at `time`; at a kink the slope to the left.
+   pure subroutine find_amplitude_value(amplitude, time, value, slope)
+      type(amplitude_t), intent(in) :: amplitude
+      real(wp), intent(in) :: time
+      real(wp), intent(out) :: value                 !! factor
+      real(wp), intent(out) :: slope                 !! [1/T]
+      integer :: i, n
+
+      n = size(amplitude%time)
+      slope = 0.0_wp
+      if (time <= amplitude%time(1)) then
+         value = amplitude%value(1)
+      else if (time > amplitude%time(n)) then
+         value = amplitude%value(n)
+      else
+         i = count(amplitude%time < time)
+         slope = (amplitude%value(i + 1) - amplitude%value(i)) &
+            /(amplitude%time(i + 1) - amplitude%time(i))
+         value = amplitude%value(i) + slope*(time - amplitude%time(i))
+      end if
+   end subroutine find_amplitude_value
+
+end module emcon_scene

@@ -1,0 +1,84 @@
+!> What a constitutive law is: strain energy as a function of the invariants of the strain.
+!>
+!> E is the Green-Lagrange strain (small strain without NLGEOM). A law gives W(e1, e2, e3) with
+!> e1 = tr E, e2 = (tr^2 E - tr E^2)/2, e3 = det E, in discrete-gradient arithmetic; stress and
+!> tangent follow here for all laws. In terms of E nothing cancels at small strains, as
+!> det C - 1 = 2 e1 + 4 e2 + 8 e3. Source: docs/theory.md, section 3.
+module emcon_law
+   use emcon_dgrad3, only : dg_t, dg_variable, operator(+), operator(*)
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: law_t, law_box_t, law_response_t, law_response_plane, volume_excess
+
+   type, abstract :: law_t
+      real(wp) :: density = 0.0_wp               !! [M/L^3]
+   contains
+      procedure(energy_interface), deferred :: energy
+   end type law_t
+
+   !> For arrays of laws of different types.
+   type :: law_box_t
+      class(law_t), allocatable :: law
+   end type law_box_t
+
+   abstract interface
+      !> Strain energy per reference volume.
+      pure function energy_interface(self, e1, e2, e3) result(w)
+         import :: dg_t, law_t
+         class(law_t), intent(in) :: self
+         type(dg_t), intent(in) :: e1, e2, e3    !! invariants of E
+         type(dg_t) :: w                         !! [M/(L T^2)]
+      end function energy_interface
+   end interface
+
+   !> Stress and tangent of a step in the plane; components 11, 22, 12 (strain: 2 E12).
+   type :: law_response_t
+      real(wp) :: energy = 0.0_wp                !! W at the end
+      real(wp) :: stress(3) = 0.0_wp             !! S_alg: S_alg.(E1 - E0) = W1 - W0
+      real(wp) :: stress_33 = 0.0_wp             !! normal to the plane; meaningful for E1 = E0
+      real(wp) :: tangent(3, 3) = 0.0_wp         !! derivative of S_alg by E1
+   end type law_response_t
+
+contains
+
+   !> Response to a strain that goes from `strain` to `strain + dstrain` in plane strain.
+   pure subroutine law_response_plane(law, strain, dstrain, response)
+      class(law_t), intent(in) :: law
+      real(wp), intent(in) :: strain(3), dstrain(3)   !! E11, E22, 2 E12
+      type(law_response_t), intent(out) :: response
+      type(dg_t) :: e1, e2, e3, w
+      real(wp) :: mean(3), last(3), g2(3), c2(3), t1(3), t2(3)
+      real(wp), parameter :: g1(3) = [1.0_wp, 1.0_wp, 0.0_wp]
+
+      mean = strain + 0.5_wp*dstrain
+      last = strain + dstrain
+      g2 = [mean(2), mean(1), -0.5_wp*mean(3)]
+      c2 = [last(2), last(1), -0.5_wp*last(3)]
+      e1 = dg_variable(1, strain(1) + strain(2), dstrain(1) + dstrain(2))
+      e2 = dg_variable(2, strain(1)*strain(2) - 0.25_wp*strain(3)**2, dot_product(g2, dstrain))
+      e3 = dg_variable(3, 0.0_wp, 0.0_wp)
+      w = law%energy(e1, e2, e3)
+
+      response%energy = w%f1
+      response%stress = w%g(1)*g1 + w%g(2)*g2
+      response%stress_33 = w%g(1) + w%g(2)*e1%f1 + w%g(3)*e2%f1
+      t1 = w%h(1, 1)*g1 + w%h(2, 1)*g2
+      t2 = w%h(1, 2)*g1 + w%h(2, 2)*g2
+      response%tangent(:, 1) = t1*g1(1) + t2*c2(1)
+      response%tangent(:, 2) = t1*g1(2) + t2*c2(2)
+      response%tangent(:, 3) = t2*c2(3)
+      response%tangent(1, 2) = response%tangent(1, 2) + 0.5_wp*w%g(2)
+      response%tangent(2, 1) = response%tangent(2, 1) + 0.5_wp*w%g(2)
+      response%tangent(3, 3) = response%tangent(3, 3) - 0.25_wp*w%g(2)
+   end subroutine law_response_plane
+
+   !> det C - 1 = 2 e1 + 4 e2 + 8 e3.
+   pure function volume_excess(e1, e2, e3) result(y)
+      type(dg_t), intent(in) :: e1, e2, e3
+      type(dg_t) :: y
+
+      y = 2.0_wp*e1 + 4.0_wp*e2 + 8.0_wp*e3
+   end function volume_excess
+
+end module emcon_law

@@ -1,0 +1,201 @@
+!> All elements of a scene: reference geometry, laws, mass; forces and tangents over a step.
+module emcon_solid
+   use emcon_element, only : element_geometry_t, element_respond, element_response_t
+   use emcon_element_kinds, only : element_kinds, max_element_nodes
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : dp, wp
+   use emcon_law, only : law_box_t
+   use emcon_law_registry, only : law_create
+   use emcon_scene, only : scene_t
+   use emcon_shape, only : shape_create, shape_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: solid_t, solid_init, solid_respond, solid_response_t, element_mass
+
+   type :: solid_t
+      integer :: n_element = 0
+      integer :: n_node = 0
+      integer, allocatable :: kind(:)                    !! (n_element)
+      integer, allocatable :: node(:, :)                 !! (max_element_nodes, n_element)
+      integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
+      type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
+      type(law_box_t), allocatable :: law(:)             !! one per material
+      real(wp), allocatable :: mass(:, :, :)             !! consistent: (4, 4, n_element) [M]
+      real(wp), allocatable :: volume_mass(:, :)         !! int rho N_i: (4, n_element) [M]
+      real(wp), allocatable :: thickness(:)              !! (n_element) [L]
+   end type solid_t
+
+   !> What all elements give over one step; sized by the caller.
+   type :: solid_response_t
+      real(wp), allocatable :: force(:, :)               !! (2, n_node)
+      real(wp), allocatable :: magnitude(:, :)           !! (2, n_node) sum of |contributions|
+      real(wp), allocatable :: energy(:)                 !! (n_element) at the end of the step
+      integer :: inverted_element = 0                    !! first one with det F <= 0, or 0
+   end type solid_response_t
+
+contains
+
+   !> Geometry, laws and mass of the elements of `scene`.
+   subroutine solid_init(self, scene, error)
+      type(solid_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(shape_t) :: stiffness(size(element_kinds)), mass(size(element_kinds))
+      integer :: e, k, n
+
+      n = size(scene%element_kind)
+      self%n_element = n
+      self%n_node = size(scene%x, 2)
+      self%kind = scene%element_kind
+      self%node = scene%element_node
+      allocate(self%law_of(n), self%geometry(n), self%thickness(n))
+      allocate(self%mass(max_element_nodes, max_element_nodes, n), source=0.0_wp)
+      allocate(self%volume_mass(max_element_nodes, n), source=0.0_wp)
+      allocate(self%law(size(scene%material)))
+      do k = 1, size(scene%material)
+         if (scene%material(k)%law == 0) cycle
+         call law_create(scene%material(k), self%law(k)%law, error)
+         if (allocated(error)) return
+      end do
+      do k = 1, size(element_kinds)
+         call shape_create(k, stiffness(k), mass(k))
+      end do
+      do e = 1, n
+         self%law_of(e) = scene%section(scene%element_section(e))%material
+         self%thickness(e) = scene%section(scene%element_section(e))%thickness
+         call init_element(self, scene%x, e, stiffness(self%kind(e)), mass(self%kind(e)))
+         if (any(self%geometry(e)%weight(:self%geometry(e)%n_gp) <= 0.0_wp)) then
+            call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
+               " is inverted or has no area; check the order of its nodes")
+            return
+         end if
+      end do
+   end subroutine solid_init
+
+   pure subroutine init_element(self, x, e, stiffness, mass)
+      type(solid_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:, :)
+      integer, intent(in) :: e
+      type(shape_t), intent(in) :: stiffness, mass
+      real(wp) :: local(2, max_element_nodes), gradient(2, max_element_nodes), det, rho_dv
+      integer :: n, k, i
+
+      n = stiffness%n_node
+      local = 0.0_wp
+      do i = 1, n
+         local(:, i) = x(:, self%node(i, e)) - x(:, self%node(1, e))
+      end do
+      self%geometry(e)%n_node = n
+      self%geometry(e)%n_gp = stiffness%n_gp
+      do k = 1, stiffness%n_gp
+         call reference_gradient(n, local, stiffness%slope(:, :, k), gradient, det)
+         self%geometry(e)%gradient(:, :, k) = gradient
+         self%geometry(e)%weight(k) = stiffness%weight(k)*det*self%thickness(e)
+      end do
+      do k = 1, mass%n_gp
+         call reference_gradient(n, local, mass%slope(:, :, k), gradient, det)
+         rho_dv = self%law(self%law_of(e))%law%density*mass%weight(k)*det*self%thickness(e)
+         self%volume_mass(:, e) = self%volume_mass(:, e) + rho_dv*mass%value(:, k)
+         do i = 1, n
+            self%mass(:, i, e) = self%mass(:, i, e) + rho_dv*mass%value(i, k)*mass%value(:, k)
+         end do
+      end do
+   end subroutine init_element
+
+   !> Gradient of the shape functions by X and the Jacobian determinant.
+   pure subroutine reference_gradient(n, x, slope, gradient, det)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: x(2, max_element_nodes), slope(2, max_element_nodes)
+      real(wp), intent(out) :: gradient(2, max_element_nodes), det
+      real(wp) :: jacobian(2, 2)
+      integer :: i
+
+      jacobian = 0.0_wp
+      do i = 1, n
+         jacobian(:, 1) = jacobian(:, 1) + x(:, i)*slope(1, i)
+         jacobian(:, 2) = jacobian(:, 2) + x(:, i)*slope(2, i)
+      end do
+      det = jacobian(1, 1)*jacobian(2, 2) - jacobian(1, 2)*jacobian(2, 1)
+      gradient = 0.0_wp
+      if (.not. abs(det) > 0.0_wp) return
+      do i = 1, n
+         gradient(1, i) = (jacobian(2, 2)*slope(1, i) - jacobian(2, 1)*slope(2, i))/det
+         gradient(2, i) = (jacobian(1, 1)*slope(2, i) - jacobian(1, 2)*slope(1, i))/det
+      end do
+   end subroutine reference_gradient
+
+   !> The consistent mass of element `e` as it enters both directions: (4, 4).
+   pure function element_mass(self, e) result(mass)
+      type(solid_t), intent(in) :: self
+      integer, intent(in) :: e
+      real(wp) :: mass(max_element_nodes, max_element_nodes)
+
+      mass = self%mass(:, :, e)
+   end function element_mass
+
+   !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
+   !> to the matrix entries `value`.
+   pure subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value)
+      type(solid_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      logical, intent(in) :: nlgeom
+      type(solid_response_t), intent(inout) :: response
+      real(wp), intent(in), optional :: factor
+      integer, intent(in), contiguous, optional :: slot(:)       !! as `csr_from_elements` gives it
+      real(dp), intent(inout), contiguous, optional :: value(:)
+      type(element_response_t) :: part
+      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      logical :: with_tangent
+      integer :: e, i, n, node, first
+
+      with_tangent = present(slot)
+      first = 1
+      response%force = 0.0_wp
+      response%magnitude = 0.0_wp
+      response%inverted_element = 0
+      local0 = 0.0_wp
+      dlocal = 0.0_wp
+      do e = 1, self%n_element
+         n = self%geometry(e)%n_node
+         do i = 1, n
+            node = self%node(i, e)
+            local0(:, i) = u0(:, node)
+            dlocal(:, i) = du(:, node)
+         end do
+         call element_respond(self%geometry(e), self%law(self%law_of(e))%law, local0, dlocal, &
+            nlgeom, with_tangent, part)
+         if (part%is_inverted) then
+            response%inverted_element = e
+            return
+         end if
+         response%energy(e) = part%energy
+         do i = 1, n
+            node = self%node(i, e)
+            response%force(:, node) = response%force(:, node) + part%force(:, i)
+            response%magnitude(:, node) = response%magnitude(:, node) + part%magnitude(:, i)
+         end do
+         if (with_tangent) then
+            call scatter(2*n, part%tangent, factor, slot(first:), value)
+            first = first + 4*n*n
+         end if
+      end do
+   end subroutine solid_respond
+
+   !> Add a square element matrix of `n` unknowns to its places; `slot` runs down the columns.
+   pure subroutine scatter(n, tangent, factor, slot, value)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: tangent(2*max_element_nodes, 2*max_element_nodes), factor
+      integer, intent(in) :: slot(:)
+      real(dp), intent(inout) :: value(:)
+      integer :: i, j, k
+
+      do j = 1, n
+         do i = 1, n
+            k = slot(i + n*(j - 1))
+            if (k > 0) value(k) = value(k) + real(factor*tangent(i, j), dp)
+         end do
+      end do
+   end subroutine scatter
+
+end module emcon_solid

@@ -1,0 +1,274 @@
+!> The active constraints of a step: values, gradients, multipliers.
+!>
+!> One set serves all contact pairs. Constraint k demands gap_k(q1) = target_k; its multiplier
+!> lam_k >= 0 is the contact force. Sign: docs/theory.md, eq. (1).
+module emcon_constraints
+   use emcon_contact, only : constraint_t, max_constraint_nodes
+   use emcon_csr, only : csr_find, csr_t
+   use emcon_kinds, only : dp, wp
+   use emcon_numbering, only : numbering_t
+   use emcon_scene, only : scene_t
+   use emcon_system, only : pose_t, system_t
+   implicit none
+   private
+   public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
+   public :: constraints_add_curvature, constraints_force, constraints_merge_pattern, constraint_place
+
+   !> Which constraints act, and the linearised set on the unknowns.
+   type :: constraint_set_t
+      integer :: n = 0
+      integer, allocatable :: id(:)              !! (n) numbers over all pairs
+      type(constraint_t), allocatable :: item(:) !! (n) values and derivatives
+      real(wp), allocatable :: target(:)         !! (n) gap to hold [L]
+      logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
+      real(wp), allocatable :: lam(:)            !! (n) multipliers [M L/T^2]
+      real(wp), allocatable :: defect(:)         !! (n) gap(q1) - target
+      type(csr_t) :: force_rows                  !! (n x n_unknown) discrete gradients
+      type(csr_t) :: gap_rows                    !! (n x n_unknown) gradients at the end
+   end type constraint_set_t
+
+contains
+
+   !> Take the constraints `id` as the active ones; multipliers start at zero.
+   pure subroutine constraints_select(self, id)
+      type(constraint_set_t), intent(inout) :: self
+      integer, intent(in) :: id(:)
+
+      self%n = size(id)
+      self%id = id
+      if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, self%lam, &
+         self%defect)
+      allocate(self%item(self%n), self%is_kept(self%n))
+      allocate(self%target(self%n), self%lam(self%n), self%defect(self%n), source=0.0_wp)
+      self%is_kept = .false.
+   end subroutine constraints_select
+
+   !> Pair and number within the pair of constraint `id`.
+   pure subroutine constraint_place(system, id, pair, i)
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: id
+      integer, intent(out) :: pair, i
+
+      pair = count(system%first_constraint < id)
+      i = id - system%first_constraint(pair)
+   end subroutine constraint_place
+
+   !> Values and derivatives of all active constraints for the step `u0` to `u0 + du`.
+   subroutine constraints_evaluate(self, system, scene, pose, u0, du)
+      type(constraint_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      integer :: k, pair, i
+
+      if (pose%is_end) system%u_work = u0 + du
+      do k = 1, self%n
+         call constraint_place(system, self%id(k), pair, i)
+         associate (contact => system%contact(pair)%contact, item => self%item(k))
+            if (pose%is_end) then
+               call contact%evaluate(i, scene%x, system%u_work, system%zero, item)
+               item%h = 2.0_wp*item%h
+            else
+               call contact%evaluate(i, scene%x, u0, du, item)
+            end if
+            self%defect(k) = item%gap1 - self%target(k)
+            if (self%is_kept(k)) self%defect(k) = item%dgap
+         end associate
+      end do
+   end subroutine constraints_evaluate
+
+   !> Gradients of the active constraints as rows over the unknowns.
+   subroutine constraints_rows(self, numbering)
+      type(constraint_set_t), intent(inout) :: self
+      type(numbering_t), intent(in) :: numbering
+      integer :: k, i, a, n, unknown, order(2*max_constraint_nodes), m
+      integer :: column(2*max_constraint_nodes)
+      real(wp) :: g(2*max_constraint_nodes), c(2*max_constraint_nodes)
+
+      call reset(self%force_rows)
+      call reset(self%gap_rows)
+      n = 0
+      do k = 1, self%n
+         m = 0
+         do i = 1, self%item(k)%n_node
+            do a = 1, 2
+               unknown = numbering%unknown(a, self%item(k)%node(i))
+               if (unknown == 0) cycle
+               m = m + 1
+               column(m) = unknown - 1
+               g(m) = self%item(k)%g(a, i)
+               c(m) = self%item(k)%c(a, i)
+            end do
+         end do
+         order(:m) = insertion_order(column(:m))
+         self%force_rows%column(n + 1:n + m) = column(order(:m))
+         self%force_rows%value(n + 1:n + m) = real(g(order(:m)), dp)
+         self%gap_rows%value(n + 1:n + m) = real(c(order(:m)), dp)
+         n = n + m
+         self%force_rows%row_start(k + 1) = n
+      end do
+      self%gap_rows%row_start = self%force_rows%row_start
+      self%gap_rows%column = self%force_rows%column
+
+   contains
+
+      subroutine reset(rows)
+         type(csr_t), intent(inout) :: rows
+
+         rows%n_row = self%n
+         rows%n_col = numbering%n_unknown
+         if (allocated(rows%row_start)) then
+            if (size(rows%row_start) == self%n + 1) return
+            deallocate(rows%row_start, rows%column, rows%value)
+         end if
+         allocate(rows%row_start(self%n + 1), source=0)
+         allocate(rows%column(2*max_constraint_nodes*self%n), source=0)
+         allocate(rows%value(2*max_constraint_nodes*self%n), source=0.0_dp)
+      end subroutine reset
+
+   end subroutine constraints_rows
+
+   !> The order that sorts a short list.
+   pure function insertion_order(key) result(order)
+      integer, intent(in) :: key(:)
+      integer :: order(size(key)), i, j, held
+
+      do i = 1, size(key)
+         held = i
+         do j = i - 1, 1, -1
+            if (key(order(j)) <= key(held)) exit
+            order(j + 1) = order(j)
+         end do
+         order(j + 1) = held
+      end do
+   end function insertion_order
+
+   !> The pattern of `base` widened by all pairs of unknowns that meet in a constraint, and where
+   !> the entries of `base` went.
+   subroutine constraints_merge_pattern(self, base, merged, slot)
+      type(constraint_set_t), intent(in) :: self
+      type(csr_t), intent(in) :: base
+      type(csr_t), intent(out) :: merged
+      integer, allocatable, intent(out) :: slot(:)       !! (entries of `base`)
+      integer, allocatable :: user_start(:), user(:)
+      integer :: i, j, k, l, n, pass
+      integer, allocatable :: seen(:)
+
+      call list_rows(self%force_rows, user_start, user)
+      allocate(seen(base%n_row), slot(size(base%column)))
+      merged%n_row = base%n_row
+      merged%n_col = base%n_col
+      allocate(merged%row_start(base%n_row + 1), source=0)
+      do pass = 1, 2
+         seen = 0
+         n = 0
+         do i = 1, base%n_row
+            do k = base%row_start(i) + 1, base%row_start(i + 1)
+               call add_column(base%column(k))
+            end do
+            do l = user_start(i), user_start(i + 1) - 1
+               associate (rows => self%force_rows, row => user(l))
+                  do k = rows%row_start(row) + 1, rows%row_start(row + 1)
+                     call add_column(rows%column(k))
+                  end do
+               end associate
+            end do
+            if (pass == 2 .and. user_start(i + 1) > user_start(i)) then
+               associate (part => merged%column(merged%row_start(i) + 1:n))
+                  part = part(insertion_order(part))
+               end associate
+            end if
+            merged%row_start(i + 1) = n
+         end do
+         if (pass == 1) allocate(merged%column(n))
+      end do
+      allocate(merged%value(n), source=0.0_dp)
+      do i = 1, base%n_row
+         j = merged%row_start(i) + 1
+         do k = base%row_start(i) + 1, base%row_start(i + 1)
+            do while (merged%column(j) /= base%column(k))
+               j = j + 1
+            end do
+            slot(k) = j
+         end do
+      end do
+
+   contains
+
+      subroutine add_column(column)
+         integer, intent(in) :: column
+
+         if (seen(column + 1) == i) return
+         seen(column + 1) = i
+         n = n + 1
+         if (pass == 2) merged%column(n) = column
+      end subroutine add_column
+
+   end subroutine constraints_merge_pattern
+
+   !> For each unknown the rows that it occurs in.
+   pure subroutine list_rows(rows, user_start, user)
+      type(csr_t), intent(in) :: rows
+      integer, allocatable, intent(out) :: user_start(:), user(:)
+      integer :: i, k, place(rows%n_col)
+
+      allocate(user_start(rows%n_col + 1), source=0)
+      allocate(user(rows%row_start(rows%n_row + 1)))
+      do k = 1, size(user)
+         user_start(rows%column(k) + 2) = user_start(rows%column(k) + 2) + 1
+      end do
+      user_start(1) = 1
+      do i = 1, rows%n_col
+         user_start(i + 1) = user_start(i + 1) + user_start(i)
+         place(i) = user_start(i)
+      end do
+      do i = 1, rows%n_row
+         do k = rows%row_start(i) + 1, rows%row_start(i + 1)
+            user(place(rows%column(k) + 1)) = i
+            place(rows%column(k) + 1) = place(rows%column(k) + 1) + 1
+         end do
+      end do
+   end subroutine list_rows
+
+   !> Contact forces lam_k g_k on all nodes, and the sum of their sizes.
+   pure subroutine constraints_force(self, force, magnitude)
+      type(constraint_set_t), intent(in) :: self
+      real(wp), intent(out), contiguous :: force(:, :)         !! (2, n_node)
+      real(wp), intent(inout), contiguous :: magnitude(:, :)   !! (2, n_node), added to
+      integer :: k, i, node
+
+      force = 0.0_wp
+      do k = 1, self%n
+         do i = 1, self%item(k)%n_node
+            node = self%item(k)%node(i)
+            force(:, node) = force(:, node) + self%lam(k)*self%item(k)%g(:, i)
+            magnitude(:, node) = magnitude(:, node) + abs(self%lam(k)*self%item(k)%g(:, i))
+         end do
+      end do
+   end subroutine constraints_force
+
+   !> Subtract the sum of lam_k d(discrete gradient of gap_k)/d q1 from the matrix `merged`.
+   subroutine constraints_add_curvature(self, numbering, merged)
+      type(constraint_set_t), intent(in) :: self
+      type(numbering_t), intent(in) :: numbering
+      type(csr_t), intent(inout) :: merged
+      integer :: k, i, j, slot, row, column
+
+      do k = 1, self%n
+         associate (item => self%item(k))
+            do j = 1, 2*item%n_node
+               column = numbering%unknown(2 - mod(j, 2), item%node((j + 1)/2))
+               if (column == 0) cycle
+               do i = 1, 2*item%n_node
+                  row = numbering%unknown(2 - mod(i, 2), item%node((i + 1)/2))
+                  if (row == 0) cycle
+                  slot = csr_find(merged, row, column)
+                  merged%value(slot) = merged%value(slot) - real(self%lam(k)*item%h(i, j), dp)
+               end do
+            end do
+         end associate
+      end do
+   end subroutine constraints_add_curvature
+
+end module emcon_constraints

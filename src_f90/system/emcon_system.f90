@@ -1,0 +1,257 @@
+!> The discrete system of one step: numbered unknowns, forces, mass, tangent, contact pairs.
+!>
+!> It knows configurations and weights, not time stepping: a scheme asks for
+!> r = a M du - b M v0 + f_int - f_ext and its tangent.
+module emcon_system
+   use emcon_bodies, only : bodies_find
+   use emcon_contact, only : contact_box_t
+   use emcon_csr, only : csr_from_elements, csr_t
+   use emcon_element_kinds, only : element_kinds, max_element_nodes
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
+   use emcon_nts, only : nts_init, nts_t
+   use emcon_numbering, only : numbering_init, numbering_t
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t
+   implicit none
+   private
+   public :: system_t, pose_t, system_init, system_begin_step, system_respond, mass_times
+
+   !> Where forces are evaluated and how inertia enters: all that a scheme decides.
+   type :: pose_t
+      real(wp) :: mass_du = 0.0_wp               !! a in a M du [1/T^2]
+      real(wp) :: mass_v = 0.0_wp                !! b in b M v0 [1/T]
+      logical :: is_end = .false.                !! gradients at the end, not discrete gradients
+      type(instant_t) :: load_instant            !! when loads are taken
+   end type pose_t
+
+   type :: system_t
+      type(solid_t) :: solid
+      type(csr_t) :: mass                        !! node by node, the same in all directions
+      type(contact_box_t), allocatable :: contact(:)
+      integer, allocatable :: first_constraint(:)   !! (n_pair + 1) constraints before each pair
+      integer :: n_constraint = 0
+      integer :: n_body = 0
+      integer, allocatable :: body(:)            !! (n_node) connected part; 0: no element
+      integer :: i_step = 0                      !! step of the deck the rest belongs to
+      logical :: nlgeom = .false.
+      type(numbering_t) :: numbering
+      type(loads_t) :: loads
+      type(csr_t) :: matrix                      !! tangent over the unknowns
+      integer, allocatable :: slot(:)            !! element entries in `matrix`
+      real(dp), allocatable :: mass_value(:)     !! mass in the pattern of `matrix`
+      type(solid_response_t) :: response
+      real(wp), allocatable :: inertia(:, :)     !! (2, n_node) a M du - b M v0
+      real(wp), allocatable :: external(:, :)    !! (2, n_node) loads
+      real(wp), allocatable :: residual(:, :)    !! (2, n_node) without contact forces
+      real(wp), allocatable :: magnitude(:, :)   !! (2, n_node) sum of |contributions| to it
+      real(wp), allocatable :: u_work(:, :), f_work(:, :), zero(:, :)
+   end type system_t
+
+contains
+
+   !> What stays the same in all steps of `scene`.
+   subroutine system_init(self, scene, error)
+      type(system_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer :: n
+
+      call solid_init(self%solid, scene, error)
+      if (allocated(error)) return
+      call init_mass(self, error)
+      if (allocated(error)) return
+      call init_contact(self, scene, error)
+      if (allocated(error)) return
+      n = self%solid%n_node
+      call bodies_find(self%solid%node, n, self%body, self%n_body)
+      allocate(self%response%force(2, n), self%response%magnitude(2, n), source=0.0_wp)
+      allocate(self%response%energy(self%solid%n_element), source=0.0_wp)
+      allocate(self%inertia(2, n), self%external(2, n), source=0.0_wp)
+      allocate(self%residual(2, n), self%magnitude(2, n), source=0.0_wp)
+      allocate(self%u_work(2, n), self%f_work(2, n), self%zero(2, n), source=0.0_wp)
+   end subroutine system_init
+
+   !> The mass matrix, node by node.
+   subroutine init_mass(self, error)
+      type(system_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: start(:), list(:), slot(:)
+      integer :: e, i, j, k, n
+
+      call element_lists(self%solid, 1, start, list)
+      call csr_from_elements(self%mass, self%solid%n_node, start, list, slot, error)
+      if (allocated(error)) return
+      k = 0
+      do e = 1, self%solid%n_element
+         n = start(e + 1) - start(e)
+         do j = 1, n
+            do i = 1, n
+               k = k + 1
+               self%mass%value(slot(k)) = self%mass%value(slot(k)) &
+                  + real(self%solid%mass(i, j, e), dp)
+            end do
+         end do
+      end do
+   end subroutine init_mass
+
+   !> Lists of the degrees of freedom of all elements, as `csr_from_elements` reads them;
+   !> degree of freedom a of node i is `n_dim*(i - 1) + a`.
+   pure subroutine element_lists(solid, n_dim, start, list)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: n_dim
+      integer, allocatable, intent(out) :: start(:), list(:)
+      integer :: e, i, a, k
+
+      allocate(start(solid%n_element + 1), list(n_dim*max_element_nodes*solid%n_element))
+      k = 0
+      do e = 1, solid%n_element
+         start(e) = k + 1
+         do i = 1, element_kinds(solid%kind(e))%n_node
+            do a = 1, n_dim
+               k = k + 1
+               list(k) = n_dim*(solid%node(i, e) - 1) + a
+            end do
+         end do
+      end do
+      start(solid%n_element + 1) = k + 1
+      list = list(:k)
+   end subroutine element_lists
+
+   !> The contact pairs and the numbers of their constraints.
+   subroutine init_contact(self, scene, error)
+      type(system_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(nts_t), allocatable :: nts
+      integer :: i
+
+      allocate(self%contact(size(scene%pair)))
+      allocate(self%first_constraint(size(scene%pair) + 1), source=0)
+      do i = 1, size(scene%pair)
+         allocate(nts)
+         call nts_init(nts, scene, scene%pair(i), error)
+         if (allocated(error)) return
+         call move_alloc(nts, self%contact(i)%contact)
+         self%n_constraint = self%n_constraint + self%contact(i)%contact%n_constraint
+         self%first_constraint(i + 1) = self%n_constraint
+      end do
+   end subroutine init_contact
+
+   !> Number the unknowns of step `i_step` of the deck and lay out its matrix.
+   subroutine system_begin_step(self, scene, i_step, error)
+      type(system_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: start(:), list(:)
+      integer :: k
+
+      self%i_step = i_step
+      self%nlgeom = scene%step(i_step)%nlgeom
+      call numbering_init(self%numbering, 2, self%solid%n_node, scene%step(i_step)%prescribed)
+      call element_lists(self%solid, 2, start, list)
+      do k = 1, size(list)
+         list(k) = self%numbering%unknown(2 - mod(list(k), 2), (list(k) + 1)/2)
+      end do
+      call csr_from_elements(self%matrix, self%numbering%n_unknown, start, list, self%slot, error)
+      if (allocated(error)) return
+      call place_mass(self)
+      call loads_init(self%loads, scene, scene%step(i_step), self%numbering, self%matrix)
+   end subroutine system_begin_step
+
+   !> Put the mass into the pattern of the matrix.
+   subroutine place_mass(self)
+      type(system_t), intent(inout) :: self
+      integer :: e, i, j, a, k, n, before
+
+      if (allocated(self%mass_value)) deallocate(self%mass_value)
+      allocate(self%mass_value(size(self%matrix%value)), source=0.0_dp)
+      before = 0
+      do e = 1, self%solid%n_element
+         n = element_kinds(self%solid%kind(e))%n_node
+         do j = 1, n
+            do i = 1, n
+               do a = 1, 2
+                  k = self%slot(before + 2*(i - 1) + a + 2*n*(2*(j - 1) + a - 1))
+                  if (k == 0) cycle
+                  self%mass_value(k) = self%mass_value(k) + real(self%solid%mass(i, j, e), dp)
+               end do
+            end do
+         end do
+         before = before + 4*n*n
+      end do
+   end subroutine place_mass
+
+   !> Residual of the step from `u0`, `v0` to `u0 + du` without contact forces, and with
+   !> `with_tangent` the tangent. `inverted_element` in `response` tells of a failure.
+   subroutine system_respond(self, scene, pose, u0, v0, du, offset, with_tangent)
+      type(system_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), du(:, :)   !! (2, n_node)
+      real(wp), intent(in), contiguous :: offset(:, :)       !! (2, n_node) to `du`, for inertia
+      logical, intent(in) :: with_tangent
+
+      self%external = 0.0_wp
+      if (with_tangent) self%matrix%value = real(pose%mass_du, dp)*self%mass_value
+      if (pose%is_end) then
+         self%u_work = u0 + du
+         call respond_at(self%u_work, self%zero, 2.0_wp, 1.0_wp)
+      else
+         self%u_work = u0 + 0.5_wp*du
+         call respond_at(u0, du, 1.0_wp, 0.5_wp)
+      end if
+      if (self%response%inverted_element > 0) return
+      if (pose%mass_du > 0.0_wp) then
+         self%f_work = pose%mass_du*(du + offset) - pose%mass_v*v0
+         call mass_times(self, self%f_work, self%inertia)
+         self%f_work = abs(pose%mass_du*(du + offset)) + abs(pose%mass_v*v0)
+         call mass_times(self, self%f_work, self%magnitude)
+      else
+         self%inertia = 0.0_wp
+         self%magnitude = 0.0_wp
+      end if
+      self%residual = self%inertia + (self%response%force - self%external)
+      self%magnitude = self%magnitude + (self%response%magnitude + abs(self%external))
+
+   contains
+
+      !> Internal forces from `start` by `step`, loads at `u_work`.
+      subroutine respond_at(start, step, solid_factor, load_factor)
+         real(wp), intent(in), contiguous :: start(:, :), step(:, :)
+         real(wp), intent(in) :: solid_factor, load_factor
+
+         if (with_tangent) then
+            call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
+               solid_factor, self%slot, self%matrix%value)
+            call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
+               self%external, load_factor, self%matrix%value)
+         else
+            call solid_respond(self%solid, start, step, self%nlgeom, self%response)
+            call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
+               self%external)
+         end if
+      end subroutine respond_at
+
+   end subroutine system_respond
+
+   !> M field, in both directions.
+   pure subroutine mass_times(self, field, product)
+      type(system_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: field(:, :)        !! (2, n_node)
+      real(wp), intent(inout), contiguous :: product(:, :)   !! (2, n_node)
+      real(wp) :: total(2)
+      integer :: i, k
+
+      do i = 1, self%mass%n_row
+         total = 0.0_wp
+         do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
+            total = total + real(self%mass%value(k), wp)*field(:, self%mass%column(k) + 1)
+         end do
+         product(:, i) = total
+      end do
+   end subroutine mass_times
+
+end module emcon_system

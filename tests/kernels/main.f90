@@ -1,0 +1,95 @@
+!> The kernel tests: `main` runs all, `main SUITE` one suite, `main SUITE TEST` one test.
+!>
+!> A new suite takes two lines: its `use` and its `call run`. Every test finds the generator of
+!> `random_number` in the same state, so a test gives the same figures alone and among others.
+program main
+   use, intrinsic :: iso_fortran_env, only : output_unit
+   use check, only : test_case_t
+   use emcon_errors, only : error_t
+   use test_check, only : collect_check
+   use test_cholmod, only : collect_cholmod
+   use test_csr, only : collect_csr
+   use test_lapack, only : collect_lapack
+   use test_triple_product, only : collect_triple_product
+   use test_umfpack, only : collect_umfpack
+   implicit none
+
+   abstract interface
+      subroutine collect_procedure(tests)
+         import :: test_case_t
+         type(test_case_t), allocatable, intent(out) :: tests(:)
+      end subroutine collect_procedure
+   end interface
+
+   character(len=64) :: only_suite, only_test       !! blank: all
+   integer :: n_passed, n_failed
+
+   n_passed = 0
+   n_failed = 0
+   call get_command_argument(1, only_suite)
+   call get_command_argument(2, only_test)
+
+   call run("check", collect_check)
+   call run("csr", collect_csr)
+   call run("triple_product", collect_triple_product)
+   call run("umfpack", collect_umfpack)
+   call run("cholmod", collect_cholmod)
+   call run("lapack", collect_lapack)
+
+   if (n_passed + n_failed == 0) then
+      write(output_unit, "(a)") "no test is called " // trim(only_suite) // " " // trim(only_test)
+      n_failed = 1
+   end if
+   write(output_unit, "(i0, a, i0, a)") n_passed, " passed, ", n_failed, " failed"
+   flush(output_unit)
+   if (n_failed > 0) stop 1
+
+contains
+
+   !> Run the tests of one suite; one line for the suite, one for each failure.
+   subroutine run(suite, collect)
+      character(len=*), intent(in) :: suite
+      procedure(collect_procedure) :: collect
+      type(test_case_t), allocatable :: tests(:)
+      type(error_t), allocatable :: error
+      integer :: i, n_run, n_bad
+
+      if (only_suite /= " " .and. only_suite /= suite) return
+      call collect(tests)
+      n_run = 0
+      n_bad = 0
+      do i = 1, size(tests)
+         if (only_test /= " " .and. only_test /= tests(i)%name) cycle
+         n_run = n_run + 1
+         call seed_random()
+         call tests(i)%run(error)
+         if (allocated(error) .eqv. tests(i)%should_fail) cycle
+         n_bad = n_bad + 1
+         if (allocated(error)) then
+            write(output_unit, "(6a)") "   FAILED ", suite, " ", trim(tests(i)%name), ": ", &
+               error%message
+         else
+            write(output_unit, "(4a)") "   FAILED ", suite, " ", trim(tests(i)%name) &
+               // ": passed, but should fail"
+         end if
+      end do
+      if (n_run == 0) return
+      write(output_unit, "(a, t24, i4, a, i4, a)") suite, n_run - n_bad, " passed", n_bad, " failed"
+      flush(output_unit)
+      n_passed = n_passed + n_run - n_bad
+      n_failed = n_failed + n_bad
+   end subroutine run
+
+   subroutine seed_random()
+      integer, allocatable :: seed(:)
+      integer :: i, n
+
+      call random_seed(size=n)
+      allocate(seed(n))
+      do i = 1, n
+         seed(i) = 7919*i
+      end do
+      call random_seed(put=seed)
+   end subroutine seed_random
+
+end program main

@@ -1,0 +1,189 @@
+"""The layers of the house, read from the sources: one way down, no arrow back up.
+
+The rooms stand in the order of ROOMS; a module uses its own room and rooms before it. The
+functions take the root of a tree and return findings, so they are tried on bad trees below.
+"""
+
+import graphlib
+import importlib.util
+import pathlib
+import re
+import subprocess
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOMS = (
+    "base algebra dgrad scene deck solid contact system march results api app".split()
+)
+# The program knows the stepper only; texts and errors of base are common to all.
+ONLY = {"app": {"app", "api", "base"}}
+TOP = set("Makefile src_f90 pywrap input_decks tests docs README.md LICENSE".split())
+
+STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
+COMMENT = re.compile(r"!.*")
+# At the start of a statement or behind a one-line `if (...)`.
+STOP = re.compile(r"(?:^|[;)])\s*(?:(?:error\s+)?stop\b(?!\s*[=(%])|call\s+(?:exit|abort)\b)", re.I)
+PRINT = re.compile(r"(?:^|[;)])\s*(?:print\s*[*\"'(]|write\s*\(\s*\*)", re.I)
+
+_spec = importlib.util.spec_from_file_location("module_order", ROOT / "src_f90/module_order.py")
+module_order = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(module_order)
+
+
+def sources(root):
+    return sorted(p for p in (root / "src_f90").rglob("*") if p.suffix in {".f90", ".F90", ".inc"})
+
+
+def room(root, path):
+    return path.relative_to(root / "src_f90").parts[0]
+
+
+def modules(root):
+    """Module name -> (file, room, used modules); an included file counts for the including one."""
+    found = {}
+    for path in sources(root):
+        if path.suffix == ".inc":
+            continue
+        text = path.read_text()
+        used = set()
+        for part in [path, *module_order.included(path)]:
+            used |= module_order.used(part.read_text())
+        for name in module_order.defined(text) or [f"program {path.stem}"]:
+            found[name] = (path, room(root, path), used)
+    return found
+
+
+def names(root):
+    """Files that are not one module of the file's name (in app/, one may be the program)."""
+    for path in sources(root):
+        if path.suffix == ".inc":
+            continue
+        if room(root, path) not in ROOMS:
+            yield f"{path.relative_to(root)}: not in a room of the house"
+        defined = module_order.defined(path.read_text())
+        is_program = not defined and room(root, path) == "app"
+        if defined != [path.stem] and not is_program:
+            yield f"{path.relative_to(root)}: defines {defined or 'no module'}, not {path.stem}"
+
+
+def arrows_up(root):
+    """Uses of a room that stands below the user's own."""
+    found = modules(root)
+    for name, (_, home, used) in sorted(found.items()):
+        for other in sorted(used & set(found)):
+            there = found[other][1]
+            allowed = ONLY.get(home) or set(ROOMS[: ROOMS.index(home) + 1])
+            if there not in allowed:
+                yield f"{name} ({home}) uses {other} ({there})"
+
+
+def cycles(root):
+    """The first cycle among the modules, if any."""
+    try:
+        graphlib.TopologicalSorter({n: m[2] for n, m in modules(root).items()}).prepare()
+    except graphlib.CycleError as error:
+        yield " -> ".join(error.args[1])
+
+
+def statements(root, pattern, rooms_free):
+    """Lines that match, comments and strings aside, outside the rooms that may do so."""
+    for path in sources(root):
+        if room(root, path) in rooms_free:
+            continue
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            if pattern.search(COMMENT.sub("", STRING.sub('""', line))):
+                yield f"{path.relative_to(root)}:{number}: {line.strip()}"
+
+
+def top_level(root):
+    """Entries at the top that the house does not know; ignored files do not count."""
+    listed = subprocess.run(
+        ["git", "-C", root, "ls-files", "--cached", "--others", "--exclude-standard"],
+        capture_output=True,
+        text=True,
+    )
+    if listed.returncode == 0:
+        entries = {line.split("/")[0] for line in listed.stdout.splitlines()}
+    else:  # an unpacked archive
+        entries = {p.name for p in root.iterdir()} - {"build"}
+    return sorted(e for e in entries - TOP if not e.startswith("."))
+
+
+CHECKS = {
+    "names": names,
+    "arrows up": arrows_up,
+    "cycles": cycles,
+    "stop": lambda root: statements(root, STOP, {"app"}),
+    "print": lambda root: statements(root, PRINT, {"app", "results"}),
+    "top level": top_level,
+}
+
+
+@pytest.mark.parametrize("check", CHECKS)
+def test_house(check):
+    assert list(CHECKS[check](ROOT)) == []
+
+
+# ---- the checks themselves, on made-up trees ----------------------------------------------------
+
+
+GOOD = {
+    "base/emcon_kinds.F90": "module emcon_kinds ! the kinds\nend module emcon_kinds\n",
+    "base/emcon_text.f90": "module emcon_text\n   use emcon_kinds, only : wp\n"
+    "   ! stop\n   text = 'stop'; stop_at = 1\nend module emcon_text\n",
+    "api/emcon_stepper.f90": "module emcon_stepper\n   use :: emcon_text\n"
+    "   use, intrinsic :: iso_c_binding\nend module emcon_stepper\n",
+    "app/emcon.f90": "program emcon\n   use emcon_stepper\n   print *, 1\n   stop 1\nend program\n",
+}
+BAD = {
+    "names": {"base/emcon_sort.f90": "module emcon_order\nend module emcon_order\n"},
+    "names, two": {
+        "base/emcon_a.f90": "module emcon_a\nend module\nmodule emcon_b\nend module\n"
+    },
+    "names, room": {"misc/emcon_a.f90": "module emcon_a\nend module emcon_a\n"},
+    "arrows up": {"scene/emcon_a.f90": "module emcon_a\n  use emcon_stepper\nend module emcon_a\n"},
+    "arrows up, include": {
+        "scene/emcon_a.f90": 'module emcon_a\n   include "a.inc"\nend module emcon_a\n',
+        "scene/a.inc": "   USE emcon_stepper, ONLY : x\n",
+    },
+    "arrows up, program": {
+        "solid/emcon_law.f90": "module emcon_law\nend module emcon_law\n",
+        "app/emcon.f90": "program emcon\n   use emcon_law\nend program\n",
+    },
+    "cycles": {
+        "base/emcon_a.f90": "module emcon_a\n   use emcon_b\nend module emcon_a\n",
+        "base/emcon_b.f90": "module emcon_b\n   use emcon_a\nend module emcon_b\n",
+    },
+    "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
+    "stop, exit": {"api/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},
+    "print": {"deck/emcon_a.f90": "module emcon_a\n   write (*, *) x\nend module emcon_a\n"},
+}
+
+
+def build(root, files):
+    for name, text in {**GOOD, **files}.items():
+        path = root / "src_f90" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return root
+
+
+@pytest.mark.parametrize("check", CHECKS)
+def test_good_tree_passes(check, tmp_path):
+    assert list(CHECKS[check](build(tmp_path, {}))) == []
+
+
+@pytest.mark.parametrize("fault", BAD)
+def test_bad_tree_fails(fault, tmp_path):
+    assert list(CHECKS[fault.split(",")[0]](build(tmp_path, BAD[fault])))
+
+
+@pytest.mark.parametrize("in_git", [False, True])
+def test_stray_file_at_the_top_fails(in_git, tmp_path):
+    if in_git:
+        subprocess.run(["git", "init", "--quiet", tmp_path], check=True)
+        (tmp_path / ".gitignore").write_text("/kept_out\n")
+        (tmp_path / "kept_out").write_text("")
+    (tmp_path / "notes.md").write_text("")
+    assert top_level(build(tmp_path, {})) == ["notes.md"]

@@ -1,0 +1,26 @@
+"""The kernel tests, one suite at a time, as built for use and with all run-time checks."""
+
+import pathlib
+import re
+import subprocess
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+SUITES = re.findall(r'^ *call run\("(\w+)"', (ROOT / "tests/kernels/main.f90").read_text(), re.M)
+
+
+@pytest.mark.parametrize("mode", ["release", "debug"])
+@pytest.mark.parametrize("suite", SUITES)
+def test_suite(suite, mode):
+    program = ROOT / "build" / mode / "kernels"
+    done = subprocess.run(
+        [program, suite], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stdout
+
+
+def test_every_suite_is_run():
+    """A file test_<suite>.f90 that main.f90 forgets would pass unseen."""
+    files = {p.stem.removeprefix("test_") for p in (ROOT / "tests/kernels").glob("test_*.f90")}
+    assert files == set(SUITES)
