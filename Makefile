@@ -27,32 +27,32 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels lint bench docs install status clean help FORCE
+.PHONY: run test lib app pywrap kernels lint bench docs install status clean help
 
 # ---- set-up -------------------------------------------------------------------------------------
 
-# An included makefile is made before anything else: so the set-up comes first, when there is none
-# or when the tree has come from another machine. Help and clean do without.
+# Before anything else, unless build/config.mk was written on this machine: help and clean do
+# without. What the caller sets in place of a search is handed on.
+SETUP = FC='$(FC)' CC='$(CC)' $(foreach v,PYTHON HDF5_CFLAGS HDF5_LIBS UMFPACK_CFLAGS UMFPACK_LIBS \
+	LAPACK_LIBS,$(if $(findstring command,$(origin $v)),$v='$($v)')) .ci/setup
 ifneq ($(filter-out help clean,$(MAKECMDGOALS)),)
-ifeq ($(shell FC='$(FC)' .ci/setup current && echo yes),)
-build/config.mk: FORCE
+$(shell $(SETUP) system >&2)
+ifneq ($(.SHELLSTATUS),0)
+$(error The set-up is not complete)
 endif
 include build/config.mk
 endif
 
-build/config.mk: .ci/setup
-	@FC='$(FC)' CC='$(CC)' .ci/setup system
-
 .venv/%.stamp: pywrap/pyproject.toml build/config.mk
-	@FC='$(FC)' .ci/setup python $*
+	@$(SETUP) python $*
 
 PY := .venv/bin/python
-# Our matrices are sparse: threads inside dense kernels cost time here, and two suffice to spin.
+# The dense blocks are small here: threads inside BLAS would spin more than they work.
 export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONHOME PYTHONPATH
 
 # Two runs at a time take turns at building. Parallel, unless the caller has said how.
-BUILDING = +@flock build/.lock $(MAKE) --no-print-directory \
+BUILDING = +@flock build/.lock $(MAKE) --no-print-directory $(if $(V),,--silent) \
 	$(if $(findstring -j,$(MAKEFLAGS)),,-j$(shell nproc))
 
 # ---- sources ------------------------------------------------------------------------------------
@@ -90,7 +90,6 @@ CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(CFLAGS)
 LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(LAPACK_LIBS)
 
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
-# (All this once the configuration is known; make reads this file again after writing it.)
 ifdef COMPILER
 $(shell mkdir -p $(O) $(BUILD)/mod $(BUILD)/py)
 FLAGS := $(strip $(COMPILER) $(FCOMPILE) $(CCOMPILE) $(LIBS))
@@ -216,7 +215,7 @@ install: app lib  ## program, library, modules, header and emcon.pc below PREFIX
 		'Libs.private: $(LIBS) -lgfortran -lm' > $(TO)/lib/pkgconfig/emcon.pc
 
 status:  ## compiler, libraries and Python packages that were found
-	@FC='$(FC)' CC='$(CC)' .ci/setup status
+	@$(SETUP) status
 
 clean:  ## remove build/ and the compiled extension (.venv stays)
 	rm -rf build pywrap/emcon/_core*.so pywrap/emcon/libemcon.so.0

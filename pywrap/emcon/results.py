@@ -197,39 +197,39 @@ class Bodies:
 
 
 def read_bodies(paths: ResultPaths) -> Bodies | None:
-    """Group `bodies` of NAME.h5; None if the file or the group is not there."""
+    """Masses and momenta of the bodies, /sets/BODIES in NAME.h5; None if they are not there."""
     if not paths.history.is_file():
         return None
     with _open(paths.history) as file:
-        group = file.get("bodies")
+        group = file.get("sets/BODIES")
         if not isinstance(group, h5py.Group):
             return None
         try:
-            mass, px, py, lz = (_read(group, name) for name in ("mass", "px", "py", "lz"))
+            mass, momentum = _read(group, "MASS"), _read(group, "MOMENTUM")
         except ResultError:
             return None
-    rows = min(len(px), len(py), len(lz))
-    fits = all(p.ndim == 2 and p.shape[1] == len(mass) for p in (px, py, lz))
-    if not (fits and rows and len(mass) and (mass > 0.0).all()):
+    mass = mass.ravel()
+    fits = momentum.ndim == 3 and momentum.shape[1:] == (len(mass), 3) and len(momentum) > 0
+    if not (fits and len(mass) and (mass > 0.0).all()):
         return None
-    return Bodies(mass, px[:rows], py[:rows], lz[:rows])
+    return Bodies(mass, momentum[..., 0], momentum[..., 1], momentum[..., 2])
 
 
 def read_contact_force(paths: ResultPaths) -> tuple[Array, Array] | None:
-    """Times (n_time) [T] and resultant of the contact force (n_time, n_dim) [M L/T^2].
+    """Times (n_time) [T] and resultant of the forces on the slave nodes (n_time, n_dim) [M L/T^2].
 
-    From `*CONTACT PRINT` with CF, that is /sets/<SET>/CF in NAME.h5; None unless just one set
-    has it (forces on slave and master would cancel).
+    From `*CONTACT PRINT` with CF: /sets/CONTACT/TOTAL_CF or CF in NAME.h5; None without either.
     """
     if not paths.history.is_file():
         return None
     with _open(paths.history) as file:
-        sets = file.get("sets")
-        found = [group for group in (sets.values() if isinstance(sets, h5py.Group) else ())
-                 if isinstance(group, h5py.Group) and "CF" in group and "CF_time" in group]
-        if len(found) != 1:
+        group = file.get("sets/CONTACT")
+        if not isinstance(group, h5py.Group):
             return None
-        times, force = _read(found[0], "CF_time"), _read(found[0], "CF")
+        name = next((name for name in ("TOTAL_CF", "CF") if name in group), None)
+        if name is None or f"{name}_time" not in group:
+            return None
+        times, force = _read(group, f"{name}_time"), _read(group, name)
     rows = min(len(times), len(force))
     if force.ndim != 3 or rows == 0:
         return None
@@ -237,14 +237,14 @@ def read_contact_force(paths: ResultPaths) -> tuple[Array, Array] | None:
 
 
 def read_wall_seconds(paths: ResultPaths) -> float | None:
-    """Wall time of the run [s], /run/wall_seconds in NAME.h5; None if it is not there."""
+    """Wall time of the run [s], /sets/RUN/WALL_SECONDS in NAME.h5; None if it is not there."""
     if not paths.history.is_file():
         return None
     with _open(paths.history) as file:
-        run = file.get("run")
-        if not isinstance(run, h5py.Group) or "wall_seconds" not in run:
+        group = file.get("sets/RUN")
+        if not isinstance(group, h5py.Group) or "WALL_SECONDS" not in group:
             return None
-        return float(_read(run, "wall_seconds")[0])
+        return float(_read(group, "WALL_SECONDS").ravel()[-1])
 
 
 # --- fields ------------------------------------------------------------------------------------

@@ -37,11 +37,13 @@ module emcon_cholmod
    interface
       function emcon_cholmod_new() result(handle) bind(c)
          import :: c_ptr
+         implicit none
          type(c_ptr) :: handle
       end function emcon_cholmod_new
 
       function emcon_cholmod_analyse(handle, n, ap, ai) result(status) bind(c)
          import :: c_int, c_ptr
+         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
@@ -51,6 +53,7 @@ module emcon_cholmod
       function emcon_cholmod_factorise(handle, n, ap, ai, ax, rcond, n_factor) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
+         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
@@ -61,6 +64,7 @@ module emcon_cholmod
 
       function emcon_cholmod_solve(handle, n, b, x) result(status) bind(c)
          import :: c_double, c_int, c_ptr
+         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          real(c_double), intent(in) :: b(*)
@@ -70,6 +74,7 @@ module emcon_cholmod
 
       subroutine emcon_cholmod_free(handle) bind(c)
          import :: c_ptr
+         implicit none
          type(c_ptr), value :: handle
       end subroutine emcon_cholmod_free
    end interface

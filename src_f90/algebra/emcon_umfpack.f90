@@ -48,17 +48,18 @@ module emcon_umfpack
    interface
       subroutine umfpack_di_defaults(control) bind(c)
          import :: c_double
+         implicit none
          real(c_double), intent(out) :: control(*)
       end subroutine umfpack_di_defaults
 
       function umfpack_di_symbolic(n_row, n_col, ap, ai, ax, symbolic, control, info) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
+         implicit none
          integer(c_int), value :: n_row, n_col
          integer(c_int), intent(in) :: ap(*), ai(*)
-         type(c_ptr), value :: ax                            ! null: the pattern alone decides
+         real(c_double), intent(in) :: ax(*), control(*)
          type(c_ptr), intent(out) :: symbolic
-         real(c_double), intent(in) :: control(*)
          real(c_double), intent(inout) :: info(*)
          integer(c_int) :: status
       end function umfpack_di_symbolic
@@ -66,6 +67,7 @@ module emcon_umfpack
       function umfpack_di_numeric(ap, ai, ax, symbolic, numeric, control, info) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
+         implicit none
          integer(c_int), intent(in) :: ap(*), ai(*)
          real(c_double), intent(in) :: ax(*), control(*)
          type(c_ptr), value :: symbolic
@@ -77,6 +79,7 @@ module emcon_umfpack
       function umfpack_di_wsolve(sys, ap, ai, ax, x, b, numeric, control, info, wi, w) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
+         implicit none
          integer(c_int), value :: sys
          integer(c_int), intent(in) :: ap(*), ai(*)
          real(c_double), intent(in) :: ax(*), b(*), control(*)
@@ -88,11 +91,13 @@ module emcon_umfpack
 
       subroutine umfpack_di_free_symbolic(symbolic) bind(c)
          import :: c_ptr
+         implicit none
          type(c_ptr), intent(inout) :: symbolic
       end subroutine umfpack_di_free_symbolic
 
       subroutine umfpack_di_free_numeric(numeric) bind(c)
          import :: c_ptr
+         implicit none
          type(c_ptr), intent(inout) :: numeric
       end subroutine umfpack_di_free_numeric
    end interface
@@ -119,9 +124,12 @@ contains
       call umfpack_di_defaults(self%control)
       self%control(control_ordering) = real(self%ordering, c_double)
       self%control(control_scale) = 0.0_c_double
+      ! Ones, not a null pointer: without values UMFPACK counts no diagonal entry and takes the
+      ! strategy for unsymmetric patterns, which here costs twice the time and many digits.
+      self%scaled%value = 1.0_dp
       associate (a => self%scaled)
          status = umfpack_di_symbolic(int(n, c_int), int(n, c_int), a%row_start, a%column, &
-            c_null_ptr, self%symbolic, self%control, self%info)
+            a%value, self%symbolic, self%control, self%info)
       end associate
       self%n_analysis = self%n_analysis + 1
       if (status /= umfpack_ok) call solver_raise(error, "UMFPACK", "ordering", int(status), &

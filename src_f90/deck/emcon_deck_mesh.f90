@@ -60,6 +60,7 @@ contains
       scene%node_origin = scene%node_origin(:n)
       scene%x = scene%x(:, :n)
       call label_map_init(reader%node_map, scene%node_label, repeated)
+      reader%doubt_positions = reader%doubt_positions .or. size(repeated) > 0
       do i = 1, size(repeated)
          call tell_repeated(reader, scene, "node", scene%node_label(repeated(i)), &
             scene%node_origin(repeated(i)), scene%node_origin( &
@@ -94,6 +95,7 @@ contains
             call get_real(reader, data, k + 1, "coordinate " // axis(k) // " of node " &
                // to_text(label), position(k))
          end do
+         reader%doubt_positions = reader%doubt_positions .or. .not. data%ok
          ! A node with a bad coordinate stays, so that what names it is not an error too.
          n = n + 1
          scene%node_label(n) = label

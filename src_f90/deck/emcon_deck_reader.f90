@@ -43,6 +43,7 @@ module emcon_deck_reader
       type(diagnostics_t) :: log
       logical :: is_lenient = .false.
       logical :: doubt_nodes = .false., doubt_elements = .false., doubt_names = .false.
+      logical :: doubt_positions = .false.               !! some node is not where it should be
       type(label_map_t) :: node_map, element_map
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times

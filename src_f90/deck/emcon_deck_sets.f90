@@ -104,19 +104,34 @@ contains
       allocate(builder%list(i_set)%item(8))
    end subroutine find_or_add
 
+   !> Repeated items are dropped before the list grows: sets of sets of the same items stay small.
    pure subroutine append(list, item)
       type(growing_t), intent(inout) :: list
       integer, intent(in) :: item
       integer, allocatable :: grown(:)
 
       if (list%n == size(list%item)) then
-         allocate(grown(2*list%n))
-         grown(:list%n) = list%item
-         call move_alloc(grown, list%item)
+         if (.not. is_ascending(list)) then
+            grown = unique_sorted(list%item)
+            list%n = size(grown)
+            list%item(:list%n) = grown
+            deallocate(grown)
+         end if
+         if (2*list%n > size(list%item)) then
+            allocate(grown(2*size(list%item)))
+            grown(:list%n) = list%item(:list%n)
+            call move_alloc(grown, list%item)
+         end if
       end if
       list%n = list%n + 1
       list%item(list%n) = item
    end subroutine append
+
+   pure logical function is_ascending(list)
+      type(growing_t), intent(in) :: list
+
+      is_ascending = all(list%item(2:list%n) > list%item(:list%n - 1))
+   end function is_ascending
 
    !> Data lines of labels and names of sets defined before.
    subroutine read_entries(reader, card, builder, i_set, map, is_doubted)
@@ -211,7 +226,7 @@ contains
       set = builder%set(:builder%n)
       do i = 1, builder%n
          associate (list => builder%list(i))
-            if (all(list%item(2:list%n) > list%item(:list%n - 1))) then
+            if (is_ascending(list)) then
                set(i)%item = list%item(:list%n)
             else
                set(i)%item = unique_sorted(list%item(:list%n))

@@ -35,6 +35,7 @@ module emcon_active_set
       logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
       integer :: n_tried = 0
       integer :: n_newton = 0                    !! iterations over all sets of the last step
+      real(wp) :: deepest = 0.0_wp               !! smallest gap per edge at the end, 0 if all open
       integer :: cycling_node = 0                !! slave node of a constraint that comes and goes
    end type active_set_t
 
@@ -160,6 +161,7 @@ contains
 
       status = step_done
       has_changed = .false.
+      self%deepest = 0.0_wp
       k = 0
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
@@ -168,6 +170,7 @@ contains
                if (self%is_active(id)) then
                   k = k + 1
                   state = contact%gap_state(i, scene%x, u0, du)
+                  self%deepest = min(self%deepest, state%gap1/state%size)
                   if (.not. state%is_covered) status = step_too_far
                   if (self%gap_tolerance > 0.0_wp .and. self%holds_gap .and. .not. was_active(id) &
                      .and. state%gap0 > self%gap_tolerance*state%size) status = step_stands_off
@@ -177,6 +180,7 @@ contains
                else
                   state = contact%gap_state(i, scene%x, u0, du)
                   if (.not. (state%is_near .and. state%is_over)) cycle
+                  self%deepest = min(self%deepest, state%gap1/state%size)
                   if (state%gap1 >= -gap_noise*state%size) cycle
                   if (.not. state%is_covered) status = step_too_far
                   self%is_active(id) = .true.

@@ -39,6 +39,7 @@ module emcon_march
       integer :: n_newton = 0                    !! iterations, over all cuts and active sets
       integer :: n_cut = 0
       integer :: n_active = 0
+      real(wp) :: deepest = 0.0_wp               !! smallest gap per master edge, 0 if all open
       type(notes_t) :: notes
    end type increment_t
 
@@ -408,6 +409,7 @@ contains
          state%contact = self%newton%contact
          state%internal = system%response%force
          state%energy = system%response%energy
+         increment%deepest = min(increment%deepest, self%active%deepest)
          state%is_active = .false.
          state%lam = 0.0_wp
          do k = 1, set%n

@@ -15,12 +15,13 @@ module emcon_files
    public :: is_terminal, survive_file_size_limit, clear_system_reason, system_reason
 
    !> An open file. Nothing is buffered: what `file_put` has taken, a kill cannot lose.
+   !>
+   !> Closed by `file_close`, not by a finaliser: with one, gfortran 12 leaves the components of an
+   !> `intent(out)` argument as they were.
    type :: file_t
       private
       type(c_ptr) :: stream = c_null_ptr
       character(len=:), allocatable :: path
-   contains
-      final :: file_final
    end type file_t
 
    integer, parameter :: block_size = 1048576     !! of `file_copy` [byte]
@@ -106,13 +107,6 @@ contains
       self%stream = c_null_ptr
       if (stat /= 0) call raise_system(error, "close", self%path)
    end subroutine file_close
-
-   subroutine file_final(self)
-      type(file_t), intent(inout) :: self
-      type(error_t), allocatable :: ignored
-
-      call file_close(self, ignored)
-   end subroutine file_final
 
    !> Whether there is a file or folder called `path`.
    logical function file_exists(path)

@@ -4,8 +4,8 @@
 !> failure names the file, what was being done and, where the system gave one, the reason; the
 !> library's own report is silenced.
 module emcon_hdf5
-   use, intrinsic :: iso_c_binding, only : c_associated, c_bool, c_f_pointer, c_int, c_int64_t, &
-      c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only : c_associated, c_bool, c_f_pointer, c_float, c_int, &
+      c_int64_t, c_null_ptr, c_ptr
    use emcon_errors, only : error_t, raise, err_file
    use emcon_files, only : clear_system_reason, file_discard, file_exists, system_reason
    use hdf5, only : hid_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5fcreate_f, &
@@ -19,14 +19,12 @@ module emcon_hdf5
    public :: hdf5_file_t, hdf5_create, hdf5_open, hdf5_flush, hdf5_close, hdf5_fail
    public :: hdf5_make_group, hdf5_plan_object, hdf5_has
 
-   !> An open HDF5 file.
+   !> An open HDF5 file. Closed by `hdf5_close`; no finaliser, for the reason given at `file_t`.
    type :: hdf5_file_t
       integer(hid_t) :: id = -1_hid_t
       character(len=:), allocatable :: path
       logical :: is_checked = .false.    !! checksums on all that is stored, no compression
       logical :: has_failed = .false.    !! something was not written: the file is worth nothing
-   contains
-      final :: hdf5_final
    end type hdf5_file_t
 
    !> Bytes of chunk cache per open data set: rows of a few columns are gathered, whole frames pass.
@@ -117,7 +115,7 @@ contains
       call h5eset_auto_f(0, e)
       call h5pcreate_f(H5P_FILE_ACCESS_F, access, e)
       call h5pset_fclose_degree_f(access, H5F_CLOSE_STRONG_F, e)
-      call h5pset_cache_f(access, 0, 521_size_t, cache_size, 1.0, e)
+      call h5pset_cache_f(access, 0, 521_size_t, cache_size, 1.0_c_float, e)
    end subroutine make_access
 
    !> Hand all that was written to the system: the file is complete then.
@@ -156,13 +154,6 @@ contains
       self%id = -1_hid_t
       if (e < 0 .and. .not. self%has_failed) call hdf5_fail(self, "close", "", error)
    end subroutine hdf5_close
-
-   subroutine hdf5_final(self)
-      type(hdf5_file_t), intent(inout) :: self
-      type(error_t), allocatable :: ignored
-
-      call hdf5_close(self, ignored)
-   end subroutine hdf5_final
 
    !> Report that `action` failed on the data set `name` ("": the file), and mark the file.
    subroutine hdf5_fail(self, action, name, error)

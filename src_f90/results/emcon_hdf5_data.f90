@@ -307,9 +307,10 @@ contains
       if (stat >= 0) call h5tget_class_f(text_type, class, stat)
       if (stat >= 0) stat = merge(0, -1, class == H5T_STRING_F)
       if (stat >= 0) call h5tget_size_f(text_type, length, stat)
-      if (stat >= 0) allocate(letter(length, n), texts(n), stat=stat)
+      if (stat >= 0) allocate(letter(length, n), stat=stat)
+      if (stat == 0) allocate(texts(n), stat=stat)
       if (stat == 0) stat = read_block(dset, text_type, n, c_loc(letter))
-      if (stat >= 0) then
+      if (stat == 0) then
          do i = 1, n
             allocate(character(len=count(letter(:, i) /= c_null_char)) :: texts(i)%text)
             do j = 1, len(texts(i)%text)

@@ -110,8 +110,8 @@ contains
    subroutine series_append(self, file, values, n_row, error)
       type(hdf5_series_t), intent(inout) :: self
       type(hdf5_file_t), intent(inout) :: file
-      real(dp), intent(in), target :: values(*)      !! (row_shape, n_row)
       integer, intent(in) :: n_row
+      real(dp), intent(in), target :: values(product(self%row_shape)*n_row)   !! row after row
       type(error_t), allocatable, intent(out) :: error
       integer(hid_t) :: file_space, memory_space
       integer(hsize_t), dimension(self%row_rank + 1) :: dims, start, block

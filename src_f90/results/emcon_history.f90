@@ -151,7 +151,9 @@ contains
          call file_put(self%csv, csv_row(self%column, kept(i, :)), error)
       end do
       if (.not. allocated(error)) call file_rename(base // ".csv.tmp", base // ".csv", error)
-      if (allocated(error)) call file_remove(base // ".csv.tmp", ignored)
+      if (.not. allocated(error)) return
+      call file_close(self%csv, ignored)
+      call file_remove(base // ".csv.tmp", ignored)
    end subroutine begin_csv
 
    !> A line of NAME.csv: reals that read back to the same bits, integers as such.
@@ -217,7 +219,7 @@ contains
       type(history_t), intent(inout) :: self
       character(len=*), intent(in) :: set
       character(len=*), intent(in) :: variable
-      integer, intent(in) :: label(:)                !! (n_item) the user's numbers of its members
+      integer, intent(in), contiguous :: label(:)    !! (n_item) the user's numbers of its members
       integer, intent(in) :: n_component
       integer, intent(out) :: i_set
       type(error_t), allocatable, intent(out) :: error

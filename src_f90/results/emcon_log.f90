@@ -24,12 +24,14 @@ contains
       character(len=*), intent(in) :: path
       logical, intent(in) :: is_resumed
       type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: ignored
 
       ! Emptied only when locked: the other run's lines are not ours.
       call file_open(self%file, path, "a", error)
       if (.not. allocated(error)) call file_lock(self%file, error)
       if (.not. allocated(error) .and. .not. is_resumed) call file_truncate(self%file, error)
       self%is_open = .not. allocated(error)
+      if (allocated(error)) call file_close(self%file, ignored)
    end subroutine log_open
 
    !> Append a line.

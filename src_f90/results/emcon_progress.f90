@@ -48,7 +48,6 @@ contains
       integer, intent(in) :: n_active                !! active constraints
       character(len=160) :: line
       real(dp) :: now
-      integer :: ignored
 
       if (self%is_quiet) return
       now = wall_seconds()
@@ -59,13 +58,11 @@ contains
          time_left(self, now, fraction)
       if (self%is_terminal) then
          ! Blanks wipe what a longer line left.
-         write(output_unit, "(a)", advance="no", iostat=ignored) achar(13) &
-            // line(:max(len_trim(line), self%n_shown))
+         call put(self, achar(13) // line(:max(len_trim(line), self%n_shown)))
          self%n_shown = len_trim(line)
       else
-         write(output_unit, "(a)", iostat=ignored) trim(line)
+         call put(self, trim(line) // new_line("a"))
       end if
-      flush(output_unit, iostat=ignored)
    end subroutine progress_show
 
    !> ", 1:05 left", from the pace so far; nothing while there is none.
@@ -105,14 +102,22 @@ contains
    !> Wipe the line on the terminal: what comes next begins on a fresh one.
    subroutine progress_end(self)
       type(progress_t), intent(inout) :: self
-      integer :: ignored
 
       if (self%n_shown > 0) then
-         write(output_unit, "(a)", advance="no", iostat=ignored) achar(13) &
-            // repeat(" ", self%n_shown) // achar(13)
-         flush(output_unit, iostat=ignored)
+         call put(self, achar(13) // repeat(" ", self%n_shown) // achar(13))
       end if
       self%n_shown = 0
    end subroutine progress_end
+
+   !> Write to standard output; once nobody takes it any more, be quiet.
+   subroutine put(self, text)
+      type(progress_t), intent(inout) :: self
+      character(len=*), intent(in) :: text
+      integer :: stat
+
+      write(output_unit, "(a)", advance="no", iostat=stat) text
+      if (stat == 0) flush(output_unit, iostat=stat)
+      if (stat /= 0) self%is_quiet = .true.
+   end subroutine put
 
 end module emcon_progress

@@ -4,8 +4,8 @@
 !> copy renamed to NAME: NAME is always whole. The last publication renames the working copy.
 module emcon_published
    use emcon_errors, only : error_t, raise, err_file
-   use emcon_files, only : file_copy, file_exists, file_open, file_remove, file_rename, file_sync, &
-      file_t
+   use emcon_files, only : file_close, file_copy, file_exists, file_open, file_remove, &
+      file_rename, file_sync, file_t
    use emcon_hdf5, only : hdf5_close, hdf5_create, hdf5_file_t, hdf5_flush, hdf5_open
    use emcon_kinds, only : dp
    use emcon_timer, only : wall_seconds
@@ -119,6 +119,7 @@ contains
       if (.not. allocated(error) .and. .not. self%file%has_failed) then
          call file_open(part, self%path // ".part", "r", error)
          if (.not. allocated(error)) call file_sync(part, error)
+         call file_close(part, ignored)
          if (.not. allocated(error)) call file_rename(self%path // ".part", self%path, error)
       end if
       if (allocated(error) .or. self%file%has_failed) then

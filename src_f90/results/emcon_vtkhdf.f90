@@ -174,7 +174,7 @@ contains
       integer, intent(in) :: element_node(:, :)
       integer, intent(in) :: element_kind(:)
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: connectivity(:), offset(:)
+      integer, allocatable :: connectivity(:), offset(:), vtk_type(:)
       integer :: i, n
 
       allocate(connectivity(size(element_node)), offset(size(element_kind) + 1), source=0)
@@ -184,11 +184,12 @@ contains
          connectivity(offset(i) + 1:offset(i + 1)) = element_node(:n, i) - 1
       end do
       n = offset(size(offset))
+      vtk_type = element_kinds(element_kind)%vtk_type
       call hdf5_write_integers(file, "/VTKHDF/Connectivity", connectivity(:n), error)
       if (allocated(error)) return
       call hdf5_write_integers(file, "/VTKHDF/Offsets", offset, error)
       if (allocated(error)) return
-      call hdf5_write_bytes(file, "/VTKHDF/Types", element_kinds(element_kind)%vtk_type, error)
+      call hdf5_write_bytes(file, "/VTKHDF/Types", vtk_type, error)
       if (allocated(error)) return
       call hdf5_write_integers(file, "/VTKHDF/NumberOfCells", [size(element_kind)], error)
       if (allocated(error)) return

@@ -17,6 +17,7 @@ module check
    abstract interface
       subroutine test_procedure(error)
          import :: error_t
+         implicit none
          type(error_t), allocatable, intent(out) :: error
       end subroutine test_procedure
    end interface

@@ -6,10 +6,12 @@ program main
    use, intrinsic :: iso_fortran_env, only : output_unit
    use check, only : test_case_t
    use emcon_errors, only : error_t
+   use test_blas, only : collect_blas
    use test_check, only : collect_check
    use test_cholmod, only : collect_cholmod
    use test_csr, only : collect_csr
    use test_lapack, only : collect_lapack
+   use test_results, only : collect_results
    use test_triple_product, only : collect_triple_product
    use test_umfpack, only : collect_umfpack
    implicit none
@@ -17,6 +19,7 @@ program main
    abstract interface
       subroutine collect_procedure(tests)
          import :: test_case_t
+         implicit none
          type(test_case_t), allocatable, intent(out) :: tests(:)
       end subroutine collect_procedure
    end interface
@@ -30,11 +33,13 @@ program main
    call get_command_argument(2, only_test)
 
    call run("check", collect_check)
+   call run("blas", collect_blas)
    call run("csr", collect_csr)
    call run("triple_product", collect_triple_product)
    call run("umfpack", collect_umfpack)
    call run("cholmod", collect_cholmod)
    call run("lapack", collect_lapack)
+   call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then
       write(output_unit, "(a)") "no test is called " // trim(only_suite) // " " // trim(only_test)

@@ -133,7 +133,7 @@ contains
             a%value = 0.0_dp
          case (3)
             a%value(1) = -1.0_dp
-         case (4)
+         case default
             a%value(size(good)) = -1.0_dp
          end select
          call solver%factorise(a%value, error)

@@ -1,0 +1,147 @@
+"""The stepper: open a deck, step through it, read the state. Needs the compiled extension."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _core
+
+_flat = _core.emcon_flat
+
+
+class InputError(ValueError):
+    """A deck or an argument is wrong; the text says what, where and what to do."""
+
+
+class AnalysisError(ArithmeticError):
+    """The analysis failed; the state is that of the last part that succeeded."""
+
+
+_KINDS = {2: InputError, 3: AnalysisError, 4: OSError}
+
+
+def _check(ierr: int) -> None:
+    if ierr:
+        text = _flat.last_error().decode("utf-8", "replace").rstrip()
+        raise _KINDS.get(ierr, RuntimeError)(text)
+
+
+@dataclass(frozen=True)
+class Increment:
+    """What one increment took: h and time in the deck's units, and counts."""
+
+    h: float
+    time: float
+    newton: int
+    cuts: int
+    active: int
+
+
+class Stepper:
+    """A model read from a deck, at some point of its analysis.
+
+    Parameters of the deck are given as keywords: ``Stepper("ring.inp", h=0.005)``. Arrays are
+    copies, of shape (n_node, 2) where they belong to nodes. Raises `InputError` for a bad deck.
+    """
+
+    def __init__(self, deck: str | os.PathLike[str], *, lenient: bool = False,
+                 **parameters: object) -> None:
+        overrides = "\n".join(f"{name}={value}" for name, value in parameters.items())
+        self._handle, ierr = _flat.open_deck(os.fsencode(deck), overrides, int(lenient))
+        _check(ierr)
+        sizes, ierr = _flat.model_size(self._handle)
+        _check(ierr)
+        (self.n_node, self.n_element, self.n_constraint, self.n_body, self.n_unknown,
+         self.n_step) = (int(size) for size in sizes)
+
+    def close(self) -> None:
+        """Free the model. Harmless when closed; any other call then raises `InputError`."""
+        if self._handle:
+            _flat.close_model(self._handle)
+            self._handle = 0
+
+    def __enter__(self) -> Stepper:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", 0):
+            self.close()
+
+    def step(self) -> Increment:
+        """Advance by one increment. Raises `AnalysisError` if it fails."""
+        counts, times, ierr = _flat.advance(self._handle)
+        _check(ierr)
+        return Increment(float(times[0]), float(times[1]), *(int(count) for count in counts))
+
+    @property
+    def is_done(self) -> bool:
+        """True after the last increment of the last step."""
+        done, ierr = _flat.is_done(self._handle)
+        _check(ierr)
+        return bool(done)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Reference positions X, (n_node, 2) [L]."""
+        x, _, ierr = _flat.get_positions(self._handle, self.n_node)
+        _check(ierr)
+        return x.T
+
+    @property
+    def labels(self) -> NDArray[np.int32]:
+        """Node numbers of the deck, (n_node,)."""
+        _, label, ierr = _flat.get_positions(self._handle, self.n_node)
+        _check(ierr)
+        return label
+
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """Displacements, (n_node, 2) [L]."""
+        return self._state()[0]
+
+    @property
+    def q(self) -> NDArray[np.float64]:
+        """Present positions X + u, (n_node, 2) [L]."""
+        return self.positions + self.u
+
+    @property
+    def v(self) -> NDArray[np.float64]:
+        """Velocities, (n_node, 2) [L/T]."""
+        return self._state()[1]
+
+    def _state(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        u, v, ierr = _flat.get_state(self._handle, self.n_node)
+        _check(ierr)
+        return u.T, v.T
+
+    def contact(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int32]]:
+        """Multipliers (contact forces, 0 where open), active flags, slave node numbers.
+
+        All of shape (n_constraint,).
+        """
+        lam, active, label, ierr = _flat.get_contact(self._handle, self.n_constraint)
+        _check(ierr)
+        return lam, active.astype(bool), label
+
+    def energies(self) -> dict[str, float]:
+        """Energies and works: kinetic, strain, external_work, contact_work, total."""
+        names = ("kinetic", "strain", "external_work", "contact_work", "total")
+        return dict(zip(names, map(float, self._ledger()[:5])))
+
+    def momenta(self) -> dict[str, float]:
+        """px, py [M L/T] and lz about the origin [M L^2/T]."""
+        return dict(zip(("px", "py", "lz"), map(float, self._ledger()[5:])))
+
+    def _ledger(self) -> NDArray[np.float64]:
+        values, ierr = _flat.get_ledger(self._handle)
+        _check(ierr)
+        return values

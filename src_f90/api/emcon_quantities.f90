@@ -1,0 +1,183 @@
+!> The output quantities by their deck names, as arrays: one function per kind of place.
+module emcon_quantities
+   use emcon_kinds, only : dp, wp
+   use emcon_stepper, only : contact_gaps, stepper_t
+   use emcon_stress, only : element_means, nodal_stress, von_mises
+   use emcon_vtkhdf, only : field_t
+   implicit none
+   private
+   public :: node_quantity, element_quantity, contact_quantity, quantity_components, field_names
+
+contains
+
+   !> Components of the values that the functions below give.
+   pure integer function quantity_components(variable)
+      character(len=*), intent(in) :: variable
+
+      select case (variable)
+      case ("U", "V", "RF", "CF", "CSTR")
+         quantity_components = 2
+      case ("S")
+         quantity_components = 6
+      case ("E")
+         quantity_components = 3
+      case default
+         quantity_components = 1
+      end select
+   end function quantity_components
+
+   !> The fields of the field file that a variable stands for.
+   function field_names(variable) result(fields)
+      character(len=*), intent(in) :: variable
+      type(field_t), allocatable :: fields(:)
+
+      select case (variable)
+      case ("U")
+         fields = [field_of("displacement", 2)]
+      case ("V")
+         fields = [field_of("velocity", 2)]
+      case ("RF")
+         fields = [field_of("reaction_force", 2)]
+      case ("S")
+         fields = [field_of("cauchy_stress", 6), field_of("von_mises", 1)]
+      case ("CDIS")
+         fields = [field_of("contact_gap", 1)]
+      case ("CSTR")
+         fields = [field_of("contact_pressure", 1), field_of("contact_active", 1)]
+      case ("CF")
+         fields = [field_of("contact_force", 2)]
+      case ("ENER")
+         fields = [field_of("strain_energy", 1)]
+         fields%is_cell = .true.
+      case default
+         fields = [field_of("strain", 3)]
+         fields%is_cell = .true.
+      end select
+   end function field_names
+
+   pure function field_of(name, n_component) result(field)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: n_component
+      type(field_t) :: field
+
+      field%name = name
+      field%n_component = n_component
+   end function field_of
+
+   !> U, V, RF: (2, n_node); S: Cauchy stress and von Mises stress (7, n_node).
+   function node_quantity(stepper, variable) result(values)
+      type(stepper_t), intent(in) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :)
+      real(wp), allocatable :: stress(:, :)
+      integer :: i
+
+      associate (state => stepper%march%state, system => stepper%march%system)
+         select case (variable)
+         case ("U")
+            values = real(state%u, dp)
+         case ("V")
+            values = real(state%v, dp)
+         case ("RF")
+            values = real(state%reaction, dp)
+         case default
+            allocate(stress(6, size(state%u, 2)), values(7, size(state%u, 2)))
+            call nodal_stress(system%solid, state%u, system%nlgeom, stress)
+            values(:6, :) = real(stress, dp)
+            do i = 1, size(values, 2)
+               values(7, i) = real(von_mises(stress(:, i)), dp)
+            end do
+         end select
+      end associate
+   end function node_quantity
+
+   !> Means and sums over elements: S (6), E (3), ENER and ELSE strain energy, ELKE kinetic energy,
+   !> EVOL reference volume (1); second index the element.
+   function element_quantity(stepper, variable) result(values)
+      type(stepper_t), intent(in) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :)
+      real(wp), allocatable :: stress(:, :), strain(:, :), volume(:)
+      integer :: n
+
+      associate (state => stepper%march%state, system => stepper%march%system)
+         n = system%solid%n_element
+         select case (variable)
+         case ("ENER", "ELSE")
+            values = reshape(real(state%energy, dp), [1, n])
+         case ("ELKE")
+            values = reshape(real(kinetic_energies(stepper), dp), [1, n])
+         case default
+            allocate(stress(6, n), strain(3, n), volume(n))
+            call element_means(system%solid, state%u, system%nlgeom, stress, strain, volume)
+            if (variable == "S") then
+               values = real(stress, dp)
+            else if (variable == "E") then
+               values = real(strain, dp)
+            else
+               values = reshape(real(volume, dp), [1, n])
+            end if
+         end select
+      end associate
+   end function element_quantity
+
+   !> Kinetic energy of each element.
+   function kinetic_energies(stepper) result(energy)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), allocatable :: energy(:)
+      integer :: e, i, j
+
+      associate (solid => stepper%march%system%solid, v => stepper%march%state%v)
+         allocate(energy(solid%n_element), source=0.0_wp)
+         do e = 1, solid%n_element
+            do j = 1, solid%geometry(e)%n_node
+               do i = 1, solid%geometry(e)%n_node
+                  energy(e) = energy(e) + 0.5_wp*solid%mass(i, j, e) &
+                     *dot_product(v(:, solid%node(i, e)), v(:, solid%node(j, e)))
+               end do
+            end do
+         end do
+      end associate
+   end function kinetic_energies
+
+   !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF contact
+   !> force on the slave node (2); second index the possible constraint.
+   function contact_quantity(stepper, variable) result(values)
+      use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :)
+      real(wp), allocatable :: gap(:), area(:)
+      logical, allocatable :: is_near(:)
+      integer :: n, pair, first, last
+
+      n = stepper%march%system%n_constraint
+      associate (state => stepper%march%state, system => stepper%march%system)
+         select case (variable)
+         case ("CDIS")
+            allocate(gap(n), is_near(n))
+            call contact_gaps(stepper, gap, is_near)
+            values = reshape(merge(real(gap, dp), ieee_value(1.0_dp, ieee_quiet_nan), is_near), &
+               [1, n])
+         case ("CSTR")
+            allocate(area(n), values(2, n))
+            do pair = 1, size(system%contact)
+               first = system%first_constraint(pair) + 1
+               last = system%first_constraint(pair + 1)
+               call system%contact(pair)%contact%area(stepper%scene%x, state%u, area(first:last))
+            end do
+            values(1, :) = 0.0_dp
+            where (area > 0.0_wp) values(1, :) = real(state%lam/area, dp)
+            values(2, :) = merge(1.0_dp, 0.0_dp, state%is_active)
+         case default
+            allocate(values(2, n))
+            do pair = 1, size(system%contact)
+               first = system%first_constraint(pair) + 1
+               last = system%first_constraint(pair + 1)
+               values(:, first:last) = real(state%contact(:, system%contact(pair)%contact%node), dp)
+            end do
+         end select
+      end associate
+   end function contact_quantity
+
+end module emcon_quantities

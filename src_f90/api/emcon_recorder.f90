@@ -1,0 +1,486 @@
+!> What of a run goes into its files: fields, history and requested sets, at which increments.
+!>
+!> Turns states of the stepper into the plain arrays that results/ writes.
+module emcon_recorder
+   use emcon_errors, only : error_t
+   use emcon_history, only : column_t, history_append, history_close, history_create, &
+      history_publish, history_put_run, history_resume, history_set_append, history_set_define, &
+      history_t
+   use emcon_kinds, only : dp, wp
+   use emcon_ledger, only : body_momenta
+   use emcon_march, only : increment_t
+   use emcon_quantities, only : contact_quantity, element_quantity, field_names, node_quantity, &
+      quantity_components
+   use emcon_scene, only : output_contact_file, output_contact_print, output_element_file, &
+      output_element_print, output_node_file, output_node_print, output_t, scene_t
+   use emcon_stepper, only : stepper_t
+   use emcon_text, only : string_t
+   use emcon_version, only : version
+   use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
+      vtkhdf_end_frame, vtkhdf_publish, vtkhdf_resume, vtkhdf_t, vtkhdf_write
+   implicit none
+   private
+   public :: recorder_t, recorder_open, recorder_resume, recorder_write, recorder_publish, &
+      recorder_close, recorder_finish
+
+   !> Frames of a deck that asks for no field output.
+   integer, parameter :: default_frames = 100
+
+   character(len=13), parameter :: column_names(15) = [character(len=13) :: "increment", "time", &
+      "h", "kinetic", "strain", "external_work", "contact_work", "total", "px", "py", "lz", &
+      "active", "newton", "cuts", "cpu"]
+
+   !> One requested quantity of one set, in the history.
+   type :: series_t
+      integer :: step = 0                        !! of the deck
+      integer :: request = 0                     !! of that step
+      character(len=8) :: variable = ""
+      integer :: i_set = 0                       !! as the history counts
+      integer, allocatable :: item(:)            !! nodes, elements or constraints
+      logical :: is_total = .false.
+   end type series_t
+
+   type :: recorder_t
+      type(vtkhdf_t) :: fields
+      type(history_t) :: history
+      logical :: has_fields = .false.
+      type(string_t), allocatable :: variable(:) !! fields that are written
+      type(series_t), allocatable :: series(:)
+      integer :: momentum_set = 0
+      integer :: n_row = 0
+      real(wp) :: last_time = -huge(1.0_wp)      !! of the last record
+   end type recorder_t
+
+contains
+
+   !> Begin the files `base`.vtkhdf, .h5 and .csv.
+   subroutine recorder_open(self, stepper, base, error)
+      type(recorder_t), intent(out) :: self
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: base
+      type(error_t), allocatable, intent(out) :: error
+
+      call choose_fields(self, stepper%scene)
+      if (self%has_fields) then
+         call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), &
+            stepper%scene%element_node, stepper%scene%element_kind, fields_of(self), error)
+         if (allocated(error)) return
+      end if
+      call history_create(self%history, base, columns(), error)
+      if (allocated(error)) return
+      call history_put_run(self%history, stepper%source%line, version, error)
+      if (allocated(error)) return
+      call define_sets(self, stepper, error)
+      if (allocated(error)) return
+      call write_masses(self, stepper, error)
+   end subroutine recorder_open
+
+   !> Go on with the files of `base` after `n_row` rows and `n_frame` frames.
+   subroutine recorder_resume(self, stepper, base, n_row, n_frame, error)
+      type(recorder_t), intent(out) :: self
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: base
+      integer, intent(in) :: n_row, n_frame
+      type(error_t), allocatable, intent(out) :: error
+
+      call choose_fields(self, stepper%scene)
+      if (self%has_fields) then
+         call vtkhdf_resume(self%fields, base // ".vtkhdf", fields_of(self), n_frame, error)
+         if (allocated(error)) return
+      end if
+      call history_resume(self%history, base, columns(), n_row, error)
+      if (allocated(error)) return
+      self%n_row = n_row
+      self%last_time = stepper%march%state%time
+      call define_sets(self, stepper, error)
+   end subroutine recorder_resume
+
+   pure function columns() result(list)
+      type(column_t) :: list(size(column_names))
+
+      list%name = column_names
+      list([1, 12, 13, 14])%is_integer = .true.
+   end function columns
+
+   !> The fields that some step asks for; all of them if none asks for any.
+   subroutine choose_fields(self, scene)
+      type(recorder_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer :: i, j, k
+
+      allocate(self%variable(0))
+      do i = 1, size(scene%step)
+         do j = 1, size(scene%step(i)%output)
+            associate (output => scene%step(i)%output(j))
+               if (output%kind > output_contact_file) cycle
+               do k = 1, size(output%variable)
+                  call add(output%variable(k)%text)
+               end do
+            end associate
+         end do
+      end do
+      if (size(self%variable) == 0) then
+         call add("U")
+         call add("V")
+         call add("RF")
+         call add("S")
+         call add("ENER")
+         if (size(scene%pair) > 0) call add("CSTR")
+      end if
+      self%has_fields = .true.
+
+   contains
+
+      subroutine add(name)
+         character(len=*), intent(in) :: name
+         type(string_t) :: new(1)
+         integer :: l
+
+         do l = 1, size(self%variable)
+            if (self%variable(l)%text == name) return
+         end do
+         new(1)%text = name
+         self%variable = [self%variable, new]
+      end subroutine add
+
+   end subroutine choose_fields
+
+   !> The fields of all variables, as the field file declares them.
+   function fields_of(self) result(fields)
+      type(recorder_t), intent(in) :: self
+      type(field_t), allocatable :: fields(:)
+      integer :: i
+
+      allocate(fields(0))
+      do i = 1, size(self%variable)
+         fields = [fields, field_names(self%variable(i)%text)]
+      end do
+   end function fields_of
+
+   !> Declare the sets that PRINT requests name, and the bodies.
+   subroutine define_sets(self, stepper, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, j, k, n
+      type(series_t) :: series
+
+      allocate(self%series(0))
+      do i = 1, size(stepper%scene%step)
+         do j = 1, size(stepper%scene%step(i)%output)
+            associate (output => stepper%scene%step(i)%output(j))
+               if (all(output%kind /= [output_node_print, output_element_print, &
+                  output_contact_print])) cycle
+               do k = 1, size(output%variable)
+                  series%step = i
+                  series%request = j
+                  series%variable = output%variable(k)%text
+                  if (.not. output%only_totals) call define_series(self, stepper, output, series, &
+                     .false., error)
+                  if (allocated(error)) return
+                  if (output%totals .or. output%only_totals) call define_series(self, stepper, &
+                     output, series, .true., error)
+                  if (allocated(error)) return
+               end do
+            end associate
+         end do
+      end do
+      n = stepper%march%system%n_body
+      call history_set_define(self%history, "BODIES", "MOMENTUM", [(k, k = 1, n)], 3, &
+         self%momentum_set, error)
+   end subroutine define_sets
+
+   !> Declare one quantity of one set, or its sum; what an earlier step declared is used again.
+   subroutine define_series(self, stepper, output, series, is_total, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(output_t), intent(in) :: output
+      type(series_t), intent(inout) :: series
+      logical, intent(in) :: is_total
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: set, variable
+      integer, allocatable :: label(:)
+      integer :: i
+
+      call find_items(stepper, output, set, series%item, label)
+      series%is_total = is_total
+      variable = trim(series%variable)
+      if (is_total) then
+         variable = "TOTAL_" // variable
+         label = [0]
+      end if
+      do i = 1, size(self%series)
+         if (self%series(i)%step == series%step) cycle
+         if (self%series(i)%variable /= series%variable) cycle
+         if (self%series(i)%is_total .neqv. is_total) cycle
+         if (size(self%series(i)%item) /= size(series%item)) cycle
+         if (any(self%series(i)%item /= series%item)) cycle
+         if (stepper%scene%step(self%series(i)%step)%output(self%series(i)%request)%kind &
+            /= output%kind) cycle
+         series%i_set = self%series(i)%i_set
+         self%series = [self%series, series]
+         return
+      end do
+      call history_set_define(self%history, set, variable, label, &
+         quantity_components(trim(series%variable)), series%i_set, error)
+      self%series = [self%series, series]
+   end subroutine define_series
+
+   !> Name, members and labels of the set that `output` is about.
+   subroutine find_items(stepper, output, set, item, label)
+      type(stepper_t), intent(in) :: stepper
+      type(output_t), intent(in) :: output
+      character(len=:), allocatable, intent(out) :: set
+      integer, allocatable, intent(out) :: item(:), label(:)
+      integer :: i
+
+      associate (scene => stepper%scene, system => stepper%march%system)
+         select case (output%kind)
+         case (output_node_print)
+            set = "ALL_NODES"
+            item = [(i, i = 1, size(scene%node_label))]
+            if (output%set > 0) then
+               set = scene%node_set(output%set)%name
+               item = scene%node_set(output%set)%item
+            end if
+            label = scene%node_label(item)
+         case (output_element_print)
+            set = "ALL_ELEMENTS"
+            item = [(i, i = 1, size(scene%element_label))]
+            if (output%set > 0) then
+               set = scene%element_set(output%set)%name
+               item = scene%element_set(output%set)%item
+            end if
+            label = scene%element_label(item)
+         case default
+            set = "CONTACT"
+            item = [(i, i = 1, system%n_constraint)]
+            allocate(label(0))
+            do i = 1, size(system%contact)
+               label = [label, scene%node_label(system%contact(i)%contact%node)]
+            end do
+         end select
+      end associate
+   end subroutine find_items
+
+   !> The masses of the bodies, once.
+   subroutine write_masses(self, stepper, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: mass(1, stepper%march%system%n_body)
+      integer :: i, k, i_set
+
+      mass = 0.0_dp
+      associate (system => stepper%march%system)
+         do i = 1, system%mass%n_row
+            do k = system%mass%row_start(i) + 1, system%mass%row_start(i + 1)
+               mass(1, system%body(i)) = mass(1, system%body(i)) + system%mass%value(k)
+            end do
+         end do
+         call history_set_define(self%history, "BODIES", "MASS", [(k, k = 1, system%n_body)], 1, &
+            i_set, error)
+      end associate
+      if (allocated(error)) return
+      call history_set_append(self%history, i_set, 0.0_dp, mass, error)
+   end subroutine write_masses
+
+   !> Record the present state after `increment`.
+   subroutine recorder_write(self, stepper, increment, cpu, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(inout) :: stepper
+      type(increment_t), intent(in) :: increment
+      real(dp), intent(in) :: cpu                !! seconds of CPU time so far
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: momenta(3, stepper%march%system%n_body)
+
+      associate (state => stepper%march%state, ledger => stepper%march%ledger)
+         call history_append(self%history, [real(dp) :: real(state%increment, dp), &
+            real(state%time, dp), real(increment%h, dp), real(ledger%kinetic, dp), &
+            real(ledger%strain, dp), real(ledger%external_work, dp), &
+            real(ledger%contact_work, dp), real(ledger%total, dp), real(ledger%momentum, dp), &
+            real(ledger%angular, dp), real(increment%n_active, dp), real(increment%n_newton, dp), &
+            real(increment%n_cut, dp), cpu], error)
+         if (allocated(error)) return
+         self%n_row = self%n_row + 1
+         call body_momenta(stepper%march%system, stepper%scene%x, state, momenta)
+         call history_set_append(self%history, self%momentum_set, real(state%time, dp), &
+            real(momenta, dp), error)
+      end associate
+      if (allocated(error)) return
+      call write_series(self, stepper, error)
+      if (allocated(error)) return
+      call write_fields(self, stepper, error)
+      self%last_time = stepper%march%state%time
+   end subroutine recorder_write
+
+   !> Is the request due now: at its increments, its time points, or at the end of the step?
+   pure logical function is_due(self, stepper, output)
+      type(recorder_t), intent(in) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(output_t), intent(in) :: output
+      real(wp) :: before, now, slack
+
+      associate (state => stepper%march%state)
+         if (allocated(output%time)) then
+            slack = 0.5_wp*sqrt(epsilon(1.0_wp))*stepper%scene%step(state%i_step)%duration
+            before = self%last_time - state%start_time
+            now = state%time - state%start_time
+            is_due = any(output%time > before + slack .and. output%time <= now + slack)
+         else if (output%frequency == 0) then
+            is_due = .false.
+         else
+            is_due = mod(state%n_grid, output%frequency) == 0
+         end if
+         is_due = is_due .or. (output%frequency > 0 .and. state%n_grid >= stepper%march%n_grid)
+      end associate
+   end function is_due
+
+   !> Append what PRINT requests of this step are due.
+   subroutine write_series(self, stepper, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(inout) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      real(dp), allocatable :: values(:, :)
+      integer :: i
+
+      do i = 1, size(self%series)
+         associate (series => self%series(i), i_step => stepper%march%state%i_step)
+            if (series%step /= i_step) cycle
+            associate (output => stepper%scene%step(i_step)%output(series%request))
+               if (.not. is_due(self, stepper, output)) cycle
+               select case (output%kind)
+               case (output_node_print)
+                  values = node_quantity(stepper, trim(series%variable))
+               case (output_element_print)
+                  values = element_quantity(stepper, trim(series%variable))
+               case default
+                  values = contact_quantity(stepper, trim(series%variable))
+               end select
+            end associate
+            values = values(:, series%item)
+            if (series%is_total) values = reshape(sum(values, dim=2), [size(values, 1), 1])
+            call history_set_append(self%history, series%i_set, &
+               real(stepper%march%state%time, dp), values, error)
+            if (allocated(error)) return
+         end associate
+      end do
+   end subroutine write_series
+
+   !> Append a frame if a FILE request is due.
+   subroutine write_fields(self, stepper, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(inout) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      logical :: due, has_request
+      integer :: i, stride
+
+      due = self%fields%n_frame == 0
+      has_request = .false.
+      associate (step => stepper%scene%step(stepper%march%state%i_step))
+         do i = 1, size(step%output)
+            if (step%output(i)%kind > output_contact_file) cycle
+            has_request = .true.
+            due = due .or. is_due(self, stepper, step%output(i))
+         end do
+      end associate
+      if (.not. has_request) then
+         stride = max(1, stepper%march%n_grid/default_frames)
+         due = due .or. mod(stepper%march%state%n_grid, stride) == 0 &
+            .or. stepper%march%state%n_grid >= stepper%march%n_grid
+      end if
+      if (.not. due) return
+      call vtkhdf_begin_frame(self%fields, real(stepper%march%state%time, dp))
+      do i = 1, size(self%variable)
+         call write_variable(self, stepper, self%variable(i)%text, error)
+         if (allocated(error)) return
+      end do
+      call vtkhdf_end_frame(self%fields, error)
+   end subroutine write_fields
+
+   !> The fields that belong to one variable, e.g. stress and von Mises stress to S.
+   subroutine write_variable(self, stepper, variable, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: variable
+      type(error_t), allocatable, intent(out) :: error
+      type(field_t), allocatable :: fields(:)
+      real(dp), allocatable :: values(:, :), spread(:, :)
+      integer :: i, first
+
+      allocate(fields, source=field_names(variable))
+      if (fields(1)%is_cell) then
+         values = element_quantity(stepper, variable)
+      else if (any(variable == ["CDIS", "CSTR", "CF  "])) then
+         values = contact_fields(stepper, variable)
+      else
+         values = node_quantity(stepper, variable)
+      end if
+      first = 1
+      do i = 1, size(fields)
+         spread = values(first:first + fields(i)%n_component - 1, :)
+         call vtkhdf_write(self%fields, trim(fields(i)%name), spread, error)
+         if (allocated(error)) return
+         first = first + fields(i)%n_component
+      end do
+   end subroutine write_variable
+
+   !> Contact quantities on all nodes.
+   function contact_fields(stepper, variable) result(values)
+      use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :), at_slave(:, :)
+      integer :: pair, i, id
+
+      if (variable == "CF") then
+         values = real(stepper%march%state%contact, dp)
+         return
+      end if
+      at_slave = contact_quantity(stepper, variable)
+      allocate(values(size(at_slave, 1), size(stepper%scene%x, 2)), source=0.0_dp)
+      if (variable == "CDIS") values = ieee_value(1.0_dp, ieee_quiet_nan)
+      associate (system => stepper%march%system)
+         do pair = 1, size(system%contact)
+            do i = 1, system%contact(pair)%contact%n_constraint
+               id = system%first_constraint(pair) + i
+               values(:, system%contact(pair)%contact%node(i)) = at_slave(:, id)
+            end do
+         end do
+      end associate
+   end function contact_fields
+
+   !> Make visible what is written, if it is time or forced.
+   subroutine recorder_publish(self, is_forced, error)
+      type(recorder_t), intent(inout) :: self
+      logical, intent(in) :: is_forced
+      type(error_t), allocatable, intent(out) :: error
+
+      call vtkhdf_publish(self%fields, is_forced, error)
+      if (.not. allocated(error)) call history_publish(self%history, is_forced, error)
+   end subroutine recorder_publish
+
+   !> Note the wall time of the run.
+   subroutine recorder_finish(self, wall, error)
+      type(recorder_t), intent(inout) :: self
+      real(dp), intent(in) :: wall               !! [s]
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i_set
+
+      call history_set_define(self%history, "RUN", "WALL_SECONDS", [0], 1, i_set, error)
+      if (.not. allocated(error)) call history_set_append(self%history, i_set, 0.0_dp, &
+         reshape([wall], [1, 1]), error)
+   end subroutine recorder_finish
+
+   !> Complete and close all files; the first failure is told.
+   subroutine recorder_close(self, error)
+      type(recorder_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: second
+
+      call vtkhdf_close(self%fields, error)
+      call history_close(self%history, second)
+      if (.not. allocated(error)) call move_alloc(second, error)
+   end subroutine recorder_close
+
+end module emcon_recorder

@@ -1,0 +1,228 @@
+!> The stepper: open a deck, step, query, save, go on. All state is in the object; any number of
+!> steppers live side by side.
+module emcon_stepper
+   use emcon_contact, only : gap_state_t
+   use emcon_deck, only : deck_read
+   use emcon_deck_source, only : deck_open, deck_source_t
+   use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_initial_contact, only : initial_contact_prepare
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_measure
+   use emcon_march, only : increment_t, march_begin_step, march_increment, march_init, &
+      march_is_done, march_resume, march_t
+   use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
+   use emcon_scene, only : scene_t
+   use emcon_text, only : notes_t, string_t
+   implicit none
+   private
+   public :: stepper_t, stepper_open, stepper_open_source, stepper_advance, stepper_is_done
+   public :: stepper_fraction, stepper_save, stepper_load, contact_gaps
+
+   type :: stepper_t
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(deck_source_t) :: source              !! the deck as read, for restart files
+      type(string_t), allocatable :: override(:) !! NAME=VALUE as given
+      logical :: is_lenient = .false.
+      type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
+      type(notes_t) :: notes                     !! what was done before the first step
+   end type stepper_t
+
+contains
+
+   !> Read the deck at `path` and build its model. On an input error `diagnostic` tells all.
+   subroutine stepper_open(self, path, override, is_lenient, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: path
+      type(string_t), intent(in) :: override(:)  !! parameters, NAME=VALUE
+      logical, intent(in) :: is_lenient          !! unknown keywords are warnings
+      type(error_t), allocatable, intent(out) :: error
+      type(diagnostics_t) :: diagnostics
+
+      call deck_open(path, self%source, diagnostics)
+      if (diagnostics%n_errors > 0 .and. size(self%source%line) == 0) then
+         self%diagnostic = diagnostics_texts(diagnostics)
+         call raise(error, err_input, self%diagnostic(1)%text)
+         return
+      end if
+      self%override = override
+      self%is_lenient = is_lenient
+      call stepper_open_source(self, diagnostics, error)
+   end subroutine stepper_open
+
+   !> Build the model of the deck source that `self` holds.
+   subroutine stepper_open_source(self, diagnostics, error)
+      type(stepper_t), intent(inout) :: self
+      type(diagnostics_t), intent(inout) :: diagnostics
+      type(error_t), allocatable, intent(out) :: error
+
+      call deck_read(self%source, self%override, self%is_lenient, self%scene, diagnostics)
+      self%diagnostic = diagnostics_texts(diagnostics)
+      if (diagnostics%n_errors > 0) then
+         call raise(error, err_input, self%diagnostic(1)%text)
+         return
+      end if
+      call initial_contact_prepare(self%scene, self%notes, error)
+      if (allocated(error)) return
+      call march_init(self%march, self%scene, error)
+      if (allocated(error)) return
+      call march_begin_step(self%march, self%scene, 1, error)
+   end subroutine stepper_open_source
+
+   !> True after the last increment of the last step.
+   pure logical function stepper_is_done(self)
+      type(stepper_t), intent(in) :: self
+
+      stepper_is_done = self%march%state%i_step >= size(self%scene%step) &
+         .and. march_is_done(self%march)
+   end function stepper_is_done
+
+   !> One increment; at the end of a step of the deck the next one begins first.
+   subroutine stepper_advance(self, increment, error)
+      type(stepper_t), intent(inout) :: self
+      type(increment_t), intent(out) :: increment
+      type(error_t), allocatable, intent(out) :: error
+
+      if (stepper_is_done(self)) return
+      if (march_is_done(self%march)) then
+         call march_begin_step(self%march, self%scene, self%march%state%i_step + 1, error)
+         if (allocated(error)) return
+      end if
+      call march_increment(self%march, self%scene, increment, error)
+   end subroutine stepper_advance
+
+   !> Part of the analysis that is done, by time: 0..1.
+   pure real(wp) function stepper_fraction(self)
+      type(stepper_t), intent(in) :: self
+
+      stepper_fraction = min(1.0_wp, self%march%state%time/sum(self%scene%step%duration))
+   end function stepper_fraction
+
+   !> Gap of each possible constraint at the present state, > 0 open; `is_near` false: not measured.
+   subroutine contact_gaps(self, gap, is_near)
+      type(stepper_t), intent(inout) :: self
+      real(wp), intent(out) :: gap(:)            !! (n_constraint)
+      logical, intent(out) :: is_near(:)
+      type(gap_state_t) :: state
+      integer :: pair, i, id
+
+      gap = 0.0_wp
+      is_near = .false.
+      associate (system => self%march%system, u => self%march%state%u)
+         do pair = 1, size(system%contact)
+            associate (contact => system%contact(pair)%contact)
+               call contact%begin_step(self%scene%x, u, system%zero)
+               do i = 1, contact%n_constraint
+                  id = system%first_constraint(pair) + i
+                  state = contact%gap_state(i, self%scene%x, u, system%zero)
+                  is_near(id) = state%is_near .and. state%is_over
+                  if (is_near(id)) gap(id) = state%gap0
+               end do
+            end associate
+         end do
+      end associate
+   end subroutine contact_gaps
+
+   !> Put all that the next increment depends on into `restart`.
+   subroutine stepper_save(self, restart)
+      type(stepper_t), intent(in) :: self
+      type(restart_t), intent(inout) :: restart
+
+      call restart_put(restart, "deck_line", self%source%line)
+      call restart_put(restart, "deck_file", self%source%file)
+      call restart_put(restart, "deck_number", self%source%number)
+      call restart_put(restart, "deck_file_name", self%source%file_name)
+      call restart_put(restart, "override", self%override)
+      call restart_put(restart, "is_lenient", [merge(1, 0, self%is_lenient)])
+      associate (state => self%march%state, ledger => self%march%ledger)
+         call restart_put(restart, "progress", [state%i_step, state%n_grid, state%grid_stride, &
+            state%n_easy, state%increment])
+         call restart_put(restart, "time", [state%start_time, state%time])
+         call restart_put(restart, "work", [ledger%external_work, ledger%contact_work])
+         call restart_put(restart, "u", state%u)
+         call restart_put(restart, "v", state%v)
+         call restart_put(restart, "u_start", state%u_start)
+         call restart_put(restart, "contact", state%contact)
+         call restart_put(restart, "reaction", state%reaction)
+         call restart_put(restart, "internal", state%internal)
+         call restart_put(restart, "lam", state%lam)
+         call restart_put(restart, "is_active", merge(1, 0, state%is_active))
+      end associate
+   end subroutine stepper_save
+
+   !> Build the model of a restart file and put it into the state that was saved.
+   subroutine stepper_load(self, restart, error)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(in) :: restart
+      type(error_t), allocatable, intent(out) :: error
+      type(diagnostics_t) :: diagnostics
+      integer :: flag(1), progress(5)
+      integer, allocatable :: active(:)
+      real(wp) :: time(2), work(2)
+
+      call load_source(self, restart, error)
+      if (allocated(error)) return
+      call restart_get(restart, "is_lenient", flag, error)
+      if (allocated(error)) return
+      self%is_lenient = flag(1) == 1
+      diagnostics%file_name = self%source%file_name
+      call stepper_open_source(self, diagnostics, error)
+      if (allocated(error)) return
+      call restart_get(restart, "progress", progress, error)
+      if (.not. allocated(error)) call restart_get(restart, "time", time, error)
+      if (.not. allocated(error)) call restart_get(restart, "work", work, error)
+      if (.not. allocated(error)) call load_fields(self, restart, error)
+      if (allocated(error)) return
+      allocate(active(size(self%march%state%is_active)))
+      call restart_get(restart, "is_active", active, error)
+      if (allocated(error)) return
+      associate (state => self%march%state)
+         state%is_active = active == 1
+         state%i_step = progress(1)
+         state%n_grid = progress(2)
+         state%grid_stride = progress(3)
+         state%n_easy = progress(4)
+         state%increment = progress(5)
+         state%start_time = time(1)
+         state%time = time(2)
+      end associate
+      self%march%ledger%external_work = work(1)
+      self%march%ledger%contact_work = work(2)
+      call march_resume(self%march, self%scene, error)
+      if (allocated(error)) return
+      call restart_get(restart, "internal", self%march%state%internal, error)
+   end subroutine stepper_load
+
+   subroutine load_source(self, restart, error)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(in) :: restart
+      type(error_t), allocatable, intent(out) :: error
+
+      call restart_get(restart, "deck_line", self%source%line, error)
+      if (.not. allocated(error)) call restart_get(restart, "deck_file_name", &
+         self%source%file_name, error)
+      if (.not. allocated(error)) call restart_get(restart, "override", self%override, error)
+      if (allocated(error)) return
+      allocate(self%source%file(max(0, restart_size(restart, "deck_file"))))
+      allocate(self%source%number(max(0, restart_size(restart, "deck_number"))))
+      call restart_get(restart, "deck_file", self%source%file, error)
+      if (.not. allocated(error)) call restart_get(restart, "deck_number", self%source%number, error)
+   end subroutine load_source
+
+   subroutine load_fields(self, restart, error)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(in) :: restart
+      type(error_t), allocatable, intent(out) :: error
+
+      associate (state => self%march%state)
+         call restart_get(restart, "u", state%u, error)
+         if (.not. allocated(error)) call restart_get(restart, "v", state%v, error)
+         if (.not. allocated(error)) call restart_get(restart, "u_start", state%u_start, error)
+         if (.not. allocated(error)) call restart_get(restart, "contact", state%contact, error)
+         if (.not. allocated(error)) call restart_get(restart, "reaction", state%reaction, error)
+         if (.not. allocated(error)) call restart_get(restart, "lam", state%lam, error)
+      end associate
+   end subroutine load_fields
+
+end module emcon_stepper

@@ -1,0 +1,8 @@
+!> The version of EMCON.
+module emcon_version
+   implicit none
+   private
+   public :: version
+
+   character(len=*), parameter :: version = "0.1.0"
+end module emcon_version

@@ -1,0 +1,98 @@
+!> The program: reads the command line, calls the library, prints, and sets the exit code.
+program emcon
+   use, intrinsic :: iso_c_binding, only : c_int
+   use, intrinsic :: iso_fortran_env, only : error_unit, output_unit
+   use emcon_blas, only : blas_keep_memory, blas_single_thread
+   use emcon_command_line, only : command_read, command_t, usage
+   use emcon_errors, only : err_input, err_none, error_t
+   use emcon_files, only : survive_file_size_limit
+   use emcon_interrupt, only : interrupt_watch, is_interrupted
+   use emcon_run, only : run_check, run_deck, run_report_t, run_restart
+   use emcon_version, only : version
+   implicit none
+
+   interface
+      !> Ends without the remarks on floating-point flags that `stop` makes.
+      subroutine c_exit(code) bind(c, name="exit")
+         import :: c_int
+         integer(c_int), value :: code
+      end subroutine c_exit
+   end interface
+
+   integer :: code
+
+   call execute(code)
+   flush(output_unit)
+   flush(error_unit)
+   call c_exit(int(code, c_int))
+
+contains
+
+   !> All the work, so that its memory is freed before the program ends.
+   subroutine execute(code)
+      integer, intent(out) :: code
+      type(command_t) :: command
+      type(run_report_t) :: report
+      type(error_t), allocatable :: error
+      logical :: is_single
+      integer :: i
+
+      code = err_none
+      call blas_single_thread(is_single)
+      call blas_keep_memory()
+      call survive_file_size_limit()
+      call command_read(command)
+      if (len(command%fault) > 0) then
+         write(error_unit, "(a)") "emcon: " // command%fault // " (see emcon --help)"
+         code = err_input
+         return
+      end if
+      select case (command%verb)
+      case ("help")
+         associate (text => usage())
+            write(output_unit, "(a)") (trim(text(i)), i = 1, size(text))
+         end associate
+         return
+      case ("version")
+         write(output_unit, "(a)") "emcon " // version
+         return
+      case ("check")
+         call run_check(command%path, command%options, report, error)
+      case ("restart")
+         call interrupt_watch()
+         call run_restart(command%path, command%options, is_interrupted, report, error)
+      case default
+         call interrupt_watch()
+         call run_deck(command%path, command%options, is_interrupted, report, error)
+      end select
+      call tell(report, error, command%options%is_quiet, code)
+   end subroutine execute
+
+   !> Print what there is to tell; `code` is the exit code.
+   subroutine tell(report, error, is_quiet, code)
+      type(run_report_t), intent(in) :: report
+      type(error_t), intent(in), allocatable :: error
+      logical, intent(in) :: is_quiet
+      integer, intent(out) :: code
+      integer :: i
+      logical :: is_told
+
+      code = err_none
+      is_told = .false.
+      if (allocated(report%diagnostic)) then
+         do i = 1, size(report%diagnostic)
+            write(error_unit, "(a)") report%diagnostic(i)%text
+            if (allocated(error)) is_told = is_told .or. error%message == report%diagnostic(i)%text
+         end do
+      end if
+      if (allocated(report%closing) .and. .not. is_quiet) then
+         do i = 1, size(report%closing)
+            write(output_unit, "(a)") report%closing(i)%text
+         end do
+      end if
+      if (.not. allocated(error)) return
+      code = error%code
+      if (.not. is_told) write(error_unit, "(a)") "emcon: " // error%message
+   end subroutine tell
+
+end program emcon

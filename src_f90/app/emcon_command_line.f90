@@ -1,0 +1,164 @@
+!> The command line of the program.
+module emcon_command_line
+   use emcon_run, only : run_options_t
+   use emcon_text, only : nearest_word, string_t
+   implicit none
+   private
+   public :: command_t, command_read, usage
+
+   type :: command_t
+      character(len=:), allocatable :: verb      !! run, check, restart, version or help
+      character(len=:), allocatable :: path
+      type(run_options_t) :: options
+      character(len=:), allocatable :: fault     !! what is wrong with the command line, or empty
+   end type command_t
+
+contains
+
+   !> Take the arguments of the program apart.
+   subroutine command_read(self)
+      type(command_t), intent(out) :: self
+      character(len=:), allocatable :: word
+      integer :: i, n_plain
+
+      self%verb = "run"
+      self%path = ""
+      self%fault = ""
+      self%options%folder = ""
+      allocate(self%options%override(0))
+      n_plain = 0
+      i = 0
+      if (command_argument_count() == 0) self%verb = "help"
+      do while (i < command_argument_count() .and. len(self%fault) == 0)
+         i = i + 1
+         word = argument(i)
+         if (len(word) > 1 .and. word(1:1) == "-") then
+            call take_option(self, word, i)
+         else
+            n_plain = n_plain + 1
+            call take_word(self, word, n_plain)
+         end if
+      end do
+      if (len(self%fault) > 0 .or. self%verb == "help" .or. self%verb == "version") return
+      if (len(self%path) == 0) self%fault = "no file is named"
+   end subroutine command_read
+
+   !> A word that is no option: the verb, or the file.
+   subroutine take_word(self, word, n_plain)
+      type(command_t), intent(inout) :: self
+      character(len=*), intent(in) :: word
+      integer, intent(inout) :: n_plain
+
+      if (n_plain == 1 .and. any(word == [character(len=7) :: "run", "check", "restart"])) then
+         self%verb = word
+      else if (len(self%path) == 0) then
+         self%path = word
+      else
+         self%fault = "'" // word // "' is one file too many after '" // self%path // "'"
+      end if
+   end subroutine take_word
+
+   subroutine take_option(self, word, i)
+      type(command_t), intent(inout) :: self
+      character(len=*), intent(in) :: word
+      integer, intent(inout) :: i                !! number of the argument, moved past a value
+      character(len=:), allocatable :: name, value
+      type(string_t) :: override(1)
+      integer :: equals
+
+      equals = index(word, "=")
+      name = word
+      value = ""
+      if (equals > 0) then
+         name = word(:equals - 1)
+         value = word(equals + 1:)
+      end if
+      select case (name)
+      case ("--help", "-h")
+         self%verb = "help"
+      case ("--version")
+         self%verb = "version"
+      case ("--lenient")
+         self%options%is_lenient = .true.
+      case ("--quiet", "-q")
+         self%options%is_quiet = .true.
+      case ("--output", "--set")
+         if (equals == 0) then
+            i = i + 1
+            if (i <= command_argument_count()) value = argument(i)
+         end if
+         if (len(value) == 0) self%fault = name // " needs a value"
+         if (name == "--output") then
+            self%options%folder = without_slash(value)
+         else
+            if (index(value, "=") < 2) self%fault = "--set takes NAME=VALUE, not '" // value // "'"
+            override(1)%text = value
+            self%options%override = [self%options%override, override]
+         end if
+      case default
+         self%fault = "unknown option " // name
+         if (len(near_option(name)) > 0) self%fault = self%fault // "; did you mean " // &
+            near_option(name) // "?"
+      end select
+   end subroutine take_option
+
+   function near_option(name) result(near)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: near
+      type(string_t) :: known(6)
+
+      known(1)%text = "--output"
+      known(2)%text = "--set"
+      known(3)%text = "--lenient"
+      known(4)%text = "--quiet"
+      known(5)%text = "--help"
+      known(6)%text = "--version"
+      near = nearest_word(name, known)
+   end function near_option
+
+   pure function without_slash(path) result(folder)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: folder
+
+      folder = path
+      do while (len(folder) > 1)
+         if (folder(len(folder):) /= "/") exit
+         folder = folder(:len(folder) - 1)
+      end do
+   end function without_slash
+
+   function argument(i) result(word)
+      integer, intent(in) :: i
+      character(len=:), allocatable :: word
+      integer :: length
+
+      call get_command_argument(i, length=length)
+      allocate(character(len=length) :: word)
+      call get_command_argument(i, word)
+   end function argument
+
+   !> The help text.
+   function usage() result(line)
+      character(len=72) :: line(17)
+
+      line = [character(len=72) :: &
+         "usage: emcon [run] DECK [options]     run a deck", &
+         "       emcon check DECK [options]     read and check it, no run", &
+         "       emcon restart NAME.rst.h5      go on from a restart file", &
+         "", &
+         "options:", &
+         "  --output DIR       write the results into DIR, not beside the deck", &
+         "  --set NAME=VALUE   set a *PARAMETER of the deck; may be repeated", &
+         "  --lenient          unknown keywords are warnings, not errors", &
+         "  --quiet            no progress on standard output", &
+         "  --version, --help", &
+         "", &
+         "results:  NAME.vtkhdf fields for ParaView, NAME.csv and NAME.h5 history,", &
+         "          NAME.log, NAME.rst.h5 for a restart", &
+         "exit:     0 done, 2 error in the deck or on the command line,", &
+         "          3 the analysis failed (results up to there are kept),", &
+         "          4 cannot write, 130 interrupted", &
+         "decks:    docs/deck.md"]
+   end function usage
+
+end module emcon_command_line

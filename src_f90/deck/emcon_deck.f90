@@ -1,0 +1,97 @@
+!> The deck reader: text deck in, scene out, every complaint with file and line.
+!>
+!> `deck_open` reads files, `deck_read` understands what they say from memory only, so that a
+!> restart file can carry the deck it belongs to.
+module emcon_deck
+   use emcon_deck_cards, only : read_cards
+   use emcon_deck_check, only : check_materials, check_nodes, check_pairs
+   use emcon_deck_contact, only : read_interactions, read_pairs
+   use emcon_deck_geometry, only : check_shapes
+   use emcon_deck_materials, only : read_materials, read_sections
+   use emcon_deck_mesh, only : read_elements, read_nodes
+   use emcon_deck_reader, only : data_open, data_t, next_line, reader_t
+   use emcon_deck_sets, only : read_sets
+   use emcon_deck_source, only : deck_open, deck_source_t
+   use emcon_deck_step, only : read_steps
+   use emcon_deck_surfaces, only : read_surfaces
+   use emcon_deck_tables, only : read_amplitudes, read_initial_conditions, read_time_points
+   use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
+   use emcon_scene, only : scene_t
+   use emcon_text, only : string_t
+   implicit none
+   private
+   public :: deck_source_t, deck_open, deck_read
+   public :: diagnostics_t, diagnostics_texts
+
+contains
+
+   !> The scene that `source` describes. It is complete only if no error was added.
+   !>
+   !> The cards are read in passes, so that before the first step they may stand in any order:
+   !> mesh, sets, surfaces, materials, tables, contact, then the steps one by one.
+   subroutine deck_read(source, overrides, is_lenient, scene, diagnostics)
+      type(deck_source_t), intent(in), target :: source
+      type(string_t), intent(in) :: overrides(:)            !! NAME=VALUE for *PARAMETER
+      logical, intent(in) :: is_lenient                     !! warn of unknown keywords and output
+      type(scene_t), intent(out) :: scene
+      type(diagnostics_t), intent(inout) :: diagnostics     !! those of `deck_open` stay
+      type(reader_t) :: reader
+
+      reader%line => source%line
+      reader%file => source%file
+      reader%number => source%number
+      reader%log = diagnostics
+      reader%log%file_name = source%file_name
+      reader%is_lenient = is_lenient
+      reader%doubt_nodes = .not. source%is_whole
+      reader%doubt_elements = .not. source%is_whole
+      reader%doubt_names = .not. source%is_whole
+      scene%file = source%file_name
+      scene%n_dim = 2
+      call read_cards(reader, overrides)
+      if (size(reader%card) > 0) call read_scene(reader, scene)
+      diagnostics = reader%log
+   end subroutine deck_read
+
+   subroutine read_scene(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+
+      call read_heading(reader, scene)
+      call read_nodes(reader, scene)
+      call read_elements(reader, scene)
+      call read_sets(reader, scene)
+      call read_surfaces(reader, scene)
+      call read_materials(reader, scene)
+      call read_sections(reader, scene)
+      call read_amplitudes(reader, scene)
+      call read_time_points(reader, scene)
+      call read_initial_conditions(reader, scene)
+      call read_interactions(reader)
+      call read_pairs(reader, scene)
+      call read_steps(reader, scene)
+      call check_shapes(reader, scene)
+      call check_materials(reader, scene)
+      call check_nodes(reader, scene)
+      call check_pairs(reader, scene)
+   end subroutine read_scene
+
+   !> The lines of *HEADING, with line ends between them.
+   subroutine read_heading(reader, scene)
+      type(reader_t), intent(in) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(data_t) :: data
+      integer :: i
+
+      scene%heading = ""
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "HEADING") cycle
+         call data_open(data, reader%card(i))
+         do while (next_line(reader, data))
+            if (scene%heading /= "") scene%heading = scene%heading // new_line("a")
+            scene%heading = scene%heading // trim(data%text)
+         end do
+      end do
+   end subroutine read_heading
+
+end module emcon_deck

@@ -1,0 +1,205 @@
+!> *SURFACE INTERACTION, *SURFACE BEHAVIOR, *FRICTION and *CONTACT PAIR.
+module emcon_deck_contact
+   use emcon_deck_reader, only : card_error, card_t, check_count, data_error, data_open, data_t, &
+      get_name, get_real, has_option, need_name, next_line, option_name, reader_t, &
+      refuse_option
+   use emcon_deck_sets, only : find_set, set_names
+   use emcon_deck_surfaces, only : find_surface, surface_names
+   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_kinds, only : wp
+   use emcon_scene, only : contact_pair_t, formulation_nts, scene_t
+   use emcon_text, only : read_real, string_t, to_text
+   implicit none
+   private
+   public :: read_interactions, read_pairs
+
+contains
+
+   !> The names of the surface interactions. All of them mean hard contact without friction.
+   subroutine read_interactions(reader)
+      type(reader_t), intent(inout) :: reader
+      character(len=:), allocatable :: name
+      integer :: i, n
+
+      allocate(reader%interaction(size(reader%card)))
+      n = 0
+      do i = 1, size(reader%card)
+         associate (card => reader%card(i))
+            select case (card%name)
+            case ("SURFACEINTERACTION")
+               call need_name(reader, card, "NAME", name)
+               n = n + 1
+               reader%interaction(n)%text = name
+            case ("SURFACEBEHAVIOR", "FRICTION")
+               if (n == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+                  "there is no *SURFACE INTERACTION before")
+               if (card%name == "FRICTION") then
+                  call check_friction(reader, card)
+               else
+                  call check_behavior(reader, card)
+               end if
+            end select
+         end associate
+      end do
+      reader%interaction = reader%interaction(:n)
+   end subroutine read_interactions
+
+   subroutine check_behavior(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+
+      select case (option_name(card, "PRESSURE-OVERCLOSURE"))
+      case ("", "HARD")
+         continue
+      case ("LINEAR", "EXPONENTIAL", "TABULAR", "TIED", "SCALEFACTOR")
+         call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", &
+            "contact is enforced exactly, without penalty")
+      case default
+         call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", "")
+      end select
+   end subroutine check_behavior
+
+   !> Only a coefficient of 0 is what this version computes.
+   subroutine check_friction(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(data_t) :: data
+      real(wp) :: coefficient
+
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         coefficient = 0.0_wp
+         call get_real(reader, data, 1, "friction coefficient", coefficient)
+         if (coefficient /= 0.0_wp) call data_error(reader, data, "friction is known but not " &
+            // "supported; the coefficient must be 0, not " // to_text(coefficient))
+      end do
+   end subroutine check_friction
+
+   !> All *CONTACT PAIR cards.
+   subroutine read_pairs(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(contact_pair_t), allocatable :: pair(:)
+      type(data_t) :: data
+      integer :: i, n, n_before, most
+
+      most = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == "CONTACTPAIR") then
+            most = most + reader%card(i)%last - reader%card(i)%first + 1
+         end if
+      end do
+      allocate(pair(most))
+      n = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "CONTACTPAIR") cycle
+         n_before = n
+         call data_open(data, reader%card(i))
+         do while (next_line(reader, data))
+            n = n + 1
+            pair(n)%origin = reader%card(i)%origin
+            call read_surfaces_of_pair(reader, data, scene, pair(n))
+         end do
+         call read_pair_options(reader, reader%card(i), scene, pair(n_before + 1:n))
+      end do
+      scene%pair = pair(:n)
+   end subroutine read_pairs
+
+   !> Data line: slave, master. A surface that is in doubt stays 0.
+   subroutine read_surfaces_of_pair(reader, data, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair
+      integer :: side, i_surface(2)
+      character(len=:), allocatable :: name
+      character(len=6), parameter :: role(2) = ["slave ", "master"]
+
+      call check_count(reader, data, 2, 2, "slave surface, master surface")
+      if (.not. data%ok) return
+      i_surface = 0
+      do side = 1, 2
+         data%ok = .true.
+         call get_name(reader, data, side, trim(role(side)) // " surface", name)
+         if (.not. data%ok) cycle
+         i_surface(side) = find_surface(scene%surface, name)
+         if (i_surface(side) == 0 .and. .not. reader%doubt_names) then
+            call data_error(reader, data, "unknown " // trim(role(side)) // " surface " &
+               // quoted(name) // suggestion(name, surface_names(scene%surface)))
+         end if
+      end do
+      pair%slave = i_surface(1)
+      pair%master = i_surface(2)
+      if (any(i_surface == 0)) return
+      if (pair%slave == pair%master) then
+         call data_error(reader, data, "slave and master are the same surface, " // quoted(name))
+         pair%master = 0
+      else if (scene%surface(pair%master)%is_nodal) then
+         call data_error(reader, data, "the master surface " // quoted(name) &
+            // " has TYPE=NODE; only the slave surface may")
+         pair%master = 0
+      end if
+   end subroutine read_surfaces_of_pair
+
+   !> What a card says of all its pairs.
+   subroutine read_pair_options(reader, card, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair(:)
+      type(contact_pair_t) :: common
+      character(len=:), allocatable :: name
+      logical :: is_known
+      integer :: i
+
+      if (size(pair) == 0) call card_error(reader, card, "no pair of surfaces is given")
+      call need_name(reader, card, "INTERACTION", name)
+      is_known = name == "" .or. reader%doubt_names
+      do i = 1, size(reader%interaction)
+         is_known = is_known .or. reader%interaction(i)%text == name
+      end do
+      if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
+         // quoted(name) // suggestion(name, reader%interaction))
+      select case (option_name(card, "TYPE"))
+      case ("", "NODETOSURFACE")
+         common%formulation = formulation_nts
+      case ("MORTAR", "LINMORTAR", "PGLINMORTAR", "SURFACETOSURFACE", "MASSLESS")
+         call refuse_option(reader, card, "TYPE", "NODE TO SURFACE", "not in this version")
+      case default
+         call refuse_option(reader, card, "TYPE", "NODE TO SURFACE", "")
+      end select
+      if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, common)
+      do i = 1, size(pair)
+         pair(i)%formulation = common%formulation
+         pair(i)%adjust_distance = common%adjust_distance
+         pair(i)%adjust_set = common%adjust_set
+      end do
+   end subroutine read_pair_options
+
+   !> ADJUST= a distance or a node set.
+   subroutine read_adjust(reader, card, scene, common)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: common
+      character(len=:), allocatable :: value
+      real(wp) :: distance
+      logical :: is_number
+
+      value = option_name(card, "ADJUST")
+      if (value == "") return
+      call read_real(value, distance, is_number)
+      if (is_number .and. distance < 0.0_wp) then
+         call card_error(reader, card, "the distance ADJUST=" // value // " is negative")
+      else if (is_number) then
+         common%adjust_distance = distance
+      else
+         common%adjust_set = find_set(scene%node_set, value)
+         if (common%adjust_set == 0 .and. .not. reader%doubt_names) then
+            call card_error(reader, card, "ADJUST=" // quoted(value) // " is neither a number " &
+               // "nor a node set" // suggestion(value, set_names(scene%node_set)))
+         end if
+      end if
+   end subroutine read_adjust
+
+end module emcon_deck_contact

@@ -1,0 +1,89 @@
+!> The shape of elements, as far as it can be seen from their corners.
+module emcon_deck_geometry
+   use emcon_deck_reader, only : reader_t
+   use emcon_diagnostics, only : add_error, label_list
+   use emcon_element_kinds, only : element_kinds
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t
+   implicit none
+   private
+   public :: check_shapes
+
+   !> A corner's cross product of edges, over the square of the longest edge, below which it has
+   !> no area. Slender elements are far above; rounding of the coordinates of nodes on one line is
+   !> below as long as these do not exceed 1e5 edges.
+   real(wp), parameter :: least_corner = 1.0e-10_wp
+   integer, parameter :: shape_good = 0, shape_flat = 1, shape_clockwise = 2, shape_folded = 3
+
+contains
+
+   !> Refuse elements without area, numbered clockwise, or folded; one message for each kind.
+   subroutine check_shapes(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: fault(:)
+      integer :: i
+
+      if (reader%doubt_positions) return
+      allocate(fault(size(scene%element_label)))
+      do i = 1, size(fault)
+         fault(i) = element_shape(scene, i)
+      end do
+      call tell(shape_flat, " has no area")
+      call tell(shape_clockwise, " is inverted: its nodes run clockwise")
+      call tell(shape_folded, " is folded: the angle at a corner is 180 degrees or more")
+
+   contains
+
+      subroutine tell(kind, text)
+         integer, intent(in) :: kind
+         character(len=*), intent(in) :: text
+         integer :: k
+
+         do k = 1, size(fault)
+            if (fault(k) == kind) exit
+         end do
+         if (k > size(fault)) return
+         call add_error(reader%log, scene%element_origin(k), "element " &
+            // label_list(pack(scene%element_label, fault == kind)) // text)
+      end subroutine tell
+
+   end subroutine check_shapes
+
+   !> Judge the cross products of the edges at the corners of a plane element.
+   pure integer function element_shape(scene, element)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: element
+      real(wp) :: x(2, size(scene%element_node, 1)), edge(2, size(scene%element_node, 1))
+      real(wp) :: corner(size(scene%element_node, 1)), longest
+      integer :: k, n, before
+
+      element_shape = shape_good
+      n = element_kinds(scene%element_kind(element))%n_node
+      if (any(scene%element_node(:n, element) == 0)) return
+      x(:, :n) = scene%x(:, scene%element_node(:n, element))
+      ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
+      x(:, :n) = scale(x(:, :n), -exponent(maxval(abs(x(:, :n)))))
+      do k = 1, n
+         edge(:, k) = x(:, merge(1, k + 1, k == n)) - x(:, k)
+      end do
+      longest = maxval(abs(edge(:, :n)))
+      element_shape = shape_flat
+      if (longest <= 0.0_wp) return
+      edge(:, :n) = edge(:, :n)/longest
+      do k = 1, n
+         before = merge(n, k - 1, k == 1)
+         corner(k) = edge(1, before)*edge(2, k) - edge(2, before)*edge(1, k)
+      end do
+      if (abs(sum(corner(:n))) <= least_corner) then
+         element_shape = shape_flat
+      else if (all(corner(:n) < 0.0_wp)) then
+         element_shape = shape_clockwise
+      else if (any(corner(:n) <= least_corner)) then
+         element_shape = shape_folded
+      else
+         element_shape = shape_good
+      end if
+   end function element_shape
+
+end module emcon_deck_geometry

@@ -1,0 +1,221 @@
+!> Output requests: *NODE FILE and its kin.
+!>
+!> Requests carry over to later steps until a step has a request of the same kind.
+module emcon_deck_output
+   use emcon_deck_reader, only : card_error, card_t, card_warning, data_error, data_open, data_t, &
+      data_warning, get_name, has_option, next_line, option_count, option_name, reader_t, &
+      refuse_option
+   use emcon_deck_sets, only : find_set, set_names
+   use emcon_deck_tables, only : find_table, table_names
+   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_scene, only : named_set_t, output_contact_file, output_contact_print, &
+      output_element_file, output_element_print, output_energy_print, output_node_file, &
+      output_node_print, output_t, scene_t
+   use emcon_text, only : string_t
+   implicit none
+   private
+   public :: requests_t, requests_init, read_output, is_output
+
+   !> The requests that hold in the step that is being read.
+   type :: requests_t
+      type(output_t), allocatable :: output(:)
+      integer, allocatable :: step(:)              !! the step that gave each
+   end type requests_t
+
+   !> One keyword with what it can write. `longer` gives other names of the same variables.
+   type :: output_row_t
+      character(len=12) :: keyword
+      integer :: kind
+      character(len=32) :: variables
+      character(len=32) :: longer
+   end type output_row_t
+
+   character(len=*), parameter :: of_node = "U V RF", of_element = "S E ENER ELSE ELKE EVOL", &
+      of_contact = "CDIS CSTR CF", longer_contact = "CDISP CSTRESS CFORCE", &
+      of_energy = "ALLKE ALLSE ALLWK ETOTAL"
+
+   type(output_row_t), parameter :: output_rows(*) = [ &
+      output_row_t("NODEFILE", output_node_file, of_node, ""), &
+      output_row_t("NODEPRINT", output_node_print, of_node, ""), &
+      output_row_t("ELFILE", output_element_file, of_element, ""), &
+      output_row_t("ELPRINT", output_element_print, of_element, ""), &
+      output_row_t("CONTACTFILE", output_contact_file, of_contact, longer_contact), &
+      output_row_t("CONTACTPRINT", output_contact_print, of_contact, longer_contact), &
+      output_row_t("ENERGYPRINT", output_energy_print, of_energy, "")]
+
+contains
+
+   subroutine requests_init(self)
+      type(requests_t), intent(out) :: self
+
+      allocate(self%output(0), self%step(0))
+   end subroutine requests_init
+
+   pure logical function is_output(card)
+      type(card_t), intent(in) :: card
+
+      is_output = any(output_rows%keyword == card%name)
+   end function is_output
+
+   !> Take in the request of one card of step `card%step`.
+   subroutine read_output(reader, card, scene, self)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(requests_t), intent(inout) :: self
+      type(output_t) :: new
+      type(output_t), allocatable :: grown(:)
+      integer, allocatable :: kept(:)
+      integer :: i, i_row, n
+
+      i_row = 1
+      do i = 1, size(output_rows)
+         if (output_rows(i)%keyword == card%name) i_row = i
+      end do
+      new%kind = output_rows(i_row)%kind
+      new%origin = card%origin
+      call read_variables(reader, card, output_rows(i_row), new)
+      call read_set(reader, card, scene, new)
+      call option_count(reader, card, "FREQUENCY", 0, new%frequency)
+      call read_times(reader, card, new)
+      select case (option_name(card, "TOTALS"))
+      case ("", "NO")
+         continue
+      case ("YES", "ONLY")
+         new%totals = .true.
+         new%only_totals = option_name(card, "TOTALS") == "ONLY"
+      case default
+         call refuse_option(reader, card, "TOTALS", "YES, ONLY, NO", "")
+      end select
+      kept = pack([(i, i = 1, size(self%step))], &
+         self%output%kind /= new%kind .or. self%step == card%step)
+      n = size(kept)
+      allocate(grown(n + 1))
+      do i = 1, n
+         grown(i) = self%output(kept(i))
+      end do
+      grown(n + 1) = new
+      self%step = [self%step(kept), card%step]
+      call move_alloc(grown, self%output)
+   end subroutine read_output
+
+   !> The variables on the data lines, in their short forms.
+   subroutine read_variables(reader, card, row, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(output_row_t), intent(in) :: row
+      type(output_t), intent(inout) :: new
+      type(data_t) :: data
+      type(string_t), allocatable :: list(:), longer(:)
+      character(len=:), allocatable :: name
+      logical, allocatable :: is_wanted(:)
+      integer :: i, k, n_before
+
+      call split_words(row%variables, list)
+      call split_words(row%longer, longer)
+      allocate(is_wanted(size(list)), source=.false.)
+      n_before = reader%log%n_errors + reader%log%n_warnings
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         do k = 1, data%n
+            if (data%to(k) < data%from(k)) cycle
+            call get_name(reader, data, k, "variable", name)
+            do i = 1, size(list)
+               if (list(i)%text == name) exit
+               if (i > size(longer)) cycle
+               if (longer(i)%text == name) exit
+            end do
+            if (i <= size(list)) then
+               is_wanted(i) = .true.
+            else if (reader%is_lenient) then
+               call data_warning(reader, data, "output variable " // quoted(name) &
+                  // " is not supported, left out; supported: " // trim(row%variables))
+            else
+               call data_error(reader, data, "output variable " // quoted(name) &
+                  // " is not supported; supported: " // trim(row%variables))
+            end if
+         end do
+      end do
+      if (row%kind == output_energy_print .and. .not. any(is_wanted)) is_wanted = .true.
+      if (.not. any(is_wanted) .and. reader%log%n_errors + reader%log%n_warnings == n_before) then
+         call card_warning(reader, card, "no variable is named, nothing will be written; known: " &
+            // trim(row%variables))
+      end if
+      allocate(new%variable(count(is_wanted)))
+      k = 0
+      do i = 1, size(list)
+         if (.not. is_wanted(i)) cycle
+         k = k + 1
+         new%variable(k) = list(i)
+      end do
+   end subroutine read_variables
+
+   !> The words of `text`, which blanks part.
+   pure subroutine split_words(text, list)
+      character(len=*), intent(in) :: text
+      type(string_t), allocatable, intent(out) :: list(:)
+      integer :: first, last, n
+
+      allocate(list(len_trim(text)))
+      n = 0
+      first = 1
+      do while (first <= len_trim(text))
+         last = index(text(first:) // " ", " ") + first - 2
+         n = n + 1
+         list(n)%text = text(first:last)
+         first = last + 2
+      end do
+      list = list(:n)
+   end subroutine split_words
+
+   subroutine read_set(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(output_t), intent(inout) :: new
+
+      select case (new%kind)
+      case (output_node_file, output_node_print)
+         call look_up("NSET", scene%node_set)
+      case (output_element_file, output_element_print)
+         call look_up("ELSET", scene%element_set)
+      end select
+
+   contains
+
+      subroutine look_up(option, set)
+         character(len=*), intent(in) :: option
+         type(named_set_t), intent(in) :: set(:)
+         character(len=:), allocatable :: name
+
+         name = option_name(card, option)
+         if (name == "") return
+         new%set = find_set(set, name)
+         if (new%set == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+            "unknown set " // option // "=" // quoted(name) // suggestion(name, set_names(set)))
+      end subroutine look_up
+
+   end subroutine read_set
+
+   subroutine read_times(reader, card, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(output_t), intent(inout) :: new
+      character(len=:), allocatable :: name
+      integer :: i
+
+      name = option_name(card, "TIMEPOINTS")
+      if (name == "") return
+      if (has_option(card, "FREQUENCY")) then
+         call card_error(reader, card, "FREQUENCY and TIME POINTS exclude each other")
+      end if
+      i = find_table(reader%time_points, name)
+      if (i > 0) then
+         new%time = reader%time_points(i)%time
+      else if (.not. reader%doubt_names) then
+         call card_error(reader, card, "unknown time points " // quoted(name) &
+            // suggestion(name, table_names(reader%time_points)))
+      end if
+   end subroutine read_times
+
+end module emcon_deck_output

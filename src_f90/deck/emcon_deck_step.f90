@@ -1,0 +1,324 @@
+!> The steps: *STEP, its procedure, its settings, and all that holds in it.
+!>
+!> Settings (constraint method, contact initiation, Newton, restart) stay until a later step
+!> changes them.
+module emcon_deck_step
+   use emcon_deck_loads, only : conditions_carry, conditions_init, conditions_store, conditions_t, &
+      read_boundary, read_cload, read_dload
+   use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
+   use emcon_deck_reader, only : card_error, card_t, card_warning, check_count, data_error, &
+      data_open, data_t, get_real, has_option, is_blank, next_line, option_count, option_name, &
+      option_real, reader_t, refuse_option
+   use emcon_diagnostics, only : add_error
+   use emcon_kinds, only : wp
+   use emcon_scene, only : initiation_admissible, initiation_persistent, &
+      initiation_velocity_update, method_null_space, method_saddle_point, origin_t, &
+      procedure_dynamic, procedure_static, scene_t, step_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: read_steps
+
+contains
+
+   !> All steps, after the model has been read.
+   subroutine read_steps(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(conditions_t) :: conditions
+      type(requests_t) :: requests
+      type(step_t) :: last
+      integer :: i, k, n_step
+      real(wp) :: time
+
+      n_step = 0
+      call conditions_init(conditions, scene)
+      call requests_init(requests)
+      do i = 1, size(reader%card)
+         n_step = max(n_step, reader%card(i)%step)
+         if (reader%card(i)%step == 0 .and. reader%card(i)%name == "BOUNDARY") then
+            call read_boundary(reader, reader%card(i), scene, conditions)
+         end if
+      end do
+      allocate(scene%step(n_step))
+      time = 0.0_wp
+      i = 1
+      do k = 1, n_step
+         do while (reader%card(i)%step < k)
+            i = i + 1
+         end do
+         call inherit(last, scene%step(k))
+         scene%step(k)%origin = reader%card(i)%origin
+         call read_settings(reader, i, scene%step(k))
+         call conditions_carry(conditions, scene%amplitude, last, time)
+         if (k > 1) time = time + last%duration
+         call read_conditions(reader, i, scene, conditions, requests)
+         call conditions_store(conditions, scene%step(k))
+         scene%step(k)%output = requests%output
+         last = scene%step(k)
+      end do
+      if (n_step == 0 .and. .not. reader%doubt_names) then
+         call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
+      end if
+   end subroutine read_steps
+
+   !> What stays set from one step to the next.
+   subroutine inherit(last, step)
+      type(step_t), intent(in) :: last
+      type(step_t), intent(out) :: step
+
+      step%nlgeom = last%nlgeom
+      step%constraint_method = last%constraint_method
+      step%initiation = last%initiation
+      step%gap_tolerance = last%gap_tolerance
+      step%newton_tolerance = last%newton_tolerance
+      step%newton_maximum = last%newton_maximum
+      step%restart_frequency = last%restart_frequency
+   end subroutine inherit
+
+   !> Procedure and settings of the step whose first card is `i_first`.
+   subroutine read_settings(reader, i_first, step)
+      type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: i_first
+      type(step_t), intent(inout) :: step
+      integer :: i
+
+      do i = i_first, size(reader%card)
+         if (reader%card(i)%step /= reader%card(i_first)%step) then
+            if (reader%card(i)%step > 0) exit
+            cycle
+         end if
+         associate (card => reader%card(i))
+            select case (card%name)
+            case ("STATIC", "DYNAMIC")
+               call read_procedure(reader, card, step)
+            case ("CONSTRAINTMETHOD")
+               call read_constraint_method(reader, card, step)
+            case ("CONTACTINITIATION")
+               call read_initiation(reader, card, step)
+            case ("NEWTON")
+               call read_newton(reader, card, step)
+            case ("TIMEINTEGRATION")
+               call check_scheme(reader, card)
+            case ("RESTART")
+               call read_restart(reader, card, step)
+            end select
+         end associate
+      end do
+      call read_step_card(reader, reader%card(i_first), step)
+      if (step%procedure /= 0 .or. reader%doubt_names) return
+      if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
+         "the step has no procedure: *STATIC or *DYNAMIC")
+   end subroutine read_settings
+
+   !> Whether a card after `i_first`, before the next step, was refused: it may be the procedure.
+   pure logical function has_refused(reader, i_first)
+      type(reader_t), intent(in) :: reader
+      integer, intent(in) :: i_first
+      integer :: i
+
+      has_refused = .false.
+      do i = i_first + 1, size(reader%card)
+         if (reader%card(i)%name == "STEP") return
+         has_refused = has_refused .or. reader%card(i)%name == ""
+      end do
+   end function has_refused
+
+   subroutine read_step_card(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+
+      call option_count(reader, card, "INC", 1, step%max_increments)
+      if (has_option(card, "NLGEOM")) then
+         select case (option_name(card, "NLGEOM"))
+         case ("", "YES")
+            step%nlgeom = .true.
+         case ("NO")
+            if (step%nlgeom) call card_warning(reader, card, &
+               "NLGEOM=NO has no effect: an earlier step has set NLGEOM, and it stays")
+         case default
+            call refuse_option(reader, card, "NLGEOM", "YES, NO", "")
+         end select
+      end if
+      select case (option_name(card, "AMPLITUDE"))
+      case ("")
+         continue
+      case ("RAMP")
+         if (step%procedure == procedure_dynamic) call refuse_option(reader, card, "AMPLITUDE", &
+            "STEP in a dynamic step", "give the loads an amplitude")
+      case ("STEP")
+         if (step%procedure == procedure_static) call refuse_option(reader, card, "AMPLITUDE", &
+            "RAMP in a static step", "give the loads an amplitude")
+      case default
+         call refuse_option(reader, card, "AMPLITUDE", "RAMP, STEP", "")
+      end select
+   end subroutine read_step_card
+
+   !> *STATIC or *DYNAMIC: increment, duration, least and largest increment.
+   subroutine read_procedure(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+      type(data_t) :: data
+      real(wp) :: value(4)
+      integer :: k
+      character(len=17), parameter :: what(4) = [character(len=17) :: "increment", "duration", &
+         "least increment", "largest increment"]
+
+      if (step%procedure /= 0) then
+         call card_error(reader, card, "the step has a procedure already")
+         return
+      end if
+      step%procedure = merge(procedure_static, procedure_dynamic, card%name == "STATIC")
+      step%is_direct = has_option(card, "DIRECT")
+      value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
+      call data_open(data, card)
+      if (.not. next_line(reader, data)) return
+      call check_count(reader, data, 0, 4, "increment, duration, least and largest increment")
+      do k = 1, 4
+         call get_real(reader, data, k, trim(what(k)), value(k))
+      end do
+      if (is_blank(data, 1)) value(1) = value(2)
+      if (data%ok) call check_times(reader, data, value)
+      if (data%ok) then
+         step%h = value(1)
+         step%duration = value(2)
+         step%h_min = value(3)
+         step%h_max = value(4)
+      end if
+      if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
+   end subroutine read_procedure
+
+   subroutine check_times(reader, data, value)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      real(wp), intent(in) :: value(4)             !! h, duration, h_min, h_max
+
+      if (value(1) <= 0.0_wp) then
+         call data_error(reader, data, "the increment " // to_text(value(1)) // " is not positive")
+      else if (value(2) <= 0.0_wp) then
+         call data_error(reader, data, "the duration " // to_text(value(2)) // " is not positive")
+      else if (value(2) < value(1)) then
+         call data_error(reader, data, "the duration " // to_text(value(2)) &
+            // " is less than the increment " // to_text(value(1)))
+      else if (value(3) < 0.0_wp .or. value(3) > value(1)) then
+         call data_error(reader, data, "the least increment " // to_text(value(3)) &
+            // " must lie between 0 and the increment " // to_text(value(1)))
+      else if (value(4) < 0.0_wp .or. (value(4) > 0.0_wp .and. value(4) < value(1))) then
+         call data_error(reader, data, "the largest increment " // to_text(value(4)) &
+            // " is less than the increment " // to_text(value(1)))
+      end if
+   end subroutine check_times
+
+   subroutine read_constraint_method(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+      character(len=*), parameter :: known = "NULL SPACE, SADDLE POINT"
+
+      select case (option_name(card, "TYPE"))
+      case ("", "NULLSPACE")
+         step%constraint_method = method_null_space
+      case ("SADDLEPOINT")
+         step%constraint_method = method_saddle_point
+      case ("PENALTY", "AUGMENTEDLAGRANGE")
+         call refuse_option(reader, card, "TYPE", known, "not in this version")
+      case default
+         call refuse_option(reader, card, "TYPE", known, "")
+      end select
+   end subroutine read_constraint_method
+
+   subroutine read_initiation(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+
+      select case (option_name(card, "TYPE"))
+      case ("", "PERSISTENT")
+         step%initiation = initiation_persistent
+      case ("ADMISSIBLE")
+         step%initiation = initiation_admissible
+      case ("VELOCITYUPDATE")
+         step%initiation = initiation_velocity_update
+      case default
+         call refuse_option(reader, card, "TYPE", "PERSISTENT, ADMISSIBLE, VELOCITY UPDATE", "")
+      end select
+      call option_real(reader, card, "GAPTOLERANCE", step%gap_tolerance)
+   end subroutine read_initiation
+
+   subroutine read_newton(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+
+      select case (option_name(card, "TYPE"))
+      case ("", "FULL")
+         continue
+      case ("MODIFIED", "INEXACT")
+         call refuse_option(reader, card, "TYPE", "FULL", "not in this version")
+      case default
+         call refuse_option(reader, card, "TYPE", "FULL", "")
+      end select
+      call option_real(reader, card, "TOLERANCE", step%newton_tolerance)
+      if (step%newton_tolerance >= 1.0_wp) then
+         call card_error(reader, card, "TOLERANCE is relative and must be below 1")
+      end if
+      call option_count(reader, card, "MAXIMUM", 1, step%newton_maximum)
+   end subroutine read_newton
+
+   subroutine check_scheme(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+
+      select case (option_name(card, "SCHEME"))
+      case ("", "ENERGYMOMENTUM")
+         continue
+      case ("MIDPOINT", "TRAPEZOIDAL", "GENERALIZEDALPHA", "CENTRALDIFFERENCE")
+         call refuse_option(reader, card, "SCHEME", "ENERGY MOMENTUM", "not in this version")
+      case default
+         call refuse_option(reader, card, "SCHEME", "ENERGY MOMENTUM", "")
+      end select
+   end subroutine check_scheme
+
+   subroutine read_restart(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+
+      if (.not. has_option(card, "WRITE")) then
+         if (.not. has_option(card, "READ")) call card_error(reader, card, "WRITE is missing")
+         return
+      end if
+      step%restart_frequency = 1
+      call option_count(reader, card, "FREQUENCY", 0, step%restart_frequency)
+   end subroutine read_restart
+
+   !> Boundaries, loads and output requests of the step whose first card is `i_first`.
+   subroutine read_conditions(reader, i_first, scene, conditions, requests)
+      type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: i_first
+      type(scene_t), intent(in) :: scene
+      type(conditions_t), intent(inout) :: conditions
+      type(requests_t), intent(inout) :: requests
+      type(card_t) :: card
+      integer :: i
+
+      do i = i_first, size(reader%card)
+         if (reader%card(i)%step > reader%card(i_first)%step) exit
+         if (reader%card(i)%step < reader%card(i_first)%step) cycle
+         card = reader%card(i)
+         select case (card%name)
+         case ("BOUNDARY")
+            call read_boundary(reader, card, scene, conditions)
+         case ("CLOAD")
+            call read_cload(reader, card, scene, conditions)
+         case ("DLOAD")
+            call read_dload(reader, card, scene, conditions)
+         case default
+            if (is_output(card)) call read_output(reader, card, scene, requests)
+         end select
+      end do
+   end subroutine read_conditions
+
+end module emcon_deck_step

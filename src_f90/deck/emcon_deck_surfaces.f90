@@ -1,0 +1,322 @@
+!> *SURFACE, and the faces that elements share.
+module emcon_deck_surfaces
+   use emcon_deck_reader, only : card_error, card_t, card_warning, check_count, data_error, &
+      data_open, data_t, get_name, is_blank, need_name, next_line, option_name, reader_t, &
+      refuse_option
+   use emcon_deck_sets, only : get_elements, get_nodes
+   use emcon_diagnostics, only : label_list, quoted
+   use emcon_element_kinds, only : element_kinds
+   use emcon_scene, only : scene_t, surface_t, where_text
+   use emcon_text, only : string_t, to_text
+   implicit none
+   private
+   public :: read_surfaces, find_surface, surface_names
+   public :: adjacency_t, adjacency_init, n_neighbours
+
+   !> The elements at each node: element(first(i):first(i + 1) - 1).
+   type :: adjacency_t
+      integer, allocatable :: first(:)
+      integer, allocatable :: element(:)
+   end type adjacency_t
+
+   !> Faces of a surface while it grows.
+   type :: faces_t
+      integer :: n = 0
+      integer, allocatable :: element(:), face(:)
+   end type faces_t
+
+contains
+
+   !> All *SURFACE cards.
+   subroutine read_surfaces(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(adjacency_t) :: adjacency
+      type(surface_t) :: surface
+      integer :: i, n, i_same
+      character(len=:), allocatable :: name
+
+      allocate(scene%surface(0))
+      n = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == "SURFACE") n = n + 1
+      end do
+      if (n == 0) return
+      deallocate(scene%surface)
+      allocate(scene%surface(n))
+      call adjacency_init(adjacency, scene)
+      n = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "SURFACE") cycle
+         call need_name(reader, reader%card(i), "NAME", name)
+         if (name == "") cycle
+         i_same = find_surface(scene%surface(:n), name)
+         if (i_same > 0) then
+            call card_error(reader, reader%card(i), "surface " // name &
+               // " is defined twice; first at " // where_text(scene, scene%surface(i_same)%origin))
+            cycle
+         end if
+         call read_surface(reader, reader%card(i), scene, adjacency, surface)
+         surface%name = name
+         surface%origin = reader%card(i)%origin
+         n = n + 1
+         scene%surface(n) = surface
+      end do
+      scene%surface = scene%surface(:n)
+   end subroutine read_surfaces
+
+   subroutine read_surface(reader, card, scene, adjacency, surface)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t), intent(in) :: adjacency
+      type(surface_t), intent(out) :: surface
+      integer :: n_before, n_item
+
+      n_before = reader%log%n_errors
+      allocate(surface%element(0), surface%face(0), surface%node(0))
+      select case (option_name(card, "TYPE"))
+      case ("", "ELEMENT")
+         call read_faces(reader, card, scene, adjacency, surface)
+      case ("NODE")
+         surface%is_nodal = .true.
+         call read_nodes(reader, card, scene, surface)
+      case ("CYLINDER", "CUTTINGSURFACE", "REVOLUTION", "SEGMENTS", "USER")
+         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE", "surfaces belong to elements")
+      case default
+         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE", "")
+      end select
+      n_item = size(surface%element) + size(surface%node)
+      if (n_item == 0 .and. reader%log%n_errors == n_before .and. .not. reader%doubt_names &
+         .and. .not. reader%doubt_elements) then
+         call card_error(reader, card, "the surface has no " &
+            // trim(merge("node", "face", surface%is_nodal)))
+      end if
+   end subroutine read_surface
+
+   !> Nodes of a surface in the order of the deck, each once.
+   subroutine read_nodes(reader, card, scene, surface)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(inout) :: surface
+      type(data_t) :: data
+      integer, allocatable :: item(:), list(:)
+      logical, allocatable :: is_in(:)
+      integer :: i, n
+
+      allocate(is_in(size(scene%node_label)), source=.false.)
+      allocate(list(size(scene%node_label)))
+      n = 0
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         ! A second value, the area of the node in Abaqus, is not needed.
+         call check_count(reader, data, 1, 2, "node or node set")
+         if (data%ok) call get_nodes(reader, data, 1, scene, item)
+         if (.not. data%ok) cycle
+         do i = 1, size(item)
+            if (is_in(item(i))) cycle
+            is_in(item(i)) = .true.
+            n = n + 1
+            list(n) = item(i)
+         end do
+      end do
+      surface%node = list(:n)
+   end subroutine read_nodes
+
+   subroutine read_faces(reader, card, scene, adjacency, surface)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t), intent(in) :: adjacency
+      type(surface_t), intent(inout) :: surface
+      type(data_t) :: data
+      type(faces_t) :: faces
+      integer, allocatable :: item(:)
+      integer :: i, face, n_repeated
+
+      allocate(faces%element(16), faces%face(16))
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, 1, 2, "element or element set, face")
+         if (data%ok) call get_elements(reader, data, 1, scene, item)
+         if (.not. data%ok) cycle
+         if (is_blank(data, 2)) then
+            do i = 1, size(item)
+               call append_free_faces(scene, adjacency, item(i), faces)
+            end do
+         else
+            call get_face(reader, data, scene, item, face)
+            if (.not. data%ok) cycle
+            do i = 1, size(item)
+               call append_face(faces, item(i), face)
+            end do
+         end if
+      end do
+      call drop_repeated(faces, size(scene%element_label), n_repeated)
+      if (n_repeated > 0) call card_warning(reader, card, to_text(n_repeated) &
+         // " faces are named more than once; each is taken once")
+      surface%element = faces%element(:faces%n)
+      surface%face = faces%face(:faces%n)
+   end subroutine read_faces
+
+   !> Read a face `S1`, `S2`, ... that all elements of `item` must have.
+   subroutine get_face(reader, data, scene, item, face)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: item(:)
+      integer, intent(out) :: face
+      character(len=:), allocatable :: name
+      logical :: has_not(size(item))
+
+      call get_name(reader, data, 2, "face", name)
+      face = 0
+      if (len(name) == 2) face = index("1234", name(2:2))*index("S", name(1:1))
+      if (face == 0) then
+         call data_error(reader, data, "unknown face " // quoted(name) // "; known: S1, S2, S3, S4")
+         return
+      end if
+      has_not = element_kinds(scene%element_kind(item))%n_face < face
+      if (any(has_not)) call data_error(reader, data, "element " &
+         // label_list(pack(scene%element_label(item), has_not)) // " has no face " // name)
+   end subroutine get_face
+
+   pure subroutine append_free_faces(scene, adjacency, element, faces)
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t), intent(in) :: adjacency
+      integer, intent(in) :: element
+      type(faces_t), intent(inout) :: faces
+      integer :: face
+
+      if (scene%element_node(1, element) == 0) return
+      do face = 1, element_kinds(scene%element_kind(element))%n_face
+         if (n_neighbours(scene, adjacency, element, face) == 0) then
+            call append_face(faces, element, face)
+         end if
+      end do
+   end subroutine append_free_faces
+
+   pure subroutine append_face(faces, element, face)
+      type(faces_t), intent(inout) :: faces
+      integer, intent(in) :: element, face
+      integer, allocatable :: grown(:)
+      integer :: n
+
+      n = faces%n
+      if (n == size(faces%face)) then
+         allocate(grown(2*n))
+         grown(:n) = faces%element
+         call move_alloc(grown, faces%element)
+         allocate(grown(2*n))
+         grown(:n) = faces%face
+         call move_alloc(grown, faces%face)
+      end if
+      faces%n = n + 1
+      faces%element(n + 1) = element
+      faces%face(n + 1) = face
+   end subroutine append_face
+
+   !> Keep the first of equal faces.
+   pure subroutine drop_repeated(faces, n_element, n_repeated)
+      type(faces_t), intent(inout) :: faces
+      integer, intent(in) :: n_element
+      integer, intent(out) :: n_repeated
+      logical, allocatable :: is_in(:, :)
+      integer :: i, n
+
+      allocate(is_in(maxval(element_kinds%n_face), n_element), source=.false.)
+      n = 0
+      do i = 1, faces%n
+         if (is_in(faces%face(i), faces%element(i))) cycle
+         is_in(faces%face(i), faces%element(i)) = .true.
+         n = n + 1
+         faces%element(n) = faces%element(i)
+         faces%face(n) = faces%face(i)
+      end do
+      n_repeated = faces%n - n
+      faces%n = n
+   end subroutine drop_repeated
+
+   !> Elements without nodes (they had errors) are left out.
+   pure subroutine adjacency_init(self, scene)
+      type(adjacency_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: next(:)
+      integer :: e, k, node, n_node
+
+      n_node = size(scene%node_label)
+      allocate(self%first(n_node + 1), source=0)
+      do e = 1, size(scene%element_label)
+         do k = 1, element_kinds(scene%element_kind(e))%n_node
+            node = scene%element_node(k, e)
+            if (node > 0) self%first(node) = self%first(node) + 1
+         end do
+      end do
+      k = 1
+      do node = 1, n_node + 1
+         e = self%first(node)
+         self%first(node) = k
+         k = k + e
+      end do
+      next = self%first
+      allocate(self%element(k - 1))
+      do e = 1, size(scene%element_label)
+         do k = 1, element_kinds(scene%element_kind(e))%n_node
+            node = scene%element_node(k, e)
+            if (node == 0) cycle
+            self%element(next(node)) = e
+            next(node) = next(node) + 1
+         end do
+      end do
+   end subroutine adjacency_init
+
+   !> Number of other elements with all nodes of this face.
+   pure integer function n_neighbours(scene, adjacency, element, face)
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t), intent(in) :: adjacency
+      integer, intent(in) :: element, face
+      integer :: i, k, other, n_face_node, node
+      logical :: has_all
+
+      n_neighbours = 0
+      associate (kind => element_kinds(scene%element_kind(element)))
+         n_face_node = kind%n_face_node
+         node = scene%element_node(kind%face_node(1, face), element)
+         if (node == 0) return
+         do i = adjacency%first(node), adjacency%first(node + 1) - 1
+            other = adjacency%element(i)
+            if (other == element) cycle
+            has_all = .true.
+            do k = 2, n_face_node
+               has_all = has_all .and. any(scene%element_node(:, other) &
+                  == scene%element_node(kind%face_node(k, face), element))
+            end do
+            if (has_all) n_neighbours = n_neighbours + 1
+         end do
+      end associate
+   end function n_neighbours
+
+   !> Index of the surface called `name`, 0 if there is none.
+   pure integer function find_surface(surface, name)
+      type(surface_t), intent(in) :: surface(:)
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      find_surface = 0
+      do i = 1, size(surface)
+         if (surface(i)%name == name) find_surface = i
+      end do
+   end function find_surface
+
+   pure function surface_names(surface) result(list)
+      type(surface_t), intent(in) :: surface(:)
+      type(string_t) :: list(size(surface))
+      integer :: i
+
+      do i = 1, size(surface)
+         list(i)%text = surface(i)%name
+      end do
+   end function surface_names
+
+end module emcon_deck_surfaces

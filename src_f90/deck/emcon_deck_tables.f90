@@ -1,0 +1,279 @@
+!> *AMPLITUDE and *TIME POINTS: tables over time; *INITIAL CONDITIONS.
+module emcon_deck_tables
+   use emcon_deck_reader, only : card_error, card_t, check_count, data_error, data_open, data_t, &
+      get_integer, get_real, has_option, is_blank, need_name, next_line, option_name, reader_t, &
+      refuse_option
+   use emcon_deck_sets, only : get_nodes
+   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_kinds, only : wp
+   use emcon_scene, only : amplitude_t, scene_t, where_text
+   use emcon_text, only : string_t, to_text
+   implicit none
+   private
+   public :: read_amplitudes, read_time_points, read_initial_conditions
+   public :: find_table, table_names
+
+   !> More output times than this are a slip of the pen.
+   integer, parameter :: max_times = 1000000
+   !> By how much of an increment GENERATE may miss its end and still meet it.
+   real(wp), parameter :: grid_slack = 1.0e-6_wp
+
+contains
+
+   subroutine read_amplitudes(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+
+      call read_tables(reader, scene, "AMPLITUDE", scene%amplitude)
+   end subroutine read_amplitudes
+
+   subroutine read_time_points(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(amplitude_t), allocatable :: table(:)
+
+      call read_tables(reader, scene, "TIMEPOINTS", table)
+      call move_alloc(table, reader%time_points)
+   end subroutine read_time_points
+
+   !> All tables of one keyword. A table with errors keeps its name.
+   subroutine read_tables(reader, scene, keyword, table)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      character(len=*), intent(in) :: keyword
+      type(amplitude_t), allocatable, intent(out) :: table(:)
+      character(len=:), allocatable :: name
+      integer :: i, n, i_same
+
+      n = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == keyword) n = n + 1
+      end do
+      allocate(table(n))
+      n = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= keyword) cycle
+         call need_name(reader, reader%card(i), "NAME", name)
+         if (name == "") cycle
+         i_same = find_table(table(:n), name)
+         if (i_same > 0) then
+            call card_error(reader, reader%card(i), name // " is defined twice; first at " &
+               // where_text(scene, table(i_same)%origin))
+            cycle
+         end if
+         n = n + 1
+         table(n)%name = name
+         table(n)%origin = reader%card(i)%origin
+         if (keyword == "AMPLITUDE") then
+            call read_amplitude(reader, reader%card(i), table(n))
+         else
+            call read_times(reader, reader%card(i), table(n))
+         end if
+      end do
+      table = table(:n)
+   end subroutine read_tables
+
+   !> Pairs time, value; any number of pairs in a line.
+   subroutine read_amplitude(reader, card, table)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(amplitude_t), intent(inout) :: table
+      real(wp), allocatable :: number(:)
+      integer :: n, n_before
+
+      n_before = reader%log%n_errors
+      select case (option_name(card, "TIME"))
+      case ("TOTALTIME")
+         table%is_total_time = .true.
+      case ("", "STEPTIME")
+         continue
+      case default
+         call refuse_option(reader, card, "TIME", "STEP TIME, TOTAL TIME", "")
+      end select
+      select case (option_name(card, "DEFINITION"))
+      case ("", "TABULAR")
+         continue
+      case ("PERIODIC", "EQUALLYSPACED", "MODULATED", "DECAY", "SMOOTHSTEP", "USER")
+         call refuse_option(reader, card, "DEFINITION", "TABULAR", "amplitudes are tables")
+      case default
+         call refuse_option(reader, card, "DEFINITION", "TABULAR", "")
+      end select
+      call read_numbers(reader, card, "time or value", number)
+      n = size(number)/2
+      if (size(number) == 0) then
+         if (reader%log%n_errors == n_before) call card_error(reader, card, "the table is empty")
+         number = [0.0_wp, 1.0_wp]
+         n = 1
+      else if (2*n /= size(number)) then
+         call card_error(reader, card, "the last time " // to_text(number(size(number))) &
+            // " has no value")
+         n = max(n, 1)
+         number = [number, 0.0_wp]
+      end if
+      table%time = number(1:2*n:2)
+      table%value = number(2:2*n:2)
+      call check_ascending(reader, card, table%time)
+   end subroutine read_amplitude
+
+   subroutine check_ascending(reader, card, time)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      real(wp), intent(in) :: time(:)
+      integer :: i
+
+      do i = 2, size(time)
+         if (time(i) > time(i - 1)) cycle
+         call card_error(reader, card, "times must ascend: " // to_text(time(i)) // " follows " &
+            // to_text(time(i - 1)))
+         return
+      end do
+   end subroutine check_ascending
+
+   !> Times one by one, or generated from first, last and distance.
+   subroutine read_times(reader, card, table)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(amplitude_t), intent(inout) :: table
+      type(data_t) :: data
+      real(wp) :: range(3)
+      integer :: i, k, n_before
+
+      allocate(table%value(0))
+      n_before = reader%log%n_errors
+      if (.not. has_option(card, "GENERATE")) then
+         call read_numbers(reader, card, "time", table%time)
+         call check_ascending(reader, card, table%time)
+      else
+         allocate(table%time(0))
+         call data_open(data, card)
+         do while (next_line(reader, data))
+            call check_count(reader, data, 3, 3, "first time, last time, distance")
+            range = 0.0_wp
+            do k = 1, 3
+               call get_real(reader, data, k, "time", range(k))
+            end do
+            if (.not. data%ok) cycle
+            if (range(1) < 0.0_wp .or. range(2) < range(1) .or. range(3) <= 0.0_wp) then
+               call data_error(reader, data, "needs 0 <= first <= last and distance > 0")
+            else if ((range(2) - range(1))/real(max_times, wp) > range(3)) then
+               call data_error(reader, data, "more than " // to_text(max_times) // " times")
+            else
+               table%time = [table%time, (range(1) + real(i, wp)*range(3), &
+                  i = 0, int((range(2) - range(1))/range(3) + grid_slack))]
+            end if
+         end do
+         call check_ascending(reader, card, table%time)
+      end if
+      if (size(table%time) == 0 .and. reader%log%n_errors == n_before) then
+         call card_error(reader, card, "no time is given")
+      end if
+   end subroutine read_times
+
+   !> All numbers of the data lines, in order; an empty field is 0.
+   subroutine read_numbers(reader, card, what, number)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: what
+      real(wp), allocatable, intent(out) :: number(:)
+      real(wp), allocatable :: grown(:)
+      type(data_t) :: data
+      integer :: k, n
+
+      allocate(number(64))
+      n = 0
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         do k = 1, data%n
+            if (n == size(number)) then
+               allocate(grown(2*n))
+               grown(:n) = number
+               call move_alloc(grown, number)
+            end if
+            n = n + 1
+            number(n) = 0.0_wp
+            call get_real(reader, data, k, what, number(n))
+         end do
+      end do
+      number = number(:n)
+   end subroutine read_numbers
+
+   !> *INITIAL CONDITIONS: node or set, degree of freedom, value; a later one replaces.
+   subroutine read_initial_conditions(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      integer :: i
+
+      allocate(scene%u0(scene%n_dim, size(scene%node_label)), source=0.0_wp)
+      allocate(scene%v0(scene%n_dim, size(scene%node_label)), source=0.0_wp)
+      do i = 1, size(reader%card)
+         associate (card => reader%card(i))
+            if (card%name /= "INITIALCONDITIONS") cycle
+            select case (option_name(card, "TYPE"))
+            case ("VELOCITY")
+               call read_initial(reader, card, scene, scene%v0)
+            case ("DISPLACEMENT")
+               call read_initial(reader, card, scene, scene%u0)
+            case ("")
+               call card_error(reader, card, "TYPE=VELOCITY or TYPE=DISPLACEMENT is missing")
+            case ("TEMPERATURE", "STRESS", "PLASTICSTRAIN", "SOLUTION", "HARDENING", "CONTACT")
+               call refuse_option(reader, card, "TYPE", "VELOCITY, DISPLACEMENT", &
+                  "a run starts without stress at one temperature")
+            case default
+               call refuse_option(reader, card, "TYPE", "VELOCITY, DISPLACEMENT", "")
+            end select
+         end associate
+      end do
+   end subroutine read_initial_conditions
+
+   subroutine read_initial(reader, card, scene, field)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(inout) :: field(:, :)
+      type(data_t) :: data
+      integer, allocatable :: item(:)
+      integer :: dof
+      real(wp) :: value
+
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, 3, 3, "node or node set, degree of freedom, value")
+         if (.not. data%ok) cycle
+         call get_integer(reader, data, 2, "degree of freedom", dof)
+         if (data%ok .and. dof > 3) call data_error(reader, data, "degree of freedom " &
+            // to_text(dof) // " does not exist; known: 1, 2")
+         value = 0.0_wp
+         call get_real(reader, data, 3, "value", value)
+         if (data%ok) call get_nodes(reader, data, 1, scene, item)
+         if (.not. data%ok) cycle
+         if (dof <= scene%n_dim) then
+            field(dof, item) = value
+         else if (value /= 0.0_wp) then
+            call data_error(reader, data, "the model is plane: degree of freedom 3 must start at 0")
+         end if
+      end do
+   end subroutine read_initial
+
+   !> Index of the table called `name`, 0 if there is none.
+   pure integer function find_table(table, name)
+      type(amplitude_t), intent(in) :: table(:)
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      find_table = 0
+      do i = 1, size(table)
+         if (table(i)%name == name) find_table = i
+      end do
+   end function find_table
+
+   pure function table_names(table) result(list)
+      type(amplitude_t), intent(in) :: table(:)
+      type(string_t) :: list(size(table))
+      integer :: i
+
+      do i = 1, size(table)
+         list(i)%text = table(i)%name
+      end do
+   end function table_names
+
+end module emcon_deck_tables

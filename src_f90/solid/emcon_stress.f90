@@ -1,0 +1,120 @@
+!> Stress and strain for output: at nodes, extrapolated from the quadrature points and averaged, and
+!> as means over elements.
+!>
+!> Cauchy stress; without NLGEOM the stress itself. Components xx, yy, zz, xy, yz, xz.
+module emcon_stress
+   use emcon_element, only : element_strain
+   use emcon_element_kinds, only : max_element_nodes
+   use emcon_kinds, only : wp
+   use emcon_law, only : law_response_plane, law_response_t
+   use emcon_shape, only : shape_values
+   use emcon_solid, only : solid_t
+   implicit none
+   private
+   public :: nodal_stress, element_means, von_mises
+
+contains
+
+   !> Stress at the nodes: each element's field through its quadrature points, mean over elements.
+   pure subroutine nodal_stress(solid, u, nlgeom, stress)
+      type(solid_t), intent(in) :: solid
+      real(wp), intent(in), contiguous :: u(:, :)            !! (2, n_node)
+      logical, intent(in) :: nlgeom
+      real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
+      integer :: count_at(solid%n_node), e, i, k, node
+      real(wp) :: at_gp(6), weight(max_element_nodes, max_element_nodes), strain(3)
+
+      stress = 0.0_wp
+      count_at = 0
+      do e = 1, solid%n_element
+         weight = extrapolation(solid%kind(e), solid%geometry(e)%n_gp)
+         do k = 1, solid%geometry(e)%n_gp
+            call point_state(solid, e, k, u, nlgeom, at_gp, strain)
+            do i = 1, solid%geometry(e)%n_node
+               node = solid%node(i, e)
+               stress(:, node) = stress(:, node) + weight(k, i)*at_gp
+            end do
+         end do
+         do i = 1, solid%geometry(e)%n_node
+            count_at(solid%node(i, e)) = count_at(solid%node(i, e)) + 1
+         end do
+      end do
+      do i = 1, solid%n_node
+         if (count_at(i) > 0) stress(:, i) = stress(:, i)/real(count_at(i), wp)
+      end do
+   end subroutine nodal_stress
+
+   !> weight(k, i): part of quadrature point k in the value at node i.
+   pure function extrapolation(kind, n_gp) result(weight)
+      integer, intent(in) :: kind, n_gp
+      real(wp) :: weight(max_element_nodes, max_element_nodes)
+      real(wp), parameter :: corner(2, 4) = reshape([-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, &
+         1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], [2, 4])
+      real(wp) :: slope(2, max_element_nodes)
+      integer :: i
+
+      weight = 1.0_wp
+      if (n_gp == 1) return
+      do i = 1, 4
+         call shape_values(kind, sqrt(3.0_wp)*corner(:, i), weight(:, i), slope)
+      end do
+   end function extrapolation
+
+   !> Stress (6) and strain (E11, E22, 2 E12) at quadrature point `k` of element `e`.
+   pure subroutine point_state(solid, e, k, u, nlgeom, stress, strain)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e, k
+      real(wp), intent(in) :: u(:, :)
+      logical, intent(in) :: nlgeom
+      real(wp), intent(out) :: stress(6), strain(3)
+      type(law_response_t) :: state
+      real(wp) :: grad(2, 2), zero(2, 2), dstrain(3), f(2, 2), f_end(2, 2), s(2, 2), det
+      integer :: i
+
+      grad = 0.0_wp
+      zero = 0.0_wp
+      do i = 1, solid%geometry(e)%n_node
+         grad(:, 1) = grad(:, 1) + u(:, solid%node(i, e))*solid%geometry(e)%gradient(1, i, k)
+         grad(:, 2) = grad(:, 2) + u(:, solid%node(i, e))*solid%geometry(e)%gradient(2, i, k)
+      end do
+      call element_strain(grad, zero, nlgeom, strain, dstrain, f, f_end)
+      call law_response_plane(solid%law(solid%law_of(e))%law, strain, dstrain, state)
+      s = reshape([state%stress(1), state%stress(3), state%stress(3), state%stress(2)], [2, 2])
+      det = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1)
+      s = matmul(matmul(f, s), transpose(f))/det
+      stress = [s(1, 1), s(2, 2), state%stress_33/det, s(1, 2), 0.0_wp, 0.0_wp]
+   end subroutine point_state
+
+   !> Means over the reference volume of each element, and that volume.
+   pure subroutine element_means(solid, u, nlgeom, stress, strain, volume)
+      type(solid_t), intent(in) :: solid
+      real(wp), intent(in), contiguous :: u(:, :)
+      logical, intent(in) :: nlgeom
+      real(wp), intent(out) :: stress(:, :)      !! (6, n_element)
+      real(wp), intent(out) :: strain(:, :)      !! (3, n_element) E11, E22, 2 E12
+      real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
+      real(wp) :: stress_k(6), strain_k(3), weight
+      integer :: e, k
+
+      stress = 0.0_wp
+      strain = 0.0_wp
+      do e = 1, solid%n_element
+         volume(e) = sum(solid%geometry(e)%weight(:solid%geometry(e)%n_gp))
+         do k = 1, solid%geometry(e)%n_gp
+            call point_state(solid, e, k, u, nlgeom, stress_k, strain_k)
+            weight = solid%geometry(e)%weight(k)/volume(e)
+            stress(:, e) = stress(:, e) + weight*stress_k
+            strain(:, e) = strain(:, e) + weight*strain_k
+         end do
+      end do
+   end subroutine element_means
+
+   !> Von Mises stress of (xx, yy, zz, xy, yz, xz).
+   pure real(wp) function von_mises(s)
+      real(wp), intent(in) :: s(6)
+
+      von_mises = sqrt(0.5_wp*((s(1) - s(2))**2 + (s(2) - s(3))**2 + (s(3) - s(1))**2) &
+         + 3.0_wp*(s(4)**2 + s(5)**2 + s(6)**2))
+   end function von_mises
+
+end module emcon_stress
