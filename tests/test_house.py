@@ -125,6 +125,14 @@ def test_house(check):
     assert list(CHECKS[check](ROOT)) == []
 
 
+def test_one_version():
+    """The library and the Python package bear the same version."""
+    library = (ROOT / "src_f90/api/emcon_version.f90").read_text()
+    package = (ROOT / "pywrap/pyproject.toml").read_text()
+    (number,) = re.findall(r'version = "([\d.]+)"', library)
+    assert number in re.findall(r'^version = "(.*)"', package, re.M)
+
+
 # ---- the checks themselves, on made-up trees ----------------------------------------------------
 
 

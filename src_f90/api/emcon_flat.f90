@@ -73,7 +73,7 @@ contains
             end do
          end associate
       end if
-      deallocate(slot(handle)%stepper)
+      call close_model(handle)
       handle = 0
    end subroutine open_deck
 
@@ -118,9 +118,10 @@ contains
    !> Free a model; harmless if it is closed.
    subroutine close_model(handle)
       integer(c_int), intent(in) :: handle
+      type(stepper_t), allocatable :: closed   ! freed on return; gfortran 12 cannot deallocate in place
       integer(c_int) :: ierr
 
-      if (is_open(handle, ierr)) deallocate(slot(handle)%stepper)
+      if (is_open(handle, ierr)) call move_alloc(slot(handle)%stepper, closed)
    end subroutine close_model
 
    !> Nodes, elements, possible contact constraints, bodies, unknowns, steps.
@@ -292,15 +293,16 @@ contains
 
    !> Gap of a slave node over an edge and its neighbours, with its derivatives. Columns of `x0` and
    !> `dx`: slave, edge, node before and after the edge (`has_before`, `has_after`: 0 or 1).
-   subroutine nts_kernel(x0, dx, has_before, has_after, gap, g, c, h)
+   subroutine nts_kernel(x0, dx, has_before, has_after, rounding, gap, g, c, h)
       real(c_double), intent(in) :: x0(2, 5), dx(2, 5)
       integer(c_int), intent(in) :: has_before, has_after
+      real(c_double), intent(in) :: rounding     !! length over which corners are rounded
       real(c_double), intent(out) :: gap(3)      !! at the start, at the end, difference
       real(c_double), intent(out) :: g(10), c(10), h(10, 10)
       type(dg_t) :: number
 
       number = nts_gap(real(x0, wp), real(dx, wp), merge(4, 0, has_before /= 0), &
-         merge(5, 0, has_after /= 0))
+         merge(5, 0, has_after /= 0), real(rounding, wp))
       gap = [real(number%f0, c_double), real(number%f1, c_double), real(number%df, c_double)]
       g = real(number%g, c_double)
       c = real(number%c, c_double)

@@ -49,8 +49,14 @@ contains
       case ("ENER")
          fields = [field_of("strain_energy", 1)]
          fields%is_cell = .true.
-      case default
+      case ("E")
          fields = [field_of("strain", 3)]
+         fields%is_cell = .true.
+      case ("ELKE")
+         fields = [field_of("kinetic_energy", 1)]
+         fields%is_cell = .true.
+      case default
+         fields = [field_of("volume", 1)]
          fields%is_cell = .true.
       end select
    end function field_names

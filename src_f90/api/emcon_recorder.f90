@@ -125,7 +125,11 @@ contains
          call add("RF")
          call add("S")
          call add("ENER")
-         if (size(scene%pair) > 0) call add("CSTR")
+         if (size(scene%pair) > 0) then
+            call add("CDIS")
+            call add("CSTR")
+            call add("CF")
+         end if
       end if
       self%has_fields = .true.
 
@@ -136,10 +140,11 @@ contains
          type(string_t) :: new(1)
          integer :: l
 
-         do l = 1, size(self%variable)
-            if (self%variable(l)%text == name) return
-         end do
          new(1)%text = name
+         if (name == "ELSE") new(1)%text = "ENER"    ! the same, element by element
+         do l = 1, size(self%variable)
+            if (self%variable(l)%text == new(1)%text) return
+         end do
          self%variable = [self%variable, new]
       end subroutine add
 

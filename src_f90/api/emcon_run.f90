@@ -1,8 +1,9 @@
 !> A batch run: deck in, files out, from the first increment or from a restart file.
 module emcon_run
+   use emcon_blas, only : blas_keep_memory, blas_single_thread
    use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : err_file, err_input, err_interrupt, error_t, raise
-   use emcon_files, only : file_exists, make_directory
+   use emcon_files, only : file_exists, make_directory, survive_file_size_limit
    use emcon_kinds, only : dp, wp
    use emcon_log, only : log_close, log_line, log_open, log_t
    use emcon_march, only : increment_t
@@ -17,7 +18,8 @@ module emcon_run
    use emcon_version, only : version
    implicit none
    private
-   public :: run_options_t, run_report_t, run_deck, run_restart, run_check, interrupt_interface
+   public :: run_options_t, run_report_t, interrupt_interface
+   public :: run_prepare, run_deck, run_restart, run_check
 
    !> What the command line can say of a run.
    type :: run_options_t
@@ -57,6 +59,16 @@ module emcon_run
    end type run_t
 
 contains
+
+   !> Settings of the whole process, for a program of its own: one thread in BLAS (small matrices),
+   !> freed memory is kept, and a file size limit is an error like a full disk.
+   subroutine run_prepare()
+      logical :: is_single
+
+      call blas_single_thread(is_single)
+      call blas_keep_memory()
+      call survive_file_size_limit()
+   end subroutine run_prepare
 
    !> Read and check the deck at `path`, without a run.
    subroutine run_check(path, options, report, error)

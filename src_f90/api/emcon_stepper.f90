@@ -137,7 +137,7 @@ contains
       call restart_put(restart, "is_lenient", [merge(1, 0, self%is_lenient)])
       associate (state => self%march%state, ledger => self%march%ledger)
          call restart_put(restart, "progress", [state%i_step, state%n_grid, state%grid_stride, &
-            state%n_easy, state%increment])
+            state%n_easy, state%increment, state%n_before])
          call restart_put(restart, "time", [state%start_time, state%time])
          call restart_put(restart, "work", [ledger%external_work, ledger%contact_work])
          call restart_put(restart, "u", state%u)
@@ -157,7 +157,7 @@ contains
       type(restart_t), intent(in) :: restart
       type(error_t), allocatable, intent(out) :: error
       type(diagnostics_t) :: diagnostics
-      integer :: flag(1), progress(5)
+      integer :: flag(1), progress(6)
       integer, allocatable :: active(:)
       real(wp) :: time(2), work(2)
 
@@ -184,6 +184,7 @@ contains
          state%grid_stride = progress(3)
          state%n_easy = progress(4)
          state%increment = progress(5)
+         state%n_before = progress(6)
          state%start_time = time(1)
          state%time = time(2)
       end associate

@@ -2,12 +2,10 @@
 program emcon
    use, intrinsic :: iso_c_binding, only : c_int
    use, intrinsic :: iso_fortran_env, only : error_unit, output_unit
-   use emcon_blas, only : blas_keep_memory, blas_single_thread
    use emcon_command_line, only : command_read, command_t, usage
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_files, only : survive_file_size_limit
    use emcon_interrupt, only : interrupt_watch, is_interrupted
-   use emcon_run, only : run_check, run_deck, run_report_t, run_restart
+   use emcon_run, only : run_check, run_deck, run_prepare, run_report_t, run_restart
    use emcon_version, only : version
    implicit none
 
@@ -34,13 +32,10 @@ contains
       type(command_t) :: command
       type(run_report_t) :: report
       type(error_t), allocatable :: error
-      logical :: is_single
       integer :: i
 
       code = err_none
-      call blas_single_thread(is_single)
-      call blas_keep_memory()
-      call survive_file_size_limit()
+      call run_prepare()
       call command_read(command)
       if (len(command%fault) > 0) then
          write(error_unit, "(a)") "emcon: " // command%fault // " (see emcon --help)"

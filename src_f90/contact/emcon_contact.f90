@@ -26,7 +26,7 @@ module emcon_contact
 
    !> Where one possible constraint stands at both ends of a step.
    type :: gap_state_t
-      logical :: is_near = .false.                    !! false: cannot touch in this step
+      logical :: is_near = .false.                    !! false: no surface within reach
       logical :: is_over = .false.                    !! over the surface (not past its end)
       logical :: is_covered = .true.                  !! the stencil still holds at the end
       real(wp) :: gap0 = 0.0_wp
@@ -36,6 +36,7 @@ module emcon_contact
 
    type, abstract :: contact_t
       integer :: n_constraint = 0
+      real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
    contains

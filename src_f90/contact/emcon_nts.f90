@@ -17,8 +17,6 @@ module emcon_nts
    real(wp), parameter :: reach_per_edge = 0.5_wp, reach_per_motion = 8.0_wp
    !> Corners sharper than this (cosine of the turn) end the surface: the bisector degenerates.
    real(wp), parameter :: sharpest_cosine = -0.9_wp
-   !> A node counts as outside at the start of a step down to this fraction of an edge.
-   real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
 
    type, extends(contact_t) :: nts_t
       type(chain_t) :: slave
@@ -194,45 +192,80 @@ contains
       end do
    end subroutine gather
 
+   !> Reference length of the stencil's edge: what gaps are measured against.
+   pure real(wp) function edge_length(x, node)
+      real(wp), intent(in) :: x(:, :)
+      integer, intent(in) :: node(:)
+      real(wp) :: a(2)
+
+      a = x(:, node(3)) - x(:, node(2))
+      edge_length = sqrt(dot_product(a, a))
+   end function edge_length
+
    pure function nts_gap_state(self, i, x, u0, du) result(state)
       class(nts_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
       integer :: n, node(5), before, after, k
-      real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1, xi, a(2)
+      real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1, xi
 
       if (self%edge(i) == 0) return
       call stencil(self, i, x, u0, n, node, before, after)
       call gather(x, u0, du, n, node, local, dlocal)
-      a = local(:, 3) - local(:, 2)
-      state%size = sqrt(dot_product(a, a))
-      call nts_gap_value(local(:, :n), before, after, state%gap0, xi0)
+      state%size = edge_length(x, node)
+      call nts_gap_value(local(:, :n), before, after, self%rounding*state%size, state%gap0, xi0)
       do k = 1, n
          local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
       end do
-      call nts_gap_value(local(:, :n), before, after, state%gap1, xi1)
-      state%is_near = state%gap0 >= -touch_tol*state%size
+      call nts_gap_value(local(:, :n), before, after, self%rounding*state%size, state%gap1, xi1)
+      state%is_near = .true.
       xi = xi0
       if (state%gap1 < 0.0_wp .and. state%gap0 > 0.0_wp) then
          xi = xi0 + (state%gap0/(state%gap0 - state%gap1))*(xi1 - xi0)
       end if
       state%is_over = (before > 0 .or. xi >= 0.0_wp) .and. (after > 0 .or. xi <= 1.0_wp)
-      state%is_covered = is_covered(self, i, xi1, before, after)
+      state%is_covered = .true.
+      if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, x, u0, du)
    end function nts_gap_state
 
-   !> Is the projection at the end of the step still on the edge or one of its neighbours?
-   pure logical function is_covered(self, i, xi, before, after)
+   !> Is the edge or one of its neighbours the nearest at the end of the step, rather than the edges
+   !> after next?
+   pure logical function is_covered(self, i, x, u0, du)
       type(nts_t), intent(in) :: self
-      integer, intent(in) :: i, before, after
-      real(wp), intent(in) :: xi
-      real(wp), parameter :: half = 0.5_wp
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp) :: inside, outside
+      integer :: e, k, side
 
-      is_covered = .true.
-      if (before > 0 .and. xi < -half) is_covered = &
-         self%master%previous(self%master%previous(self%edge(i))) == 0 .or. xi >= -1.0_wp
-      if (after > 0 .and. xi > 1.0_wp + half) is_covered = &
-         self%master%next(self%master%next(self%edge(i))) == 0 .or. xi <= 2.0_wp
+      inside = end_distance(self%edge(i))
+      outside = huge(outside)
+      do side = 1, 2
+         e = self%edge(i)
+         do k = 1, 2
+            if (e == 0) exit
+            e = merge(self%master%previous(e), self%master%next(e), side == 1)
+            if (e == 0) exit
+            if (k == 1) inside = min(inside, end_distance(e))
+            if (k == 2) outside = min(outside, end_distance(e))
+         end do
+      end do
+      is_covered = inside <= outside
+
+   contains
+
+      !> Distance of the slave node from edge `e` at the end of the step.
+      pure real(wp) function end_distance(e)
+         integer, intent(in) :: e
+         real(wp) :: u(2, 3), local(2, 3)
+
+         associate (node => [self%node(i), self%master%edge(:, e)])
+            local = x(:, node)
+            u = u0(:, node) + du(:, node)
+         end associate
+         end_distance = edge_distance(local, u, 1, [2, 3])
+      end function end_distance
+
    end function is_covered
 
    pure subroutine nts_evaluate(self, i, x, u0, du, constraint)
@@ -241,15 +274,14 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(constraint_t), intent(inout) :: constraint
       integer :: n, before, after
-      real(wp) :: local(2, 5), dlocal(2, 5), a(2)
+      real(wp) :: local(2, 5), dlocal(2, 5)
       type(dg_t) :: gap
 
       call stencil(self, i, x, u0, n, constraint%node, before, after)
       call gather(x, u0, du, n, constraint%node, local, dlocal)
-      gap = nts_gap(local(:, :n), dlocal(:, :n), before, after)
-      a = local(:, 3) - local(:, 2)
       constraint%n_node = n
-      constraint%size = sqrt(dot_product(a, a))
+      constraint%size = edge_length(x, constraint%node)
+      gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*constraint%size)
       constraint%gap0 = gap%f0
       constraint%gap1 = gap%f1
       constraint%dgap = gap%df

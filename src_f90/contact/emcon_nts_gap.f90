@@ -3,10 +3,11 @@
 !> Edge a = x2 - x1, b = xs - x1, outward normal n: gap over the line of the edge
 !> (b x a)/|a|. Where the node passes a corner to a neighbour the gap goes over to the neighbour's
 !> line, so that the gap is one continuous function over three edges: no event when a node slides
-!> over a master node, hence neither energy nor penetration is made there.
+!> over a master node, hence neither energy nor penetration is made there. In statics a node can
+!> come to rest in a dent, at a master node, where the gradient jumps: there corners are rounded.
 !> Source: docs/theory.md, section 4. Sign: gap > 0 is open.
 module emcon_nts_gap
-   use emcon_dgrad10, only : dg_cross, dg_dot, dg_negative_part, dg_positive_part, dg_sqrt, dg_t, &
+   use emcon_dgrad10, only : dg_cross, dg_dot, dg_negative_part, dg_sqrt, dg_t, &
       difference, difference_t, operator(*), operator(+), operator(-), operator(/)
    use emcon_kinds, only : wp
    implicit none
@@ -19,11 +20,12 @@ module emcon_nts_gap
 contains
 
    !> The gap over a step, in discrete-gradient arithmetic.
-   pure function nts_gap(x0, dx, before, after) result(gap)
+   pure function nts_gap(x0, dx, before, after, rounding) result(gap)
       real(wp), intent(in) :: x0(:, :)           !! (2, 3 to 5) slave, edge, further nodes; local
       real(wp), intent(in) :: dx(:, :)           !! their motion
       integer, intent(in) :: before              !! local number of the node before the edge, or 0
       integer, intent(in) :: after               !! of the node after it, or 0
+      real(wp), intent(in) :: rounding           !! length over which corners are rounded [L]
       type(dg_t) :: gap
       type(difference_t) :: a, b
       type(dg_t) :: length
@@ -32,30 +34,33 @@ contains
       b = difference(slave, first, x0, dx)
       length = dg_sqrt(dg_dot(a, a))
       gap = dg_cross(b, a)/length
-      if (before > 0) gap = gap + corner_before(a, b, length, difference(first, before, x0, dx))
-      if (after > 0) gap = gap - corner_after(a, length, difference(slave, last, x0, dx), &
-         difference(after, last, x0, dx))
+      if (before > 0) gap = gap + corner_before(a, b, length, &
+         difference(first, before, x0, dx), rounding)
+      if (after > 0) gap = gap + corner_after(a, length, difference(slave, last, x0, dx), &
+         difference(after, last, x0, dx), rounding)
    end function nts_gap
 
    !> kappa min(tau, 0): what the line of the edge before adds on its side of the bisector.
-   pure function corner_before(a, b, length, edge) result(part)
+   pure function corner_before(a, b, length, edge, rounding) result(part)
       type(difference_t), intent(in) :: a, b, edge
       type(dg_t), intent(in) :: length
+      real(wp), intent(in) :: rounding
       type(dg_t) :: part, other
 
       other = dg_sqrt(dg_dot(edge, edge))
-      part = dg_negative_part(dg_dot(b, edge)/other + dg_dot(b, a)/length)
+      part = dg_negative_part(dg_dot(b, edge)/other + dg_dot(b, a)/length, rounding)
       part = bend(edge, a, other, length)*part
    end function corner_before
 
-   !> kappa max(tau, 0), with `b` from the last node of the edge to the slave node.
-   pure function corner_after(a, length, b, edge) result(part)
+   !> -kappa max(tau, 0), with `b` from the last node of the edge to the slave node.
+   pure function corner_after(a, length, b, edge, rounding) result(part)
       type(difference_t), intent(in) :: a, b, edge
       type(dg_t), intent(in) :: length
+      real(wp), intent(in) :: rounding
       type(dg_t) :: part, other
 
       other = dg_sqrt(dg_dot(edge, edge))
-      part = dg_positive_part(dg_dot(b, a)/length + dg_dot(b, edge)/other)
+      part = dg_negative_part((-1.0_wp)*(dg_dot(b, a)/length + dg_dot(b, edge)/other), rounding)
       part = bend(a, edge, length, other)*part
    end function corner_after
 
@@ -69,9 +74,10 @@ contains
    end function bend
 
    !> The same gap for one configuration, and the projection `xi` on the edge (0..1 inside).
-   pure subroutine nts_gap_value(x, before, after, gap, xi)
+   pure subroutine nts_gap_value(x, before, after, rounding, gap, xi)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
       integer, intent(in) :: before, after
+      real(wp), intent(in) :: rounding
       real(wp), intent(out) :: gap, xi
       real(wp) :: a(2), b(2), edge(2), length, other, tau
 
@@ -84,15 +90,25 @@ contains
          edge = x(:, first) - x(:, before)
          other = sqrt(dot_product(edge, edge))
          tau = dot_product(b, edge)/other + dot_product(b, a)/length
-         gap = gap - min(tau, 0.0_wp)*cross(edge, a)/(length*other + dot_product(edge, a))
+         gap = gap - negative_part(tau)*cross(edge, a)/(length*other + dot_product(edge, a))
       end if
       if (after > 0) then
          edge = x(:, after) - x(:, last)
          b = x(:, slave) - x(:, last)
          other = sqrt(dot_product(edge, edge))
          tau = dot_product(b, a)/length + dot_product(b, edge)/other
-         gap = gap + max(tau, 0.0_wp)*cross(a, edge)/(length*other + dot_product(a, edge))
+         gap = gap - negative_part(-tau)*cross(a, edge)/(length*other + dot_product(a, edge))
       end if
+
+   contains
+
+      pure real(wp) function negative_part(tau)
+         real(wp), intent(in) :: tau
+
+         negative_part = 0.5_wp*(tau - sqrt(tau**2 + rounding**2))
+         if (.not. rounding > 0.0_wp) negative_part = min(tau, 0.0_wp)
+      end function negative_part
+
    end subroutine nts_gap_value
 
    pure real(wp) function cross(a, b)

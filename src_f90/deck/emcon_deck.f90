@@ -9,7 +9,8 @@ module emcon_deck
    use emcon_deck_geometry, only : check_shapes
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
-   use emcon_deck_reader, only : data_open, data_t, next_line, reader_t
+   use emcon_deck_fields, only : data_open, data_t, next_line
+   use emcon_deck_reader, only : reader_t
    use emcon_deck_sets, only : read_sets
    use emcon_deck_source, only : deck_open, deck_source_t
    use emcon_deck_step, only : read_steps

@@ -2,7 +2,7 @@
 module emcon_deck_cards
    use emcon_deck_keywords, only : find_keyword, in_model, in_step, keyword_names, keyword_t, &
       keywords, mark_flag, mark_none, mark_unsupported, mark_value, &
-      mark_without_effect, parameter_mark, parameter_names
+      mark_without_effect, parameter_mark, parameter_names, parameter_reason
    use emcon_deck_laws, only : law_variants
    use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
       substitute_parameters, unused_override
@@ -94,13 +94,16 @@ contains
       integer, intent(inout) :: i
       character(len=:), allocatable :: text
       integer :: i_first
+      logical :: is_resolved
 
       if (is_card(reader%line(i)%text)) then
          i_first = i
          call gather_card(reader, i, text)
-         call put_parameters(reader, parameters, i_first, text)
+         call put_parameters(reader, parameters, i_first, text, is_resolved)
          place%n_card = place%n_card + 1
+         reader%doubt_names = reader%doubt_names .or. .not. is_resolved
          call read_card(reader, place, text, i_first, reader%card(place%n_card))
+         reader%card(place%n_card)%is_unresolved = .not. is_resolved
          reader%card(place%n_card)%first = i + 1
          reader%card(place%n_card)%last = i
       else if (is_comment(reader%line(i)%text)) then
@@ -122,6 +125,7 @@ contains
       character(len=*), intent(in) :: keyword
       integer, intent(in) :: i
       character(len=:), allocatable :: text, fault
+      logical :: is_resolved
 
       if (keyword == "PARAMETER") then
          call parameter_define(parameters, reader%line(i)%text, fault)
@@ -129,23 +133,32 @@ contains
       else if (keyword /= "HEADING" .and. keyword /= "") then
          if (index(reader%line(i)%text, "<") == 0) return
          text = reader%line(i)%text
-         call put_parameters(reader, parameters, i, text)
+         call put_parameters(reader, parameters, i, text, is_resolved)
+         if (.not. is_resolved) then
+            if (.not. allocated(reader%is_unresolved)) then
+               allocate(reader%is_unresolved(size(reader%line)), source=.false.)
+            end if
+            reader%is_unresolved(i) = .true.
+         end if
          if (.not. allocated(reader%patched)) allocate(reader%patched(size(reader%line)))
          call move_alloc(text, reader%patched(i)%text)
       end if
    end subroutine read_data
 
    !> Put the values of parameters into `text`, which stands at line `i`.
-   subroutine put_parameters(reader, parameters, i, text)
+   subroutine put_parameters(reader, parameters, i, text, is_resolved)
       type(reader_t), intent(inout) :: reader
       type(parameters_t), intent(in) :: parameters
       integer, intent(in) :: i
       character(len=:), allocatable, intent(inout) :: text
+      logical, intent(out) :: is_resolved          !! false: a parameter is unknown
       character(len=:), allocatable :: patched, fault
 
+      is_resolved = .true.
       if (index(text, "<") == 0) return
       call substitute_parameters(parameters, text, patched, fault)
-      if (fault /= "") call add_error(reader%log, line_origin(reader, i), fault)
+      is_resolved = fault == ""
+      if (.not. is_resolved) call add_error(reader%log, line_origin(reader, i), fault)
       call move_alloc(patched, text)
    end subroutine put_parameters
 
@@ -302,7 +315,8 @@ contains
                   // suggestion(option%name, parameter_names(parameters))
                reader%doubt_names = .true.
             else if (mark == mark_unsupported) then
-               fault = "parameter " // option%name // " is known but not supported"
+               fault = "parameter " // option%name // " is known but not supported" &
+                  // parameter_reason(option%name)
             else if (mark == mark_value .and. option%value == "") then
                fault = "parameter " // option%name // " needs a value"
                reader%doubt_names = .true.

@@ -5,9 +5,8 @@ module emcon_deck_check
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, load_gravity, load_point, origin_t, procedure_dynamic, &
-      scene_t, surface_t
-   use emcon_text, only : to_text
+   use emcon_scene, only : contact_pair_t, load_gravity, load_point, procedure_dynamic, scene_t, &
+      surface_t
    implicit none
    private
    public :: check_materials, check_nodes, check_pairs
@@ -77,7 +76,7 @@ contains
       logical, allocatable :: is_bare(:), is_loaded(:)
       integer :: i, k
 
-      if (reader%doubt_nodes .or. reader%doubt_elements) return
+      if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_positions) return
       if (any(scene%element_node(1, :) == 0)) return
       allocate(is_bare(size(scene%node_label)), source=.true.)
       do i = 1, size(scene%element_label)
@@ -145,7 +144,7 @@ contains
       logical, allocatable :: is_checked(:)
       integer :: i, side, surface
 
-      if (size(scene%pair) == 0) return
+      if (size(scene%pair) == 0 .or. reader%doubt_shapes) return
       call adjacency_init(adjacency, scene)
       allocate(is_checked(size(scene%surface)), source=.false.)
       do i = 1, size(scene%pair)

@@ -1,14 +1,15 @@
 !> *SURFACE INTERACTION, *SURFACE BEHAVIOR, *FRICTION and *CONTACT PAIR.
 module emcon_deck_contact
-   use emcon_deck_reader, only : card_error, card_t, check_count, data_error, data_open, data_t, &
-      get_name, get_real, has_option, need_name, next_line, option_name, reader_t, &
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, get_real, &
+      next_line
+   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t, &
       refuse_option
    use emcon_deck_sets, only : find_set, set_names
    use emcon_deck_surfaces, only : find_surface, surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, formulation_nts, scene_t
-   use emcon_text, only : read_real, string_t, to_text
+   use emcon_text, only : read_real, to_text
    implicit none
    private
    public :: read_interactions, read_pairs

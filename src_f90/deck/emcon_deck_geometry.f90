@@ -44,6 +44,7 @@ contains
             if (fault(k) == kind) exit
          end do
          if (k > size(fault)) return
+         reader%doubt_shapes = .true.
          call add_error(reader%log, scene%element_origin(k), "element " &
             // label_list(pack(scene%element_label, fault == kind)) // text)
       end subroutine tell

@@ -3,7 +3,8 @@ module emcon_deck_keywords
    use emcon_text, only : squeezed, string_t
    implicit none
    private
-   public :: keyword_t, keywords, find_keyword, keyword_names, parameter_mark, parameter_names
+   public :: keyword_t, keywords, find_keyword, keyword_names
+   public :: parameter_mark, parameter_names, parameter_reason
    public :: in_model, in_step, in_both
    public :: mark_none, mark_flag, mark_value, mark_either, mark_unsupported, mark_without_effect
 
@@ -206,6 +207,31 @@ contains
          return
       end do
    end function parameter_mark
+
+   !> Why a known parameter is not supported: " (...)", or nothing where the name says it.
+   pure function parameter_reason(name) result(reason)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: reason
+
+      select case (name)
+      case ("ALPHA")
+         reason = " (the energy-momentum scheme has no numerical damping)"
+      case ("EXPLICIT")
+         reason = " (time integration is implicit)"
+      case ("SMALLSLIDING")
+         reason = " (contact follows the deformed surfaces)"
+      case ("TIMEDELAY")
+         reason = " (shift the times of the amplitude)"
+      case ("OGDEN", "MOONEY-RIVLIN", "YEOH", "POLYNOMIAL")
+         reason = " (use NEO HOOKE or COUPLED NEO HOOKE)"
+      case ("READ")
+         reason = " (use: emcon restart NAME.rst.h5)"
+      case ("INPUT")
+         reason = " (use *INCLUDE)"
+      case default
+         reason = ""
+      end select
+   end function parameter_reason
 
    !> The supported parameters of a list, for suggestions.
    pure function parameter_names(parameters) result(list)

@@ -1,158 +1,23 @@
-!> *BOUNDARY, *CLOAD and *DLOAD, and how they carry over from step to step.
-!>
-!> One rule for all: what is given again for the same place (node and degree of freedom; element
-!> and face; gravity of an element) replaces what was given before, in an earlier step, card or
-!> line; two loads on one place do not add up. OP=NEW drops what earlier steps gave.
-!>
-!> What carries over keeps its value. An amplitude over step time has ended with its step: its
-!> last value stays. A load dropped in a static step runs to zero over that step.
+!> *BOUNDARY, *CLOAD and *DLOAD: the cards. What their entries mean: `emcon_deck_conditions`.
 module emcon_deck_loads
-   use emcon_deck_reader, only : card_error, card_t, check_count, data_error, data_open, data_t, &
-      data_warning, get_integer, get_name, get_real, has_option, is_blank, next_line, option_name, &
-      reader_t, refuse_option
+   use emcon_deck_conditions, only : conditions_t, drop_loads, drop_prescribed, put_load, &
+      put_prescribed
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
+      get_integer, get_name, get_real, is_blank, next_line
+   use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
+      refuse_option
    use emcon_deck_sets, only : get_elements, get_nodes
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
-   use emcon_scene, only : amplitude_t, find_amplitude_value, load_gravity, load_point, &
-      load_pressure, load_t, prescribed_t, procedure_static, scene_t, step_t
+   use emcon_scene, only : load_gravity, load_point, load_pressure, load_t, prescribed_t, scene_t
    use emcon_text, only : to_text
    implicit none
    private
-   public :: conditions_t, conditions_init, conditions_carry, conditions_store
    public :: read_boundary, read_cload, read_dload
 
-   !> What holds in the step that is being read. A slot is the index of the entry at a place, 0:
-   !> none. Gravity has the slot of face 0.
-   type :: conditions_t
-      integer :: step = 0                          !! number of the step, 0: before the first
-      integer :: n_prescribed = 0, n_load = 0
-      type(prescribed_t), allocatable :: prescribed(:)
-      type(load_t), allocatable :: load(:)
-      integer, allocatable :: prescribed_step(:), load_step(:)         !! the step that gave it
-      logical, allocatable :: prescribed_dropped(:), load_dropped(:)
-      integer, allocatable :: prescribed_slot(:, :)                    !! (n_dim, n_node)
-      integer, allocatable :: point_slot(:, :)                         !! (n_dim, n_node)
-      integer, allocatable :: element_slot(:, :)                       !! (0:n_face, n_element)
-      logical :: is_third_told = .false.
-   end type conditions_t
-
 contains
-
-   subroutine conditions_init(self, scene)
-      type(conditions_t), intent(out) :: self
-      type(scene_t), intent(in) :: scene
-
-      allocate(self%prescribed(16), self%prescribed_step(16), self%prescribed_dropped(16))
-      allocate(self%load(16), self%load_step(16), self%load_dropped(16))
-      allocate(self%prescribed_slot(scene%n_dim, size(scene%node_label)), source=0)
-      allocate(self%point_slot(scene%n_dim, size(scene%node_label)), source=0)
-      allocate(self%element_slot(0:maxval(element_kinds%n_face), size(scene%element_label)), &
-         source=0)
-   end subroutine conditions_init
-
-   !> Go to the next step: drop what was dropped, keep the last values of `last`.
-   subroutine conditions_carry(self, amplitude, last, time)
-      type(conditions_t), intent(inout) :: self
-      type(amplitude_t), intent(in) :: amplitude(:)
-      type(step_t), intent(in) :: last             !! the step that ends
-      real(wp), intent(in) :: time                 !! total time at its start [T]
-      real(wp) :: value_end
-      integer :: i, n
-
-      self%step = self%step + 1
-      self%prescribed_slot = 0
-      n = 0
-      do i = 1, self%n_prescribed
-         if (self%prescribed_dropped(i)) cycle
-         n = n + 1
-         self%prescribed(n) = self%prescribed(i)
-         self%prescribed_step(n) = self%prescribed_step(i)
-         self%prescribed_dropped(n) = .false.
-         associate (entry_n => self%prescribed(n))
-            self%prescribed_slot(entry_n%dof, entry_n%node) = n
-            call end_amplitude(amplitude, last%duration, time, entry_n%amplitude, entry_n%value, &
-               value_end)
-         end associate
-      end do
-      self%n_prescribed = n
-      self%point_slot = 0
-      self%element_slot = 0
-      n = 0
-      do i = 1, self%n_load
-         if (self%load_dropped(i)) cycle
-         n = n + 1
-         self%load(n) = self%load(i)
-         self%load_step(n) = self%load_step(i)
-         self%load_dropped(n) = .false.
-         associate (load => self%load(n))
-            call set_load_slot(self, load, n)
-            call end_amplitude(amplitude, last%duration, time, load%amplitude, load%value, &
-               load%value_start)
-         end associate
-      end do
-      self%n_load = n
-   end subroutine conditions_carry
-
-   !> The value at the end of a step. An amplitude over step time is over: that value stays.
-   pure subroutine end_amplitude(amplitude, duration, time, i_amplitude, value, value_end)
-      type(amplitude_t), intent(in) :: amplitude(:)
-      real(wp), intent(in) :: duration, time       !! of the step, and at its start [T]
-      integer, intent(inout) :: i_amplitude
-      real(wp), intent(inout) :: value
-      real(wp), intent(out) :: value_end
-      real(wp) :: factor, slope
-
-      value_end = value
-      if (i_amplitude == 0) return
-      associate (table => amplitude(i_amplitude))
-         call find_amplitude_value(table, merge(time + duration, duration, table%is_total_time), &
-            factor, slope)
-         value_end = value*factor
-         if (table%is_total_time) return
-      end associate
-      value = value_end
-      i_amplitude = 0
-   end subroutine end_amplitude
-
-   pure integer function load_slot(self, load)
-      type(conditions_t), intent(in) :: self
-      type(load_t), intent(in) :: load
-
-      if (load%kind == load_point) then
-         load_slot = self%point_slot(load%place, load%target)
-      else
-         load_slot = self%element_slot(load%place, load%target)
-      end if
-   end function load_slot
-
-   pure subroutine set_load_slot(self, load, i)
-      type(conditions_t), intent(inout) :: self
-      type(load_t), intent(in) :: load
-      integer, intent(in) :: i
-
-      if (load%kind == load_point) then
-         self%point_slot(load%place, load%target) = i
-      else
-         self%element_slot(load%place, load%target) = i
-      end if
-   end subroutine set_load_slot
-
-   !> All that holds in the step that was read.
-   subroutine conditions_store(self, step)
-      type(conditions_t), intent(in) :: self
-      type(step_t), intent(inout) :: step
-      logical :: holds(self%n_load)
-
-      step%prescribed = pack(self%prescribed(:self%n_prescribed), &
-         .not. self%prescribed_dropped(:self%n_prescribed))
-      holds = .not. self%load_dropped(:self%n_load)
-      if (step%procedure == procedure_static) then
-         holds = holds .or. self%load(:self%n_load)%value_start /= 0.0_wp
-      end if
-      step%load = pack(self%load(:self%n_load), holds)
-   end subroutine conditions_store
 
    !> Index of the amplitude that a card names; 0 if it names none, or an unknown one.
    integer function card_amplitude(reader, card, scene)
@@ -194,11 +59,7 @@ contains
       integer, allocatable :: item(:)
       integer :: first, last, dof, i
 
-      if (is_new(reader, card)) then
-         do i = 1, self%n_prescribed
-            if (self%prescribed_step(i) < self%step) self%prescribed_dropped(i) = .true.
-         end do
-      end if
+      if (is_new(reader, card)) call drop_prescribed(self)
       call check_boundary_options(reader, card)
       new%origin = card%origin
       new%amplitude = card_amplitude(reader, card, scene)
@@ -288,89 +149,6 @@ contains
       end if
    end subroutine tell_third
 
-   subroutine put_prescribed(self, new)
-      type(conditions_t), intent(inout) :: self
-      type(prescribed_t), intent(in) :: new
-      type(prescribed_t), allocatable :: grown(:)
-      integer :: i, n
-
-      i = self%prescribed_slot(new%dof, new%node)
-      if (i == 0) then
-         n = self%n_prescribed
-         if (n == size(self%prescribed)) then
-            allocate(grown(2*n))
-            grown(:n) = self%prescribed
-            call move_alloc(grown, self%prescribed)
-            call grow_marks(self%prescribed_step, self%prescribed_dropped)
-         end if
-         i = n + 1
-         self%n_prescribed = i
-         self%prescribed_slot(new%dof, new%node) = i
-      end if
-      self%prescribed(i) = new
-      self%prescribed_step(i) = self%step
-      self%prescribed_dropped(i) = .false.
-   end subroutine put_prescribed
-
-   subroutine put_load(self, new)
-      type(conditions_t), intent(inout) :: self
-      type(load_t), intent(in) :: new
-      type(load_t), allocatable :: grown(:)
-      integer :: i, n
-      real(wp) :: value_start
-
-      i = load_slot(self, new)
-      value_start = 0.0_wp
-      if (i == 0) then
-         n = self%n_load
-         if (n == size(self%load)) then
-            allocate(grown(2*n))
-            grown(:n) = self%load
-            call move_alloc(grown, self%load)
-            call grow_marks(self%load_step, self%load_dropped)
-         end if
-         i = n + 1
-         self%n_load = i
-         call set_load_slot(self, new, i)
-      else if (all(self%load(i)%direction == new%direction)) then
-         value_start = self%load(i)%value_start
-      end if
-      self%load(i) = new
-      self%load(i)%value_start = value_start
-      self%load_step(i) = self%step
-      self%load_dropped(i) = .false.
-   end subroutine put_load
-
-   subroutine grow_marks(step, dropped)
-      integer, allocatable, intent(inout) :: step(:)
-      logical, allocatable, intent(inout) :: dropped(:)
-      integer, allocatable :: grown_step(:)
-      logical, allocatable :: grown_dropped(:)
-      integer :: n
-
-      n = size(step)
-      allocate(grown_step(2*n), grown_dropped(2*n))
-      grown_step(:n) = step
-      grown_dropped(:n) = dropped
-      call move_alloc(grown_step, step)
-      call move_alloc(grown_dropped, dropped)
-   end subroutine grow_marks
-
-   !> Drop the loads of earlier steps: point loads, or those on elements.
-   subroutine drop_loads(self, on_nodes)
-      type(conditions_t), intent(inout) :: self
-      logical, intent(in) :: on_nodes
-      integer :: i
-
-      do i = 1, self%n_load
-         if ((self%load(i)%kind == load_point) .neqv. on_nodes) cycle
-         if (self%load_step(i) == self%step) cycle
-         self%load_dropped(i) = .true.
-         self%load(i)%value = 0.0_wp
-         self%load(i)%amplitude = 0
-      end do
-   end subroutine drop_loads
-
    !> *CLOAD: node or set, dof, force.
    subroutine read_cload(reader, card, scene, self)
       type(reader_t), intent(inout) :: reader
@@ -442,7 +220,8 @@ contains
 
       has_not = element_kinds(scene%element_kind(item))%n_face < face
       if (any(has_not)) call data_error(reader, data, "element " &
-         // label_list(pack(scene%element_label(item), has_not)) // " has no face " // to_text(face))
+         // label_list(pack(scene%element_label(item), has_not)) // " has no face " &
+         // to_text(face))
    end subroutine check_faces
 
    !> Kind, place, value and direction of a load on elements.

@@ -1,13 +1,14 @@
 !> *MATERIAL with its cards, and *SOLID SECTION.
 module emcon_deck_materials
-   use emcon_deck_laws, only : constant_fault, law_row_t, law_rows
-   use emcon_deck_reader, only : card_error, card_t, card_warning, check_count, data_error, &
-      data_open, data_t, data_warning, get_real, has_option, is_blank, need_name, next_line, &
+   use emcon_deck_laws, only : constant_fault, law_rows
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
+      get_real, is_blank, next_line
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_sets, only : find_set, set_names
-   use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
+   use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
-   use emcon_scene, only : law_neo_hooke, material_t, origin_t, scene_t, where_text
+   use emcon_scene, only : law_neo_hooke, material_t, scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private

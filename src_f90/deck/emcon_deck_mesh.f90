@@ -1,9 +1,10 @@
 !> *NODE and *ELEMENT.
 module emcon_deck_mesh
    use emcon_deck_labels, only : find_label, label_map_init
-   use emcon_deck_reader, only : card_error, card_t, check_count, data_error, data_open, data_t, &
-      data_warning, get_integer, get_real, line_origin, need_name, next_line, reader_t
-   use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
+      get_integer, get_real, next_line
+   use emcon_deck_reader, only : card_error, card_t, line_origin, need_name, reader_t
+   use emcon_diagnostics, only : add_error, label_list, quoted
    use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
    use emcon_kinds, only : wp
    use emcon_scene, only : origin_t, scene_t, where_text
@@ -77,7 +78,7 @@ contains
       type(scene_t), intent(inout) :: scene
       integer, intent(inout) :: n                  !! nodes so far
       logical, intent(inout) :: is_solid_told      !! a third coordinate was told
-      character(len=1), parameter :: axis(3) = ["x", "y", "z"]
+      character(len=12), parameter :: axis(3) = ["coordinate x", "coordinate y", "coordinate z"]
       type(data_t) :: data
       real(wp) :: position(3)
       integer :: label, k
@@ -92,8 +93,7 @@ contains
          call check_count(reader, data, 1, 4, "label, x, y, z")
          position = 0.0_wp
          do k = 1, 3
-            call get_real(reader, data, k + 1, "coordinate " // axis(k) // " of node " &
-               // to_text(label), position(k))
+            call get_real(reader, data, k + 1, axis(k), position(k))
          end do
          reader%doubt_positions = reader%doubt_positions .or. .not. data%ok
          ! A node with a bad coordinate stays, so that what names it is not an error too.
@@ -143,6 +143,7 @@ contains
       scene%element_node = scene%element_node(:, :n)
       allocate(scene%element_section(n), source=0)
       call label_map_init(reader%element_map, scene%element_label, repeated)
+      reader%doubt_shapes = size(repeated) > 0
       do i = 1, size(repeated)
          call tell_repeated(reader, scene, "element", scene%element_label(repeated(i)), &
             scene%element_origin(repeated(i)), scene%element_origin( &
@@ -219,9 +220,7 @@ contains
       integer, intent(in) :: label, n_node
       integer, intent(out) :: node(max_element_nodes)
       integer :: node_label(max_element_nodes), n_read, k
-      character(len=:), allocatable :: title
 
-      title = "element " // to_text(label)
       node = 0
       n_read = 0
       k = 2
@@ -234,42 +233,46 @@ contains
             end if
             exit
          end if
-         call get_integer(reader, data, k, "node of " // title, node_label(n_read + 1))
+         call get_integer(reader, data, k, "node label", node_label(n_read + 1))
          n_read = n_read + 1
          k = k + 1
       end do
       if (.not. data%ok) return
       if (n_read < n_node) then
-         call data_error(reader, data, title // " needs " // to_text(n_node) // " nodes, found " &
-            // to_text(n_read))
+         call data_error(reader, data, "element " // to_text(label) // " needs " &
+            // to_text(n_node) // " nodes, found " // to_text(n_read))
       else if (data%n >= k) then
-         call data_error(reader, data, title // " needs " // to_text(n_node) // " nodes: " &
+         call data_error(reader, data, "element " // to_text(label) // " needs " &
+            // to_text(n_node) // " nodes: " &
             // quoted(data%text(data%from(k):data%to(data%n))) // " is too much")
       end if
       if (.not. data%ok) return
       do k = 1, n_node
          node(k) = find_label(reader%node_map, node_label(k))
       end do
-      call check_nodes(reader, data, title, node_label(:n_node), node(:n_node))
+      call check_nodes(reader, data, label, node_label(:n_node), node(:n_node))
    end subroutine read_connectivity
 
-   subroutine check_nodes(reader, data, title, label, node)
+   !> Refuse an element that names an unknown node, or a node twice: its nodes become 0.
+   subroutine check_nodes(reader, data, element, label, node)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
-      character(len=*), intent(in) :: title
+      integer, intent(in) :: element               !! its label
       integer, intent(in) :: label(:)
       integer, intent(inout) :: node(:)            !! index of each label, 0: unknown
       integer :: k
 
       if (any(node == 0)) then
-         if (.not. reader%doubt_nodes) call data_error(reader, data, title // " names node " &
-            // label_list(pack(label, node == 0)) // ", which does not exist")
+         if (.not. reader%doubt_nodes) call data_error(reader, data, "element " &
+            // to_text(element) // " names node " // label_list(pack(label, node == 0)) &
+            // ", which does not exist")
          node = 0
          return
       end if
       do k = 2, size(node)
          if (all(node(:k - 1) /= node(k))) cycle
-         call data_error(reader, data, title // " names node " // to_text(label(k)) // " twice")
+         call data_error(reader, data, "element " // to_text(element) // " names node " &
+            // to_text(label(k)) // " twice")
          node = 0
          return
       end do

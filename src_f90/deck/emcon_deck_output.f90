@@ -2,9 +2,9 @@
 !>
 !> Requests carry over to later steps until a step has a request of the same kind.
 module emcon_deck_output
-   use emcon_deck_reader, only : card_error, card_t, card_warning, data_error, data_open, data_t, &
-      data_warning, get_name, has_option, next_line, option_count, option_name, reader_t, &
-      refuse_option
+   use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, get_name, next_line
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
+      option_name, reader_t, refuse_option
    use emcon_deck_sets, only : find_set, set_names
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : quoted, suggestion

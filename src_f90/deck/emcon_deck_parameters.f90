@@ -157,7 +157,8 @@ contains
          name = to_upper(trim(adjustl(line(i_open + 1:i_open + n))))
          i = find_parameter(self%table, name)
          if (i == 0) then
-            fault = "unknown parameter <" // name // ">" // suggestion(name, parameter_list(self%table))
+            fault = "unknown parameter <" // name // ">" &
+               // suggestion(name, parameter_list(self%table))
             text = line
             return
          end if

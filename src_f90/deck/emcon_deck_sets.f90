@@ -1,9 +1,9 @@
 !> Node and element sets, and what stands for nodes or elements elsewhere: a label or a set.
 module emcon_deck_sets
    use emcon_deck_labels, only : find_label, label_map_t, label_range
-   use emcon_deck_reader, only : card_t, check_count, data_error, data_open, data_t, data_warning, &
-      get_integer, get_name, has_option, is_label, max_name, need_name, next_line, option_name, &
-      reader_t
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
+      get_integer, get_name, is_label, next_line
+   use emcon_deck_reader, only : card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_scene, only : named_set_t, scene_t
    use emcon_sort, only : unique_sorted

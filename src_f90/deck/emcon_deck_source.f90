@@ -31,6 +31,7 @@ module emcon_deck_source
       integer :: n_file = 0
       integer :: open_file(max_depth) = 0          !! the chain of files that are being read
       integer :: depth = 0
+      logical :: is_full = .false.                 !! too many files: nothing more is read
    end type builder_t
 
 contains
@@ -89,8 +90,8 @@ contains
    end subroutine append_file
 
    !> Why `path` may not be included here; empty if it may.
-   pure function include_fault(builder, path) result(fault)
-      type(builder_t), intent(in) :: builder
+   function include_fault(builder, path) result(fault)
+      type(builder_t), intent(inout) :: builder
       character(len=*), intent(in) :: path
       character(len=:), allocatable :: fault
       integer :: i
@@ -106,6 +107,7 @@ contains
          fault = "files are nested more than " // to_text(max_depth) // " deep"
       else if (builder%n_file == max_includes) then
          fault = "more than " // to_text(max_includes) // " files are included"
+         builder%is_full = .true.
       end if
    end function include_fault
 
@@ -176,16 +178,18 @@ contains
       character(len=*), intent(in) :: text
       integer, intent(in) :: i_file
       character(len=:), allocatable :: include_card
-      integer :: first, last, i, number
+      integer :: first, last, i, number, n_needed
       type(origin_t) :: origin
 
-      call resize(builder, max(builder%n_line + count_lines(text), (3*size(builder%source%file))/2))
+      n_needed = builder%n_line + count_lines(text)
+      if (n_needed > size(builder%source%file)) then
+         call resize(builder, max(n_needed, 2*size(builder%source%file)))
+      end if
       include_card = ""
       number = 0
       first = 1
       if (index(text, utf8_mark) == 1) first = 4
-      do while (first <= len(text))
-         last = first
+      do while (first <= len(text) .and. .not. builder%is_full)
          do last = first, len(text)
             if (text(last:last) == achar(10) .or. text(last:last) == achar(13)) exit
          end do

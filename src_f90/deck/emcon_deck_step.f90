@@ -3,12 +3,14 @@
 !> Settings (constraint method, contact initiation, Newton, restart) stay until a later step
 !> changes them.
 module emcon_deck_step
-   use emcon_deck_loads, only : conditions_carry, conditions_init, conditions_store, conditions_t, &
-      read_boundary, read_cload, read_dload
+   use emcon_deck_conditions, only : conditions_carry, conditions_init, conditions_store, &
+      conditions_t
+   use emcon_deck_loads, only : read_boundary, read_cload, read_dload
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
-   use emcon_deck_reader, only : card_error, card_t, card_warning, check_count, data_error, &
-      data_open, data_t, get_real, has_option, is_blank, next_line, option_count, option_name, &
-      option_real, reader_t, refuse_option
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
+      next_line
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
+      option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_scene, only : initiation_admissible, initiation_persistent, &

@@ -1,8 +1,9 @@
 !> *SURFACE, and the faces that elements share.
 module emcon_deck_surfaces
-   use emcon_deck_reader, only : card_error, card_t, card_warning, check_count, data_error, &
-      data_open, data_t, get_name, is_blank, need_name, next_line, option_name, reader_t, &
-      refuse_option
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
+      next_line
+   use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
+      reader_t, refuse_option
    use emcon_deck_sets, only : get_elements, get_nodes
    use emcon_diagnostics, only : label_list, quoted
    use emcon_element_kinds, only : element_kinds

@@ -36,7 +36,7 @@ contains
       type(origin_t), intent(in) :: origin
       character(len=*), intent(in) :: text
 
-      call add(self, diagnostic_t(origin, .true., trim(text)))
+      call add(self, origin, .true., text)
       self%n_errors = self%n_errors + 1
    end subroutine add_error
 
@@ -45,13 +45,15 @@ contains
       type(origin_t), intent(in) :: origin
       character(len=*), intent(in) :: text
 
-      call add(self, diagnostic_t(origin, .false., trim(text)))
+      call add(self, origin, .false., text)
       self%n_warnings = self%n_warnings + 1
    end subroutine add_warning
 
-   subroutine add(self, item)
+   subroutine add(self, origin, is_error, text)
       type(diagnostics_t), intent(inout) :: self
-      type(diagnostic_t), intent(in) :: item
+      type(origin_t), intent(in) :: origin
+      logical, intent(in) :: is_error
+      character(len=*), intent(in) :: text
       type(diagnostic_t), allocatable :: grown(:)
       integer :: n
 
@@ -62,7 +64,9 @@ contains
          grown(:n) = self%item
          call move_alloc(grown, self%item)
       end if
-      self%item(n + 1) = item
+      self%item(n + 1)%origin = origin
+      self%item(n + 1)%is_error = is_error
+      self%item(n + 1)%text = trim(text)
    end subroutine add
 
    !> All messages, one line each, in the order of files and lines: `file:line: error: ...`.

@@ -24,6 +24,8 @@ module emcon_active_set
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp), force_noise = 1.0e3_wp*epsilon(1.0_wp)
+   !> A node counts as outside at the start of a step down to this fraction of a master edge.
+   real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
    !> Sets tried in one step at most.
    integer, parameter :: most_sets = 40
 
@@ -79,6 +81,7 @@ contains
             status, error)
          if (allocated(error)) return
          self%n_newton = self%n_newton + newton%n_iteration
+         newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
          if (status /= newton_converged .or. system%n_constraint == 0) return
          call update(self, system, scene, u0, du, was_active, only_adds, has_changed, status)
          if (status /= step_done .or. .not. has_changed) return
@@ -149,7 +152,7 @@ contains
    !> The next set, from the gaps and multipliers of the converged one.
    subroutine update(self, system, scene, u0, du, was_active, only_adds, has_changed, status)
       type(active_set_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
+      type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       logical, intent(in) :: was_active(:), only_adds
@@ -165,6 +168,7 @@ contains
       k = 0
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
+            call contact%begin_step(scene%x, u0, du)   ! the motion may be more than was expected
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then
@@ -180,6 +184,7 @@ contains
                else
                   state = contact%gap_state(i, scene%x, u0, du)
                   if (.not. (state%is_near .and. state%is_over)) cycle
+                  if (state%gap0 < -touch_tol*state%size .and. .not. was_active(id)) cycle
                   self%deepest = min(self%deepest, state%gap1/state%size)
                   if (state%gap1 >= -gap_noise*state%size) cycle
                   if (.not. state%is_covered) status = step_too_far

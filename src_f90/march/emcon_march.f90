@@ -30,6 +30,8 @@ module emcon_march
    integer, parameter :: default_levels = 12, most_levels = 24
    !> Increments without a cut after which an automatic increment is doubled.
    integer, parameter :: easy_increments = 5
+   !> Corners of master surfaces are rounded over this fraction of an edge if a step is static.
+   real(wp), parameter :: static_rounding = 0.01_wp
    !> Closer than this a step's duration counts as a whole number of increments.
    real(wp), parameter :: whole = 1.0e3_wp*epsilon(1.0_wp)
 
@@ -95,6 +97,7 @@ contains
       self%state%n_grid = 0
       self%state%grid_stride = 1
       self%state%n_easy = 0
+      self%state%n_before = self%state%increment
       self%state%start_time = self%state%time
       self%state%u_start = self%state%u
       if (scene%step(i_step)%procedure == procedure_static) then
@@ -114,6 +117,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(pose_t) :: rest
+      integer :: i
 
       associate (step => scene%step(self%state%i_step), state => self%state)
          call system_begin_step(self%system, scene, state%i_step, error)
@@ -132,6 +136,10 @@ contains
          self%active%holds_gap = step%initiation == initiation_persistent &
             .and. self%scheme%has_inertia
          self%active%gap_tolerance = step%gap_tolerance
+         do i = 1, size(self%system%contact)
+            self%system%contact(i)%contact%rounding = merge(static_rounding, 0.0_wp, &
+               any(scene%step%procedure == procedure_static))
+         end do
          call count_grid(self, step)
          self%du = 0.0_wp
          rest%is_end = .true.
@@ -199,8 +207,8 @@ contains
       integer :: stride
 
       associate (state => self%state, step => scene%step(self%state%i_step))
-         if (step%max_increments > 0 .and. state%n_grid >= step%max_increments &
-            .and. self%most_stride == 1) then
+         if (step%max_increments > 0 .and. &
+            state%increment - state%n_before >= step%max_increments) then
             call raise(error, err_analysis, "the " // to_text(step%max_increments) // &
                " increments of *STEP, INC= are used up at time " // to_text(state%time))
             return
@@ -356,6 +364,10 @@ contains
       self%offset = 0.0_wp
       self%du = 0.0_wp
       if (self%scheme%has_inertia .and. .not. is_at_rest) self%du = h*self%state%v
+      do k = 1, size(self%du, 2)
+         if (self%system%body(k) == 0) self%du(:, k) = 0.0_wp
+      end do
+      self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%i_step))
          do k = 1, size(step%prescribed)
             associate (a => step%prescribed(k)%dof, i => step%prescribed(k)%node)
@@ -363,6 +375,7 @@ contains
                   state%u_start(a, i), u, v)
                self%du(a, i) = u - state%u(a, i)
                self%v1(a, i) = v
+               if (.not. self%scheme%has_inertia) self%newton%driven(a, i) = self%du(a, i)
                if (self%scheme%has_inertia) then
                   self%offset(a, i) = 0.5_wp*h*(state%v(a, i) + v) - self%du(a, i)
                end if

@@ -12,7 +12,7 @@ module emcon_newton
    use emcon_kinds, only : wp
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
-   use emcon_system, only : pose_t, system_respond, system_t
+   use emcon_system, only : pose_t, system_respond, system_tangent_times, system_t
    implicit none
    private
    public :: newton_t, newton_init, newton_solve
@@ -21,7 +21,8 @@ module emcon_newton
    integer, parameter :: newton_converged = 0, newton_inverted = 1, newton_diverged = 2, &
       newton_singular = 3
 
-   !> A residual below this multiple of epsilon is round-off.
+   !> A residual below this multiple of epsilon is round-off: of what its contributions are, and of
+   !> what the forces' own evaluation rounds.
    real(wp), parameter :: floor = 4.0_wp*epsilon(1.0_wp)
    !> Corrections with an old factorisation at most, and the factor each has to gain.
    integer, parameter :: most_polish = 3
@@ -45,6 +46,8 @@ module emcon_newton
       real(wp), allocatable :: residual(:), scale(:), correction(:)   !! (n_unknown)
       real(wp), allocatable :: dlam(:)
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) contact forces
+      !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
+      real(wp), allocatable :: driven(:, :)
    end type newton_t
 
 contains
@@ -59,7 +62,7 @@ contains
       self%tolerance = tolerance
       self%maximum = maximum
       allocate(self%residual(n_unknown), self%scale(n_unknown), self%correction(n_unknown))
-      allocate(self%contact(2, n_node), source=0.0_wp)
+      allocate(self%contact(2, n_node), self%driven(2, n_node), source=0.0_wp)
       allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
    end subroutine newton_init
 
@@ -78,7 +81,7 @@ contains
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: norm, last, best, defect
-      logical :: with_tangent, is_polish, is_singular
+      logical :: with_tangent, is_polish, is_singular, is_rounding, is_driven
       integer :: n_polish, n_stall
 
       if (allocated(self%dlam)) deallocate(self%dlam)
@@ -86,6 +89,8 @@ contains
       self%n_iteration = 0
       self%n_solve = 0
       self%n_history = 0
+      is_driven = any(abs(self%driven) > 0.0_wp)
+      if (is_driven) du = du - self%driven
       n_polish = 0
       n_stall = 0
       is_polish = .false.
@@ -94,8 +99,14 @@ contains
       do
          with_tangent = .not. is_polish
          call evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, &
-            with_tangent, du, norm, defect, status, error)
+            with_tangent, du, norm, defect, is_rounding, status, error)
          if (allocated(error) .or. status /= newton_converged) return
+         if (is_driven) then
+            call start_driven(self, system, correction, set, pose, u0, du, status, error)
+            if (allocated(error) .or. status /= newton_converged) return
+            is_driven = .false.
+            cycle
+         end if
          self%n_history = self%n_history + 1
          self%history(self%n_history) = max(norm, defect)
 
@@ -103,7 +114,7 @@ contains
          if (is_polish .and. max(norm, defect) > polish_gain*last) return
          if (n_polish == most_polish) return
          last = max(norm, defect)
-         is_polish = is_polish .or. last <= self%tolerance
+         is_polish = is_polish .or. last <= self%tolerance .or. is_rounding
          if (last < 0.9_wp*best) then
             n_stall = 0
             best = last
@@ -139,9 +150,46 @@ contains
       end do
    end subroutine newton_solve
 
+   !> First correction: what the prescribed motion does by the tangent at its start. Elements at
+   !> driven nodes would be squeezed if these moved alone.
+   subroutine start_driven(self, system, correction, set, pose, u0, du, status, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(correction_t), intent(inout) :: correction
+      type(constraint_set_t), intent(inout) :: set
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :)
+      real(wp), intent(inout), contiguous :: du(:, :)
+      integer, intent(out) :: status
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_singular
+      integer :: k, i
+
+      call system_tangent_times(system, pose, u0, du, self%driven, self%contact)
+      call pick_unknowns(system%numbering, self%contact, self%scale)
+      self%residual = self%residual + self%scale
+      do k = 1, set%n
+         do i = 1, set%item(k)%n_node
+            set%defect(k) = set%defect(k) &
+               + dot_product(set%item(k)%c(:, i), self%driven(:, set%item(k)%node(i)))
+         end do
+      end do
+      call correction_factorise(correction, system, set, is_singular, error)
+      if (allocated(error)) return
+      status = merge(newton_singular, newton_converged, is_singular)
+      if (is_singular) return
+      self%n_iteration = 1
+      call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
+      if (allocated(error)) return
+      self%n_solve = 1
+      call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
+      du = du + self%driven
+      set%lam = set%lam + self%dlam
+   end subroutine start_driven
+
    !> Residual at `du`; the last correction is halved as long as an element is inverted.
    subroutine evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, &
-      with_tangent, du, norm, defect, status, error)
+      with_tangent, du, norm, defect, is_rounding, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
@@ -152,11 +200,13 @@ contains
       logical, intent(in) :: with_tangent
       real(wp), intent(inout), contiguous :: du(:, :)
       real(wp), intent(out) :: norm, defect
+      logical, intent(out) :: is_rounding
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
       status = newton_inverted
+      is_rounding = .false.
       norm = huge(norm)
       defect = huge(defect)
       do i = 0, most_halvings
@@ -172,16 +222,17 @@ contains
       if (set%n > 0) call constraints_rows(set, system%numbering)
       call correction_lay_out(correction, system, set, error)
       if (allocated(error)) return
-      call measure(self, system, correction, set, norm, defect)
+      call measure(self, system, correction, set, norm, defect, is_rounding)
    end subroutine evaluate_damped
 
-   !> Residual with contact forces, its relative size, and the largest relative gap defect.
-   subroutine measure(self, system, correction, set, norm, defect)
+   !> Residual with contact forces, its size relative to its contributions, and the largest relative gap defect.
+   subroutine measure(self, system, correction, set, norm, defect, is_rounding)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(correction_t), intent(in) :: correction
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(out) :: norm, defect
+      logical, intent(out) :: is_rounding        !! nothing but round-off is left
       integer :: k
 
       call pick_unknowns(system%numbering, system%residual, self%residual)
@@ -197,15 +248,18 @@ contains
       do k = 1, set%n
          defect = max(defect, abs(set%defect(k))/set%item(k)%size)
       end do
+      call pick_unknowns(system%numbering, system%response%rounding, self%scale)
+      is_rounding = relative_size(self%residual, self%scale) <= floor .and. defect <= floor
    end subroutine measure
 
-   !> |v| / |scale|, 0 where both vanish, without overflow on the way.
+   !> |v| / |scale|, 0 where v vanishes, without overflow on the way.
    pure real(wp) function relative_size(v, scale)
       real(wp), intent(in) :: v(:), scale(:)
       real(wp) :: largest
 
       relative_size = 0.0_wp
-      if (size(v) == 0) return
+      if (.not. any(abs(v) > 0.0_wp)) return
+      relative_size = huge(relative_size)
       largest = maxval(scale)
       if (.not. largest > 0.0_wp) return
       largest = real(radix(largest), wp)**exponent(largest)

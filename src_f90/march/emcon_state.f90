@@ -11,6 +11,7 @@ module emcon_state
       integer :: grid_stride = 1                 !! grid increments per increment, a power of two
       integer :: n_easy = 0                      !! increments in a row without a cut
       integer :: increment = 0                   !! increments done over all steps
+      integer :: n_before = 0                    !! of these, before this step
       real(wp) :: start_time = 0.0_wp            !! total time at the start of the step [T]
       real(wp) :: time = 0.0_wp                  !! total time [T]
       real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement [L]

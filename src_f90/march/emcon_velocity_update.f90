@@ -9,7 +9,7 @@ module emcon_velocity_update
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : add_to_dofs, pick_unknowns
-   use emcon_system, only : system_t
+   use emcon_system, only : mass_times, system_t
    implicit none
    private
    public :: velocity_update_t, velocity_update_reset, velocity_update_apply
@@ -58,8 +58,9 @@ contains
       call self%mass%solve(self%push, self%jump, error)
       if (allocated(error)) return
       a = dot_product(self%push, self%jump)
-      call pick_unknowns(system%numbering, v, self%push)
-      b = dot_unknown(system, self%push)
+      call mass_times(system, v, system%f_work)
+      call pick_unknowns(system%numbering, system%f_work, self%push)
+      b = dot_product(self%push, self%jump)
       has_root = a > 0.0_wp .and. lost > 0.0_wp
       if (.not. has_root) return
       root = sqrt(b*b + 2.0_wp*a*lost)
@@ -71,16 +72,6 @@ contains
       call add_to_dofs(system%numbering, self%jump, root, v)
       restored = lost
    end subroutine velocity_update_apply
-
-   !> Product of the velocities `v` of the unknowns with the forces in `f_work`.
-   real(wp) function dot_unknown(system, v)
-      type(system_t), intent(in) :: system
-      real(wp), intent(in) :: v(:)
-      real(wp) :: force(size(v))
-
-      call pick_unknowns(system%numbering, system%f_work, force)
-      dot_unknown = dot_product(v, force)
-   end function dot_unknown
 
    !> Sum of w_k grad gap_k at the end of the step.
    pure subroutine push_forces(set, force)

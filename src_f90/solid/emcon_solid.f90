@@ -4,14 +4,14 @@ module emcon_solid
    use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : dp, wp
-   use emcon_law, only : law_box_t
+   use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create
    use emcon_scene, only : scene_t
    use emcon_shape, only : shape_create, shape_t
    use emcon_text, only : to_text
    implicit none
    private
-   public :: solid_t, solid_init, solid_respond, solid_response_t, element_mass
+   public :: solid_t, solid_init, solid_respond, solid_response_t, solid_tangent_times
 
    type :: solid_t
       integer :: n_element = 0
@@ -24,12 +24,15 @@ module emcon_solid
       real(wp), allocatable :: mass(:, :, :)             !! consistent: (4, 4, n_element) [M]
       real(wp), allocatable :: volume_mass(:, :)         !! int rho N_i: (4, n_element) [M]
       real(wp), allocatable :: thickness(:)              !! (n_element) [L]
+      !> (4, n_element) force that a displacement of one causes before anything cancels [M/T^2]
+      real(wp), allocatable :: stiffness(:, :)
    end type solid_t
 
    !> What all elements give over one step; sized by the caller.
    type :: solid_response_t
       real(wp), allocatable :: force(:, :)               !! (2, n_node)
       real(wp), allocatable :: magnitude(:, :)           !! (2, n_node) sum of |contributions|
+      real(wp), allocatable :: rounding(:, :)            !! (2, n_node) times epsilon: round-off
       real(wp), allocatable :: energy(:)                 !! (n_element) at the end of the step
       integer :: inverted_element = 0                    !! first one with det F <= 0, or 0
    end type solid_response_t
@@ -52,6 +55,7 @@ contains
       allocate(self%law_of(n), self%geometry(n), self%thickness(n))
       allocate(self%mass(max_element_nodes, max_element_nodes, n), source=0.0_wp)
       allocate(self%volume_mass(max_element_nodes, n), source=0.0_wp)
+      allocate(self%stiffness(max_element_nodes, n), source=0.0_wp)
       allocate(self%law(size(scene%material)))
       do k = 1, size(scene%material)
          if (scene%material(k)%law == 0) cycle
@@ -65,6 +69,7 @@ contains
          self%law_of(e) = scene%section(scene%element_section(e))%material
          self%thickness(e) = scene%section(scene%element_section(e))%thickness
          call init_element(self, scene%x, e, stiffness(self%kind(e)), mass(self%kind(e)))
+         call estimate_stiffness(self, e)
          if (any(self%geometry(e)%weight(:self%geometry(e)%n_gp) <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
                " is inverted or has no area; check the order of its nodes")
@@ -103,6 +108,28 @@ contains
       end do
    end subroutine init_element
 
+   !> A displacement u rounds the strain by epsilon |grad N| |u|, however small the strain is; what
+   !> force that makes follows from the law's stiffness at rest.
+   pure subroutine estimate_stiffness(self, e)
+      type(solid_t), intent(inout) :: self
+      integer, intent(in) :: e
+      real(wp), parameter :: rest(3) = 0.0_wp
+      type(law_response_t) :: state
+      real(wp) :: spread
+      integer :: k, i
+
+      call law_response_plane(self%law(self%law_of(e))%law, rest, rest, state)
+      associate (geometry => self%geometry(e))
+         do k = 1, geometry%n_gp
+            spread = geometry%weight(k)*maxval(abs(state%tangent))*sum(abs(geometry%gradient(:, :, k)))
+            do i = 1, geometry%n_node
+               self%stiffness(i, e) = self%stiffness(i, e) &
+                  + spread*sum(abs(geometry%gradient(:, i, k)))
+            end do
+         end do
+      end associate
+   end subroutine estimate_stiffness
+
    !> Gradient of the shape functions by X and the Jacobian determinant.
    pure subroutine reference_gradient(n, x, slope, gradient, det)
       integer, intent(in) :: n
@@ -125,15 +152,6 @@ contains
       end do
    end subroutine reference_gradient
 
-   !> The consistent mass of element `e` as it enters both directions: (4, 4).
-   pure function element_mass(self, e) result(mass)
-      type(solid_t), intent(in) :: self
-      integer, intent(in) :: e
-      real(wp) :: mass(max_element_nodes, max_element_nodes)
-
-      mass = self%mass(:, :, e)
-   end function element_mass
-
    !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
    !> to the matrix entries `value`.
    pure subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value)
@@ -145,7 +163,7 @@ contains
       integer, intent(in), contiguous, optional :: slot(:)       !! as `csr_from_elements` gives it
       real(dp), intent(inout), contiguous, optional :: value(:)
       type(element_response_t) :: part
-      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
       logical :: with_tangent
       integer :: e, i, n, node, first
 
@@ -153,6 +171,7 @@ contains
       first = 1
       response%force = 0.0_wp
       response%magnitude = 0.0_wp
+      response%rounding = 0.0_wp
       response%inverted_element = 0
       local0 = 0.0_wp
       dlocal = 0.0_wp
@@ -170,10 +189,12 @@ contains
             return
          end if
          response%energy(e) = part%energy
+         largest = maxval(abs(local0(:, :n) + dlocal(:, :n)))
          do i = 1, n
             node = self%node(i, e)
             response%force(:, node) = response%force(:, node) + part%force(:, i)
             response%magnitude(:, node) = response%magnitude(:, node) + part%magnitude(:, i)
+            response%rounding(:, node) = response%rounding(:, node) + largest*self%stiffness(i, e)
          end do
          if (with_tangent) then
             call scatter(2*n, part%tangent, factor, slot(first:), value)
@@ -181,6 +202,44 @@ contains
          end if
       end do
    end subroutine solid_respond
+
+   !> Add `factor` times the tangent of the step times `direction` to `product`. Elements that
+   !> `direction` does not touch are passed over.
+   pure subroutine solid_tangent_times(self, u0, du, nlgeom, factor, direction, product)
+      type(solid_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :), direction(:, :)   !! (2, n_node)
+      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: factor
+      real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
+      type(element_response_t) :: part
+      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      real(wp) :: image(2*max_element_nodes)
+      integer :: e, i, n, node
+
+      local0 = 0.0_wp
+      dlocal = 0.0_wp
+      do e = 1, self%n_element
+         n = self%geometry(e)%n_node
+         if (.not. any(abs(direction(:, self%node(:n, e))) > 0.0_wp)) cycle
+         do i = 1, n
+            local0(:, i) = u0(:, self%node(i, e))
+            dlocal(:, i) = du(:, self%node(i, e))
+         end do
+         call element_respond(self%geometry(e), self%law(self%law_of(e))%law, local0, dlocal, &
+            nlgeom, .true., part)
+         if (part%is_inverted) return
+         image = 0.0_wp
+         do i = 1, n
+            node = self%node(i, e)
+            image(:2*n) = image(:2*n) + part%tangent(:2*n, 2*i - 1)*direction(1, node) &
+               + part%tangent(:2*n, 2*i)*direction(2, node)
+         end do
+         do i = 1, n
+            node = self%node(i, e)
+            product(:, node) = product(:, node) + factor*image(2*i - 1:2*i)
+         end do
+      end do
+   end subroutine solid_tangent_times
 
    !> Add a square element matrix of `n` unknowns to its places; `slot` runs down the columns.
    pure subroutine scatter(n, tangent, factor, slot, value)

@@ -14,21 +14,26 @@ module emcon_numbering
 
 contains
 
-   !> Number all degrees of freedom of `n_node` nodes that `prescribed` does not name.
-   subroutine numbering_init(self, n_dim, n_node, prescribed)
+   !> Number all degrees of freedom that `prescribed` does not name, of nodes that belong to a
+   !> body: a node without element has neither mass nor stiffness, it stays where it is.
+   subroutine numbering_init(self, n_dim, body, prescribed)
       type(numbering_t), intent(out) :: self
-      integer, intent(in) :: n_dim, n_node
+      integer, intent(in) :: n_dim
+      integer, intent(in) :: body(:)             !! (n_node) 0: no element
       type(prescribed_t), intent(in) :: prescribed(:)
       integer :: i, a, k
 
-      allocate(self%unknown(n_dim, n_node), source=1)
+      allocate(self%unknown(n_dim, size(body)), source=1)
+      do i = 1, size(body)
+         if (body(i) == 0) self%unknown(:, i) = 0
+      end do
       do k = 1, size(prescribed)
          self%unknown(prescribed(k)%dof, prescribed(k)%node) = 0
       end do
       self%n_unknown = sum(self%unknown)
       allocate(self%dof(self%n_unknown))
       k = 0
-      do i = 1, n_node
+      do i = 1, size(body)
          do a = 1, n_dim
             if (self%unknown(a, i) == 0) cycle
             k = k + 1

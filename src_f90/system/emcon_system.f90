@@ -13,10 +13,12 @@ module emcon_system
    use emcon_nts, only : nts_init, nts_t
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t
+   use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t, &
+      solid_tangent_times
    implicit none
    private
-   public :: system_t, pose_t, system_init, system_begin_step, system_respond, mass_times
+   public :: system_t, pose_t, system_init, system_begin_step, system_respond, &
+      system_tangent_times, mass_times
 
    !> Where forces are evaluated and how inertia enters: all that a scheme decides.
    type :: pose_t
@@ -67,6 +69,7 @@ contains
       n = self%solid%n_node
       call bodies_find(self%solid%node, n, self%body, self%n_body)
       allocate(self%response%force(2, n), self%response%magnitude(2, n), source=0.0_wp)
+      allocate(self%response%rounding(2, n), source=0.0_wp)
       allocate(self%response%energy(self%solid%n_element), source=0.0_wp)
       allocate(self%inertia(2, n), self%external(2, n), source=0.0_wp)
       allocate(self%residual(2, n), self%magnitude(2, n), source=0.0_wp)
@@ -150,7 +153,7 @@ contains
 
       self%i_step = i_step
       self%nlgeom = scene%step(i_step)%nlgeom
-      call numbering_init(self%numbering, 2, self%solid%n_node, scene%step(i_step)%prescribed)
+      call numbering_init(self%numbering, 2, self%body, scene%step(i_step)%prescribed)
       call element_lists(self%solid, 2, start, list)
       do k = 1, size(list)
          list(k) = self%numbering%unknown(2 - mod(list(k), 2), (list(k) + 1)/2)
@@ -236,6 +239,25 @@ contains
       end subroutine respond_at
 
    end subroutine system_respond
+
+   !> The tangent of internal forces and inertia at u0 + du times `direction`, on all nodes: what
+   !> prescribed motion does to first order. In gradients at the end (`is_end`) as in steps.
+   subroutine system_tangent_times(self, pose, u0, du, direction, product)
+      type(system_t), intent(inout) :: self
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :), direction(:, :)   !! (2, n_node)
+      real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
+
+      self%f_work = pose%mass_du*direction
+      call mass_times(self, self%f_work, product)
+      if (pose%is_end) then
+         self%u_work = u0 + du
+         call solid_tangent_times(self%solid, self%u_work, self%zero, self%nlgeom, 2.0_wp, &
+            direction, product)
+      else
+         call solid_tangent_times(self%solid, u0, du, self%nlgeom, 1.0_wp, direction, product)
+      end if
+   end subroutine system_tangent_times
 
    !> M field, in both directions.
    pure subroutine mass_times(self, field, product)

@@ -64,9 +64,9 @@ def write_history_file(path: Path, values: dict[str, np.ndarray]) -> None:
     with h5py.File(path, "w") as file:
         for name in COLUMNS:
             file[f"history/{name}"] = values[name]
-        file["bodies/mass"] = [5.0, 2.0]
-        for name in ("px", "py", "lz"):
-            file[f"bodies/{name}"] = np.column_stack([0.0*values[name], values[name]])
+        file["sets/BODIES/MASS"] = [[5.0, 2.0]]
+        file["sets/BODIES/MOMENTUM"] = np.stack(
+            [np.column_stack([0.0*values[name], values[name]]) for name in ("px", "py", "lz")], -1)
 
 
 def field_values(name: str, time: float) -> np.ndarray:
@@ -203,23 +203,24 @@ def test_unfinished_frame_is_left_out(run: Path) -> None:
         assert len(field.times) == 8
 
 
-def test_contact_force_of_one_set_is_summed(run: Path) -> None:
+def test_contact_force_is_the_total_or_the_sum(run: Path) -> None:
     paths = locate(run)
     assert read_contact_force(paths) is None
     force = np.zeros((9, 3, 2))
     force[4] = [[0.5, 1.0], [0.0, 2.0], [-0.5, 3.0]]
     with h5py.File(paths.history, "a") as file:
-        file["sets/FOOT/CF"] = force
-        file["sets/FOOT/CF_time"] = TIMES
-        file["run/wall_seconds"] = 12.5
+        file["sets/CONTACT/CF"] = force
+        file["sets/CONTACT/CF_time"] = TIMES
+        file["sets/RUN/WALL_SECONDS"] = [12.5]
     found = read_contact_force(paths)
     assert found is not None
     assert list(found[1][4]) == [0.0, 6.0] and not found[1][3].any()
     assert read_wall_seconds(paths) == 12.5
-    with h5py.File(paths.history, "a") as file:     # the other side too: which one is meant?
-        file["sets/FLOOR/CF"] = -force
-        file["sets/FLOOR/CF_time"] = TIMES
-    assert read_contact_force(paths) is None
+    with h5py.File(paths.history, "a") as file:     # the total, where there is one
+        file["sets/CONTACT/TOTAL_CF"] = 2.0*force.sum(axis=1, keepdims=True)
+        file["sets/CONTACT/TOTAL_CF_time"] = TIMES
+    found = read_contact_force(paths)
+    assert found is not None and list(found[1][4]) == [0.0, 12.0]
 
 
 # --- commands ----------------------------------------------------------------------------------

@@ -1,0 +1,46 @@
+"""Fixtures for all tests. Helpers to import are in scene_tools.py, beside this file."""
+
+import concurrent.futures
+
+import pytest
+import scene_tools
+
+# Whole runs of the ring scene that tests of several files look at, dearest first.
+RING_RUNS = [
+    ("PERSISTENT", 0.005),
+    ("PERSISTENT", 0.01),
+    ("ADMISSIBLE", 0.01),
+    ("VELOCITY UPDATE", 0.01),
+    ("VELOCITY UPDATE", 0.02),
+    ("PERSISTENT", 0.02),
+    ("ADMISSIBLE", 0.02),
+    ("VELOCITY UPDATE", 0.05),
+    ("ADMISSIBLE", 0.05),
+    ("PERSISTENT", 0.05),
+]
+
+
+@pytest.fixture(scope="session")
+def ring(tmp_path_factory):
+    """`ring(initiation, h)` is the finished run; each is made once, two at a time."""
+    folder = tmp_path_factory.mktemp("ring")
+    pool = concurrent.futures.ThreadPoolExecutor(2)
+    waiting = {}
+
+    def run(initiation, h):
+        return scene_tools.run_deck(
+            scene_tools.DECKS / "ring.inp",
+            folder / f"{initiation.split()[0].lower()}_{h}",
+            initiation=initiation,
+            h=h,
+        )
+
+    def ring_run(initiation, h):
+        # The one asked for first; the others will be asked for too, unless tests are deselected.
+        for key in [(initiation, h), *RING_RUNS]:
+            if key not in waiting:
+                waiting[key] = pool.submit(run, *key)
+        return waiting[initiation, h].result()
+
+    yield ring_run
+    pool.shutdown(cancel_futures=True)

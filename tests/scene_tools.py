@@ -1,0 +1,249 @@
+"""Run the program on decks, read what it leaves, and edit decks: helpers of the tests of runs."""
+
+import dataclasses
+import functools
+import os
+import pathlib
+import re
+import subprocess
+
+import h5py
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+DECKS = ROOT / "input_decks"
+PROGRAM = ROOT / "build" / "release" / "emcon"
+EPSILON = np.finfo(float).eps
+
+#: What a program that crashed, or a library that was not asked to speak, leaves on the screen.
+CRASH = re.compile(
+    r"backtrace|forrtl|sigsegv|segmentation|fortran runtime error|error termination|hdf5-diag|"
+    r"program received signal|floating-point exceptions|double free|core dumped|assertion",
+    re.IGNORECASE,
+)
+
+
+# ---- running ------------------------------------------------------------------------------------
+
+
+def emcon(*arguments, timeout=120, **options):
+    """Call the program; exit code and texts as of `subprocess.run`. Never a crash, whatever asked."""
+    done = subprocess.run(
+        [PROGRAM, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        **options,
+    )
+    assert_no_crash(done.returncode, done.stdout + done.stderr)
+    return done
+
+
+def assert_no_crash(code, text):
+    assert code in (0, 2, 3, 4, 130), f"exit code {code}\n{text}"
+    assert not CRASH.search(text), text
+
+
+def overrides(parameters):
+    """`--set` options for parameters of a deck."""
+    return [f"--set={name}={value}" for name, value in parameters.items()]
+
+
+def run_deck(deck, folder, code=0, options=(), **parameters):
+    """Run `deck`, a path or a `Deck`, with results in `folder`; the exit code must be `code`."""
+    folder = pathlib.Path(folder)
+    if isinstance(deck, Deck):
+        folder.mkdir(parents=True, exist_ok=True)
+        deck = deck.write(folder / f"{deck.name}.inp")
+    done = emcon(deck, "--quiet", "--output", folder, *options, *overrides(parameters))
+    assert done.returncode == code, f"exit code {done.returncode}\n{done.stderr}"
+    return Run(folder / deck.stem, done.stderr)
+
+
+# ---- results ------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """The files of a run, `base` plus a suffix each, and what it wrote to standard error."""
+
+    base: pathlib.Path
+    errors: str = ""
+
+    def file(self, suffix):
+        return self.base.with_name(self.base.name + suffix)
+
+    @functools.cached_property
+    def log(self):
+        return self.file(".log").read_text()
+
+    @functools.cached_property
+    def history(self):
+        """NAME.csv as a structured array, one row per increment."""
+        return np.atleast_1d(np.genfromtxt(self.file(".csv"), delimiter=",", names=True))
+
+    def digits(self):
+        """The columns of NAME.csv as they are written, all but `cpu`, for comparison bit by bit."""
+        head, *rows = [line.split(",") for line in self.file(".csv").read_text().splitlines()]
+        return {name: [row[k] for row in rows] for k, name in enumerate(head) if name != "cpu"}
+
+    @functools.cached_property
+    def increments(self):
+        """The lines of the log that belong to each increment: remarks, then its own line."""
+        groups, group = [], []
+        for line in self.log.split(" increment          time", 1)[1].splitlines()[1:]:
+            group.append(line)
+            if re.match(r" {0,9}\d+ +\d\.\d+E", line):
+                groups.append(group)
+                group = []
+        return groups
+
+    def closing(self, pattern):
+        """The number that `pattern` finds in the closing balance of the log."""
+        return float(re.search(pattern, self.log)[1])
+
+    def series(self, place, variable):
+        """Times and values of one requested quantity in NAME.h5."""
+        with h5py.File(self.file(".h5"), "r") as file:
+            group = file["sets"][place]
+            return group[f"{variable}_time"][:], group[variable][:]
+
+    def fields(self):
+        return Fields(self.file(".vtkhdf"))
+
+
+class Fields:
+    """The field file, all of it: times, `x` (n_node, 2) and fields (n_frame, n, n_component)."""
+
+    def __init__(self, path):
+        with h5py.File(path, "r") as file:
+            root = file["VTKHDF"]
+            steps = root["Steps"]
+            n_frame = int(steps.attrs["NSteps"])
+            self.time = steps["Values"][:n_frame]
+            self.x = root["Points"][:, :2]
+            self.cells = np.split(root["Connectivity"][:], root["Offsets"][1:-1])
+            self._data = {}
+            for kind in ("PointData", "CellData"):
+                n = len(self.x) if kind == "PointData" else len(self.cells)
+                for name, values in root[kind].items():
+                    start = steps[f"{kind}Offsets"][name][:n_frame]
+                    self._data[name] = np.array([values[k : k + n] for k in start])
+
+    def names(self):
+        return set(self._data)
+
+    def __getitem__(self, name):
+        values = self._data[name]
+        return values[..., :2] if values.ndim == 3 and values.shape[2] == 3 else values
+
+
+# ---- decks --------------------------------------------------------------------------------------
+
+
+def number(value):
+    """The shortest text that reads back as the same double."""
+    return repr(float(value))
+
+
+class Deck:
+    """A deck as a list of cards, each a keyword line and its data lines, without comments.
+
+    Enough for the decks of this project, one keyword per line; parameters stay as they are.
+    """
+
+    def __init__(self, text, name="deck"):
+        self.name = name
+        self.card = []
+        for line in text.splitlines():
+            if line.startswith("**") or not line.strip():
+                continue
+            if line.startswith("*"):
+                self.card.append((line, []))
+            else:
+                self.card[-1][1].append(line)
+
+    @classmethod
+    def read(cls, path):
+        return cls(pathlib.Path(path).read_text(), pathlib.Path(path).stem)
+
+    def text(self):
+        return "".join("\n".join([head, *data]) + "\n" for head, data in self.card)
+
+    def write(self, path):
+        path = pathlib.Path(path)
+        path.write_text(self.text())
+        return path
+
+    def find(self, keyword, containing=""):
+        """Index of the first card with this keyword and `containing` in its keyword line."""
+        for k, (head, _) in enumerate(self.card):
+            if head.split(",")[0].strip() == keyword and containing in head:
+                return k
+        raise KeyError(f"{keyword} {containing}")
+
+    def replace(self, old, new):
+        """Another text in place of `old`, which must be there, in all lines."""
+        assert old in self.text(), old
+        self.__init__(self.text().replace(old, new), self.name)
+
+    def insert(self, text, before="*END STEP"):
+        """Put cards in front of the first card of the keyword `before`."""
+        k = self.find(before)
+        self.card[k:k] = Deck(text).card
+
+    def remove(self, keyword, containing=""):
+        del self.card[self.find(keyword, containing)]
+
+    def data(self, keyword, containing=""):
+        return self.card[self.find(keyword, containing)][1]
+
+    def map_numbers(self, keyword, function):
+        """Change the values of all cards of a keyword: `function(words)` gives the new words."""
+        for head, data in self.card:
+            if head.split(",")[0].strip() == keyword:
+                data[:] = [
+                    ", ".join(function([word.strip() for word in line.split(",")])) for line in data
+                ]
+
+    def move_nodes(self, function):
+        """Node positions anew: `function(label, x, y)` gives (x, y)."""
+
+        def moved(words):
+            x, y = function(int(words[0]), float(words[1]), float(words[2]))
+            return [words[0], number(x), number(y)]
+
+        self.map_numbers("*NODE", moved)
+
+    def set_parameter(self, name, value):
+        data = self.data("*PARAMETER")
+        k = next(k for k, line in enumerate(data) if line.split("=")[0].strip() == name)
+        data[k] = f"{name} = {value}"
+
+    def parameter(self, name):
+        for line in self.data("*PARAMETER"):
+            left, right = line.split("=")
+            if left.strip() == name:
+                return right.strip()
+        raise KeyError(name)
+
+
+def heading(deck):
+    """The opening lines of a deck file, up to its first keyword after *HEADING, as running text."""
+    lines = []
+    for line in pathlib.Path(deck).read_text().splitlines()[1:]:
+        if line.startswith("*") and not line.startswith("**"):
+            break
+        lines.append(line.lstrip("* "))
+    return " ".join(lines)
+
+
+def figures(deck, pattern):
+    """Numbers that `pattern`, with one group each, finds in the heading of a deck file."""
+    found = re.search(pattern, heading(deck))
+    assert found, f"{pattern} is not in the heading of {deck}"
+    return [float(text) for text in found.groups()]
+
+
+def root_user():
+    return os.geteuid() == 0
