@@ -31,7 +31,6 @@ module emcon_cholmod
       procedure :: factorise => cholmod_factorise
       procedure :: solve => cholmod_solve
       procedure :: free => cholmod_free
-      final :: cholmod_final
    end type cholmod_t
 
    interface
@@ -171,11 +170,5 @@ contains
       self%is_factorised = .false.
       self%is_singular = .false.
    end subroutine cholmod_free
-
-   subroutine cholmod_final(self)
-      type(cholmod_t), intent(inout) :: self
-
-      call self%free()
-   end subroutine cholmod_final
 
 end module emcon_cholmod

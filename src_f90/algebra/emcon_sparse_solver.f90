@@ -2,8 +2,9 @@
 !>
 !> Order of use: `analyse` once per pattern, `factorise` for each set of values, `solve` for each
 !> right-hand side. A matrix that cannot be factorised is a result (`is_singular`), not an error.
-!> An object owns memory of a C library: never assign one to another, and `free` may be called at
-!> any time, also twice.
+!> An object owns memory of a C library: never assign one to another, and `free` it at the end (at
+!> any time, also twice). There is no finaliser: gfortran 12 loses other components of an object
+!> that holds one.
 module emcon_sparse_solver
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, err_internal, error_t, raise

@@ -42,7 +42,6 @@ module emcon_umfpack
       procedure :: factorise => umfpack_factorise
       procedure :: solve => umfpack_solve
       procedure :: free => umfpack_free
-      final :: umfpack_final
    end type umfpack_t
 
    interface
@@ -204,11 +203,5 @@ contains
       self%scaled = csr_t()
       self%is_singular = .false.
    end subroutine umfpack_free
-
-   subroutine umfpack_final(self)
-      type(umfpack_t), intent(inout) :: self
-
-      call self%free()
-   end subroutine umfpack_final
 
 end module emcon_umfpack

@@ -12,7 +12,8 @@ module emcon_flat
    use emcon_march, only : increment_t
    use emcon_nts_gap, only : nts_gap
    use emcon_scene, only : material_t
-   use emcon_stepper, only : stepper_advance, stepper_is_done, stepper_open, stepper_t
+   use emcon_stepper, only : stepper_advance, stepper_close, stepper_is_done, stepper_open, &
+      stepper_t
    use emcon_text, only : string_t
    implicit none
    private
@@ -26,8 +27,8 @@ module emcon_flat
    end type slot_t
 
    !> The open models; the handle is the place in this table.
-   type(slot_t), save :: slot(most_models)
-   character(len=:), allocatable, save :: message
+   type(slot_t) :: slot(most_models)
+   character(len=:), allocatable :: message
 
 contains
 
@@ -67,9 +68,8 @@ contains
       call fail(error%message, error%code, ierr)
       if (allocated(slot(handle)%stepper%diagnostic)) then
          associate (text => slot(handle)%stepper%diagnostic)
-            if (size(text) > 0) message = ""
             do i = 1, size(text)
-               message = message // text(i)%text // new_line("a")
+               if (text(i)%text /= error%message) message = message // new_line("a") // text(i)%text
             end do
          end associate
       end if
@@ -118,10 +118,13 @@ contains
    !> Free a model; harmless if it is closed.
    subroutine close_model(handle)
       integer(c_int), intent(in) :: handle
-      type(stepper_t), allocatable :: closed   ! freed on return; gfortran 12 cannot deallocate in place
+      ! Freed on return: gfortran 12 cannot deallocate in place.
+      type(stepper_t), allocatable :: closed
       integer(c_int) :: ierr
 
-      if (is_open(handle, ierr)) call move_alloc(slot(handle)%stepper, closed)
+      if (.not. is_open(handle, ierr)) return
+      call move_alloc(slot(handle)%stepper, closed)
+      call stepper_close(closed)
    end subroutine close_model
 
    !> Nodes, elements, possible contact constraints, bodies, unknowns, steps.

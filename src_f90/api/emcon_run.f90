@@ -11,8 +11,8 @@ module emcon_run
    use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
       recorder_resume, recorder_t, recorder_write
    use emcon_restart, only : restart_get, restart_put, restart_read, restart_t, restart_write
-   use emcon_stepper, only : stepper_advance, stepper_fraction, stepper_is_done, stepper_load, &
-      stepper_open, stepper_save, stepper_t
+   use emcon_stepper, only : stepper_advance, stepper_close, stepper_fraction, stepper_is_done, &
+      stepper_load, stepper_open, stepper_save, stepper_t
    use emcon_text, only : string_t, to_text
    use emcon_timer, only : cpu_seconds, wall_seconds
    use emcon_version, only : version
@@ -41,6 +41,9 @@ module emcon_run
       logical function interrupt_interface()
       end function interrupt_interface
    end interface
+
+   !> Residuals told per increment, at most.
+   integer, parameter :: most_residuals = 15
 
    !> All that a run in progress holds.
    type :: run_t
@@ -238,6 +241,7 @@ contains
       do i = 1, size(report%closing)
          call log_line(run%log, report%closing(i)%text)
       end do
+      call stepper_close(run%stepper)
       call log_close(run%log, second)
       if (.not. allocated(error)) call move_alloc(second, error)
    end subroutine finish
@@ -311,7 +315,7 @@ contains
       end do
       call log_line(run%log, "")
       call log_line(run%log, " increment          time             h newton cuts active" // &
-         "          kinetic           strain            total")
+         "          kinetic           strain            total  residuals of the last solve")
    end subroutine log_start
 
    !> What is modelled, in a few lines.
@@ -361,8 +365,8 @@ contains
    subroutine log_increment(run, increment)
       type(run_t), intent(inout) :: run
       type(increment_t), intent(in) :: increment
-      character(len=140) :: line
-      integer :: i
+      character(len=320) :: line
+      integer :: i, n
 
       do i = 1, increment%notes%n
          call log_line(run%log, "   " // increment%notes%item(i)%text)
@@ -379,6 +383,10 @@ contains
             increment%h, increment%n_newton, increment%n_cut, increment%n_active, &
             ledger%kinetic, ledger%strain, ledger%total
       end associate
+      if (allocated(increment%residual)) then
+         n = min(size(increment%residual), most_residuals)
+         write(line(len_trim(line) + 1:), "(*(es9.1))") increment%residual(:n)
+      end if
       call log_line(run%log, trim(line))
    end subroutine log_increment
 

@@ -9,7 +9,7 @@ module emcon_stepper
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure
-   use emcon_march, only : increment_t, march_begin_step, march_increment, march_init, &
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_resume, march_t
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
    use emcon_scene, only : scene_t
@@ -17,7 +17,7 @@ module emcon_stepper
    implicit none
    private
    public :: stepper_t, stepper_open, stepper_open_source, stepper_advance, stepper_is_done
-   public :: stepper_fraction, stepper_save, stepper_load, contact_gaps
+   public :: stepper_close, stepper_fraction, stepper_save, stepper_load, contact_gaps
 
    type :: stepper_t
       type(scene_t) :: scene
@@ -69,6 +69,13 @@ contains
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
    end subroutine stepper_open_source
+
+   !> Free what libraries hold for `self`; call it before the object goes, also after an error.
+   subroutine stepper_close(self)
+      type(stepper_t), intent(inout) :: self
+
+      call march_free(self%march)
+   end subroutine stepper_close
 
    !> True after the last increment of the last step.
    pure logical function stepper_is_done(self)
@@ -208,7 +215,8 @@ contains
       allocate(self%source%file(max(0, restart_size(restart, "deck_file"))))
       allocate(self%source%number(max(0, restart_size(restart, "deck_number"))))
       call restart_get(restart, "deck_file", self%source%file, error)
-      if (.not. allocated(error)) call restart_get(restart, "deck_number", self%source%number, error)
+      if (.not. allocated(error)) call restart_get(restart, "deck_number", self%source%number, &
+         error)
    end subroutine load_source
 
    subroutine load_fields(self, restart, error)

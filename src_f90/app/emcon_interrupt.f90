@@ -8,7 +8,7 @@ module emcon_interrupt
    integer(c_int), parameter :: sigint = 2, sigterm = 15
 
    !> The one thing a signal handler can reach.
-   logical, volatile, save :: has_been_asked = .false.
+   logical, volatile :: has_been_asked = .false.
 
    interface
       function c_signal(number, handler) result(previous) bind(c, name="signal")

@@ -30,7 +30,7 @@ module emcon_text
    !> Whole numbers below `largest_exact` and powers of ten up to `largest_power` (5**22 < 2**53)
    !> have no rounding error in `wp`.
    integer(int64), parameter :: largest_exact = 2_int64**min(digits(1.0_wp), 60)
-   integer, parameter :: largest_power = min(22, int(0.43*real(digits(1.0_wp))))
+   integer, parameter :: largest_power = min(22, int(0.43_wp*real(digits(1.0_wp), wp)))
    real(wp), parameter :: power_of_ten(0:22) = [1.0e0_wp, 1.0e1_wp, 1.0e2_wp, 1.0e3_wp, &
       1.0e4_wp, 1.0e5_wp, 1.0e6_wp, 1.0e7_wp, 1.0e8_wp, 1.0e9_wp, 1.0e10_wp, 1.0e11_wp, &
       1.0e12_wp, 1.0e13_wp, 1.0e14_wp, 1.0e15_wp, 1.0e16_wp, 1.0e17_wp, 1.0e18_wp, 1.0e19_wp, &

@@ -16,8 +16,8 @@ module emcon_chain
    type :: chain_t
       integer :: n_edge = 0
       integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node
-      integer, allocatable :: previous(:)        !! (n_edge) edge that ends where this begins; 0: end
-      integer, allocatable :: next(:)            !! (n_edge)
+      integer, allocatable :: previous(:)        !! (n_edge) edge before; 0: an end
+      integer, allocatable :: next(:)            !! (n_edge) edge after
       integer, allocatable :: node(:)            !! ascending distinct nodes
    end type chain_t
 

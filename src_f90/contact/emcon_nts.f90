@@ -8,6 +8,7 @@ module emcon_nts
    use emcon_nts_gap, only : nts_gap, nts_gap_value
    use emcon_scene, only : contact_pair_t, scene_t
    use emcon_search, only : box_distance, candidates_t, search_candidates
+   use emcon_sort, only : find_sorted
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
@@ -41,7 +42,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
-      integer :: i
+      integer :: i, j, k
 
       call chain_init(self%slave, scene, scene%surface(pair%slave), error)
       if (allocated(error)) return
@@ -52,11 +53,13 @@ contains
       allocate(self%edge(self%n_constraint), source=0)
       allocate(self%thickness(self%n_constraint), source=1.0_wp)
       associate (surface => scene%surface(pair%slave))
-         if (.not. surface%is_nodal) then
-            do i = 1, self%n_constraint
-               self%thickness(i) = scene%section(scene%element_section(surface%element(1)))%thickness
+         do i = 1, self%slave%n_edge
+            do j = 1, 2
+               k = find_sorted(self%node, self%slave%edge(j, i))
+               self%thickness(k) = &
+                  scene%section(scene%element_section(surface%element(i)))%thickness
             end do
-         end if
+         end do
       end associate
       self%u_slave = scene%u0(:, self%slave%node)
       self%u_master = scene%u0(:, self%master%node)

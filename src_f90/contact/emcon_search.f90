@@ -18,6 +18,7 @@ module emcon_search
 
    type :: grid_t
       real(wp) :: low(2) = 0.0_wp
+      real(wp) :: top(2) = 0.0_wp
       real(wp) :: cell(2) = 0.0_wp
       integer :: n(2) = 1
       integer, allocatable :: start(:)           !! (n_cell + 1)
@@ -67,7 +68,7 @@ contains
    pure subroutine grid_init(grid, point, low, high, reach)
       type(grid_t), intent(out) :: grid
       real(wp), intent(in) :: point(:, :), low(:, :), high(:, :), reach
-      real(wp) :: top(2), size_mean(2)
+      real(wp) :: size_mean(2)
       integer :: n_edge, a, e, pass, i, j, first(2), last(2), cell
       integer, allocatable :: n_in(:)
 
@@ -75,20 +76,20 @@ contains
       allocate(grid%edge(0))
       do a = 1, 2
          grid%low(a) = max(minval(point(a, :)), minval(low(a, :)) - reach)
-         top(a) = min(maxval(point(a, :)), maxval(high(a, :)) + reach)
+         grid%top(a) = min(maxval(point(a, :)), maxval(high(a, :)) + reach)
          size_mean(a) = sum(high(a, :) - low(a, :))/real(n_edge, wp) + 2.0_wp*reach
       end do
-      if (any(top < grid%low)) return
-      grid%n = max(1, int(min((top - grid%low)/size_mean, real(cells_per_edge*n_edge, wp))))
+      if (any(grid%top < grid%low)) return
+      grid%n = max(1, int(min((grid%top - grid%low)/size_mean, real(cells_per_edge*n_edge, wp))))
       do while (real(grid%n(1), wp)*real(grid%n(2), wp) > real(cells_per_edge*n_edge, wp))
          grid%n = (grid%n + 1)/2
       end do
-      grid%cell = (top - grid%low)/real(grid%n, wp)
+      grid%cell = (grid%top - grid%low)/real(grid%n, wp)
       allocate(grid%start(grid%n(1)*grid%n(2) + 1), n_in(grid%n(1)*grid%n(2)))
       do pass = 1, 2
          n_in = 0
          do e = 1, n_edge
-            if (any(high(:, e) + reach < grid%low) .or. any(low(:, e) - reach > top)) cycle
+            if (any(high(:, e) + reach < grid%low) .or. any(low(:, e) - reach > grid%top)) cycle
             first = place(low(:, e) - reach)
             last = place(high(:, e) + reach)
             do j = first(2), last(2)
@@ -142,10 +143,7 @@ contains
       integer :: index(2)
 
       grid_cell = 0
-      if (any(x < grid%low) .or. any(x > grid%low + grid%cell*real(grid%n, wp))) then
-         if (any(x < grid%low)) return
-         if (any(x - grid%low > grid%cell*real(grid%n, wp)*(1.0_wp + 4.0_wp*epsilon(1.0_wp)))) return
-      end if
+      if (any(x < grid%low) .or. any(x > grid%top)) return
       index = grid_place(grid, x)
       grid_cell = index(1) + grid%n(1)*(index(2) - 1)
    end function grid_cell

@@ -14,7 +14,7 @@ module emcon_deck_parameters
    public :: substitute_parameters
 
    !> Digits that bring a value of kind `wp` back unchanged.
-   integer, parameter :: round_trip_digits = 2 + int(real(digits(1.0_wp))*log10(2.0))
+   integer, parameter :: round_trip_digits = 2 + int(real(digits(1.0_wp), wp)*log10(2.0_wp))
 
    !> A value that the command line sets.
    type :: override_t

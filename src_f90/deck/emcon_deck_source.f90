@@ -147,8 +147,9 @@ contains
       end if
       if (stat /= 0) then
          fault = "cannot be read: " // trim(message)
-         if (index(message, "directory") > 0 .and. index(message, "Is a") > 0) &
+         if (index(message, "directory") > 0 .and. index(message, "Is a") > 0) then
             fault = "is a directory, not a deck"
+         end if
       else
          fault = binary_fault(text)
       end if
@@ -267,8 +268,9 @@ contains
          if (name(len(name):) == ",") name = clean(name(:len(name) - 1))
       end if
       if (len(name) > 1) then
-         if (scan(name(1:1), """'") == 1 .and. name(1:1) == name(len(name):)) &
+         if (scan(name(1:1), """'") == 1 .and. name(1:1) == name(len(name):)) then
             name = name(2:len(name) - 1)
+         end if
       end if
       if (len(name) == 0) then
          call add_error(builder%log, origin, "*INCLUDE needs INPUT=file")

@@ -23,7 +23,8 @@ module emcon_active_set
       step_cycling = 4, step_too_far = 5, step_stands_off = 6
 
    !> Penetration and tension below these multiples of epsilon are round-off.
-   real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp), force_noise = 1.0e3_wp*epsilon(1.0_wp)
+   real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
+   real(wp), parameter :: force_noise = 1.0e3_wp*epsilon(1.0_wp)
    !> A node counts as outside at the start of a step down to this fraction of a master edge.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
    !> Sets tried in one step at most.

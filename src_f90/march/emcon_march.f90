@@ -4,7 +4,7 @@
 module emcon_march
    use emcon_active_set, only : active_set_init, active_set_solve, active_set_t, step_cycling, &
       step_diverged, step_done, step_inverted, step_singular, step_stands_off, step_too_far
-   use emcon_correction, only : correction_reset, correction_t
+   use emcon_correction, only : correction_free, correction_reset, correction_t
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
@@ -19,12 +19,12 @@ module emcon_march
    use emcon_state, only : state_t
    use emcon_system, only : pose_t, system_begin_step, system_init, system_respond, system_t
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_velocity_update, only : velocity_update_apply, velocity_update_reset, &
-      velocity_update_t
+   use emcon_velocity_update, only : velocity_update_apply, velocity_update_free, &
+      velocity_update_reset, velocity_update_t
    implicit none
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
-      march_resume
+      march_resume, march_free
 
    !> An increment is halved so often at most, unless the deck gives h_min.
    integer, parameter :: default_levels = 12, most_levels = 24
@@ -42,6 +42,7 @@ module emcon_march
       integer :: n_cut = 0
       integer :: n_active = 0
       real(wp) :: deepest = 0.0_wp               !! smallest gap per master edge, 0 if all open
+      real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
       type(notes_t) :: notes
    end type increment_t
 
@@ -84,6 +85,14 @@ contains
       end associate
       call active_set_init(self%active, self%system)
    end subroutine march_init
+
+   !> Free what the solvers hold; the rest goes with the object.
+   subroutine march_free(self)
+      type(march_t), intent(inout) :: self
+
+      call correction_free(self%correction)
+      call velocity_update_free(self%velocity_update)
+   end subroutine march_free
 
    !> Begin step `i_step` of the deck from the present state.
    subroutine march_begin_step(self, scene, i_step, error)
@@ -295,7 +304,8 @@ contains
          text = "the system is singular"
       case (step_cycling)
          text = "the contact at slave node " // &
-            to_text(scene%node_label(max(1, self%active%cycling_node))) // " opens and closes in turn"
+            to_text(scene%node_label(max(1, self%active%cycling_node))) // &
+            " opens and closes in turn"
       case (step_too_far)
          text = "a slave node slides over more than two master edges"
       case (step_stands_off)
@@ -422,6 +432,7 @@ contains
          state%contact = self%newton%contact
          state%internal = system%response%force
          state%energy = system%response%energy
+         increment%residual = self%newton%history(:self%newton%n_history)
          increment%deepest = min(increment%deepest, self%active%deepest)
          state%is_active = .false.
          state%lam = 0.0_wp

@@ -225,7 +225,8 @@ contains
       call measure(self, system, correction, set, norm, defect, is_rounding)
    end subroutine evaluate_damped
 
-   !> Residual with contact forces, its size relative to its contributions, and the largest relative gap defect.
+   !> Residual with contact forces, its size relative to its contributions, and the largest gap
+   !> defect relative to the edge.
    subroutine measure(self, system, correction, set, norm, defect, is_rounding)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system

@@ -12,7 +12,8 @@ module emcon_velocity_update
    use emcon_system, only : mass_times, system_t
    implicit none
    private
-   public :: velocity_update_t, velocity_update_reset, velocity_update_apply
+   public :: velocity_update_t, velocity_update_reset, velocity_update_apply, &
+      velocity_update_free
 
    type :: velocity_update_t
       logical :: is_ready = .false.              !! mass factorised for the present numbering
@@ -28,6 +29,13 @@ contains
 
       self%is_ready = .false.
    end subroutine velocity_update_reset
+
+   subroutine velocity_update_free(self)
+      type(velocity_update_t), intent(inout) :: self
+
+      call self%mass%free()
+      self%is_ready = .false.
+   end subroutine velocity_update_free
 
    !> Add the jump to `v`. `restored` is the energy given back, 0 if there was none to give or no
    !> root (`has_root`).

@@ -135,7 +135,8 @@ contains
                   + (b_mid(1, i)*db(1) + b_mid(2, i)*db(2) + b_mid(3, i)*db(3))
             end do
          end do
-         stress_gradient = factor*[state%stress(1)*gradient(1, j) + state%stress(3)*gradient(2, j), &
+         stress_gradient = factor*[ &
+            state%stress(1)*gradient(1, j) + state%stress(3)*gradient(2, j), &
             state%stress(3)*gradient(1, j) + state%stress(2)*gradient(2, j)]
          do i = 1, n
             geometric = gradient(1, i)*stress_gradient(1) + gradient(2, i)*stress_gradient(2)

@@ -121,7 +121,8 @@ contains
       call law_response_plane(self%law(self%law_of(e))%law, rest, rest, state)
       associate (geometry => self%geometry(e))
          do k = 1, geometry%n_gp
-            spread = geometry%weight(k)*maxval(abs(state%tangent))*sum(abs(geometry%gradient(:, :, k)))
+            spread = geometry%weight(k)*maxval(abs(state%tangent)) &
+               *sum(abs(geometry%gradient(:, :, k)))
             do i = 1, geometry%n_node
                self%stiffness(i, e) = self%stiffness(i, e) &
                   + spread*sum(abs(geometry%gradient(:, i, k)))

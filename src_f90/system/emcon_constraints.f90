@@ -12,7 +12,8 @@ module emcon_constraints
    implicit none
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
-   public :: constraints_add_curvature, constraints_force, constraints_merge_pattern, constraint_place
+   public :: constraints_add_curvature, constraints_force, constraints_merge_pattern
+   public :: constraint_place
 
    !> Which constraints act, and the linearised set on the unknowns.
    type :: constraint_set_t

@@ -17,7 +17,7 @@ module emcon_correction
    implicit none
    private
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
-      correction_multipliers, correction_reset
+      correction_multipliers, correction_reset, correction_free
 
    type :: correction_t
       integer :: method = method_null_space      !! as the deck asks
@@ -41,6 +41,15 @@ contains
       self%method = method
       if (allocated(self%row_start)) deallocate(self%row_start, self%column)
    end subroutine correction_reset
+
+   !> Free what the solvers hold.
+   subroutine correction_free(self)
+      type(correction_t), intent(inout) :: self
+
+      call self%solver%free()
+      call self%null_space%solver%free()
+      call self%saddle_point%solver%free()
+   end subroutine correction_free
 
    !> Prepare for the pattern of the active constraints, unless it is the last one's.
    subroutine correction_lay_out(self, system, set, error)

@@ -85,7 +85,8 @@ contains
       center = center/real(count(system%body == b), wp)
       size_of_body = 0.0_wp
       do i = 1, size(scene%x, 2)
-         if (system%body(i) == b) size_of_body = max(size_of_body, maxval(abs(scene%x(:, i) - center)))
+         if (system%body(i) /= b) cycle
+         size_of_body = max(size_of_body, maxval(abs(scene%x(:, i) - center)))
       end do
       gram = 0.0_wp
       has = .false.
