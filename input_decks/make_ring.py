@@ -53,9 +53,9 @@ With CONTACT INITIATION=PERSISTENT the total energy is held through contact and 
 
 Expected: total energy {energy:.6g} throughout; ring mass {mass:.6g};
           ring momentum ({px:.6g}, {py:.6g}) before contact;
-          after release px unchanged, ring py between 2.60 and 2.76 (that spread is the
-          discretisation error over h = 0.05..0.005 and the treatments of first contact,
-          on 64 x 4 and 60 x 5 elements).
+          after release px within 0.2 percent of that (the surface tilts a little), ring py
+          between 2.53 and 2.78 (that spread is the discretisation error over h = 0.05..0.005
+          and the treatments of first contact, on 64 x 4 and 60 x 5 elements).
 
 Made by make_ring.py. Change a parameter for one run: emcon run ring.inp --set h=0.005
 """

@@ -9,7 +9,16 @@ Results of a run, read from Python:
     with FieldFile(paths.field) as field:
         u = field.point("displacement", -1)  # (n_node, 3) [L], last frame
 
-From the shell: `python -m emcon plot ring`, `python -m emcon summary ring`.
+A run, step by step:
+
+    from emcon.stepper import Stepper
+
+    with Stepper("ring.inp", h=0.02) as ring:
+        while not ring.is_done:
+            ring.step()
+        print(ring.energies(), ring.momenta())
+
+Single kernels, for tests: `emcon.kernels`. From the shell: `python -m emcon plot ring`, `python -m emcon summary ring`.
 
 Units are those of the deck, any consistent set: length [L], mass [M], time [T].
 """

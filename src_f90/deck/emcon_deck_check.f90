@@ -206,12 +206,12 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      logical, allocatable :: is_slave(:), is_master(:), is_held(:)
+      logical, allocatable :: is_slave(:), is_master(:), is_held(:), is_guided(:)
       integer, allocatable :: n_prescribed(:)
       integer :: i, k
 
       allocate(is_slave(size(scene%node_label)), is_master(size(scene%node_label)), &
-         is_held(size(scene%node_label)), source=.false.)
+         is_held(size(scene%node_label)), is_guided(size(scene%node_label)), source=.false.)
       call mark_nodes(scene, scene%surface(pair%slave), is_slave)
       call mark_nodes(scene, scene%surface(pair%master), is_master)
       if (any(is_slave .and. is_master)) then
@@ -229,11 +229,17 @@ contains
             end do
          end associate
          is_held = is_held .or. (is_slave .and. n_prescribed == scene%n_dim)
+         is_guided = is_guided .or. (is_slave .and. n_prescribed > 0)
       end do
       if (any(is_held)) call add_error(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
          // label_list(pack(scene%node_label, is_held)) // " of surface " &
          // scene%surface(pair%slave)%name // " is over-constrained: all its degrees of freedom " &
          // "are prescribed, it cannot follow the master; take it off the surface")
+      is_guided = is_guided .and. .not. is_held
+      if (any(is_guided)) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
+         // label_list(pack(scene%node_label, is_guided)) // " of surface " &
+         // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it in " &
+         // "the other one only, and is singular where the master faces along the first")
    end subroutine check_slave_nodes
 
 end module emcon_deck_check

@@ -16,15 +16,16 @@ module emcon_scheme_energy_momentum
 
 contains
 
-   !> r = M (2/h^2 du - 2/h v0) + forces; loads at mid-time on the mid-configuration.
+   !> r = M (2/h du - 2 v0)/h + forces; loads at mid-time on the mid-configuration.
    pure function energy_momentum_pose(self, start, h) result(pose)
       class(scheme_energy_momentum_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h
       type(pose_t) :: pose
 
-      pose%mass_du = 2.0_wp/(h*h)
-      pose%mass_v = 2.0_wp/h
+      pose%mass_scale = 1.0_wp/h
+      pose%rate = 2.0_wp/h
+      pose%v_weight = 2.0_wp
       pose%load_instant = instant_t(start%step_time + 0.5_wp*h, start%total_time + 0.5_wp*h)
    end function energy_momentum_pose
 

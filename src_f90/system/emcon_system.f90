@@ -1,7 +1,7 @@
 !> The discrete system of one step: numbered unknowns, forces, mass, tangent, contact pairs.
 !>
 !> It knows configurations and weights, not time stepping: a scheme asks for
-!> r = a M du - b M v0 + f_int - f_ext and its tangent.
+!> r = s M (b du - w v0) + f_int - f_ext and its tangent.
 module emcon_system
    use emcon_bodies, only : bodies_find
    use emcon_contact, only : contact_box_t
@@ -22,8 +22,11 @@ module emcon_system
 
    !> Where forces are evaluated and how inertia enters: all that a scheme decides.
    type :: pose_t
-      real(wp) :: mass_du = 0.0_wp               !! a in a M du [1/T^2]
-      real(wp) :: mass_v = 0.0_wp                !! b in b M v0 [1/T]
+      !> Inertia s M (b du - w v0): b du - w v0 is the change of velocity, computed with the same b
+      !> as the velocity itself. Two factors for du and v0 would round apart, a bias in each step.
+      real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: no inertia
+      real(wp) :: rate = 0.0_wp                  !! b [1/T]
+      real(wp) :: v_weight = 0.0_wp              !! w
       logical :: is_end = .false.                !! gradients at the end, not discrete gradients
       type(instant_t) :: load_instant            !! when loads are taken
    end type pose_t
@@ -44,7 +47,7 @@ module emcon_system
       integer, allocatable :: slot(:)            !! element entries in `matrix`
       real(dp), allocatable :: mass_value(:)     !! mass in the pattern of `matrix`
       type(solid_response_t) :: response
-      real(wp), allocatable :: inertia(:, :)     !! (2, n_node) a M du - b M v0
+      real(wp), allocatable :: inertia(:, :)     !! (2, n_node) s M (b du - w v0)
       real(wp), allocatable :: external(:, :)    !! (2, n_node) loads
       real(wp), allocatable :: residual(:, :)    !! (2, n_node) without contact forces
       real(wp), allocatable :: magnitude(:, :)   !! (2, n_node) sum of |contributions| to it
@@ -198,7 +201,7 @@ contains
       logical, intent(in) :: with_tangent
 
       self%external = 0.0_wp
-      if (with_tangent) self%matrix%value = real(pose%mass_du, dp)*self%mass_value
+      if (with_tangent) self%matrix%value = real(pose%mass_scale*pose%rate, dp)*self%mass_value
       if (pose%is_end) then
          self%u_work = u0 + du
          call respond_at(self%u_work, self%zero, 2.0_wp, 1.0_wp)
@@ -207,11 +210,13 @@ contains
          call respond_at(u0, du, 1.0_wp, 0.5_wp)
       end if
       if (self%response%inverted_element > 0) return
-      if (pose%mass_du > 0.0_wp) then
-         self%f_work = pose%mass_du*(du + offset) - pose%mass_v*v0
+      if (pose%mass_scale > 0.0_wp) then
+         self%f_work = pose%rate*(du + offset) - pose%v_weight*v0
          call mass_times(self, self%f_work, self%inertia)
-         self%f_work = abs(pose%mass_du*(du + offset)) + abs(pose%mass_v*v0)
+         self%inertia = pose%mass_scale*self%inertia
+         self%f_work = abs(pose%rate*(du + offset)) + abs(pose%v_weight*v0)
          call mass_times(self, self%f_work, self%magnitude)
+         self%magnitude = pose%mass_scale*self%magnitude
       else
          self%inertia = 0.0_wp
          self%magnitude = 0.0_wp
@@ -248,7 +253,7 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :), direction(:, :)   !! (2, n_node)
       real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
 
-      self%f_work = pose%mass_du*direction
+      self%f_work = (pose%mass_scale*pose%rate)*direction
       call mass_times(self, self%f_work, product)
       if (pose%is_end) then
          self%u_work = u0 + du

@@ -1,0 +1,69 @@
+"""Single kernels of the library, for tests and for trying things out. Needs the extension."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+
+_flat = _core.emcon_flat
+
+#: Constitutive laws by name: the constants are (E, nu), (C10, D1), (E, nu).
+LAWS = {"linear": 1, "neo hooke": 2, "coupled neo hooke": 3}
+
+
+@dataclass(frozen=True)
+class LawResponse:
+    """Strain energy density at the end of a step, algorithmic stress (3,), its tangent (3, 3)."""
+
+    energy: float
+    stress: NDArray[np.float64]
+    tangent: NDArray[np.float64]
+
+
+def law_response(law: str, constants: ArrayLike, strain: ArrayLike,
+                 dstrain: ArrayLike = (0.0, 0.0, 0.0)) -> LawResponse:
+    """Response of `law` to a Green-Lagrange strain that goes from `strain` to `strain + dstrain`.
+
+    Components 11, 22, 2*12; plane strain. The stress S satisfies S.dstrain = W1 - W0 exactly and
+    is the stress itself for dstrain = 0. Raises `ValueError` for an unknown law.
+    """
+    if law not in LAWS:
+        raise ValueError(f"there is no law '{law}'; known: {', '.join(LAWS)}")
+    energy, stress, tangent, _ = _flat.law_kernel(LAWS[law], constants, strain, dstrain)
+    return LawResponse(float(energy), stress, tangent)
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Gap of a slave node at the start and end of a step, with derivatives by 10 coordinates.
+
+    `g` is the discrete gradient (g.dx = dgap), `c` the gradient at the end, `h[i, j]` the
+    derivative of g[i] by end coordinate j. Coordinates: x, y of slave, edge start, edge end, node
+    before, node after.
+    """
+
+    start: float
+    end: float
+    dgap: float
+    g: NDArray[np.float64]
+    c: NDArray[np.float64]
+    h: NDArray[np.float64]
+
+
+def nts_gap(x0: ArrayLike, dx: ArrayLike, *, before: bool = True, after: bool = True,
+            rounding: float = 0.0) -> Gap:
+    """Gap over a master edge and its neighbours [L].
+
+    `x0` (5, 2) positions at the start, `dx` (5, 2) their motion; rows: slave, edge start, edge
+    end, node before and after the edge (not read unless `before`, `after`). `rounding` [L] is the
+    length over which corners are rounded.
+    """
+    x0, dx = (np.asarray(a, dtype=float) for a in (x0, dx))
+    if x0.shape != (5, 2) or dx.shape != (5, 2):
+        raise ValueError(f"x0 and dx are (5, 2) arrays, not {x0.shape} and {dx.shape}")
+    gap, g, c, h = _flat.nts_kernel(x0.T, dx.T, int(before), int(after), rounding)
+    return Gap(float(gap[0]), float(gap[1]), float(gap[2]), g, c, h)

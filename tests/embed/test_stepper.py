@@ -1,0 +1,117 @@
+"""The Python stepper against the batch program, its errors, and the kernels it can call."""
+
+from __future__ import annotations
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT/"pywrap"))
+
+from emcon.kernels import LAWS, law_response, nts_gap  # noqa: E402
+from emcon.stepper import AnalysisError, InputError, Stepper  # noqa: E402
+
+RING = ROOT/"input_decks"/"ring.inp"
+EMCON = os.environ.get("EMCON", str(ROOT/"build"/"release"/"emcon"))
+EPS = np.finfo(float).eps
+
+
+def test_stepper_gives_the_bits_of_the_batch_run(tmp_path: Path) -> None:
+    subprocess.run([EMCON, str(RING), "--output", str(tmp_path), "--quiet", "--set", "h=0.05",
+                    "--set", "t_end=0.5"], check=True)
+    with open(tmp_path/"ring.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    with Stepper(RING, h=0.05, t_end=0.5) as ring:
+        for row in rows[1:]:
+            increment = ring.step()
+            values = ring.energies() | ring.momenta() | {"time": increment.time}
+            assert increment.newton == int(row["newton"])
+            assert increment.active == int(row["active"])
+            for name, value in values.items():
+                assert value == float(row[name]), name
+        assert ring.is_done
+
+
+def test_two_models_side_by_side_do_not_meet() -> None:
+    with Stepper(RING, h=0.05) as a, Stepper(RING, h=0.02) as b, Stepper(RING, h=0.05) as c:
+        for _ in range(3):
+            a.step()
+            b.step()
+        for _ in range(3):
+            c.step()
+        assert np.array_equal(a.u, c.u) and np.array_equal(a.v, c.v)
+        assert not np.array_equal(a.u, b.u)
+
+
+def test_state_arrays_have_the_documented_shapes() -> None:
+    with Stepper(RING, h=0.05) as ring:
+        ring.step()
+        assert ring.u.shape == ring.v.shape == ring.q.shape == (ring.n_node, 2)
+        assert np.array_equal(ring.q, ring.positions + ring.u)
+        lam, active, label = ring.contact()
+        assert lam.shape == active.shape == label.shape == (ring.n_constraint,)
+        assert (lam[active] > 0.0).all() and not lam[~active].any()
+        assert set(label) <= set(ring.labels)
+
+
+def test_errors_are_exceptions_with_the_message(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        Stepper(tmp_path/"none.inp")
+    bad = tmp_path/"bad.inp"
+    bad.write_text("*NODE\n1, 0., 0.\n*ELEMNT, TYPE=CPE4\n")
+    with pytest.raises(InputError, match=r"(?s)bad\.inp:3: .*ELEMENT"):
+        Stepper(bad)
+    with pytest.raises(InputError, match="HH"):
+        Stepper(RING, hh=1)
+    ring = Stepper(RING, h=8)
+    ring.close()
+    with pytest.raises(InputError, match="closed"):
+        ring.step()
+    with Stepper(RING, h=0.05, t_end=0.05) as ring:
+        ring.step()
+        with pytest.raises(InputError, match="end"):
+            ring.step()
+
+
+def test_failed_analysis_keeps_the_model_usable() -> None:
+    with Stepper(RING, h=0.05, tolerance="1e-300") as ring:
+        first = ring.energies()
+        try:
+            ring.step()
+        except AnalysisError:
+            pass
+        assert set(ring.energies()) == set(first) and np.isfinite(ring.u).all()
+
+
+def test_open_and_close_do_not_pile_up_models() -> None:
+    for _ in range(300):                    # more than the table of models holds
+        Stepper(RING).close()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_law_kernel_is_a_discrete_gradient(law: str) -> None:
+    rng = np.random.default_rng(1)
+    constants = (1.0, 0.3)
+    for size in (1.0, 1e-8, 1e-150):
+        strain, dstrain = 0.1*rng.standard_normal((2, 3))
+        dstrain *= size
+        step = law_response(law, constants, strain, dstrain)
+        change = step.energy - law_response(law, constants, strain).energy
+        scale = abs(step.energy) + np.abs(step.stress)@np.abs(dstrain)
+        assert abs(step.stress@dstrain - change) <= 16*EPS*scale
+
+
+def test_gap_kernel_is_a_discrete_gradient() -> None:
+    rng = np.random.default_rng(2)
+    x0 = np.array([[0.5, 0.2], [1.0, 0.0], [0.0, 0.0], [2.0, -0.2], [-1.0, -0.3]])
+    for size in (0.8, 1e-6, 1e-200):
+        dx = size*(rng.random((5, 2)) - 0.5)
+        gap = nts_gap(x0, dx)
+        assert abs(gap.g@dx.ravel() - gap.dgap) <= 32*EPS*np.abs(gap.g)@np.abs(dx.ravel())
+        assert np.abs(gap.g.reshape(5, 2).sum(axis=0)).max() <= 16*EPS

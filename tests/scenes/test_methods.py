@@ -1,0 +1,72 @@
+"""Null space and saddle point: the same step, the same history."""
+
+import numpy as np
+import pytest
+from scene_tools import DECKS, Deck, number, run_deck
+
+DECK = DECKS / "ring.inp"
+METHODS = ("NULL SPACE", "SADDLE POINT")
+INITIATIONS = ("PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE")
+COMPARED = {"displacement", "velocity", "contact_force", "contact_pressure"}
+COLUMNS = ("kinetic", "strain", "contact_work", "total", "px", "py", "lz")
+
+
+def assert_same_fields(first, second, tolerance):
+    """Displacements and contact forces of all frames, relative to the largest of the frames."""
+    for name in sorted(COMPARED & first.names()):
+        scale = np.abs(first[name]).max()
+        np.testing.assert_allclose(first[name], second[name], rtol=0, atol=tolerance*scale)
+    np.testing.assert_array_equal(first["contact_active"], second["contact_active"])
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory):
+    """The ring, pressed onto the foundation, as a deck that starts there."""
+    run = run_deck(DECK, tmp_path_factory.mktemp("pressed"), h=0.01, t_end=0.6, frame=0.6)
+    fields = run.fields()
+    assert fields["contact_active"][-1].sum() >= 2
+    deck = Deck.read(DECK)
+    deck.remove("*INITIAL CONDITIONS")
+    for kind, name in (("DISPLACEMENT", "displacement"), ("VELOCITY", "velocity")):
+        lines = [f"*INITIAL CONDITIONS, TYPE={kind}"]
+        for node, vector in enumerate(fields[name][-1], start=1):
+            # The clamped bottom stays where it is.
+            lines += [f"{node}, {a}, {number(v)}" for a, v in enumerate(vector, 1) if v != 0]
+        deck.insert("\n".join(lines), before="*TIME POINTS")
+    return deck
+
+
+@pytest.mark.parametrize("initiation", INITIATIONS)
+@pytest.mark.parametrize("h", [0.05, 0.005, 0.0005])
+def test_one_step_from_the_same_state(pressed, tmp_path, initiation, h):
+    first, second = (
+        run_deck(
+            pressed, tmp_path / method, h=h, t_end=h, frame=h, initiation=initiation, method=method
+        ).fields()
+        for method in METHODS
+    )
+    np.testing.assert_array_equal(first["displacement"][0], second["displacement"][0])
+    assert first["contact_active"][-1].any()
+    assert_same_fields(first, second, 1e-9)
+
+
+@pytest.mark.parametrize("initiation", INITIATIONS)
+def test_histories(tmp_path, initiation):
+    first, second = (
+        run_deck(DECK, tmp_path / method, h=0.01, t_end=1, initiation=initiation, method=method)
+        for method in METHODS
+    )
+    np.testing.assert_array_equal(first.history["active"], second.history["active"])
+    energy = first.history["total"][0]
+    for name in COLUMNS:
+        scale = max(np.abs(first.history[name]).max(), energy if "p" not in name else 0)
+        np.testing.assert_allclose(
+            first.history[name], second.history[name], rtol=0, atol=1e-8*scale, err_msg=name
+        )
+    assert_same_fields(first.fields(), second.fields(), 1e-8)
+
+
+def test_static_contact(tmp_path):
+    deck = DECKS / "two_blocks_static.inp"
+    first, second = (run_deck(deck, tmp_path / m, method=m) for m in METHODS)
+    assert_same_fields(first.fields(), second.fields(), 1e-9)
