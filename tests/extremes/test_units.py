@@ -1,0 +1,140 @@
+"""The ring scene in other units, and far from the origin.
+
+Units scaled by powers of two change exponents only: all figures must be the same bit for bit.
+"""
+
+import numpy as np
+import pytest
+from scene_tools import DECKS, Deck, number, run_deck
+
+DECK = DECKS / "ring.inp"
+
+# Powers of length, mass and time in the columns of the history.
+DIMENSION = {
+    "increment": (0, 0, 0),
+    "time": (0, 0, 1),
+    "h": (0, 0, 1),
+    "kinetic": (2, 1, -2),
+    "strain": (2, 1, -2),
+    "external_work": (2, 1, -2),
+    "contact_work": (2, 1, -2),
+    "total": (2, 1, -2),
+    "px": (1, 1, -1),
+    "py": (1, 1, -1),
+    "lz": (2, 1, -1),
+    "active": (0, 0, 0),
+    "newton": (0, 0, 0),
+    "cuts": (0, 0, 0),
+}
+
+# Exponents of two of the units of length, mass and time; the thickness is a length too.
+UNITS = [(3, 0, 0), (0, 5, 0), (0, 0, -4), (-10, 20, -7), (1, 1, 1), (-40, 33, 17), (100, -90, 60)]
+
+
+def dimension_of_stress(length, mass, time):
+    return mass - length - 2*time
+
+
+def in_units(length, mass, time, **parameters):
+    """The ring deck with lengths multiplied by 2**length, and so on."""
+    deck = Deck.read(DECK)
+    scale = lambda exponent: lambda text: number(np.ldexp(float(text), exponent))
+    x, v, t = scale(length), scale(length - time), scale(time)
+    density, stress = scale(mass - 3*length), scale(dimension_of_stress(length, mass, time))
+    deck.map_numbers("*NODE", lambda w: [w[0], x(w[1]), x(w[2])])
+    deck.map_numbers("*HYPERELASTIC", lambda w: [stress(w[0]), w[1]])
+    deck.map_numbers("*DENSITY", lambda w: [density(w[0])])
+    deck.map_numbers("*SOLID SECTION", lambda w: [x(w[0])])
+    deck.map_numbers("*INITIAL CONDITIONS", lambda w: [w[0], w[1], v(w[2])])
+    for name, value in parameters.items():
+        is_time = name in ("h", "t_end", "frame")
+        deck.set_parameter(name, t(value) if is_time else value)
+    return deck
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    """Runs in the units of the deck, by their parameters."""
+    known = {}
+
+    def run(**parameters):
+        key = tuple(sorted(parameters.items()))
+        if key not in known:
+            deck = in_units(0, 0, 0, **parameters)
+            known[key] = run_deck(deck, tmp_path_factory.mktemp("reference"))
+        return known[key]
+
+    return run
+
+
+def assert_same_bits(run, reference, units):
+    history, expected = run.history, reference.history
+    assert len(history) == len(expected)
+    for name, powers in DIMENSION.items():
+        exponent = int(np.dot(powers, units))
+        same = np.ldexp(history[name], -exponent) == expected[name]
+        assert same.all(), f"{name} differs first in row {np.argmin(same)}"
+
+
+@pytest.mark.parametrize("units", UNITS)
+@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
+def test_history_has_the_same_bits(tmp_path, reference, units, method):
+    parameters = {"h": 0.05, "t_end": 1.5, "frame": 0.5, "method": method}
+    run = run_deck(in_units(*units, **parameters), tmp_path)
+    assert run.history["active"].max() >= 2
+    assert_same_bits(run, reference(**parameters), units)
+
+
+@pytest.mark.parametrize("initiation", ["ADMISSIBLE", "VELOCITY UPDATE"])
+def test_other_treatments_of_first_contact(tmp_path, reference, initiation):
+    units = (-13, 7, 5)
+    parameters = {"h": 0.02, "t_end": 0.6, "frame": 0.2, "initiation": initiation}
+    run = run_deck(in_units(*units, **parameters), tmp_path)
+    assert_same_bits(run, reference(**parameters), units)
+
+
+def test_cut_steps(tmp_path, reference):
+    """Where Newton's method fails at first, the decisions too are the same."""
+    units = (9, -4, -6)
+    parameters = {"h": 2, "t_end": 8, "frame": 2}
+    expected = reference(**parameters)
+    assert expected.history["cuts"].sum() > 0
+    assert_same_bits(run_deck(in_units(*units, **parameters), tmp_path), expected, units)
+
+
+def test_fields_have_the_same_bits(tmp_path, reference):
+    units = length, mass, time = (5, -3, 2)
+    parameters = {"h": 0.05, "t_end": 0.5, "frame": 0.1}
+    fields = run_deck(in_units(*units, **parameters), tmp_path).fields()
+    expected = reference(**parameters).fields()
+    force = length + mass - 2*time
+    exponents = {
+        "displacement": length,
+        "velocity": length - time,
+        "reaction_force": force,
+        "contact_force": force,
+        "contact_gap": length,
+        "contact_pressure": dimension_of_stress(*units),
+        "contact_active": 0,
+        "cauchy_stress": dimension_of_stress(*units),
+        "von_mises": dimension_of_stress(*units),
+        "strain_energy": force + length,
+    }
+    assert fields.names() == set(exponents)
+    for name, exponent in exponents.items():
+        np.testing.assert_array_equal(np.ldexp(fields[name], -exponent), expected[name], name)
+
+
+def test_static_contact(tmp_path):
+    """Statics: force and length."""
+    deck = Deck.read(DECKS / "two_blocks_static.inp")
+    base = run_deck(deck, tmp_path / "base").fields()
+    length, stress = 7, -11
+    deck.map_numbers("*NODE", lambda w: [w[0], *(number(np.ldexp(float(t), length)) for t in w[1:])])
+    deck.map_numbers("*HYPERELASTIC", lambda w: [number(np.ldexp(float(w[0]), stress)), w[1]])
+    deck.map_numbers("*SOLID SECTION", lambda w: [number(np.ldexp(float(w[0]), length))])
+    deck.set_parameter("pressure", number(np.ldexp(10, stress)))
+    deck.set_parameter("approach", number(np.ldexp(-0.002, length)))
+    fields = run_deck(deck, tmp_path / "scaled").fields()
+    for name, exponent in (("displacement", length), ("contact_force", stress + 2*length)):
+        np.testing.assert_array_equal(np.ldexp(fields[name], -exponent), base[name], name)

@@ -1,0 +1,177 @@
+"""Every deck of input_decks/ runs and gives the figures of its heading.
+
+The ring has test_ring.py, the spinning ring also test_flight.py.
+"""
+
+import numpy as np
+import pytest
+from scene_tools import DECKS, emcon, figures, run_deck
+
+SHORT = {
+    "ring": {"h": 0.05, "t_end": 0.5},
+    "spinning_ring": {"t_end": 1},
+    "bouncing_bar": {"t_end": 1.2},
+}
+
+
+@pytest.mark.parametrize("deck", sorted(DECKS.glob("*.inp")), ids=lambda path: path.stem)
+def test_runs(deck, tmp_path):
+    run = run_deck(deck, tmp_path, **SHORT.get(deck.stem, {}))
+    assert len(run.history) > 1
+    assert run.errors == ""
+    for suffix in (".csv", ".h5", ".log", ".vtkhdf"):
+        assert run.file(suffix).stat().st_size > 0
+    assert not list(tmp_path.glob("*.part")) and not list(tmp_path.glob("*.tmp"))
+    np.testing.assert_allclose(run.fields().time[-1], run.history["time"][-1])
+
+
+@pytest.mark.parametrize("deck", sorted(DECKS.glob("*.inp")), ids=lambda path: path.stem)
+def test_check_writes_nothing(deck, tmp_path):
+    done = emcon("check", deck, "--output", tmp_path / "out", cwd=tmp_path)
+    assert done.returncode == 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_spinning_ring(tmp_path):
+    deck = DECKS / "spinning_ring.inp"
+    energy, mass = figures(deck, r"total energy (\S+) \(all kinetic at the start\); mass (\S+);")
+    px, py, lz = figures(deck, r"px = (\S+), py = (\S+), lz = (\S+);")
+    run = run_deck(deck, tmp_path, h=0.05, t_end=1)
+    assert run.history["strain"][0] == 0
+    # The figures have 12 digits.
+    for name, value in (("total", energy), ("px", px), ("py", py), ("lz", lz)):
+        np.testing.assert_allclose(run.history[name], value, rtol=1e-11)
+    assert run.series("BODIES", "MASS")[1][0, 0] == pytest.approx(mass, rel=1e-11)
+
+
+def test_patch_pressure(tmp_path):
+    deck = DECKS / "patch_pressure.inp"
+    yy, xx, zz = figures(deck, r"stress yy = (\S+), xx = xy = (\S+), zz = (\S+);")
+    corner = figures(deck, r"upper right corner \((\S+), (\S+)\);")
+    (energy,) = figures(deck, r"strain energy (\S+)\.")
+    run = run_deck(deck, tmp_path)
+    fields = run.fields()
+    stress = np.broadcast_to([xx, yy, zz, 0, 0, 0], (len(fields.x), 6))
+    order = voigt_of_vtk(fields["cauchy_stress"][-1])
+    np.testing.assert_allclose(order, stress, rtol=0, atol=1e-12*abs(yy))
+    k = np.argmax(fields.x.sum(axis=1))
+    np.testing.assert_allclose(fields["displacement"][-1, k], corner, rtol=1e-12)
+    assert run.history["strain"][-1] == pytest.approx(energy, rel=1e-12)
+    # The supports carry the pressure on the width 2, and nothing sideways.
+    reaction = fields["reaction_force"][-1].sum(axis=0)
+    np.testing.assert_allclose(reaction, [0, -2*yy], rtol=0, atol=1e-12*abs(2*yy))
+
+
+def voigt_of_vtk(stress):
+    """Components of a symmetric tensor as this test wants them: xx, yy, zz, xy, yz, xz."""
+    return stress
+
+
+def test_cantilever(tmp_path):
+    deck = DECKS / "cantilever.inp"
+    u = figures(deck, r"middle of the tip: u = \((\S+), (\S+)\)")
+    vertical, horizontal = figures(deck, r"reaction at the wall: vertical (\S+), horizontal (\S+)\.")
+    run = run_deck(deck, tmp_path)
+    fields = run.fields()
+    tip = np.flatnonzero((fields.x[:, 0] == 10) & (fields.x[:, 1] == fields.x[:, 1].mean()))
+    assert len(tip) == 1
+    # The figures have five digits after the point.
+    np.testing.assert_allclose(fields["displacement"][-1, tip[0]], u, rtol=0, atol=0.6e-5)
+    reaction = fields["reaction_force"][-1].sum(axis=0)
+    np.testing.assert_allclose(reaction, [horizontal, vertical], rtol=0, atol=1e-9*vertical)
+    # Load steps of another size lead to the same equilibrium.
+    assert run.history["time"][-1] == 1
+
+
+def test_two_blocks(tmp_path):
+    deck = DECKS / "two_blocks_static.inp"
+    (total,) = figures(deck, r"reaction at the bottom, (\S+) \(pressure")
+    run = run_deck(deck, tmp_path)
+    fields = run.fields()
+    force, x = fields["contact_force"][-1], fields.x
+    on_small = x[:, 1] >= 0
+    slave = np.arange(len(x)) >= 231
+    assert on_small[slave].all()
+    accuracy = 1e-9*total
+    assert force[slave, 1].sum() == pytest.approx(total, abs=accuracy)
+    np.testing.assert_allclose(force[slave].sum(axis=0) + force[~slave].sum(axis=0), 0, atol=accuracy)
+    bottom = x[:, 1] == x[:, 1].min()
+    reaction = fields["reaction_force"][-1]
+    assert reaction[bottom, 1].sum() == pytest.approx(total, abs=accuracy)
+    np.testing.assert_allclose(reaction[:, 0].sum(), 0, atol=accuracy)
+    # Symmetric about x = 0, but for a slave node opposite a master node, which is given to the
+    # edge on one side.
+    u = fields["displacement"][-1]
+    mirror = [int(np.argmin(np.abs(x - p*[-1, 1]).sum(axis=1) + 1e3*(slave != s)))
+              for p, s in zip(x, slave)]
+    np.testing.assert_allclose(u[mirror]*[-1, 1], u, rtol=0, atol=1e-6*np.abs(u).max())
+    np.testing.assert_allclose(force[slave, 0].sum(), 0, atol=1e-6*total)
+    assert np.nanmin(fields["contact_gap"]) >= -1e-12*x[:, 0].max()
+
+
+def test_two_blocks_under_another_pressure(tmp_path):
+    fields = run_deck(DECKS / "two_blocks_static.inp", tmp_path, pressure=20).fields()
+    slave = np.arange(len(fields.x)) >= 231
+    assert fields["contact_force"][-1, slave, 1].sum() == pytest.approx(40, rel=1e-9)
+
+
+# ---- bouncing bar -------------------------------------------------------------------------------
+
+LENGTH, GRAVITY, WAVE_SPEED, DROP, MASS = 10.0, 10.0, 30.0, 5.0, 10.0
+CROSSING = LENGTH/WAVE_SPEED
+PERIOD = 16/3
+ELEMENT = 0.2
+
+
+def bar_end(t):
+    """Height of the lower end, closed form (Doyen, Ern, Piperno 2011)."""
+    t = t % PERIOD
+    t1, t2 = 1.0, 1.0 + 2*CROSSING
+    t3 = t2 + 2.0
+    t4 = t3 + 2*CROSSING
+    if t < t1:
+        return DROP - GRAVITY*t**2/2
+    if t < t2 or t3 <= t < t4:
+        return 0.0
+    if t >= t4:
+        return DROP - GRAVITY*(t - t4 - 1)**2/2
+    s, n = t - t2, np.arange(1, 2000)
+    wave = 4*GRAVITY*(LENGTH/(WAVE_SPEED*n*np.pi))**2*np.cos(WAVE_SPEED*n*np.pi*s/LENGTH)
+    return DROP - GRAVITY*(s - 1)**2/2 - 2*GRAVITY*LENGTH**2/(3*WAVE_SPEED**2) + wave.sum()
+
+
+@pytest.fixture(scope="module")
+def bar(tmp_path_factory):
+    return run_deck(DECKS / "bouncing_bar.inp", tmp_path_factory.mktemp("bar"))
+
+
+def test_bar_end_follows_the_closed_form(bar):
+    """Free fall to round-off; then within the length of an element, 4 % of the drop height."""
+    fields = bar.fields()
+    lower = np.flatnonzero((fields.x[:, 1] == DROP) & (fields.x[:, 0] >= 0))[:2]
+    height = fields.x[lower, 1] + fields["displacement"][:, lower, 1]
+    exact = np.array([bar_end(t) for t in fields.time])
+    falling = fields.time < 0.999
+    np.testing.assert_allclose(height[falling, 0], exact[falling], rtol=0, atol=1e-12*DROP)
+    within = fields.time <= PERIOD
+    np.testing.assert_allclose(height[within, 0], exact[within], rtol=0, atol=ELEMENT)
+    # One-dimensional: both corners of the end do the same.
+    np.testing.assert_allclose(height[:, 0], height[:, 1], rtol=0, atol=1e-11*DROP)
+
+
+def test_bar_rests_on_the_floor_for_twice_the_crossing_time(bar):
+    history = bar.history
+    touching = history["time"][history["active"] > 0]
+    h = history["h"][1]
+    first = touching[touching < 3]
+    assert first[0] == pytest.approx(1.0, abs=1.5*h)
+    assert first[-1] == pytest.approx(1.0 + 2*CROSSING, abs=ELEMENT/WAVE_SPEED + 1.5*h)
+    # Momentum -m v at the start, about +m v at the end, and the weight in between.
+    time, force = bar.series("CONTACT", "TOTAL_CF")
+    impulse = h*force[time < 3, 0, 1].sum()
+    assert impulse == pytest.approx(MASS*GRAVITY*(2 + 2*CROSSING), rel=0.01)
+
+
+def test_bar_keeps_its_energy(bar):
+    total = bar.history["total"]
+    np.testing.assert_allclose(total, 0, atol=1e-10*bar.history["kinetic"].max())
