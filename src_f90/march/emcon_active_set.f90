@@ -11,6 +11,7 @@ module emcon_active_set
    use emcon_kinds, only : wp
    use emcon_newton, only : newton_converged, newton_solve, newton_t
    use emcon_scene, only : scene_t
+   use emcon_state, only : state_t
    use emcon_system, only : pose_t, system_t
    implicit none
    private
@@ -35,6 +36,7 @@ module emcon_active_set
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
       logical, allocatable :: is_active(:)       !! (n_constraint)
+      real(wp), allocatable :: lam(:)            !! (n_constraint) multipliers to start from
       logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
       integer :: n_tried = 0
       integer :: n_newton = 0                    !! iterations over all sets of the last step
@@ -49,42 +51,45 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
 
-      if (allocated(self%is_active)) deallocate(self%is_active, self%tried)
+      if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried)
       allocate(self%is_active(system%n_constraint), source=.false.)
+      allocate(self%lam(system%n_constraint), source=0.0_wp)
       allocate(self%tried(system%n_constraint, most_sets), source=.false.)
+      call constraints_select(self%set, [integer ::])
    end subroutine active_set_init
 
-   !> Solve the step from `u0`, `v0`; `du` is the first guess and the result. `was_active` are the
-   !> constraints that acted at its start.
-   subroutine active_set_solve(self, system, scene, newton, correction, pose, u0, v0, offset, &
-      was_active, du, status, error)
+   !> Solve the step from `state`; `du` is the first guess and the result.
+   subroutine active_set_solve(self, system, scene, newton, correction, pose, state, offset, du, &
+      status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
       type(correction_t), intent(inout) :: correction
       type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), offset(:, :)
-      logical, intent(in) :: was_active(:)
-      real(wp), intent(inout), contiguous :: du(:, :)
+      type(state_t), intent(in) :: state
+      real(wp), intent(in), contiguous :: offset(:, :)   !! (2, n_node) to `du`, for inertia
+      real(wp), intent(inout), contiguous :: du(:, :)    !! (2, n_node)
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: only_adds, has_changed
 
-      call begin_contact(self, system, scene, u0, du, was_active)
+      call begin_contact(self, system, scene, state, du)
+      self%lam = state%lam
       self%n_newton = 0
       self%n_tried = 0
       only_adds = .false.
       do
          call remember(self)
-         call select_active(self, system, scene, u0, du)
-         call newton_solve(newton, system, scene, correction, self%set, pose, u0, v0, offset, du, &
-            status, error)
+         call select_active(self, system, scene, state%u, du)
+         call newton_solve(newton, system, scene, correction, self%set, pose, state%u, state%v, &
+            offset, du, status, error)
          if (allocated(error)) return
+         self%lam(self%set%id) = self%set%lam
          self%n_newton = self%n_newton + newton%n_iteration
          newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
          if (status /= newton_converged .or. system%n_constraint == 0) return
-         call update(self, system, scene, u0, du, was_active, only_adds, has_changed, status)
+         call update(self, system, scene, state, du, only_adds, has_changed, status)
          if (status /= step_done .or. .not. has_changed) return
          if (was_tried(self)) then
             if (only_adds .or. .not. self%holds_gap) status = step_cycling
@@ -99,24 +104,24 @@ contains
    end subroutine active_set_solve
 
    !> Choose stencils; start from the constraints that acted before and still can.
-   subroutine begin_contact(self, system, scene, u0, du, was_active)
+   subroutine begin_contact(self, system, scene, state, du)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: was_active(:)
-      type(gap_state_t) :: state
+      type(state_t), intent(in) :: state
+      real(wp), intent(in), contiguous :: du(:, :)
+      type(gap_state_t) :: gap
       integer :: pair, i, id
 
       self%is_active = .false.
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
-            call contact%begin_step(scene%x, u0, du)
+            call contact%begin_step(scene%x, state%u, du)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
-               if (.not. was_active(id)) cycle
-               state = contact%gap_state(i, scene%x, u0, system%zero)
-               self%is_active(id) = state%is_near .and. state%is_over
+               if (.not. state%is_active(id)) cycle
+               gap = contact%gap_state(i, scene%x, state%u, system%zero)
+               self%is_active(id) = gap%is_near .and. gap%is_over
             end do
          end associate
       end do
@@ -128,20 +133,13 @@ contains
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      integer, allocatable :: old_id(:)
-      real(wp), allocatable :: old_lam(:)
       type(gap_state_t) :: state
       integer :: k, pair, i
 
-      if (self%set%n == 0 .and. .not. any(self%is_active)) then
-         call constraints_select(self%set, [integer ::])
-         return
-      end if
-      old_id = self%set%id
-      old_lam = self%set%lam
+      if (self%set%n == 0 .and. .not. any(self%is_active)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
       do k = 1, self%set%n
-         self%set%lam(k) = sum(old_lam, old_id == self%set%id(k))
+         self%set%lam(k) = self%lam(self%set%id(k))
          if (.not. self%holds_gap) cycle
          call constraint_place(system, self%set%id(k), pair, i)
          state = system%contact(pair)%contact%gap_state(i, scene%x, u0, du)
@@ -151,15 +149,16 @@ contains
    end subroutine select_active
 
    !> The next set, from the gaps and multipliers of the converged one.
-   subroutine update(self, system, scene, u0, du, was_active, only_adds, has_changed, status)
+   subroutine update(self, system, scene, state, du, only_adds, has_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: was_active(:), only_adds
+      type(state_t), intent(in) :: state
+      real(wp), intent(in), contiguous :: du(:, :)
+      logical, intent(in) :: only_adds
       logical, intent(out) :: has_changed
       integer, intent(out) :: status
-      type(gap_state_t) :: state
+      type(gap_state_t) :: gap
       integer :: pair, i, id, k
       real(wp) :: noise
 
@@ -169,26 +168,27 @@ contains
       k = 0
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
-            call contact%begin_step(scene%x, u0, du)   ! the motion may be more than was expected
+            call contact%begin_step(scene%x, state%u, du)   ! the motion may be more than was expected
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then
                   k = k + 1
-                  state = contact%gap_state(i, scene%x, u0, du)
-                  self%deepest = min(self%deepest, state%gap1/state%size)
-                  if (.not. state%is_covered) status = step_too_far
-                  if (self%gap_tolerance > 0.0_wp .and. self%holds_gap .and. .not. was_active(id) &
-                     .and. state%gap0 > self%gap_tolerance*state%size) status = step_stands_off
+                  gap = contact%gap_state(i, scene%x, state%u, du)
+                  self%deepest = min(self%deepest, gap%gap1/gap%size)
+                  if (.not. gap%is_covered) status = step_too_far
+                  if (self%holds_gap .and. .not. state%is_active(id)) then
+                     if (stands_off(gap)) status = step_stands_off
+                  end if
                   noise = force_noise*sum(system%magnitude(:, contact%node(i)))
                   if (only_adds .or. self%set%lam(k) >= -noise) cycle
                   self%is_active(id) = .false.
                else
-                  state = contact%gap_state(i, scene%x, u0, du)
-                  if (.not. (state%is_near .and. state%is_over)) cycle
-                  if (state%gap0 < -touch_tol*state%size .and. .not. was_active(id)) cycle
-                  self%deepest = min(self%deepest, state%gap1/state%size)
-                  if (state%gap1 >= -gap_noise*state%size) cycle
-                  if (.not. state%is_covered) status = step_too_far
+                  gap = contact%gap_state(i, scene%x, state%u, du)
+                  if (.not. (gap%is_near .and. gap%is_over)) cycle
+                  if (gap%gap0 < -touch_tol*gap%size .and. .not. state%is_active(id)) cycle
+                  self%deepest = min(self%deepest, gap%gap1/gap%size)
+                  if (gap%gap1 >= -gap_noise*gap%size) cycle
+                  if (.not. gap%is_covered) status = step_too_far
                   self%is_active(id) = .true.
                end if
                has_changed = .true.
@@ -196,6 +196,16 @@ contains
             end do
          end associate
       end do
+
+   contains
+
+      !> Would a new contact be held at a larger distance than the deck allows?
+      pure logical function stands_off(gap)
+         type(gap_state_t), intent(in) :: gap
+
+         stands_off = self%gap_tolerance > 0.0_wp .and. gap%gap0 > self%gap_tolerance*gap%size
+      end function stands_off
+
    end subroutine update
 
    subroutine remember(self)

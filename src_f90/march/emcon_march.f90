@@ -350,8 +350,7 @@ contains
       do attempt = 1, 2
          call guess(self, scene, start, h, is_at_rest=attempt == 2)
          call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
-            self%scheme%pose(start, h), self%state%u, self%state%v, self%offset, &
-            self%state%is_active, self%du, status, error)
+            self%scheme%pose(start, h), self%state, self%offset, self%du, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
          if (status /= step_inverted .or. self%active%n_newton > 0) exit

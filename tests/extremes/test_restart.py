@@ -1,0 +1,357 @@
+"""Runs that were killed, interrupted or tampered with, and what `emcon restart` makes of them."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+from scene_tools import DECKS, PROGRAM, Deck, Run, assert_no_crash, emcon, run_deck
+
+PARAMETERS = {"h": 0.02, "t_end": 2, "frame": 0.1}
+
+
+@pytest.fixture(scope="module")
+def deck(tmp_path_factory):
+    """The ring with a restart file every 5 increments."""
+    deck = Deck.read(DECKS / "ring.inp")
+    deck.replace("*RESTART, WRITE, FREQUENCY=50", "*RESTART, WRITE, FREQUENCY=5")
+    for name, value in PARAMETERS.items():
+        deck.set_parameter(name, value)
+    return deck.write(tmp_path_factory.mktemp("deck") / "ring.inp")
+
+
+@pytest.fixture(scope="module")
+def whole(deck, tmp_path_factory):
+    """The run that nobody disturbed, and the seconds it took."""
+    start = time.monotonic()
+    run = run_deck(deck, tmp_path_factory.mktemp("whole"))
+    return run, time.monotonic() - start
+
+
+def start(*arguments, **options):
+    return subprocess.Popen(
+        [PROGRAM, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+def kill_after(seconds, *arguments):
+    process = start(*arguments)
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGKILL)
+    out, err = process.communicate(timeout=60)
+    if process.returncode != -signal.SIGKILL:
+        assert_no_crash(process.returncode, out + err)
+    return process.returncode
+
+
+def wait_for(path, process, seconds=60):
+    """Until `path` is there; the process must not have ended before."""
+    end = time.monotonic() + seconds
+    while not path.exists():
+        assert process.poll() is None and time.monotonic() < end, f"no {path}"
+        time.sleep(0.002)
+
+
+def assert_files_open(run):
+    """What is there under its final name is whole, however the run ended."""
+    if run.file(".csv").exists():
+        text = run.file(".csv").read_text()
+        *lines, rest = text.split("\n")
+        assert rest == "" or len(lines) == 0
+        n = len(lines[0].split(",")) if lines else 0
+        assert all(len(line.split(",")) == n for line in lines)
+    for suffix in (".h5", ".vtkhdf", ".rst.h5"):
+        if run.file(suffix).exists():
+            with h5py.File(run.file(suffix), "r") as file:
+                file.visititems(lambda _, item: item[...] if hasattr(item, "shape") else None)
+    if run.file(".vtkhdf").exists():
+        fields = run.fields()
+        assert len(fields.time) >= 1 and "displacement" in fields.names()
+        read_with_vtk(run.file(".vtkhdf"), len(fields.time))
+
+
+def read_with_vtk(path, n_frame):
+    try:
+        from vtkmodules.vtkIOHDF import vtkHDFReader
+    except ImportError:
+        return
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == n_frame
+    for k in (0, n_frame - 1):
+        reader.SetStep(k)
+        reader.Update()
+        assert reader.GetOutputDataObject(0).GetPointData().GetArray("displacement") is not None
+
+
+def contents(path):
+    """All data sets of an HDF5 file, but for those that tell how long something took."""
+    found = {}
+
+    def visit(name, item):
+        if isinstance(item, h5py.Dataset) and not name.endswith("/cpu") and "/RUN/" not in name:
+            found[name] = item[...]
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+        steps = file.get("VTKHDF/Steps")
+        if steps is not None:
+            found["NSteps"] = np.array(steps.attrs["NSteps"])
+    return found
+
+
+def assert_same_results(run, expected):
+    assert run.digits() == expected.digits()
+    for suffix in (".vtkhdf", ".h5"):
+        one, other = contents(run.file(suffix)), contents(expected.file(suffix))
+        assert one.keys() == other.keys()
+        for name in one:
+            assert one[name].tobytes() == other[name].tobytes(), f"{suffix}: {name}"
+    left = [p.name for p in run.base.parent.iterdir() if p.suffix in (".part", ".tmp")]
+    assert not left, left
+
+
+def finish(run, deck):
+    """Go on from the restart file, or begin again where the kill came before there was one."""
+    if run.file(".rst.h5").exists():
+        done = emcon("restart", run.file(".rst.h5"), "--quiet")
+    else:
+        done = emcon(deck, "--quiet", "--output", run.base.parent)
+    assert done.returncode == 0, done.stderr
+
+
+# ---- killed -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_killed_at_a_random_moment(deck, whole, tmp_path, seed):
+    expected, seconds = whole
+    chance = random.Random(seed)
+    run = Run(tmp_path / "ring")
+    kill_after(chance.uniform(0, seconds), deck, "--quiet", "--output", tmp_path)
+    assert_files_open(run)
+    # And once more, while it goes on.
+    if run.file(".rst.h5").exists():
+        kill_after(chance.uniform(0, seconds), "restart", run.file(".rst.h5"), "--quiet")
+        assert_files_open(run)
+    finish(run, deck)
+    assert_same_results(run, expected)
+
+
+def test_killed_many_times_in_its_first_moments(deck, tmp_path):
+    """Before and while the files are made; a later run is not disturbed by what is left."""
+    run = Run(tmp_path / "ring")
+    for k in range(12):
+        kill_after(0.01*k, deck, "--quiet", "--output", tmp_path)
+        assert_files_open(run)
+    done = emcon(deck, "--quiet", "--output", tmp_path, "--set=t_end=0.2")
+    assert done.returncode == 0, done.stderr
+    assert len(run.history) == 11
+
+
+def test_killed_run_keeps_what_was_before(deck, tmp_path):
+    """A run over old results that dies at once leaves files that open."""
+    run = run_deck(deck, tmp_path, t_end=0.2)
+    before = contents(run.file(".vtkhdf"))
+    kill_after(0.005, deck, "--quiet", "--output", tmp_path)
+    assert_files_open(run)
+    assert len(before["VTKHDF/Steps/Values"]) == 3
+
+
+def test_restart_does_not_need_the_deck(deck, whole, tmp_path):
+    """The restart file holds the deck with what --set said; the deck may have moved."""
+    copy = shutil.copy(deck, tmp_path / "ring.inp")
+    process = start(copy, "--quiet", "--output", tmp_path / "out", "--set", "t_end=2.0")
+    run = Run(tmp_path / "out" / "ring")
+    wait_for(run.file(".rst.h5"), process)
+    process.kill()
+    process.communicate()
+    os.remove(copy)
+    finish(run, None)
+    assert run.digits() == whole[0].digits()
+
+
+# ---- interrupted --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_stops_after_the_increment_in_hand(deck, whole, tmp_path, number):
+    expected, _ = whole
+    run = Run(tmp_path / "ring")
+    process = start(deck, "--output", tmp_path)
+    wait_for(run.file(".rst.h5"), process)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert_no_crash(process.returncode, out + err)
+    assert "interrupted after increment" in err and "emcon restart" in err
+    assert_files_open(run)
+    n_done = len(run.history) - 1
+    assert 0 < n_done < len(expected.history) - 1
+    # Nothing is lost: the restart file holds the last increment of the table.
+    assert f"interrupted after increment {n_done};" in err
+    finish(run, deck)
+    assert_same_results(Run(run.base), expected)
+    assert f"resumed after increment {n_done}" in run.file(".log").read_text()
+
+
+def test_interrupt_before_the_first_increment(deck, whole, tmp_path):
+    """At any moment in the first second: 130 with files that can be gone on with, or not begun."""
+    for k in range(6):
+        folder = tmp_path / str(k)
+        run = Run(folder / "ring")
+        process = start(deck, "--quiet", "--output", folder)
+        time.sleep(0.02*k)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        if process.returncode == -signal.SIGINT:
+            assert not run.file(".csv").exists()
+            continue
+        assert process.returncode == 130, err
+        assert_no_crash(process.returncode, out + err)
+        finish(run, deck)
+        assert run.digits() == whole[0].digits()
+
+
+# ---- odd restart files --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def stopped(deck, whole, tmp_path):
+    """A copy of a finished run, restart file and all."""
+    for path in whole[0].base.parent.iterdir():
+        shutil.copy(path, tmp_path / path.name)
+    return Run(tmp_path / "ring")
+
+
+def test_restart_of_a_finished_run_changes_nothing(stopped, whole):
+    done = emcon("restart", stopped.file(".rst.h5"), "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert_same_results(stopped, whole[0])
+
+
+def damage_nothing_left(path):
+    path.write_bytes(b"")
+
+
+def damage_cut(path):
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data)//2])
+
+
+def damage_junk(path):
+    path.write_bytes(random.Random(1).randbytes(50000))
+
+
+def damage_text(path):
+    path.write_text("this is not a restart file\n"*100)
+
+
+def damage_foreign(path):
+    path.unlink()
+    with h5py.File(path, "w") as file:
+        file["data"] = np.arange(10)
+
+
+def damage_bits(path):
+    """One byte in the middle of the displacements: checksums must notice."""
+    with h5py.File(path, "r") as file:
+        where = file["reals/u"].id
+        offset = where.get_chunk_info(0).byte_offset if where.get_num_chunks() else None
+        offset = where.get_offset() if offset is None else offset
+    data = bytearray(path.read_bytes())
+    data[offset + 200] ^= 0x40
+    path.write_bytes(data)
+
+
+def damage_entry_missing(path):
+    with h5py.File(path, "a") as file:
+        del file["reals/v"]
+
+
+def damage_other_size(path):
+    with h5py.File(path, "a") as file:
+        del file["reals/v"]
+        file["reals/v"] = np.zeros(10)
+
+
+DAMAGES = [
+    damage_nothing_left,
+    damage_cut,
+    damage_junk,
+    damage_text,
+    damage_foreign,
+    damage_bits,
+    damage_entry_missing,
+    damage_other_size,
+]
+
+
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda f: f.__name__.removeprefix("damage_"))
+def test_broken_restart_file(stopped, whole, damage):
+    path = stopped.file(".rst.h5")
+    damage(path)
+    done = emcon("restart", path, "--quiet")
+    assert done.returncode in (2, 4)
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert path.name in done.stderr or "restart" in done.stderr
+    # The results are as they were.
+    assert stopped.digits() == whole[0].digits()
+    assert contents(stopped.file(".vtkhdf")).keys() == contents(whole[0].file(".vtkhdf")).keys()
+
+
+def test_missing_restart_file(tmp_path):
+    done = emcon("restart", tmp_path / "none.rst.h5")
+    assert done.returncode == 2
+    assert "none.rst.h5" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_restart_wants_a_restart_file(deck):
+    done = emcon("restart", deck)
+    assert done.returncode == 2
+    assert "NAME.rst.h5" in done.stderr
+
+
+@pytest.mark.parametrize("suffix", [".vtkhdf", ".h5"])
+def test_restart_without_the_results(stopped, suffix):
+    stopped.file(suffix).unlink()
+    others = {p: p.read_bytes() for p in stopped.base.parent.iterdir() if p.suffix != ".log"}
+    done = emcon("restart", stopped.file(".rst.h5"), "--quiet")
+    assert done.returncode in (2, 4)
+    assert f"ring{suffix}" in done.stderr
+    for path, data in others.items():
+        assert path.read_bytes() == data, f"{path.name} was changed"
+
+
+@pytest.mark.parametrize("rows", [0, 20])
+def test_restart_brings_the_table_back(stopped, whole, rows):
+    """NAME.csv has nothing that NAME.h5 has not: gone or cut, it is written anew."""
+    table = stopped.file(".csv")
+    lines = table.read_text().splitlines(keepends=True)
+    table.write_text("".join(lines[:rows])) if rows else table.unlink()
+    done = emcon("restart", stopped.file(".rst.h5"), "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert_same_results(stopped, whole[0])
+
+
+def test_restart_with_results_of_fewer_increments(stopped):
+    """Results that end before the restart file does: said, not filled with gaps."""
+    with h5py.File(stopped.file(".h5"), "a") as file:
+        for column in file["history"].values():
+            column.resize(20, axis=0)
+    done = emcon("restart", stopped.file(".rst.h5"), "--quiet")
+    assert done.returncode in (2, 4)
+    assert "ring.h5" in done.stderr
