@@ -41,6 +41,10 @@ contains
       end do
       if (len(self%fault) > 0 .or. self%verb == "help" .or. self%verb == "version") return
       if (len(self%path) == 0) self%fault = "no file is named"
+      if (self%verb == "restart" .and. (size(self%options%override) > 0 .or. &
+         len(self%options%folder) > 0 .or. self%options%is_lenient)) then
+         self%fault = "a restart goes on as it was: it takes --quiet only"
+      end if
    end subroutine command_read
 
    !> A word that is no option: the verb, or the file.

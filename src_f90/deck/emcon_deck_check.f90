@@ -238,8 +238,8 @@ contains
       is_guided = is_guided .and. .not. is_held
       if (any(is_guided)) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
          // label_list(pack(scene%node_label, is_guided)) // " of surface " &
-         // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it in " &
-         // "the other one only, and is singular where the master faces along the first")
+         // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it " &
+         // "in the other one only, and is singular where the master faces along the first")
    end subroutine check_slave_nodes
 
 end module emcon_deck_check

@@ -168,7 +168,8 @@ contains
       k = 0
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
-            call contact%begin_step(scene%x, state%u, du)   ! the motion may be more than was expected
+            ! The motion may be more than was expected.
+            call contact%begin_step(scene%x, state%u, du)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then

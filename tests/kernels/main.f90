@@ -6,12 +6,33 @@ program main
    use, intrinsic :: iso_fortran_env, only : output_unit
    use check, only : test_case_t
    use emcon_errors, only : error_t
+   use test_active_set, only : collect_active_set
    use test_blas, only : collect_blas
+   use test_bodies, only : collect_bodies
+   use test_chain, only : collect_chain
    use test_check, only : collect_check
    use test_cholmod, only : collect_cholmod
+   use test_constraints, only : collect_constraints
    use test_csr, only : collect_csr
+   use test_dgrad, only : collect_dgrad
+   use test_dgrad_series, only : collect_dgrad_series
+   use test_element, only : collect_element
    use test_lapack, only : collect_lapack
+   use test_law, only : collect_law
+   use test_loads, only : collect_loads
+   use test_march, only : collect_march
+   use test_newton, only : collect_newton
+   use test_nts, only : collect_nts
+   use test_nts_gap, only : collect_nts_gap
+   use test_null_space, only : collect_null_space
+   use test_numbering, only : collect_numbering
    use test_results, only : collect_results
+   use test_rigid_motion, only : collect_rigid_motion
+   use test_saddle_point, only : collect_saddle_point
+   use test_scheme, only : collect_scheme
+   use test_search, only : collect_search
+   use test_shape, only : collect_shape
+   use test_solid, only : collect_solid
    use test_triple_product, only : collect_triple_product
    use test_umfpack, only : collect_umfpack
    implicit none
@@ -39,6 +60,27 @@ program main
    call run("umfpack", collect_umfpack)
    call run("cholmod", collect_cholmod)
    call run("lapack", collect_lapack)
+   call run("dgrad_series", collect_dgrad_series)
+   call run("dgrad", collect_dgrad)
+   call run("shape", collect_shape)
+   call run("law", collect_law)
+   call run("element", collect_element)
+   call run("solid", collect_solid)
+   call run("chain", collect_chain)
+   call run("search", collect_search)
+   call run("nts_gap", collect_nts_gap)
+   call run("nts", collect_nts)
+   call run("numbering", collect_numbering)
+   call run("bodies", collect_bodies)
+   call run("loads", collect_loads)
+   call run("rigid_motion", collect_rigid_motion)
+   call run("constraints", collect_constraints)
+   call run("null_space", collect_null_space)
+   call run("saddle_point", collect_saddle_point)
+   call run("newton", collect_newton)
+   call run("scheme", collect_scheme)
+   call run("active_set", collect_active_set)
+   call run("march", collect_march)
    call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then

@@ -1,0 +1,189 @@
+!> The constraint set: selection, rows, forces, merged pattern, curvature.
+module test_constraints
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraints, only : constraint_place, constraints_force, constraints_select
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_scene, only : scene_t
+   use emcon_system, only : system_init, system_t
+   use random_constraints, only : make_problem, problem_t, tol_dp
+   use small_scenes, only : block_t, make_two_blocks
+   use sparse_samples, only : dense_of
+   implicit none
+   private
+   public :: collect_constraints
+
+contains
+
+   subroutine collect_constraints(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("rows equal the gradients", test_rows), &
+         test_case_t("merged pattern holds N and all pairs", test_merge), &
+         test_case_t("curvature", test_curvature), &
+         test_case_t("contact forces", test_force), &
+         test_case_t("a smaller set after a larger one", test_select), &
+         test_case_t("numbers over several pairs", test_place)]
+   end subroutine collect_constraints
+
+   !> The gradients of constraint `k` over all unknowns.
+   pure subroutine dense_rows(problem, k, g, c)
+      type(problem_t), intent(in) :: problem
+      integer, intent(in) :: k
+      real(wp), intent(out) :: g(:), c(:)
+      integer :: i, a, unknown
+
+      g = 0.0_wp
+      c = 0.0_wp
+      associate (item => problem%set%item(k))
+         do i = 1, item%n_node
+            do a = 1, 2
+               unknown = problem%numbering%unknown(a, item%node(i))
+               if (unknown == 0) cycle
+               g(unknown) = item%g(a, i)
+               c(unknown) = item%c(a, i)
+            end do
+         end do
+      end associate
+   end subroutine dense_rows
+
+   subroutine test_rows(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      real(wp), allocatable :: g(:), c(:), force(:, :), gap(:, :)
+      integer :: i, k
+
+      call make_problem(problem)
+      allocate(g, c, source=problem%residual)
+      force = real(dense_of(problem%set%force_rows), wp)
+      gap = real(dense_of(problem%set%gap_rows), wp)
+      do k = 1, problem%set%n
+         call dense_rows(problem, k, g, c)
+         call check_near(error, force(k, :), g, tol_dp, 1.0_wp, "force rows")
+         call check_near(error, gap(k, :), c, tol_dp, 1.0_wp, "gap rows")
+         associate (rows => problem%set%force_rows)
+            do i = rows%row_start(k) + 2, rows%row_start(k + 1)
+               call check_true(error, rows%column(i) > rows%column(i - 1), "columns ascend")
+            end do
+         end associate
+      end do
+   end subroutine test_rows
+
+   subroutine test_merge(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      logical, allocatable :: expected(:, :), is_in(:, :)
+      integer :: i, k, n
+
+      call make_problem(problem)
+      n = problem%numbering%n_unknown
+      allocate(expected(n, n), is_in(problem%set%n, n))
+      expected = abs(dense_of(problem%base)) > 0.0_dp
+      is_in = abs(dense_of(problem%set%force_rows)) > 0.0_dp
+      do k = 1, problem%set%n
+         do i = 1, n
+            if (is_in(k, i)) expected(:, i) = expected(:, i) .or. is_in(k, :)
+         end do
+      end do
+      associate (a => problem%matrix)
+         call check_equal(error, size(a%column), count(expected), "entries")
+         a%value = 1.0_dp
+         call check_true(error, all((dense_of(a) > 0.0_dp) .eqv. expected), "places")
+         a%value = 0.0_dp
+         a%value(problem%slot) = problem%base%value
+         call check_near(error, real(dense_of(a), wp), real(dense_of(problem%base), wp), 0.0_wp, &
+            1.0_wp, "entries of N")
+         do i = 1, n
+            do k = a%row_start(i) + 2, a%row_start(i + 1)
+               call check_true(error, a%column(k) > a%column(k - 1), "columns ascend")
+            end do
+         end do
+      end associate
+   end subroutine test_merge
+
+   !> N - sum of lam_k h_k.
+   subroutine test_curvature(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      real(wp), allocatable :: expected(:, :)
+      integer :: k, i, j, row, column
+
+      call make_problem(problem)
+      expected = real(dense_of(problem%base), wp)
+      do k = 1, problem%set%n
+         associate (item => problem%set%item(k), unknown => problem%numbering%unknown)
+            do j = 1, 2*item%n_node
+               do i = 1, 2*item%n_node
+                  row = unknown(2 - mod(i, 2), item%node((i + 1)/2))
+                  column = unknown(2 - mod(j, 2), item%node((j + 1)/2))
+                  if (row == 0 .or. column == 0) cycle
+                  expected(row, column) = expected(row, column) - problem%set%lam(k)*item%h(i, j)
+               end do
+            end do
+         end associate
+      end do
+      call check_near(error, real(dense_of(problem%matrix), wp), expected, tol_dp, 1.0_wp, &
+         "N with curvature")
+   end subroutine test_curvature
+
+   !> sum of lam_k g_k at all nodes, prescribed or not; sizes are added to what was there.
+   subroutine test_force(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      real(wp) :: force(2, 30), magnitude(2, 30), expected(2, 30), sizes(2, 30)
+      integer :: k, i
+
+      call make_problem(problem)
+      expected = 0.0_wp
+      sizes = 5.0_wp
+      do k = 1, problem%set%n
+         associate (item => problem%set%item(k), lam => problem%set%lam(k))
+            do i = 1, item%n_node
+               expected(:, item%node(i)) = expected(:, item%node(i)) + lam*item%g(:, i)
+               sizes(:, item%node(i)) = sizes(:, item%node(i)) + abs(lam*item%g(:, i))
+            end do
+         end associate
+      end do
+      magnitude = 5.0_wp
+      call constraints_force(problem%set, force, magnitude)
+      call check_near(error, force, expected, tol_dp, 1.0_wp, "force")
+      call check_near(error, magnitude, sizes, tol_dp, 1.0_wp, "magnitude")
+   end subroutine test_force
+
+   subroutine test_select(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      integer :: none(0)
+
+      call make_problem(problem)
+      call constraints_select(problem%set, [4, 9])
+      call check_equal(error, problem%set%id, [4, 9], "numbers")
+      call check_near(error, problem%set%lam, [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "multipliers")
+      call check_true(error, .not. any(problem%set%is_kept), "no gap is kept")
+      call constraints_select(problem%set, none)
+      call check_equal(error, problem%set%n, 0, "empty set")
+   end subroutine test_select
+
+   !> Two pairs of 3 and 5 constraints: numbers 1..3 and 4..8.
+   subroutine test_place(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(system_t) :: system
+      integer :: pair, i, id
+
+      call make_two_blocks(scene, 0.5_wp, lower, upper)
+      scene%pair = [scene%pair, scene%pair]
+      scene%pair(2)%slave = 1
+      scene%pair(2)%master = 2
+      call system_init(system, scene, error)
+      if (allocated(error)) return
+      call check_equal(error, system%first_constraint, [0, 3, 8], "constraints before each pair")
+      do id = 1, system%n_constraint
+         call constraint_place(system, id, pair, i)
+         call check_equal(error, [pair, i], merge([1, id], [2, id - 3], id <= 3), "place")
+      end do
+   end subroutine test_place
+
+end module test_constraints

@@ -1,0 +1,306 @@
+!> Loads and prescribed motion over time and configuration.
+module test_loads
+   use check, only : check_near, test_case_t
+   use emcon_csr, only : csr_find
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_loads, only : instant_t, loads_add, prescribed_motion
+   use emcon_scene, only : amplitude_t, load_gravity, load_point, load_pressure, load_t, &
+      prescribed_t, scene_t
+   use emcon_system, only : system_begin_step, system_init, system_t
+   use small_scenes, only : add_load, add_step, add_surface, block_t, bottom, clamp, left, &
+      make_block, right, shake, top
+   implicit none
+   private
+   public :: collect_loads
+
+   real(wp), parameter :: tol = 32.0_wp*epsilon(1.0_wp)
+   real(wp), parameter :: tol_dp = 32.0_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+
+contains
+
+   subroutine collect_loads(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("pressure follows the edge", test_pressure), &
+         test_case_t("pressure without nlgeom stays", test_dead_pressure), &
+         test_case_t("pressure all around: no force, no moment", test_closed), &
+         test_case_t("pressure stiffness", test_stiffness), &
+         test_case_t("gravity sums to the weight", test_gravity), &
+         test_case_t("amplitudes in step and total time", test_amplitude), &
+         test_case_t("ramp of a static step", test_ramp), &
+         test_case_t("prescribed motion", test_motion)]
+   end subroutine collect_loads
+
+   !> A block of 2 x 2 cells under the loads; `system` is ready to respond.
+   subroutine prepare(scene, is_static, nlgeom, load, system, error)
+      type(scene_t), intent(inout) :: scene
+      logical, intent(in) :: is_static, nlgeom
+      type(load_t), intent(in) :: load(:)
+      type(system_t), intent(out) :: system
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      call add_step(scene, is_static, 0.25_wp, 8)
+      scene%step(1)%nlgeom = nlgeom
+      do i = 1, size(load)
+         call add_load(scene%step(1), load(i))
+      end do
+      call system_init(system, scene, error)
+      if (allocated(error)) return
+      call system_begin_step(system, scene, 1, error)
+   end subroutine prepare
+
+   function pressure_on(element, face, value) result(load)
+      integer, intent(in) :: element, face
+      real(wp), intent(in) :: value
+      type(load_t) :: load
+
+      load%kind = load_pressure
+      load%target = element
+      load%place = face
+      load%value = value
+   end function pressure_on
+
+   !> Forces of the loads at `instant` and x + u.
+   subroutine forces(system, scene, instant, u, force)
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(in), contiguous :: u(:, :)
+      real(wp), intent(out), contiguous :: force(:, :)
+
+      force = 0.0_wp
+      call loads_add(system%loads, scene, system%solid, instant, u, force)
+   end subroutine forces
+
+   !> -p n L t, half on either node, on the deformed edge.
+   subroutine test_pressure(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      real(wp), parameter :: p = 3.0_wp, thickness = 0.5_wp
+      real(wp) :: u(2, 9), force(2, 9), expected(2, 9), a(2), n(2), length
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      scene%section(1)%thickness = thickness
+      call prepare(scene, .false., .true., [pressure_on(4, 3, p)], system, error)
+      if (allocated(error)) return
+      call shake(u, 0.2_wp)
+      call forces(system, scene, instant_t(), u, force)
+      a = (scene%x(:, 8) + u(:, 8)) - (scene%x(:, 9) + u(:, 9))   ! top side, right to left
+      length = sqrt(dot_product(a, a))
+      n = [a(2), -a(1)]/length
+      expected = 0.0_wp
+      expected(:, 8) = -0.5_wp*p*thickness*length*n
+      expected(:, 9) = expected(:, 8)
+      call check_near(error, force, expected, tol, p, "force")
+      call check_near(error, merge(1.0_wp, 0.0_wp, force(2, 8) < 0.0_wp), 1.0_wp, 0.0_wp, 1.0_wp, &
+         "pressure on the top presses down")
+   end subroutine test_pressure
+
+   subroutine test_dead_pressure(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      real(wp) :: u(2, 9), force(2, 9)
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      call prepare(scene, .false., .false., [pressure_on(4, 3, 3.0_wp)], system, error)
+      if (allocated(error)) return
+      call shake(u, 0.2_wp)
+      call forces(system, scene, instant_t(), u, force)
+      call check_near(error, force(:, 8) + force(:, 9), [0.0_wp, -3.0_wp], 0.0_wp, 1.0_wp, "force")
+   end subroutine test_dead_pressure
+
+   !> Of all sides of a deformed block, triangles or quadrilaterals.
+   subroutine test_closed(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      type(load_t) :: load(8)
+      real(wp) :: u(2, 9), force(2, 9), place(2, 9)
+      character(len=4), parameter :: name(2) = ["CPE3", "CPE4"]
+      integer :: i, k
+
+      do k = 1, 2
+         call make_block(scene, name(k), [2, 2], block)
+         call add_surface(scene, "ALL", block, [bottom, right, top, left])
+         do i = 1, 8
+            load(i) = pressure_on(scene%surface(1)%element(i), scene%surface(1)%face(i), 7.0_wp)
+         end do
+         call prepare(scene, .false., .true., load, system, error)
+         if (allocated(error)) return
+         call shake(u, 0.3_wp)
+         place = scene%x + u
+         call forces(system, scene, instant_t(), u, force)
+         call check_near(error, sum(force, dim=2), [0.0_wp, 0.0_wp], tol, 7.0_wp, &
+            name(k) // ": force")
+         call check_near(error, sum(place(1, :)*force(2, :) - place(2, :)*force(1, :)), 0.0_wp, &
+            tol, 20.0_wp, name(k) // ": moment")
+      end do
+   end subroutine test_closed
+
+   !> The force is linear in u, so a difference of any step is its derivative.
+   subroutine test_stiffness(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      real(wp) :: u(2, 9), up(2, 9), down(2, 9), slope, actual
+      integer :: i, j, slot, n
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      call add_step(scene, .false., 1.0_wp, 1)
+      call clamp(scene%step(1), [9])             ! one end of the loaded edge is held
+      call add_load(scene%step(1), pressure_on(4, 3, 3.0_wp))
+      call add_load(scene%step(1), pressure_on(3, 3, 3.0_wp))
+      call system_init(system, scene, error)
+      if (allocated(error)) return
+      call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      system%matrix%value = 0.0_dp
+      call shake(u, 0.2_wp)
+      up = 0.0_wp
+      call loads_add(system%loads, scene, system%solid, instant_t(), u, up, 0.5_wp, &
+         system%matrix%value)
+      n = system%numbering%n_unknown
+      do j = 1, n
+         u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) = &
+            u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) + 1.0_wp
+         call forces(system, scene, instant_t(), u, up)
+         u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) = &
+            u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) - 1.0_wp
+         call forces(system, scene, instant_t(), u, down)
+         do i = 1, n
+            slope = up(2 - mod(system%numbering%dof(i), 2), (system%numbering%dof(i) + 1)/2) &
+               - down(2 - mod(system%numbering%dof(i), 2), (system%numbering%dof(i) + 1)/2)
+            slot = csr_find(system%matrix, i, j)
+            actual = 0.0_wp
+            if (slot > 0) actual = real(system%matrix%value(slot), wp)
+            call check_near(error, actual, -0.5_wp*slope, tol_dp, 3.0_wp, "stiffness")
+         end do
+      end do
+   end subroutine test_stiffness
+
+   subroutine test_gravity(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      type(load_t) :: load(8)
+      real(wp) :: u(2, 9), force(2, 9)
+      integer :: e
+
+      call make_block(scene, "CPE3", [2, 2], block)
+      call shake(u, 0.2_wp)
+      scene%x(:, 5) = scene%x(:, 5) + u(:, 5)
+      scene%material(1)%density = 0.25_wp
+      scene%section(1)%thickness = 2.0_wp
+      do e = 1, 8
+         load(e)%kind = load_gravity
+         load(e)%target = e
+         load(e)%value = 10.0_wp
+         load(e)%direction = [0.6_wp, -0.8_wp, 0.0_wp]
+      end do
+      call prepare(scene, .false., .true., load, system, error)
+      if (allocated(error)) return
+      call forces(system, scene, instant_t(), u, force)
+      call check_near(error, sum(force, dim=2), 0.25_wp*2.0_wp*4.0_wp*10.0_wp*[0.6_wp, -0.8_wp], &
+         tol, 20.0_wp, "weight of density 1/4, thickness 2, area 4")
+   end subroutine test_gravity
+
+   !> (1, 0), (2, 4), (3, 2): constant outside; one load sees step time, the other total time.
+   subroutine test_amplitude(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      type(load_t) :: load(2)
+      real(wp) :: u(2, 9), force(2, 9)
+      real(wp), parameter :: time(7) = [0.5_wp, 1.0_wp, 1.25_wp, 2.0_wp, 2.5_wp, 3.0_wp, 9.0_wp], &
+         factor(7) = [0.0_wp, 0.0_wp, 1.0_wp, 4.0_wp, 3.0_wp, 2.0_wp, 2.0_wp]
+      integer :: k
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      deallocate(scene%amplitude)
+      allocate(scene%amplitude(2))
+      do k = 1, 2
+         scene%amplitude(k) = amplitude_t(name="A", time=[1.0_wp, 2.0_wp, 3.0_wp], &
+            value=[0.0_wp, 4.0_wp, 2.0_wp], is_total_time=k == 2)
+         load(k)%kind = load_point
+         load(k)%target = 5
+         load(k)%place = k
+         load(k)%value = 10.0_wp
+         load(k)%amplitude = k
+      end do
+      call prepare(scene, .true., .true., load, system, error)
+      if (allocated(error)) return
+      u = 0.0_wp
+      do k = 1, 7
+         call forces(system, scene, instant_t(time(k), time(8 - k)), u, force)
+         call check_near(error, force(:, 5), 10.0_wp*[factor(k), factor(8 - k)], 0.0_wp, 1.0_wp, &
+            "forces in x and y")
+      end do
+   end subroutine test_amplitude
+
+   !> From the value of the step before, over the 2 units of time of the step; dynamic: at once.
+   subroutine test_ramp(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      type(load_t) :: load
+      real(wp) :: u(2, 9), force(2, 9)
+      integer :: k
+
+      load%kind = load_point
+      load%target = 5
+      load%place = 1
+      load%value = 10.0_wp
+      load%value_start = 2.0_wp
+      u = 0.0_wp
+      do k = 1, 2
+         call make_block(scene, "CPE4", [2, 2], block)
+         call prepare(scene, k == 1, .true., [load], system, error)
+         if (allocated(error)) return
+         call forces(system, scene, instant_t(0.5_wp, 77.5_wp), u, force)
+         call check_near(error, force(1, 5), merge(4.0_wp, 10.0_wp, k == 1), 0.0_wp, 1.0_wp, &
+            "at a quarter of the step")
+      end do
+   end subroutine test_ramp
+
+   !> Ramp in a static step, at once in a dynamic one, along an amplitude with its slope, frozen.
+   subroutine test_motion(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(prescribed_t) :: prescribed
+      type(instant_t), parameter :: instant = instant_t(0.5_wp, 1.5_wp)
+      real(wp) :: u, v
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      call add_step(scene, .true., 0.5_wp, 4)
+      call add_step(scene, .false., 0.5_wp, 4)
+      prescribed%value = 4.0_wp
+      call prescribed_motion(scene, scene%step(1), prescribed, instant, 2.0_wp, u, v)
+      call check_near(error, [u, v], [2.5_wp, 0.0_wp], 0.0_wp, 1.0_wp, "static ramp from 2 to 4")
+      call prescribed_motion(scene, scene%step(2), prescribed, instant, 2.0_wp, u, v)
+      call check_near(error, [u, v], [4.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "dynamic: at once")
+      deallocate(scene%amplitude)
+      allocate(scene%amplitude(1))
+      scene%amplitude(1) = amplitude_t(name="A", time=[1.0_wp, 2.0_wp], value=[0.0_wp, 8.0_wp], &
+         is_total_time=.true.)
+      prescribed%amplitude = 1
+      call prescribed_motion(scene, scene%step(2), prescribed, instant, 2.0_wp, u, v)
+      call check_near(error, [u, v], [16.0_wp, 32.0_wp], 0.0_wp, 1.0_wp, "along an amplitude")
+      prescribed%is_frozen = .true.
+      call prescribed_motion(scene, scene%step(2), prescribed, instant, 2.0_wp, u, v)
+      call check_near(error, [u, v], [2.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "frozen")
+   end subroutine test_motion
+
+end module test_loads

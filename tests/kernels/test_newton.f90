@@ -1,0 +1,295 @@
+!> Newton's method: order of convergence with and without contact, damping, and how it fails.
+module test_newton
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraints, only : constraint_set_t, constraints_select
+   use emcon_correction, only : correction_free, correction_reset, correction_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_loads, only : instant_t
+   use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_inverted, &
+      newton_singular, newton_solve, newton_t
+   use emcon_scene, only : load_point, load_t, method_null_space, method_saddle_point, scene_t
+   use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_system, only : pose_t, system_begin_step, system_init, system_t
+   use emcon_text, only : to_text
+   use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, &
+      shake, young
+   implicit none
+   private
+   public :: collect_newton
+
+   !> All that one solution needs and gives.
+   type :: trial_t
+      type(system_t) :: system
+      type(newton_t) :: newton
+      type(correction_t) :: correction
+      type(constraint_set_t) :: set
+      type(pose_t) :: pose
+      real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :)
+      integer :: status = 0
+   end type trial_t
+
+contains
+
+   subroutine collect_newton(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("quadratic convergence of a large step", test_order), &
+         test_case_t("quadratic convergence in contact", test_order_in_contact), &
+         test_case_t("nothing to solve for", test_no_unknowns), &
+         test_case_t("a step from rest to rest", test_rest), &
+         test_case_t("too few iterations", test_diverged), &
+         test_case_t("singular system", test_singular), &
+         test_case_t("inverted first guess", test_inverted), &
+         test_case_t("corrections that invert are halved", test_damping)]
+   end subroutine collect_newton
+
+   !> The first step of `scene`, a dynamic one of size `h` or, for h = 0, a static one.
+   subroutine prepare(trial, scene, h, maximum, method, error)
+      type(trial_t), intent(inout) :: trial
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h
+      integer, intent(in) :: maximum, method
+      type(error_t), allocatable, intent(out) :: error
+      type(scheme_energy_momentum_t) :: scheme
+      integer :: none(0)
+
+      call system_init(trial%system, scene, error)
+      if (allocated(error)) return
+      call system_begin_step(trial%system, scene, 1, error)
+      if (allocated(error)) return
+      call newton_init(trial%newton, trial%system%numbering%n_unknown, size(scene%x, 2), &
+         1.0e3_wp*epsilon(1.0_wp), maximum)
+      call correction_reset(trial%correction, method)
+      call constraints_select(trial%set, none)
+      trial%pose%is_end = .not. h > 0.0_wp
+      if (h > 0.0_wp) trial%pose = scheme%pose(instant_t(), h)
+      trial%u0 = scene%u0
+      trial%v0 = scene%v0
+      trial%du = 0.0_wp*scene%u0
+   end subroutine prepare
+
+   subroutine solve(trial, scene, error)
+      type(trial_t), intent(inout) :: trial
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+
+      call newton_solve(trial%newton, trial%system, scene, trial%correction, trial%set, &
+         trial%pose, trial%u0, trial%v0, trial%system%zero, trial%du, trial%status, error)
+   end subroutine solve
+
+   !> The largest r(k+1)/r(k)^2 of the relative residuals above round-off, from 0.1 on: bounded, and
+   !> of size 1 for these blocks of unit cells, only if the convergence is quadratic.
+   pure real(wp) function quadratic_constant(newton)
+      type(newton_t), intent(in) :: newton
+      integer :: k
+
+      quadratic_constant = 0.0_wp
+      do k = 2, newton%n_iteration + 1
+         associate (r => newton%history(k - 1:k))
+            if (r(1) > 0.1_wp .or. r(2) < 1.0e4_wp*epsilon(1.0_wp)) cycle
+            quadratic_constant = max(quadratic_constant, r(2)/r(1)**2)
+         end associate
+      end do
+   end function quadratic_constant
+
+   !> At least two steps count, and the constant is of size 1.
+   subroutine check_quadratic(error, trial, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(trial_t), intent(in) :: trial
+      character(len=*), intent(in) :: what
+      real(wp) :: constant
+
+      constant = quadratic_constant(trial%newton)
+      call check_equal(error, trial%status, newton_converged, what // ": status")
+      call check_true(error, constant > 0.0_wp .and. constant < 5.0_wp, &
+         what // ": r1 < 5 r0^2, found " // to_text(constant))
+      associate (r => trial%newton%history(:trial%newton%n_iteration + 1))
+         call check_true(error, count(r < 0.1_wp .and. r > 1.0e4_wp*epsilon(1.0_wp)) >= 3, &
+            what // ": three residuals between 0.1 and round-off")
+      end associate
+   end subroutine check_quadratic
+
+   !> A spinning, stretching block from a poor guess: no motion at all.
+   subroutine test_order(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., 0.2_wp, 1)
+      call shake(scene%u0, 0.1_wp)
+      scene%v0(1, :) = -2.0_wp*scene%x(2, :) + 0.5_wp*scene%x(1, :)
+      scene%v0(2, :) = 2.0_wp*scene%x(1, :)
+      call prepare(trial, scene, 0.2_wp, 20, method_null_space, error)
+      if (allocated(error)) return
+      call solve(trial, scene, error)
+      if (allocated(error)) return
+      call check_quadratic(error, trial, "large step")
+      call check_true(error, trial%newton%n_iteration <= 8, &
+         "iterations: " // to_text(trial%newton%n_iteration))
+      call correction_free(trial%correction)
+   end subroutine test_order
+
+   !> With three active constraints on a bent surface, by either method.
+   subroutine test_order_in_contact(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(trial_t) :: trial
+      integer :: method
+
+      do method = method_null_space, method_saddle_point
+         call make_two_blocks(scene, 0.05_wp, lower, upper)
+         call add_step(scene, .false., 0.1_wp, 1)
+         call shake(scene%u0, 0.02_wp)
+         scene%v0(1, 11:) = 1.0_wp
+         scene%v0(2, 11:) = -2.0_wp
+         call prepare(trial, scene, 0.1_wp, 20, method, error)
+         if (allocated(error)) return
+         call constraints_select(trial%set, [1, 2, 3])
+         call trial%system%contact(1)%contact%begin_step(scene%x, trial%u0, trial%du)
+         call solve(trial, scene, error)
+         if (allocated(error)) return
+         call check_quadratic(error, trial, "method " // to_text(method))
+         call check_near(error, trial%set%defect, [0.0_wp, 0.0_wp, 0.0_wp], &
+            16.0_wp*epsilon(1.0_wp), 1.0_wp, "gaps")
+         call correction_free(trial%correction)
+         if (allocated(error)) return
+      end do
+   end subroutine test_order_in_contact
+
+   subroutine test_no_unknowns(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+
+      call make_block(scene, "CPE3", [1, 1], block)
+      call add_step(scene, .true., 1.0_wp, 1)
+      call clamp(scene%step(1), [1, 2, 3, 4])
+      call prepare(trial, scene, 0.0_wp, 20, method_null_space, error)
+      if (allocated(error)) return
+      trial%du(1, 2) = 0.1_wp
+      call solve(trial, scene, error)
+      if (allocated(error)) return
+      call check_equal(error, trial%status, newton_converged, "status")
+      call check_equal(error, trial%newton%n_solve, 0, "linear systems")
+      call check_true(error, maxval(abs(trial%system%residual)) > 0.0_wp, "reactions are there")
+      call correction_free(trial%correction)
+   end subroutine test_no_unknowns
+
+   subroutine test_rest(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+
+      call make_block(scene, "CPE3", [2, 2], block)
+      call add_step(scene, .false., 1.0_wp, 1)
+      call prepare(trial, scene, 1.0_wp, 20, method_null_space, error)
+      if (allocated(error)) return
+      call solve(trial, scene, error)
+      if (allocated(error)) return
+      call check_equal(error, [trial%status, trial%newton%n_solve], [newton_converged, 0], "solves")
+      call correction_free(trial%correction)
+   end subroutine test_rest
+
+   subroutine test_diverged(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., 0.2_wp, 1)
+      scene%v0(1, :) = -2.0_wp*scene%x(2, :)
+      scene%v0(2, :) = 2.0_wp*scene%x(1, :)
+      call prepare(trial, scene, 0.2_wp, 2, method_null_space, error)
+      if (allocated(error)) return
+      call solve(trial, scene, error)
+      if (allocated(error)) return
+      call check_equal(error, trial%status, newton_diverged, "status")
+      call check_equal(error, trial%newton%n_iteration, 2, "iterations")
+      call correction_free(trial%correction)
+   end subroutine test_diverged
+
+   !> Statics of a free block under a load.
+   subroutine test_singular(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+      type(load_t) :: load
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .true., 1.0_wp, 1)
+      load%kind = load_point
+      load%target = 3
+      load%place = 1
+      load%value = 1.0_wp
+      call add_load(scene%step(1), load)
+      call prepare(trial, scene, 0.0_wp, 20, method_null_space, error)
+      if (allocated(error)) return
+      trial%pose%load_instant%step_time = 1.0_wp
+      call solve(trial, scene, error)
+      if (allocated(error)) return
+      call check_true(error, trial%status /= newton_converged, "no solution is claimed")
+      call check_true(error, any(trial%status == [newton_singular, newton_diverged, &
+         newton_inverted]), "status")
+      call correction_free(trial%correction)
+   end subroutine test_singular
+
+   subroutine test_inverted(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      call prepare(trial, scene, 0.1_wp, 20, method_null_space, error)
+      if (allocated(error)) return
+      trial%du(1, [3, 7]) = 1.5_wp
+      call solve(trial, scene, error)
+      if (allocated(error)) return
+      call check_equal(error, trial%status, newton_inverted, "status")
+      call check_equal(error, trial%newton%inverted_element, 3, "element")
+      call correction_free(trial%correction)
+   end subroutine test_inverted
+
+   !> Dead loads that by linear theory press the block to three times its height.
+   subroutine test_damping(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+      type(load_t) :: load
+      integer :: i
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .true., 1.0_wp, 1)
+      call clamp(scene%step(1), [1, 2])
+      load%kind = load_point
+      load%place = 2
+      load%value = -1.5_wp*young
+      do i = 3, 4
+         load%target = i
+         call add_load(scene%step(1), load)
+      end do
+      call prepare(trial, scene, 0.0_wp, 60, method_null_space, error)
+      if (allocated(error)) return
+      trial%pose%load_instant%step_time = 1.0_wp
+      call solve(trial, scene, error)
+      if (allocated(error)) return
+      call check_equal(error, trial%status, newton_converged, "status")
+      call check_true(error, all(trial%du(2, 3:) < -0.5_wp .and. trial%du(2, 3:) > -1.0_wp), &
+         "pressed flat, not through")
+      call check_near(error, trial%system%response%force(2, 3:), [load%value, load%value], &
+         1.0e4_wp*epsilon(1.0_wp), young, "internal forces balance the loads")
+      call correction_free(trial%correction)
+   end subroutine test_damping
+
+end module test_newton

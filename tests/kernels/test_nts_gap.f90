@@ -1,0 +1,302 @@
+!> The node-to-segment gap: closed forms, corners, identity, momenta, derivatives, rigid motions.
+module test_nts_gap
+   use check, only : check_near, check_true, test_case_t
+   use emcon_dgrad10, only : dg_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_nts_gap, only : nts_gap, nts_gap_value
+   use emcon_text, only : to_text
+   use referee, only : qp
+   use small_scenes, only : shake
+   implicit none
+   private
+   public :: collect_nts_gap
+
+   real(wp), parameter :: eps = epsilon(1.0_wp)
+   !> Some 50 roundings of quantities of size 1.
+   real(wp), parameter :: tol = 64.0_wp*eps
+   !> Sharp corners, and corners rounded over this length.
+   real(wp), parameter :: rounding(2) = [0.0_wp, 0.05_wp]
+   !> Slave node, edge, node before it, node after it; the body is below the edge.
+   real(wp), parameter :: flat(2, 5) = reshape([0.3_wp, 0.4_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+      2.1_wp, 0.0_wp, -0.9_wp, 0.0_wp], [2, 5])
+
+contains
+
+   subroutine collect_nts_gap(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("flat surface", test_flat), &
+         test_case_t("corners: maximum if convex, minimum if concave", test_corner), &
+         test_case_t("continuous across the bisector", test_continuity), &
+         test_case_t("rounded corners", test_rounded), &
+         test_case_t("identity and values", test_identity), &
+         test_case_t("tiny steps", test_tiny), &
+         test_case_t("momenta", test_momenta), &
+         test_case_t("gradient and second derivatives", test_derivatives), &
+         test_case_t("rigid motions leave the gap", test_rigid)]
+   end subroutine collect_nts_gap
+
+   !> Distance from a line, whichever neighbours there are, at any angle.
+   subroutine test_flat(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x(2, 5), gap, xi, place
+      integer :: i
+
+      do i = 0, 30
+         place = 0.2_wp*real(i - 10, wp)         ! from before the edge to beyond it
+         x = flat
+         x(:, 1) = [1.0_wp - place, 0.3_wp*real(mod(i, 3) - 1, wp)]
+         x = turned(0.7_wp*real(i, wp), x)
+         call nts_gap_value(x, 4, 5, 0.0_wp, gap, xi)
+         call check_near(error, gap, 0.3_wp*real(mod(i, 3) - 1, wp), tol, 1.0_wp, "gap")
+         call check_near(error, xi, place, tol, 4.0_wp, "projection")
+         call nts_gap_value(x(:, :3), 0, 0, 0.0_wp, gap, xi)
+         call check_near(error, gap, 0.3_wp*real(mod(i, 3) - 1, wp), tol, 1.0_wp, "lonely edge")
+      end do
+   end subroutine test_flat
+
+   pure function turned(angle, x) result(y)
+      real(wp), intent(in) :: angle, x(:, :)
+      real(wp) :: y(2, size(x, 2))
+
+      y(1, :) = cos(angle)*x(1, :) - sin(angle)*x(2, :)
+      y(2, :) = sin(angle)*x(1, :) + cos(angle)*x(2, :)
+   end function turned
+
+   !> Gap over the line from `a` to `b`.
+   pure real(wp) function line_gap(s, a, b)
+      real(wp), intent(in) :: s(2), a(2), b(2)
+
+      line_gap = ((b(2) - a(2))*(s(1) - a(1)) - (b(1) - a(1))*(s(2) - a(2))) &
+         /sqrt(dot_product(b - a, b - a))
+   end function line_gap
+
+   !> Around a corner of up to 120 degrees, before and after the edge, inside and outside.
+   subroutine test_corner(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x(2, 5), gap, xi, turn, own, other, expected, move(2, 1)
+      integer :: i, n_crossed
+
+      n_crossed = 0
+      do i = 1, 400
+         x = flat
+         call random_number(turn)
+         turn = 4.2_wp*(turn - 0.5_wp)           ! > 0: convex
+         x(:, 5:5) = turned(turn, reshape([-0.9_wp, 0.0_wp], [2, 1]))
+         call shake(move, 0.4_wp)
+         x(:, 1) = move(:, 1)
+         own = line_gap(x(:, 1), x(:, 2), x(:, 3))
+         other = line_gap(x(:, 1), x(:, 3), x(:, 5))
+         expected = merge(max(own, other), min(own, other), turn > 0.0_wp)
+         if (abs(expected - own) > tol) n_crossed = n_crossed + 1
+         call nts_gap_value(x(:, [1, 2, 3, 5]), 0, 4, 0.0_wp, gap, xi)
+         call check_near(error, gap, expected, tol, 1.0_wp, "corner after the edge")
+         ! The same corner seen from the other edge: then it lies before that one.
+         call nts_gap_value(x(:, [1, 3, 5, 2]), 4, 0, 0.0_wp, gap, xi)
+         call check_near(error, gap, expected, tol, 1.0_wp, "corner before the edge")
+      end do
+      call check_true(error, n_crossed > 100, "many nodes are over the neighbour")
+   end subroutine test_corner
+
+   !> Just left and just right of the bisector of a corner.
+   subroutine test_continuity(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x(2, 4), gap(2), xi, turn, way(2)
+      real(wp), parameter :: side(2) = [-1.0_wp, 1.0_wp]
+      integer :: i, k
+
+      do i = -10, 10
+         turn = 0.2_wp*real(i, wp)
+         x = flat(:, :4)
+         x(:, 4:4) = turned(turn, reshape([-0.9_wp, 0.0_wp], [2, 1]))
+         way = [cos(0.5_wp*turn), sin(0.5_wp*turn)]
+         do k = 1, 2
+            x(:, 1) = 0.3_wp*[-way(2), way(1)] + side(k)*sqrt(eps)*way
+            call nts_gap_value(x, 0, 4, 0.0_wp, gap(k), xi)
+         end do
+         call check_near(error, gap(1), gap(2), 4.0_wp*sqrt(eps), 1.0_wp, "both sides")
+         x(:, 1) = x(:, 3)
+         call nts_gap_value(x, 0, 4, 0.0_wp, gap(1), xi)
+         call check_near(error, gap(1), 0.0_wp, tol, 1.0_wp, "at the corner")
+      end do
+   end subroutine test_continuity
+
+   !> A rounded corner stays within half the rounding, times the bend, of the sharp one.
+   subroutine test_rounded(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x(2, 5), dx(2, 5), sharp, round, xi
+      integer :: i
+
+      do i = 1, 200
+         call draw(x, dx)
+         call nts_gap_value(x, 4, 5, 0.0_wp, sharp, xi)
+         call nts_gap_value(x, 4, 5, rounding(2), round, xi)
+         call check_near(error, round, sharp, 0.5_wp, 2.0_wp*rounding(2), "gap")
+         x = flat
+         call random_number(x(:, 1))
+         call nts_gap_value(x, 4, 5, rounding(2), round, xi)
+         call check_near(error, round, x(2, 1), tol, 1.0_wp, "nothing to round on a flat surface")
+      end do
+   end subroutine test_rounded
+
+   !> Chains of three edges and their motion of up to a third of an edge, slave node across both
+   !> corners. Edges are in random places of the array.
+   subroutine draw(x0, dx)
+      real(wp), intent(out) :: x0(2, 5), dx(2, 5)
+      real(wp) :: move(2, 5)
+
+      call shake(move, 0.3_wp)
+      call shake(dx, 0.35_wp)
+      x0 = flat + move
+      call random_number(x0(:, 1))
+      x0(:, 1) = [-0.5_wp, -0.5_wp] + [2.0_wp, 1.0_wp]*x0(:, 1)
+   end subroutine draw
+
+   subroutine test_identity(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), gap(2), xi(2), width
+      type(dg_t) :: a
+      integer :: i, n_crossed
+
+      n_crossed = 0
+      do i = 1, 500
+         call draw(x0, dx)
+         width = rounding(1 + mod(i, 2))
+         a = nts_gap(x0, dx, 4, 5, width)
+         g = reshape(a%g, [2, 5])
+         call nts_gap_value(x0, 4, 5, width, gap(1), xi(1))
+         call nts_gap_value(x0 + dx, 4, 5, width, gap(2), xi(2))
+         if (any(abs(xi - 0.5_wp) > 0.7_wp)) n_crossed = n_crossed + 1
+         call check_near(error, [a%f0, a%f1], gap, tol, 2.0_wp, "values")
+         call check_near(error, a%df, gap(2) - gap(1), tol, 4.0_wp, "increment")
+         call check_near(error, sum(g*dx), a%df, tol, sum(abs(g*dx)), "identity")
+         a = nts_gap(x0(:, :3), dx(:, :3), 0, 0, 0.0_wp)
+         g = reshape(a%g, [2, 5])
+         call check_near(error, sum(g*dx), a%df, tol, sum(abs(g*dx)), "lonely edge")
+         call check_near(error, g(:, 4:), 0.0_wp*g(:, 4:), 0.0_wp, 1.0_wp, "absent nodes")
+      end do
+      call check_true(error, n_crossed > 100, "corners are passed")
+   end subroutine test_identity
+
+   !> The gap in quadruple precision.
+   pure real(qp) function exact_gap(x)
+      real(qp), intent(in) :: x(2, 5)
+      real(qp) :: own, before, after, bisector(2)
+
+      own = exact_line(x(:, 1), x(:, 2), x(:, 3))
+      before = exact_line(x(:, 1), x(:, 4), x(:, 2))
+      after = exact_line(x(:, 1), x(:, 3), x(:, 5))
+      exact_gap = own
+      bisector = unit(x(:, 2) - x(:, 4)) + unit(x(:, 3) - x(:, 2))
+      if (dot_product(bisector, x(:, 1) - x(:, 2)) < 0.0_qp) exact_gap = exact_gap + before - own
+      bisector = unit(x(:, 3) - x(:, 2)) + unit(x(:, 5) - x(:, 3))
+      if (dot_product(bisector, x(:, 1) - x(:, 3)) > 0.0_qp) exact_gap = exact_gap + after - own
+   end function exact_gap
+
+   pure function unit(a) result(e)
+      real(qp), intent(in) :: a(2)
+      real(qp) :: e(2)
+
+      e = a/sqrt(dot_product(a, a))
+   end function unit
+
+   pure real(qp) function exact_line(s, a, b)
+      real(qp), intent(in) :: s(2), a(2), b(2)
+      real(qp) :: e(2)
+
+      e = unit(b - a)
+      exact_line = e(2)*(s(1) - a(1)) - e(1)*(s(2) - a(2))
+   end function exact_line
+
+   !> `df` relative to its terms: against quadruple precision as far as that reaches, and g.dx
+   !> against it down to the smallest motions.
+   subroutine test_tiny(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x0(2, 5), dx(2, 5), expected, g(2, 5)
+      real(qp) :: q0(2, 5)
+      type(dg_t) :: a
+      integer :: k
+
+      do k = 0, -minexponent(1.0_wp) - 12, 4
+         call draw(x0, dx)
+         dx = scale(dx, -k)
+         a = nts_gap(x0, dx, 4, 5, 0.0_wp)
+         g = reshape(a%g, [2, 5])
+         call check_near(error, sum(g*dx), a%df, tol, sum(abs(g*dx)), "g.dx at 2^-" // to_text(k))
+         if (k > digits(1.0_qp) - digits(1.0_wp)) cycle
+         q0 = real(x0, qp)
+         expected = real(exact_gap(q0 + real(dx, qp)) - exact_gap(q0), wp)
+         call check_near(error, a%df, expected, tol, 4.0_wp*sum(abs(dx)), &
+            "df at 2^-" // to_text(k))
+      end do
+   end subroutine test_tiny
+
+   subroutine test_momenta(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), mid(2, 5)
+      type(dg_t) :: a
+      integer :: i
+
+      do i = 1, 200
+         call draw(x0, dx)
+         mid = x0 + 0.5_wp*dx
+         a = nts_gap(x0, dx, 4, 5, rounding(1 + mod(i, 2)))
+         g = reshape(a%g, [2, 5])
+         call check_near(error, sum(g, dim=2), [0.0_wp, 0.0_wp], tol, sum(abs(g)), "linear")
+         call check_near(error, sum(mid(1, :)*g(2, :) - mid(2, :)*g(1, :)), 0.0_wp, tol, &
+            sum(abs(g))*maxval(abs(mid)), "angular")
+      end do
+   end subroutine test_momenta
+
+   !> c against differences of the value, h against those of g. Steps of eps^(1/3): a few
+   !> eps^(2/3) of curvature. Where a bisector is crossed within the step of the difference, the
+   !> gradient jumps; such a case has no difference to compare with.
+   subroutine test_derivatives(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x0(2, 5), dx(2, 5), way(2, 5), step, gap(2), xi, width
+      type(dg_t) :: a, up, down
+      integer :: i, k, n, j
+
+      step = eps**(1.0_wp/3.0_wp)
+      do i = 1, 40
+         call draw(x0, dx)
+         width = rounding(1 + mod(i, 2))
+         a = nts_gap(x0, dx, 4, 5, width)
+         do k = 1, 5
+            do n = 1, 2
+               j = 2*k - 2 + n
+               way = 0.0_wp
+               way(n, k) = step
+               up = nts_gap(x0, dx + way, 4, 5, width)
+               down = nts_gap(x0, dx - way, 4, 5, width)
+               if (maxval(abs(up%c - down%c)) > 1.0e3_wp*step) cycle
+               call nts_gap_value(x0 + dx + way, 4, 5, width, gap(1), xi)
+               call nts_gap_value(x0 + dx - way, 4, 5, width, gap(2), xi)
+               call check_near(error, a%c(j), (gap(1) - gap(2))/(2.0_wp*step), &
+                  1.0e3_wp*step**2, 1.0_wp, "gradient")
+               call check_near(error, a%h(:, j), (up%g - down%g)/(2.0_wp*step), &
+                  1.0e3_wp*step**2, maxval(abs(a%h)), "column " // to_text(j))
+            end do
+         end do
+      end do
+   end subroutine test_derivatives
+
+   !> A step that only turns and moves everything: no change of the gap.
+   subroutine test_rigid(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x0(2, 5), dx(2, 5)
+      type(dg_t) :: a
+      integer :: i
+
+      do i = 1, 100
+         call draw(x0, dx)
+         dx = turned(0.06_wp*real(i, wp), x0) + 5.0_wp - x0
+         a = nts_gap(x0, dx, 4, 5, rounding(1 + mod(i, 2)))
+         call check_near(error, a%df, 0.0_wp, tol, 20.0_wp, "increment")
+         call check_near(error, a%f1, a%f0, tol, 20.0_wp, "values")
+      end do
+   end subroutine test_rigid
+
+end module test_nts_gap

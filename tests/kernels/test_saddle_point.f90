@@ -1,0 +1,117 @@
+!> Saddle point: the system of the paper, and the same correction as by null space.
+module test_saddle_point
+   use check, only : check_near, check_true, test_case_t
+   use emcon_csr, only : csr_multiply_transposed
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
+      null_space_solve, null_space_t
+   use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
+      saddle_point_t
+   use random_constraints, only : make_problem, problem_t, tol_dp
+   use sparse_samples, only : dense_of
+   implicit none
+   private
+   public :: collect_saddle_point
+
+contains
+
+   subroutine collect_saddle_point(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("blocks of the matrix", test_blocks), &
+         test_case_t("same as null space", test_null_space), &
+         test_case_t("dependent constraints are singular", test_singular)]
+   end subroutine collect_saddle_point
+
+   !> [N, -s Gb^T; s G1, 0].
+   subroutine test_blocks(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(saddle_point_t) :: saddle
+      real(wp), allocatable :: full(:, :)
+      logical :: is_singular
+      integer :: n
+      real(wp) :: s
+
+      call make_problem(problem)
+      call saddle_point_init(saddle, problem%set, problem%matrix, error)
+      if (allocated(error)) return
+      call saddle_point_factorise(saddle, problem%set, problem%matrix, is_singular, error)
+      if (allocated(error)) return
+      call check_true(error, .not. is_singular, "it is regular")
+      n = problem%numbering%n_unknown
+      full = real(dense_of(saddle%full), wp)
+      s = real(saddle%scale, wp)
+      call check_near(error, full(:n, :n), real(dense_of(problem%matrix), wp), 0.0_wp, 1.0_wp, "N")
+      call check_near(error, full(:n, n + 1:), &
+         -s*transpose(real(dense_of(problem%set%force_rows), wp)), tol_dp, s, "Gb")
+      call check_near(error, full(n + 1:, :n), s*real(dense_of(problem%set%gap_rows), wp), &
+         tol_dp, s, "G1")
+      call check_near(error, full(n + 1:, n + 1:), 0.0_wp*full(n + 1:, n + 1:), 0.0_wp, 1.0_wp, "0")
+      call saddle%solver%free()
+   end subroutine test_blocks
+
+   !> One takes the residual with the contact forces of the old multipliers, the other without.
+   subroutine test_null_space(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(saddle_point_t) :: saddle
+      type(null_space_t) :: null_space
+      real(wp), allocatable :: dq(:, :), lam(:, :), contact(:), rest(:)
+      logical :: is_singular
+      integer :: k
+
+      do k = 1, 10
+         call make_problem(problem)
+         allocate(dq(size(problem%residual), 2), lam(problem%set%n, 2))
+         allocate(contact(size(problem%residual)))
+         call csr_multiply_transposed(problem%set%force_rows, problem%set%lam, contact)
+
+         call saddle_point_init(saddle, problem%set, problem%matrix, error)
+         if (allocated(error)) return
+         call saddle_point_factorise(saddle, problem%set, problem%matrix, is_singular, error)
+         if (allocated(error)) return
+         call saddle_point_solve(saddle, problem%set, problem%residual - contact, dq(:, 1), &
+            lam(:, 1), error)
+         if (allocated(error)) return
+         lam(:, 1) = problem%set%lam + lam(:, 1)
+
+         call null_space_init(null_space, problem%set, problem%matrix, problem%numbering, error)
+         if (allocated(error)) return
+         call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
+         if (allocated(error)) return
+         call null_space_solve(null_space, problem%set, problem%matrix, &
+            problem%residual - contact, dq(:, 2), error)
+         if (allocated(error)) return
+         rest = problem%residual + matmul(real(dense_of(problem%matrix), wp), dq(:, 2))
+         call null_space_multipliers(null_space, problem%set, rest, lam(:, 2))
+
+         call check_near(error, dq(:, 1), dq(:, 2), tol_dp, 1.0_wp + maxval(abs(dq)), "dq")
+         call check_near(error, lam(:, 1), lam(:, 2), tol_dp, 10.0_wp + maxval(abs(lam)), "lam")
+         deallocate(dq, lam, contact)
+         if (allocated(error)) return
+      end do
+      call saddle%solver%free()
+      call null_space%solver%free()
+   end subroutine test_null_space
+
+   subroutine test_singular(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(saddle_point_t) :: saddle
+      logical :: is_singular
+
+      call make_problem(problem)
+      problem%set%force_rows%value = 0.0_dp
+      problem%set%gap_rows%value = 0.0_dp
+      call saddle_point_init(saddle, problem%set, problem%matrix, error)
+      if (allocated(error)) return
+      call saddle_point_factorise(saddle, problem%set, problem%matrix, is_singular, error)
+      if (allocated(error)) return
+      call check_true(error, is_singular, "it is singular")
+      call saddle%solver%free()
+   end subroutine test_singular
+
+end module test_saddle_point

@@ -1,0 +1,200 @@
+!> Time stepping schemes: conservation, second order, reversibility.
+module test_scheme
+   use check, only : check_near, check_true, test_case_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_ledger, only : body_momenta, ledger_t
+   use emcon_loads, only : instant_t
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
+      march_t
+   use emcon_scene, only : scene_t
+   use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_scheme_static, only : scheme_static_t
+   use emcon_system, only : pose_t
+   use emcon_text, only : to_text
+   use small_scenes, only : add_step, block_t, make_block
+   implicit none
+   private
+   public :: collect_scheme
+
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+
+contains
+
+   subroutine collect_scheme(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("evaluation and velocity", test_pose), &
+         test_case_t("free flight conserves over 1000 steps", test_free_flight), &
+         test_case_t("second order", test_order), &
+         test_case_t("reversible", test_reversible), &
+         test_case_t("momenta of the bodies", test_bodies)]
+   end subroutine collect_scheme
+
+   subroutine test_pose(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scheme_energy_momentum_t) :: dynamic
+      type(scheme_static_t) :: static
+      type(pose_t) :: pose
+
+      pose = dynamic%pose(instant_t(1.0_wp, 10.0_wp), 0.5_wp)
+      call check_near(error, [pose%mass_scale*pose%rate, pose%mass_scale*pose%v_weight, &
+         pose%load_instant%step_time, pose%load_instant%total_time], &
+         [8.0_wp, 4.0_wp, 1.25_wp, 10.25_wp], 0.0_wp, 1.0_wp, "mid-point")
+      call check_true(error, .not. pose%is_end, "discrete gradients")
+      call check_near(error, dynamic%velocity(0.5_wp, 3.0_wp, 2.0_wp), 5.0_wp, 0.0_wp, 1.0_wp, &
+         "mean velocity is du/h")
+      pose = static%pose(instant_t(1.0_wp, 10.0_wp), 0.5_wp)
+      call check_near(error, [pose%mass_scale, pose%load_instant%step_time, &
+         pose%load_instant%total_time], [0.0_wp, 1.5_wp, 10.5_wp], 0.0_wp, 1.0_wp, "end")
+      call check_true(error, pose%is_end, "gradients at the end")
+      call check_near(error, static%velocity(0.5_wp, 3.0_wp, 2.0_wp), 0.0_wp, 0.0_wp, 1.0_wp, &
+         "rest")
+   end subroutine test_pose
+
+   !> One element that flies, spins and pulsates, with `n` steps of size `h`.
+   subroutine make_flight(scene, h, n)
+      type(scene_t), intent(out) :: scene
+      real(wp), intent(in) :: h
+      integer, intent(in) :: n
+      type(block_t) :: block
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .false., h, n)
+      scene%u0(:, 3) = [0.2_wp, 0.1_wp]
+      scene%v0(1, :) = 1.0_wp - 2.0_wp*scene%x(2, :) + 0.5_wp*scene%x(1, :)
+      scene%v0(2, :) = -0.5_wp + 2.0_wp*scene%x(1, :)
+   end subroutine make_flight
+
+   subroutine fly(scene, n, march, error)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: n
+      type(march_t), intent(inout) :: march
+      type(error_t), allocatable, intent(out) :: error
+      type(increment_t) :: increment
+      integer :: i
+
+      do i = 1, n
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+      end do
+   end subroutine fly
+
+   !> px, py, lz and total to 1e-12 at every 50th step; to 1e-11 at the largest h, some periods of
+   !> the vibration and cut now and then: it flies so far that u itself is rounded by 1e-14.
+   subroutine test_free_flight(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(ledger_t) :: start
+      integer :: i, k
+      real(wp), parameter :: h(4) = [0.001_wp, 0.02_wp, 0.1_wp, 0.5_wp]
+      real(wp) :: tol
+
+      do k = 1, size(h)
+         call make_flight(scene, h(k), 1000)
+         tol = merge(45.0e3_wp, 4.5e3_wp, k == 4)*eps
+         block
+            type(march_t) :: march
+
+            call march_init(march, scene, error)
+            if (allocated(error)) return
+            call march_begin_step(march, scene, 1, error)
+            if (allocated(error)) return
+            start = march%ledger
+            do i = 1, 20
+               call fly(scene, 50, march, error)
+               if (allocated(error)) return
+               associate (now => march%ledger, what => "h = " // to_text(h(k)) // ": ")
+                  call check_near(error, now%momentum, start%momentum, tol, &
+                     abs(start%momentum(2)), what // "momentum")
+                  call check_near(error, now%angular, start%angular, tol, abs(start%angular), &
+                     what // "angular momentum")
+                  call check_near(error, now%total, start%total, tol, start%total, what // "total")
+               end associate
+               if (allocated(error)) return
+            end do
+            call check_near(error, 0.25_wp*sum(march%state%u(1, :) - scene%u0(1, :)), &
+               start%momentum(1)*march%state%time, tol, march%state%time, "centre of mass")
+            call march_free(march)
+         end block
+         if (allocated(error)) return
+      end do
+   end subroutine test_free_flight
+
+   !> Positions at t = 0.4 with h, h/2, h/4: differences fall by 4 each.
+   subroutine test_order(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      real(wp) :: u(2, 4, 3), ratio
+      integer :: k, n
+
+      do k = 1, 3
+         n = 160*2**(k - 1)
+         call make_flight(scene, 0.4_wp/n, n)
+         block
+            type(march_t) :: march
+
+            call march_init(march, scene, error)
+            if (allocated(error)) return
+            call march_begin_step(march, scene, 1, error)
+            if (allocated(error)) return
+            call fly(scene, n, march, error)
+            if (allocated(error)) return
+            u(:, :, k) = march%state%u
+            call march_free(march)
+         end block
+      end do
+      ratio = sqrt(sum((u(:, :, 1) - u(:, :, 2))**2)/sum((u(:, :, 2) - u(:, :, 3))**2))
+      call check_near(error, log(ratio)/log(2.0_wp), 2.0_wp, 0.05_wp, 1.0_wp, "order")
+   end subroutine test_order
+
+   !> Forth with v, back with -v.
+   subroutine test_reversible(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+
+      call make_flight(scene, 0.05_wp, 100)
+      call march_init(march, scene, error)
+      if (allocated(error)) return
+      call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      call fly(scene, 50, march, error)
+      if (allocated(error)) return
+      march%state%v = -march%state%v
+      call fly(scene, 50, march, error)
+      if (allocated(error)) return
+      call check_near(error, march%state%u, scene%u0, 1.0e4_wp*eps, 1.0_wp, "displacements")
+      call check_near(error, march%state%v, -scene%v0, 1.0e6_wp*eps, 1.0_wp, "velocities")
+      call march_free(march)
+   end subroutine test_reversible
+
+   !> Of a block of mass 1 about the origin: closed forms of a translation with spin.
+   subroutine test_bodies(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      real(wp) :: momenta(3, 1)
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      scene%x = scene%x - 0.5_wp
+      scene%u0(1, :) = 3.0_wp
+      scene%v0(1, :) = 2.0_wp - 6.0_wp*scene%x(2, :)
+      scene%v0(2, :) = 5.0_wp + 6.0_wp*scene%x(1, :)
+      call march_init(march, scene, error)
+      if (allocated(error)) return
+      call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      call body_momenta(march%system, scene%x, march%state, momenta)
+      call check_near(error, momenta(:, 1), [2.0_wp, 5.0_wp, 15.0_wp + 6.0_wp/6.0_wp], &
+         16.0_wp*eps, 10.0_wp, "px, py, lz")
+      call check_near(error, [march%ledger%momentum, march%ledger%angular], momenta(:, 1), &
+         16.0_wp*eps, 10.0_wp, "sum over the bodies")
+      call check_near(error, march%ledger%kinetic, 0.5_wp*29.0_wp + 0.5_wp*36.0_wp/6.0_wp, &
+         16.0_wp*eps, 10.0_wp, "kinetic energy")
+   end subroutine test_bodies
+
+end module test_scheme

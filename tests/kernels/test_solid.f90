@@ -1,0 +1,214 @@
+!> All elements together: masses in closed form, assembly, bad geometry.
+module test_solid
+   use check, only : check_equal, check_error, check_near, test_case_t
+   use emcon_element, only : element_respond, element_response_t
+   use emcon_errors, only : err_input, error_t
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t
+   use small_scenes, only : add_block, block_t, make_block, shake, young
+   implicit none
+   private
+   public :: collect_solid
+
+   real(wp), parameter :: eps = epsilon(1.0_wp)
+   real(wp), parameter :: tol = 16.0_wp*eps
+
+contains
+
+   subroutine collect_solid(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("mass of a rectangle and a triangle", test_closed_forms), &
+         test_case_t("total mass and row sums of a distorted mesh", test_total), &
+         test_case_t("forces and energies are the sums over the elements", test_sums), &
+         test_case_t("translation by 1e8 costs nothing", test_translation), &
+         test_case_t("first inverted element is named", test_inverted), &
+         test_case_t("clockwise element", test_clockwise), &
+         test_case_t("element without area", test_no_area)]
+   end subroutine collect_solid
+
+   !> m/36 (4, 2, 1, 2) of a rectangle, m/12 (2, 1, 1) of a triangle.
+   subroutine test_closed_forms(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      real(wp), parameter :: mass = 3.0_wp*0.25_wp*6.0_wp, zero = 0.0_wp
+      real(wp) :: expected(4, 4)
+      integer :: i
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_block(scene, "CPE3", [1, 1], [5.0_wp, 1.0_wp], [1.0_wp, 1.0_wp], block)
+      scene%x(1, :) = 2.0_wp*scene%x(1, :)
+      scene%x(2, :) = 3.0_wp*scene%x(2, :)
+      scene%material(1)%density = 3.0_wp
+      scene%section(1)%thickness = 0.25_wp
+      call solid_init(solid, scene, error)
+      if (allocated(error)) return
+      do i = 1, 4
+         expected(:, i) = mass/36.0_wp*cshift([4.0_wp, 2.0_wp, 1.0_wp, 2.0_wp], 1 - i)
+      end do
+      call check_near(error, solid%mass(:, :, 1), expected, tol, mass, "rectangle")
+      expected = zero
+      expected(:3, :3) = 0.5_wp*mass/12.0_wp*reshape([2.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp, &
+         1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp], [3, 3])
+      call check_near(error, solid%mass(:, :, 2), expected, tol, mass, "triangle")
+      call check_near(error, solid%volume_mass(:, 1), spread(0.25_wp*mass, 1, 4), tol, mass, &
+         "quarters of the rectangle")
+      call check_near(error, solid%volume_mass(:, 3), mass/6.0_wp*[1.0_wp, 1.0_wp, 1.0_wp, zero], &
+         tol, mass, "thirds of the triangle")
+   end subroutine test_closed_forms
+
+   !> Moved inner nodes leave the mass of the block; rows of the mass sum to int rho N.
+   subroutine test_total(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      real(wp) :: move(2, 16)
+      integer :: e, k
+      character(len=4), parameter :: name(2) = ["CPE3", "CPE4"]
+
+      do k = 1, 2
+         call make_block(scene, name(k), [3, 3], block)
+         call shake(move, 0.25_wp)
+         scene%x(:, [6, 7, 10, 11]) = scene%x(:, [6, 7, 10, 11]) + move(:, [6, 7, 10, 11])
+         scene%material(1)%density = 0.5_wp
+         scene%section(1)%thickness = 0.5_wp
+         call solid_init(solid, scene, error)
+         if (allocated(error)) return
+         call check_near(error, sum(solid%mass), 2.25_wp, tol, 2.25_wp, name(k) // ": total")
+         do e = 1, solid%n_element
+            call check_near(error, sum(solid%mass(:, :, e), dim=1), solid%volume_mass(:, e), tol, &
+               1.0_wp, name(k) // ": row sums")
+         end do
+      end do
+   end subroutine test_total
+
+   subroutine test_sums(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      type(solid_response_t) :: response
+      type(element_response_t) :: part
+      real(wp), allocatable :: u0(:, :), du(:, :), force(:, :)
+      integer :: e, n
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      call add_block(scene, "CPE3", [2, 1], [5.0_wp, 1.0_wp], [2.0_wp, 1.0_wp], block)
+      call solid_init(solid, scene, error)
+      if (allocated(error)) return
+      allocate(u0, du, force, source=scene%x)
+      call shake(u0, 0.1_wp)
+      call shake(du, 0.1_wp)
+      call make_response(solid, response)
+      call solid_respond(solid, u0, du, .true., response)
+      force = 0.0_wp
+      do e = 1, solid%n_element
+         n = solid%geometry(e)%n_node
+         associate (node => solid%node(:n, e))
+            call element_respond(solid%geometry(e), solid%law(1)%law, local(u0(:, node)), &
+               local(du(:, node)), .true., .false., part)
+            force(:, node) = force(:, node) + part%force(:, :n)
+            call check_near(error, response%energy(e), part%energy, tol, young, "energy")
+         end associate
+      end do
+      call check_near(error, response%force, force, tol, young, "forces")
+   end subroutine test_sums
+
+   pure subroutine make_response(solid, response)
+      type(solid_t), intent(in) :: solid
+      type(solid_response_t), intent(out) :: response
+      real(wp) :: zero(2, solid%n_node)
+
+      zero = 0.0_wp
+      allocate(response%force, response%magnitude, response%rounding, source=zero)
+      allocate(response%energy(solid%n_element), source=0.0_wp)
+   end subroutine make_response
+
+   pure function local(field) result(four)
+      real(wp), intent(in) :: field(:, :)
+      real(wp) :: four(2, 4)
+
+      four = 0.0_wp
+      four(:, :size(field, 2)) = field
+   end function local
+
+   !> A body that has flown 1e8 of its elements: forces are round-off of its displacements, of the
+   !> size that the response itself states, and the energy is of the order of its square.
+   subroutine test_translation(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      type(solid_response_t) :: response
+      real(wp), allocatable :: u0(:, :), du(:, :), move(:, :)
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      allocate(u0, du, move, source=scene%x)
+      call shake(move, 0.25_wp)
+      scene%x = scene%x + move
+      call solid_init(solid, scene, error)
+      if (allocated(error)) return
+      call make_response(solid, response)
+      u0 = 1.0e8_wp
+      du = 0.0_wp
+      du(1, :) = -3.0e7_wp
+      call solid_respond(solid, u0, du, .true., response)
+      call check_near(error, response%energy, 0.0_wp*response%energy, (4.0e8_wp*eps)**2, young, &
+         "energy")
+      call check_near(error, abs(response%force)/response%rounding, 0.0_wp*u0, 4.0_wp*eps, 1.0_wp, &
+         "forces over their round-off")
+   end subroutine test_translation
+
+   subroutine test_inverted(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      type(solid_response_t) :: response
+      real(wp), allocatable :: u0(:, :), du(:, :)
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      call solid_init(solid, scene, error)
+      if (allocated(error)) return
+      allocate(u0, du, source=0.0_wp*scene%x)
+      call make_response(solid, response)
+      du(1, [4, 8]) = -1.5_wp                    ! the right side of element 3
+      call solid_respond(solid, u0, du, .true., response)
+      call check_equal(error, response%inverted_element, 3, "inverted element")
+      call solid_respond(solid, u0, 0.5_wp*du, .true., response)
+      call check_equal(error, response%inverted_element, 0, "inverted element at half of it")
+   end subroutine test_inverted
+
+   subroutine test_clockwise(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: raised
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%element_node(:, 2) = scene%element_node([1, 4, 3, 2], 2)
+      scene%element_label = [10, 77]
+      call solid_init(solid, scene, raised)
+      call check_error(error, raised, err_input, "element 77", "clockwise element")
+   end subroutine test_clockwise
+
+   subroutine test_no_area(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: raised
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+
+      call make_block(scene, "CPE3", [1, 1], block)
+      scene%x(:, 3) = scene%x(:, 1)
+      call solid_init(solid, scene, raised)
+      call check_error(error, raised, err_input, "element 2", "element without area")
+   end subroutine test_no_area
+
+end module test_solid
