@@ -42,6 +42,8 @@ module emcon_run
       end function interrupt_interface
    end interface
 
+   !> Error of the energy balance, relative to the largest energy, that the verdict accepts.
+   real(wp), parameter :: ten_digits = 1.0e-10_wp
    !> Residuals told per increment, at most.
    integer, parameter :: most_residuals = 15
 
@@ -105,6 +107,11 @@ contains
       if (allocated(error)) return
       run%base = result_base(path, options)
       report%base = run%base
+      if (is_result(path, run%base)) then
+         call raise(error, err_input, path // ": the results would overwrite the deck; choose " // &
+            "another folder with --output, or name the deck NAME.inp")
+         return
+      end if
       if (len(options%folder) > 0) call make_directory(options%folder, error)
       if (allocated(error)) return
       call log_open(run%log, run%base // ".log", .false., error)
@@ -171,6 +178,19 @@ contains
          allocate(report%diagnostic(0))
       end if
    end subroutine move_diagnostics
+
+   !> Is `path` the name of one of the results of `base`?
+   pure logical function is_result(path, base)
+      character(len=*), intent(in) :: path, base
+      character(len=7), parameter :: suffix(5) = [character(len=7) :: ".csv", ".h5", ".log", &
+         ".vtkhdf", ".rst.h5"]
+      integer :: i
+
+      is_result = .false.
+      do i = 1, size(suffix)
+         is_result = is_result .or. path == base // trim(suffix(i))
+      end do
+   end function is_result
 
    !> Path of the results without extension: the deck's own, or its name in the folder asked for.
    function result_base(path, options) result(base)
@@ -412,7 +432,7 @@ contains
             " of the largest energy, deepest penetration " // to_text(-run%deepest, 3) // &
             " of an element")
          if (.not. run%stepper%march%scheme%has_inertia) return
-         if (run%largest_drift <= 1.0e-10_wp*scale) then
+         if (run%largest_drift <= ten_digits*scale) then
             call add("verdict: the energy balance closes to ten digits or better")
          else
             call add("verdict: the energy balance does NOT close to ten digits")

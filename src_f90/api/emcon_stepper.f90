@@ -119,6 +119,7 @@ contains
       associate (system => self%march%system, u => self%march%state%u)
          do pair = 1, size(system%contact)
             associate (contact => system%contact(pair)%contact)
+               contact%reach = 0.0_wp      ! which gaps are measured must not depend on the past
                call contact%begin_step(self%scene%x, u, system%zero)
                do i = 1, contact%n_constraint
                   id = system%first_constraint(pair) + i

@@ -37,6 +37,7 @@ module emcon_contact
    type, abstract :: contact_t
       integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
+      real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
    contains

@@ -24,7 +24,6 @@ module emcon_nts
       type(chain_t) :: master
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
       type(candidates_t) :: candidates
-      real(wp) :: reach = 0.0_wp                      !! of the candidate list; 0: no list yet
       real(wp), allocatable :: u_slave(:, :)          !! displacements when the list was made
       real(wp), allocatable :: u_master(:, :)
    contains

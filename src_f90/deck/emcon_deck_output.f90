@@ -194,8 +194,8 @@ contains
          if (new%set == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
             "unknown set " // option // "=" // quoted(name) // suggestion(name, set_names(set)))
          if (any(new%kind == [output_node_file, output_element_file])) then
-            call card_warning(reader, card, option // "= does not narrow it: the field file holds all " &
-               // "nodes and elements")
+            call card_warning(reader, card, option &
+               // "= does not narrow it: the field file holds all nodes and elements")
          end if
       end subroutine look_up
 

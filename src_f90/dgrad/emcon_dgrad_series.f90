@@ -16,14 +16,15 @@ contains
    pure subroutine atanh_excess(w, excess, rate)
       real(wp), intent(in) :: w
       real(wp), intent(out) :: excess, rate
-      real(wp) :: square, power
+      real(wp) :: square, power, inside
       integer :: k
 
       excess = 0.0_wp
       rate = 0.0_wp
       if (abs(w) >= series_limit) then
-         excess = atanh(w)/w - 1.0_wp
-         rate = (w*w/(1.0_wp - w*w) - excess)/w
+         inside = sign(min(abs(w), 1.0_wp - epsilon(w)), w)   ! w may be rounded to 1
+         excess = atanh(inside)/inside - 1.0_wp
+         rate = (inside**2/(1.0_wp - inside**2) - excess)/inside
          return
       end if
       square = w*w

@@ -112,7 +112,7 @@ contains
       if (scene%step(i_step)%procedure == procedure_static) then
          text = free_motion_text(self%system, scene, scene%step(i_step)%prescribed)
          if (len(text) > 0) then
-            call raise(error, err_analysis, text)
+            call raise(error, err_analysis, "the static problem is singular: " // text)
             return
          end if
          self%state%v = 0.0_wp
@@ -326,10 +326,10 @@ contains
 
       text = "the analysis stops at time " // to_text(start%total_time, 9) // ": with h = " // &
          to_text(h) // ", the smallest allowed, " // reason_text(self, scene, status)
-      if (status == step_singular .and. .not. self%scheme%has_inertia) then
+      if (.not. self%scheme%has_inertia) then
          motion = free_motion_text(self%system, scene, &
             scene%step(self%state%i_step)%prescribed, with_contact=.true.)
-         if (len(motion) > 0) text = text // "; " // motion
+         if (len(motion) > 0) text = text // "; without contact " // motion
       end if
    end function failure_text
 

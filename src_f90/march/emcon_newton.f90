@@ -89,7 +89,7 @@ contains
       self%n_iteration = 0
       self%n_solve = 0
       self%n_history = 0
-      is_driven = any(abs(self%driven) > 0.0_wp)
+      is_driven = any(abs(self%driven) > 0.0_wp) .and. size(self%residual) > 0
       if (is_driven) du = du - self%driven
       n_polish = 0
       n_stall = 0
@@ -253,16 +253,17 @@ contains
       is_rounding = relative_size(self%residual, self%scale) <= floor .and. defect <= floor
    end subroutine measure
 
-   !> |v| / |scale|, 0 where v vanishes, without overflow on the way.
+   !> |v| / |scale|, 0 where v vanishes, huge where it is not finite; without overflow on the way.
    pure real(wp) function relative_size(v, scale)
       real(wp), intent(in) :: v(:), scale(:)
       real(wp) :: largest
 
       relative_size = 0.0_wp
-      if (.not. any(abs(v) > 0.0_wp)) return
+      if (all(abs(v) <= 0.0_wp)) return
       relative_size = huge(relative_size)
       largest = maxval(scale)
-      if (.not. largest > 0.0_wp) return
+      if (.not. (largest > 0.0_wp .and. maxval(abs(v)) <= huge(v))) return
+      if (any(v /= v)) return
       largest = real(radix(largest), wp)**exponent(largest)
       relative_size = sqrt(sum((v/largest)**2)/sum((scale/largest)**2))
    end function relative_size

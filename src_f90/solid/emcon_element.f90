@@ -26,7 +26,8 @@ module emcon_element
       real(wp) :: force(2, max_node) = 0.0_wp
       real(wp) :: magnitude(2, max_node) = 0.0_wp          !! sum of |contributions| to `force`
       real(wp) :: tangent(2*max_node, 2*max_node) = 0.0_wp !! derivative of `force` by u1
-      logical :: is_inverted = .false.                     !! det F <= 0 at some point, at the end
+      !> det F <= 0 at some point at the end, or a strain that the law has no energy for.
+      logical :: is_inverted = .false.
    end type element_response_t
 
 contains
@@ -53,10 +54,8 @@ contains
          call displacement_gradient(geometry, k, u0, grad0)
          call displacement_gradient(geometry, k, du, dgrad)
          call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
-         if (f_end(1, 1)*f_end(2, 2) - f_end(1, 2)*f_end(2, 1) <= 0.0_wp) then
-            response%is_inverted = .true.
-            return
-         end if
+         response%is_inverted = .not. is_regular(law, strain + dstrain, f_end)
+         if (response%is_inverted) return
          call law_response_plane(law, strain, dstrain, state)
          response%energy = response%energy + geometry%weight(k)*state%energy
          state%stress = geometry%weight(k)*state%stress
@@ -75,6 +74,21 @@ contains
          end if
       end do
    end subroutine element_respond
+
+   !> Is the end state one that the law can answer to? Newton's method tries all kinds of things.
+   pure logical function is_regular(law, strain, f)
+      class(law_t), intent(in) :: law
+      real(wp), intent(in) :: strain(3), f(2, 2)
+      real(wp), parameter :: largest = huge(1.0_wp)**0.2_wp   ! its powers in energies are finite
+      real(wp) :: volume
+
+      is_regular = maxval(abs(f)) < largest .and. maxval(abs(strain)) < largest
+      if (.not. is_regular) return
+      volume = 1.0_wp
+      if (law%has_volume) volume = &
+         (1.0_wp + 2.0_wp*strain(1))*(1.0_wp + 2.0_wp*strain(2)) - strain(3)**2
+      is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp .and. volume > 0.0_wp
+   end function is_regular
 
    !> grad(a, b) = d u_a / d X_b at quadrature point `k`.
    pure subroutine displacement_gradient(geometry, k, u, grad)

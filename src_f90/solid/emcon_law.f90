@@ -13,6 +13,7 @@ module emcon_law
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
+      logical :: has_volume = .true.             !! W is infinite where det C = 0
    contains
       procedure(energy_interface), deferred :: energy
    end type law_t

@@ -32,6 +32,7 @@ contains
       law%density = material%density
       select type (law)
       type is (law_linear_t)
+         law%has_volume = .false.
          call lame_constants(material%constant(1), material%constant(2), law%lam, law%mu)
       type is (law_coupled_neo_hooke_t)
          call lame_constants(material%constant(1), material%constant(2), law%lam, law%mu)

@@ -59,6 +59,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: n
 
+      if (system%numbering%n_unknown == 0) return
       if (set%n == 0) then
          call self%solver%analyse(system%matrix, error)
          return

@@ -36,7 +36,7 @@ contains
          do while (system%body(system%solid%node(1, i)) /= b)
             i = i + 1
          end do
-         text = "the static problem is singular: the body of element " // &
+         text = "the body of element " // &
             to_text(scene%element_label(i)) // " is free to " // motion // &
             "; add *BOUNDARY conditions"
          return
@@ -101,12 +101,14 @@ contains
             gram(:, i) = gram(:, i) + row*row(i)
          end do
       end do
+      do i = 1, 2                                ! the rank of the rotation beside what is missing
+         if (.not. has(i)) gram(i, i) = 1.0_wp
+      end do
       is_full = determinant(gram) > 1.0e3_wp*epsilon(1.0_wp)*max(1.0_wp, trace(gram))**3
       text = ""
       if (.not. has(1)) text = "move in x"
       if (.not. has(2)) text = join(text, "move in y")
-      if (.not. is_full .and. (all(has) .or. .not. any(has))) text = join(text, "rotate")
-      if (.not. is_full .and. len(text) == 0) text = "rotate"
+      if (.not. is_full) text = join(text, "rotate")
    end function body_motion
 
    pure function join(a, b) result(text)

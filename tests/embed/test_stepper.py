@@ -91,7 +91,9 @@ def test_failed_analysis_keeps_the_model_usable() -> None:
 
 def test_open_and_close_do_not_pile_up_models() -> None:
     for _ in range(300):                    # more than the table of models holds
-        Stepper(RING).close()
+        ring = Stepper(RING)
+        assert ring.n_node == 686
+        ring.close()
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -170,7 +170,7 @@ def test_rows_before_the_failure_are_kept(tmp_path):
         preexec_fn=limited(500),
     )  # fmt: skip
     rows, all_rows = run.digits()["total"], expected.digits()["total"]
-    assert 5 < len(rows) < len(all_rows)
+    assert 5 < len(rows) <= len(all_rows)
     assert rows == all_rows[: len(rows)]
     assert len(run.fields().time) >= 1
 
@@ -187,20 +187,37 @@ def test_old_results_outlive_a_run_that_cannot_begin(tmp_path):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """A file system of 600 kB; needs the right to mount."""
+    """`small_disk(kilobytes)` is the folder of a new file system; needs the right to mount."""
     folder = tmp_path / "disk"
     folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", folder]
-    if not root_user() or subprocess.run(mount, capture_output=True).returncode != 0:
-        pytest.skip("no right to mount a small disk")
-    yield folder
-    subprocess.run(["umount", folder], check=True)
+
+    def mount(kilobytes):
+        command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", folder]
+        if not root_user() or subprocess.run(command, capture_output=True).returncode != 0:
+            pytest.skip("no right to mount a small disk")
+        return folder
+
+    yield mount
+    if os.path.ismount(folder):
+        subprocess.run(["umount", folder], check=True)
 
 
-def test_disk_full(small_disk):
-    done = emcon(DECK, "--output", small_disk, "--quiet", "--set=h=0.05", "--set=t_end=2")
+@pytest.mark.parametrize("kilobytes", [16, 100, 250, 600, 900])
+def test_disk_full(small_disk, kilobytes):
+    """At the start, while the first files are made, and in the middle of the run."""
+    disk = small_disk(kilobytes)
+    done = emcon(DECK, "--output", disk, "--quiet", "--set=h=0.05", "--set=t_end=2")
     assert_told(done, 4, "No space left on device")
-    assert_whole(Run(small_disk / "ring"))
+    assert_whole(Run(disk / "ring"))
+
+
+def test_read_only_disk(small_disk):
+    disk = small_disk(4000)
+    run_deck(DECK, disk, h=0.05, t_end=0.1)
+    before = contents(disk)
+    subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+    assert_told(emcon(DECK, "--output", disk, *SHORT), 4, "Read-only file system")
+    assert contents(disk) == before
 
 
 def test_standard_output_full():

@@ -37,8 +37,11 @@ def dimension_of_stress(length, mass, time):
 
 def in_units(length, mass, time, **parameters):
     """The ring deck with lengths multiplied by 2**length, and so on."""
+
+    def scale(exponent):
+        return lambda text: number(np.ldexp(float(text), exponent))
+
     deck = Deck.read(DECK)
-    scale = lambda exponent: lambda text: number(np.ldexp(float(text), exponent))
     x, v, t = scale(length), scale(length - time), scale(time)
     density, stress = scale(mass - 3*length), scale(dimension_of_stress(length, mass, time))
     deck.map_numbers("*NODE", lambda w: [w[0], x(w[1]), x(w[2])])

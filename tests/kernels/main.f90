@@ -26,6 +26,7 @@ program main
    use test_nts_gap, only : collect_nts_gap
    use test_null_space, only : collect_null_space
    use test_numbering, only : collect_numbering
+   use test_deck_parameters, only : collect_deck_parameters
    use test_results, only : collect_results
    use test_rigid_motion, only : collect_rigid_motion
    use test_saddle_point, only : collect_saddle_point
@@ -81,6 +82,7 @@ program main
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("march", collect_march)
+   call run("deck_parameters", collect_deck_parameters)
    call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then

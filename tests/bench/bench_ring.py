@@ -1,0 +1,156 @@
+"""What the ring scene costs on one thread, and what reading and contact search cost at size.
+
+Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_ring.py`.
+Orientation: 12 s of CPU and 100 MB for the ring at h = 0.01; other codes took 24 to 46 s.
+"""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+
+from scene_tools import DECKS, PROGRAM, Deck, Run, number  # noqa: E402
+
+ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+TREATMENTS = ("PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE")
+METHODS = ("NULL SPACE", "SADDLE POINT")
+
+
+# Linux counts the memory of the caller as that of a child at first: a small caller, then.
+CALLER = """
+import os, sys, time
+start = time.monotonic()
+child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
+_, status, usage = os.wait4(child, 0)
+print(status, usage.ru_utime + usage.ru_stime, time.monotonic() - start, usage.ru_maxrss)
+"""
+
+
+def measure(*arguments):
+    """Seconds of CPU, seconds on the clock and peak memory in MB of one call of the program."""
+    command = [sys.executable, "-I", "-S", "-c", CALLER, str(PROGRAM), *map(str, arguments)]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
+    status, cpu, wall, memory = done.stdout.splitlines()[-1].split()
+    if int(status) != 0:
+        sys.exit(f"{' '.join(command[5:])}:\n{done.stderr}")
+    # In kB on Linux, in bytes on macOS.
+    unit = 1024**2 if sys.platform == "darwin" else 1024
+    return float(cpu), float(wall), float(memory)/unit
+
+
+def table(*names):
+    widths = [max(len(name), 8) for name in names]
+    print("\n" + "  ".join(name.rjust(w) for name, w in zip(names, widths)))
+
+    def row(*values):
+        texts = [f"{v:.4g}" if isinstance(v, float) else str(v) for v in values]
+        print("  ".join(text.rjust(w) for text, w in zip(texts, widths)), flush=True)
+
+    return row
+
+
+def bench_ring(folder):
+    print("Ring scene, h = 0.01, 800 increments, one thread")
+    row = table(
+        "treatment      ", "method      ", "CPU [s]", "ms/increment", "Newton", "MB", "energy drift"
+    )
+    for treatment in TREATMENTS:
+        for method in METHODS:
+            out = folder / "ring"
+            cpu, _, memory = measure(
+                DECKS / "ring.inp", "--quiet", "--output", out, "--set", f"method={method}",
+                "--set", f"initiation={treatment}",
+            )  # fmt: skip
+            history = Run(out / "ring").history
+            total = history["total"]
+            drift = abs(total/total[0] - 1).max()
+            row(
+                treatment, method, cpu, 1e3*cpu/(len(history) - 1), int(history["newton"].sum()),
+                memory, float(drift),
+            )  # fmt: skip
+
+
+def block_text(n_x, n_y, name, first_node, first_element, corner, size):
+    """Nodes and elements of a rectangle, column by column from the left, each from the bottom."""
+    lines = [f"*NODE, NSET={name}"]
+    for i in range(n_x + 1):
+        for j in range(n_y + 1):
+            x, y = corner[0] + size[0]*i/n_x, corner[1] + size[1]*j/n_y
+            lines.append(f"{first_node + i*(n_y + 1) + j}, {number(x)}, {number(y)}")
+    lines.append(f"*ELEMENT, TYPE=CPE4, ELSET={name}")
+    for i in range(n_x):
+        for j in range(n_y):
+            a = first_node + i*(n_y + 1) + j
+            b = a + n_y + 1
+            lines.append(f"{first_element + i*n_y + j}, {a}, {b}, {b + 1}, {a + 1}")
+    return "\n".join(lines)
+
+
+END = """*MATERIAL, NAME=SOFT
+*ELASTIC
+100., 0.1
+*DENSITY
+0.01
+{sections}
+*STEP, INC=1000000
+*DYNAMIC, DIRECT
+{h}, {t_end}
+*NODE FILE, FREQUENCY=1000000
+U
+*END STEP
+"""
+
+
+def bench_reading(folder):
+    print("\nReading and checking a deck of one block (`emcon check`)")
+    row = table("nodes", "MB of text", "CPU [s]", "us/node", "MB")
+    for n in (50, 100, 200, 447):
+        text = "*HEADING\nBlock\n" + block_text(n, n, "BLOCK", 1, 1, (0, 0), (1, 1)) + "\n"
+        text += END.format(
+            sections="*SOLID SECTION, ELSET=BLOCK, MATERIAL=SOFT\n1.", h="0.01", t_end="0.01"
+        )
+        deck = folder / "block.inp"
+        deck.write_text(text)
+        cpu, _, memory = measure("check", deck, "--quiet")
+        n_node = (n + 1)**2
+        row(n_node, len(text)/1e6, cpu, 1e6*cpu/n_node, memory)
+
+
+def contact_deck(n, gap, touching):
+    """A strip of n elements over a wider one of as many, half a length of an element apart."""
+    parts = [
+        "*HEADING\nStrips",
+        block_text(n, 1, "LOWER", 1, 1, (0, -1), (n, 1)),
+        block_text(n, 1, "UPPER", 2*n + 3, n + 1, (0.25, gap), (n - 0.5, 1)),
+        "*SURFACE, NAME=TOP\nLOWER, S3\n*SURFACE, NAME=FOOT\nUPPER, S1",
+    ]
+    if touching:
+        parts.append(
+            "*SURFACE INTERACTION, NAME=HARD\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD\n"
+            "*CONTACT PAIR, INTERACTION=HARD, TYPE=NODE TO SURFACE\nFOOT, TOP"
+        )
+    parts.append("*INITIAL CONDITIONS, TYPE=VELOCITY\nUPPER, 2, -0.01\nUPPER, 1, 0.01")
+    sections = "\n".join(f"*SOLID SECTION, ELSET={s}, MATERIAL=SOFT\n1." for s in ("LOWER", "UPPER"))
+    return Deck("\n".join(parts) + "\n" + END.format(sections=sections, h="0.01", t_end="0.2"))
+
+
+def bench_search(folder):
+    print("\nContact search: two strips of n elements, 20 increments, CPU with and without the pair")
+    row = table("slave nodes", "gap", "with [s]", "without [s]", "us/(node increment)")
+    for gap in (0.25, 100.0):
+        for n in (1000, 4000, 16000):
+            seconds = []
+            for touching in (True, False):
+                deck = contact_deck(n, gap, touching).write(folder / "strips.inp")
+                seconds.append(min(measure(deck, "--quiet")[0] for _ in range(2)))
+            row(n + 1, gap, *seconds, 1e6*(seconds[0] - seconds[1])/(20*(n + 1)))
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as name:
+        bench_ring(pathlib.Path(name))
+        bench_reading(pathlib.Path(name))
+        bench_search(pathlib.Path(name))
