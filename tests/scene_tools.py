@@ -154,14 +154,19 @@ class Deck:
 
     def __init__(self, text, name="deck"):
         self.name = name
-        self.card = []
+        self.card = self._cards(text)
+
+    @staticmethod
+    def _cards(text):
+        cards = []
         for line in text.splitlines():
             if line.startswith("**") or not line.strip():
                 continue
             if line.startswith("*"):
-                self.card.append((line, []))
+                cards.append((line, []))
             else:
-                self.card[-1][1].append(line)
+                cards[-1][1].append(line)
+        return cards
 
     @classmethod
     def read(cls, path):
@@ -185,12 +190,12 @@ class Deck:
     def replace(self, old, new):
         """Another text in place of `old`, which must be there, in all lines."""
         assert old in self.text(), old
-        self.__init__(self.text().replace(old, new), self.name)
+        self.card = self._cards(self.text().replace(old, new))
 
     def insert(self, text, before="*END STEP"):
         """Put cards in front of the first card of the keyword `before`."""
         k = self.find(before)
-        self.card[k:k] = Deck(text).card
+        self.card[k:k] = self._cards(text)
 
     def remove(self, keyword, containing=""):
         del self.card[self.find(keyword, containing)]
@@ -219,13 +224,6 @@ class Deck:
         data = self.data("*PARAMETER")
         k = next(k for k, line in enumerate(data) if line.split("=")[0].strip() == name)
         data[k] = f"{name} = {value}"
-
-    def parameter(self, name):
-        for line in self.data("*PARAMETER"):
-            left, right = line.split("=")
-            if left.strip() == name:
-                return right.strip()
-        raise KeyError(name)
 
 
 def heading(deck):

@@ -1,7 +1,6 @@
 !> A batch run: deck in, files out, from the first increment or from a restart file.
 module emcon_run
    use emcon_blas, only : blas_keep_memory, blas_single_thread
-   use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : err_file, err_input, err_interrupt, error_t, raise
    use emcon_files, only : file_exists, make_directory, survive_file_size_limit
    use emcon_kinds, only : dp, wp
@@ -11,11 +10,11 @@ module emcon_run
    use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
       recorder_resume, recorder_t, recorder_write
    use emcon_restart, only : restart_get, restart_put, restart_read, restart_t, restart_write
+   use emcon_run_log, only : balance_t, closing_lines, log_increment, log_start, model_lines
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_fraction, stepper_is_done, &
       stepper_load, stepper_open, stepper_save, stepper_t
    use emcon_text, only : string_t, to_text
    use emcon_timer, only : cpu_seconds, wall_seconds
-   use emcon_version, only : version
    implicit none
    private
    public :: run_options_t, run_report_t, interrupt_interface
@@ -42,11 +41,6 @@ module emcon_run
       end function interrupt_interface
    end interface
 
-   !> Error of the energy balance, relative to the largest energy, that the verdict accepts.
-   real(wp), parameter :: ten_digits = 1.0e-10_wp
-   !> Residuals told per increment, at most.
-   integer, parameter :: most_residuals = 15
-
    !> All that a run in progress holds.
    type :: run_t
       type(stepper_t) :: stepper
@@ -55,12 +49,7 @@ module emcon_run
       type(progress_t) :: progress
       character(len=:), allocatable :: base
       real(dp) :: wall_start = 0.0_dp
-      real(wp) :: total0 = 0.0_wp
-      real(wp) :: largest_drift = 0.0_wp         !! of total - contact work
-      real(wp) :: largest_energy = 0.0_wp
-      real(wp) :: deepest = 0.0_wp
-      integer :: n_newton = 0
-      integer :: n_cut = 0
+      type(balance_t) :: balance
    end type run_t
 
 contains
@@ -118,7 +107,7 @@ contains
       if (allocated(error)) return
       call recorder_open(run%recorder, run%stepper, run%base, error)
       if (.not. allocated(error)) then
-         call log_start(run, report, path)
+         call log_start(run%log, run%stepper, report%diagnostic, path)
          call recorder_write(run%recorder, run%stepper, nothing, cpu_seconds(), error)
       end if
       call march_on(run, options, is_interrupted, report, error)
@@ -217,13 +206,15 @@ contains
       logical :: has_stopped
 
       has_stopped = .false.
-      if (run%stepper%march%state%increment == 0) run%total0 = run%stepper%march%ledger%total
+      associate (march => run%stepper%march)
+         if (march%state%increment == 0) run%balance%total0 = march%ledger%total
+      end associate
       call progress_start(run%progress, real(stepper_fraction(run%stepper), dp), options%is_quiet)
       do while (.not. allocated(error) .and. .not. stepper_is_done(run%stepper))
          has_stopped = is_interrupted()
          if (has_stopped) exit
          call stepper_advance(run%stepper, increment, error)
-         call log_increment(run, increment)
+         call log_increment(run%log, run%stepper, increment, run%balance)
          if (allocated(error)) exit
          call recorder_write(run%recorder, run%stepper, increment, cpu_seconds(), error)
          if (.not. allocated(error)) call save_if_due(run, error)
@@ -257,7 +248,7 @@ contains
       call recorder_close(run%recorder, second)
       if (.not. allocated(error)) call move_alloc(second, error)
       if (allocated(error)) call log_line(run%log, error%message)
-      report%closing = closing_lines(run)
+      report%closing = closing_lines(run%stepper, run%balance)
       do i = 1, size(report%closing)
          call log_line(run%log, report%closing(i)%text)
       end do
@@ -290,9 +281,11 @@ contains
       if (allocated(error)) return
       call stepper_save(run%stepper, restart)
       call restart_put(restart, "counts", [run%recorder%n_row, run%recorder%fields%n_frame])
-      call restart_put(restart, "balance", [run%total0, run%largest_drift, run%largest_energy, &
-         run%deepest])
-      call restart_put(restart, "effort", [run%n_newton, run%n_cut])
+      associate (balance => run%balance)
+         call restart_put(restart, "balance", [balance%total0, balance%largest_drift, &
+            balance%largest_energy, balance%deepest])
+         call restart_put(restart, "effort", [balance%n_newton, balance%n_cut])
+      end associate
       call restart_write(restart, run%base // ".rst.h5", error)
    end subroutine save
 
@@ -306,149 +299,12 @@ contains
       call restart_get(restart, "balance", balance, error)
       if (.not. allocated(error)) call restart_get(restart, "effort", effort, error)
       if (allocated(error)) return
-      run%total0 = balance(1)
-      run%largest_drift = balance(2)
-      run%largest_energy = balance(3)
-      run%deepest = balance(4)
-      run%n_newton = effort(1)
-      run%n_cut = effort(2)
+      run%balance%total0 = balance(1)
+      run%balance%largest_drift = balance(2)
+      run%balance%largest_energy = balance(3)
+      run%balance%deepest = balance(4)
+      run%balance%n_newton = effort(1)
+      run%balance%n_cut = effort(2)
    end subroutine load_balance
-
-   !> Head of the log: program, deck, model, remarks.
-   subroutine log_start(run, report, path)
-      type(run_t), intent(inout) :: run
-      type(run_report_t), intent(in) :: report
-      character(len=*), intent(in) :: path
-      type(string_t), allocatable :: line(:)
-      integer :: i
-
-      call log_line(run%log, "EMCON " // version // ", deck " // path)
-      do i = 1, size(run%stepper%override)
-         call log_line(run%log, "with " // run%stepper%override(i)%text)
-      end do
-      do i = 1, size(report%diagnostic)
-         call log_line(run%log, report%diagnostic(i)%text)
-      end do
-      allocate(line, source=model_lines(run%stepper))
-      do i = 1, size(line)
-         call log_line(run%log, line(i)%text)
-      end do
-      call log_line(run%log, "")
-      call log_line(run%log, " increment          time             h newton cuts active" // &
-         "          kinetic           strain            total  residuals of the last solve")
-   end subroutine log_start
-
-   !> What is modelled, in a few lines.
-   function model_lines(stepper) result(line)
-      type(stepper_t), intent(in) :: stepper
-      type(string_t), allocatable :: line(:)
-      integer :: k
-
-      allocate(line(0))
-      associate (scene => stepper%scene, system => stepper%march%system)
-         if (len_trim(scene%heading) > 0) call add(trim(scene%heading))
-         call add(to_text(size(scene%x, 2)) // " nodes, " // &
-            to_text(system%numbering%n_unknown) // " unknowns in step 1, " // &
-            to_text(system%n_body) // " bodies")
-         do k = 1, size(element_kinds)
-            if (any(scene%element_kind == k)) call add(to_text(count(scene%element_kind == k)) // &
-               " elements " // trim(element_kinds(k)%name))
-         end do
-         do k = 1, size(scene%pair)
-            call add("contact: " // scene%surface(scene%pair(k)%slave)%name // " (slave, " // &
-               to_text(system%contact(k)%contact%n_constraint) // " nodes) on " // &
-               scene%surface(scene%pair(k)%master)%name)
-         end do
-         do k = 1, size(scene%step)
-            call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
-               ", h = " // to_text(scene%step(k)%h) // &
-               merge(", NLGEOM", "        ", scene%step(k)%nlgeom))
-         end do
-      end associate
-      do k = 1, stepper%notes%n
-         call add(stepper%notes%item(k)%text)
-      end do
-
-   contains
-
-      subroutine add(text)
-         character(len=*), intent(in) :: text
-         type(string_t) :: new(1)
-
-         new(1)%text = trim(text)
-         line = [line, new]
-      end subroutine add
-
-   end function model_lines
-
-   !> One line per increment and its remarks, and the running balance.
-   subroutine log_increment(run, increment)
-      type(run_t), intent(inout) :: run
-      type(increment_t), intent(in) :: increment
-      character(len=320) :: line
-      integer :: i, n
-
-      do i = 1, increment%notes%n
-         call log_line(run%log, "   " // increment%notes%item(i)%text)
-      end do
-      run%n_newton = run%n_newton + increment%n_newton
-      run%n_cut = run%n_cut + increment%n_cut
-      run%deepest = min(run%deepest, increment%deepest)
-      associate (state => run%stepper%march%state, ledger => run%stepper%march%ledger)
-         run%largest_energy = max(run%largest_energy, abs(run%total0), &
-            ledger%kinetic + ledger%strain)
-         run%largest_drift = max(run%largest_drift, &
-            abs(ledger%total - ledger%contact_work - run%total0))
-         write(line, "(i10, 2es14.6, i7, i5, i7, 3es17.9)") state%increment, state%time, &
-            increment%h, increment%n_newton, increment%n_cut, increment%n_active, &
-            ledger%kinetic, ledger%strain, ledger%total
-      end associate
-      if (allocated(increment%residual)) then
-         n = min(size(increment%residual), most_residuals)
-         write(line(len_trim(line) + 1:), "(*(es9.1))") increment%residual(:n)
-      end if
-      call log_line(run%log, trim(line))
-   end subroutine log_increment
-
-   !> The closing balance and the verdict.
-   function closing_lines(run) result(line)
-      type(run_t), intent(in) :: run
-      type(string_t), allocatable :: line(:)
-      real(wp) :: scale
-
-      allocate(line(0))
-      if (run%stepper%march%state%increment == 0) return
-      associate (state => run%stepper%march%state, ledger => run%stepper%march%ledger)
-         scale = max(run%largest_energy, tiny(scale))
-         call add("increments " // to_text(state%increment) // ", time " // &
-            to_text(state%time, 9) // ", Newton iterations " // to_text(run%n_newton) // &
-            ", cuts " // to_text(run%n_cut))
-         call add("energy: kinetic " // to_text(ledger%kinetic, 9) // ", strain " // &
-            to_text(ledger%strain, 9) // ", external work " // to_text(ledger%external_work, 9) // &
-            ", contact work " // to_text(ledger%contact_work, 9))
-         call add("total at start " // to_text(run%total0, 12) // ", at end " // &
-            to_text(ledger%total, 12))
-         call add("largest error of the energy balance " // to_text(run%largest_drift/scale, 3) // &
-            " of the largest energy, deepest penetration " // to_text(-run%deepest, 3) // &
-            " of an element")
-         if (.not. run%stepper%march%scheme%has_inertia) return
-         if (run%largest_drift <= ten_digits*scale) then
-            call add("verdict: the energy balance closes to ten digits or better")
-         else
-            call add("verdict: the energy balance does NOT close to ten digits")
-         end if
-      end associate
-
-   contains
-
-      subroutine add(text)
-         character(len=*), intent(in) :: text
-         type(string_t) :: new(1)
-
-         new(1)%text = text
-         line = [line, new]
-      end subroutine add
-
-   end function closing_lines
 
 end module emcon_run

@@ -1,7 +1,7 @@
 !> Neo-Hookean law with Abaqus' constants: W = C10 (J^(-2/3) I1 - 3) + (J - 1)^2/D1.
 module emcon_law_neo_hooke
-   use emcon_dgrad3, only : dg_t, dg_excess, dg_expm1, dg_log1p, dg_sqrt, operator(*), operator(-), &
-      operator(+), operator(/)
+   use emcon_dgrad3, only : dg_t, dg_excess, dg_expm1, dg_log1p, dg_sqrt, operator(*), &
+      operator(-), operator(+), operator(/)
    use emcon_kinds, only : wp
    use emcon_law, only : law_t, volume_excess
    implicit none

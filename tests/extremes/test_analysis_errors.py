@@ -56,7 +56,8 @@ def test_free_motion_is_named(tmp_path, supports, motions):
     assert_told(done, 3, "singular", "body of element 101", *motions)
     for other in {"move in x", "move in y", "rotate"} - set(motions):
         assert other not in done.stderr
-    assert "singular" in result.log
+    # Seen before the first increment: nothing is begun.
+    assert not result.file(".csv").exists()
 
 
 def test_free_body_beside_a_held_one(tmp_path):
@@ -207,7 +208,7 @@ def test_impact_beyond_reason(tmp_path):
     """Three times the speed of sound: it may fail, with a word."""
     deck = ring()
     deck.replace("RING, 2, -3.", "RING, 2, -300.")
-    done, result = run(deck, tmp_path, h=0.1, t_end=0.5)
+    done, result = run(deck, tmp_path, h=0.1, t_end=0.2)
     assert done.returncode in (0, 3)
     total = result.history["total"]
     assert np.abs(total/total[0] - 1).max() <= 1e-10

@@ -209,11 +209,11 @@ def test_interrupt_stops_after_the_increment_in_hand(deck, whole, tmp_path, numb
 
 def test_interrupt_before_the_first_increment(deck, whole, tmp_path):
     """At any moment in the first second: 130 with files that can be gone on with, or not begun."""
-    for k in range(6):
+    for k in range(4):
         folder = tmp_path / str(k)
         run = Run(folder / "ring")
         process = start(deck, "--quiet", "--output", folder)
-        time.sleep(0.02*k)
+        time.sleep(0.03*k)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
         if process.returncode == -signal.SIGINT:

@@ -42,7 +42,8 @@ contains
          test_case_t("patch of one element", test_patch), &
          test_case_t("strain increment of tiny steps", test_strain), &
          test_case_t("inversion is flagged", test_inversion), &
-         test_case_t("a guess that flattens or blows up is flagged", test_wild)]
+         test_case_t("a guess that flattens or blows up is flagged", test_wild), &
+         test_case_t("a stretch whose det C is round-off is flagged", test_degenerate)]
    end subroutine collect_element
 
    !> Sample 1..12: CPE3 and CPE4, three laws, with and without geometric non-linearity.
@@ -352,5 +353,32 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_wild
+
+   !> F = [s, c s; c s, c^2 s + d] with det F = s d, but |F|^2 of the order of s^2: where d/s is
+   !> small against epsilon, 1 + 2 e1 + 4 e2 of the law may come out negative.
+   subroutine test_degenerate(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(element_response_t) :: step
+      real(wp) :: u0(2, 4), du(2, 4), c, f(2, 2)
+      integer :: i, k
+
+      do i = 2, n_sample, 2
+         call make_sample(i, sample, error)
+         if (allocated(error)) return
+         u0 = 0.0_wp
+         do k = 1, 400
+            call random_number(c)
+            f = 10.0_wp**mod(k, 9)*reshape([1.0_wp, c, c, c*c], [2, 2])
+            f(2, 2) = f(2, 2) + 10.0_wp**(-mod(k, 17))
+            du = matmul(f, sample%x) - sample%x
+            call respond(sample, u0, du, .true., step)
+            if (step%is_inverted) cycle
+            call check_true(error, abs(step%energy) < huge(1.0_wp) &
+               .and. sum(abs(step%force)) < huge(1.0_wp), sample%what // ": finite")
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_degenerate
 
 end module test_element

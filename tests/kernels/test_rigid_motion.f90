@@ -57,6 +57,7 @@ contains
       integer :: none(0)
 
       call check_motion(error, none, none, "move in x, move in y, rotate")
+      call check_motion(error, [1], [1], "move in y, rotate")
       call check_motion(error, [1, 2], [2, 2], "move in x")
       call check_motion(error, [1, 7], [1, 1], "move in y")
       call check_motion(error, [5, 5], [1, 2], "rotate")

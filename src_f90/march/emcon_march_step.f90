@@ -1,0 +1,191 @@
+!> One step in time: first guess, solution, and what follows from it for state and works.
+!>
+!> `march_t` holds all that a march through time needs; how it cuts and counts: emcon_march.
+module emcon_march_step
+   use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_inverted
+   use emcon_correction, only : correction_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_t
+   use emcon_loads, only : instant_t, prescribed_motion
+   use emcon_newton, only : newton_t
+   use emcon_scene, only : initiation_velocity_update, scene_t
+   use emcon_scheme, only : scheme_t
+   use emcon_state, only : state_t
+   use emcon_system, only : system_t
+   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
+   implicit none
+   private
+   public :: march_t, increment_t, march_step
+
+   !> What one increment took.
+   type :: increment_t
+      real(wp) :: h = 0.0_wp
+      integer :: n_newton = 0                    !! iterations, over all cuts and active sets
+      integer :: n_cut = 0
+      integer :: n_active = 0
+      real(wp) :: deepest = 0.0_wp               !! smallest gap per master edge, 0 if all open
+      real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
+      type(notes_t) :: notes
+   end type increment_t
+
+   type :: march_t
+      type(system_t) :: system
+      type(state_t) :: state
+      type(ledger_t) :: ledger
+      class(scheme_t), allocatable :: scheme
+      type(newton_t) :: newton
+      type(active_set_t) :: active
+      type(correction_t) :: correction
+      type(velocity_update_t) :: velocity_update
+      integer :: n_grid = 0                      !! grid increments in the step
+      integer :: most_stride = 1                 !! largest increment, in grid increments
+      integer :: n_level = 0                     !! halvings allowed
+      real(wp), allocatable :: du(:, :), v1(:, :), offset(:, :)   !! (2, n_node)
+   end type march_t
+
+contains
+
+   !> One step of size `h`; if it succeeds the state and the works are moved on.
+   subroutine march_step(self, scene, start, h, may_cut, increment, status, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      logical, intent(in) :: may_cut
+      type(increment_t), intent(inout) :: increment
+      integer, intent(out) :: status
+      type(error_t), allocatable, intent(out) :: error
+      integer :: attempt
+
+      self%active%gap_tolerance = 0.0_wp
+      if (may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
+      do attempt = 1, 2
+         call guess(self, scene, start, h, is_at_rest=attempt == 2)
+         call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
+            self%scheme%pose(start, h), self%state, self%offset, self%du, status, error)
+         if (allocated(error)) return
+         increment%n_newton = increment%n_newton + self%active%n_newton
+         if (status /= step_inverted .or. self%active%n_newton > 0) exit
+      end do
+      if (status == step_done) call commit(self, scene, h, increment, error)
+   end subroutine march_step
+
+   !> First guess of the motion, and the motion and velocity of prescribed freedoms.
+   subroutine guess(self, scene, start, h, is_at_rest)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      logical, intent(in) :: is_at_rest          !! free nodes do not move in the guess
+      type(instant_t) :: finish
+      real(wp) :: u, v
+      integer :: k
+
+      finish = instant_t(start%step_time + h, start%total_time + h)
+      self%offset = 0.0_wp
+      self%du = 0.0_wp
+      if (self%scheme%has_inertia .and. .not. is_at_rest) self%du = h*self%state%v
+      do k = 1, size(self%du, 2)
+         if (self%system%body(k) == 0) self%du(:, k) = 0.0_wp
+      end do
+      self%newton%driven = 0.0_wp
+      associate (state => self%state, step => scene%step(self%state%i_step))
+         do k = 1, size(step%prescribed)
+            associate (a => step%prescribed(k)%dof, i => step%prescribed(k)%node)
+               call prescribed_motion(scene, step, step%prescribed(k), finish, &
+                  state%u_start(a, i), u, v)
+               self%du(a, i) = u - state%u(a, i)
+               self%v1(a, i) = v
+               if (.not. self%scheme%has_inertia) self%newton%driven(a, i) = self%du(a, i)
+               if (self%scheme%has_inertia) then
+                  self%offset(a, i) = 0.5_wp*h*(state%v(a, i) + v) - self%du(a, i)
+               end if
+            end associate
+         end do
+      end associate
+   end subroutine guess
+
+   !> Take over the solved step: works, velocities, contact and reaction forces.
+   subroutine commit(self, scene, h, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h
+      type(increment_t), intent(inout) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: restored
+      logical :: has_root, is_free
+      integer :: i, a, k
+
+      associate (state => self%state, system => self%system, set => self%active%set, &
+            step => scene%step(self%state%i_step))
+         system%residual = system%residual - self%newton%contact
+         do i = 1, size(state%v, 2)
+            do a = 1, 2
+               is_free = system%numbering%unknown(a, i) > 0
+               if (is_free) self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), self%du(a, i))
+               state%reaction(a, i) = merge(0.0_wp, system%residual(a, i), is_free)
+            end do
+         end do
+         call book_work(self, h)
+         restored = 0.0_wp
+         if (step%initiation == initiation_velocity_update .and. self%scheme%has_inertia) then
+            call velocity_update_apply(self%velocity_update, system, set, self%v1, restored, &
+               has_root, error)
+            if (allocated(error)) return
+            self%ledger%contact_work = self%ledger%contact_work + restored
+            if (restored > 0.0_wp) call note_add(increment%notes, &
+               "velocity update restores an energy of " // to_text(restored))
+            if (.not. has_root) call note_add(increment%notes, &
+               "velocity update: no root, the energy lost in this step is not restored")
+         end if
+         state%u = state%u + self%du
+         state%v = self%v1
+         state%contact = self%newton%contact
+         state%internal = system%response%force
+         state%energy = system%response%energy
+         increment%residual = self%newton%history(:self%newton%n_history)
+         increment%deepest = min(increment%deepest, self%active%deepest)
+         state%is_active = .false.
+         state%lam = 0.0_wp
+         do k = 1, set%n
+            state%is_active(set%id(k)) = .true.
+            state%lam(set%id(k)) = set%lam(k)
+         end do
+      end associate
+   end subroutine commit
+
+   !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
+   !> docs/theory.md, section 7); in statics forces are taken as linear over the step.
+   subroutine book_work(self, h)
+      type(march_t), intent(inout) :: self
+      real(wp), intent(in) :: h
+      real(wp) :: contact_work, inner
+      integer :: k, i, a
+
+      associate (state => self%state, system => self%system, set => self%active%set)
+         contact_work = 0.0_wp
+         if (self%scheme%has_inertia) then
+            do k = 1, set%n
+               contact_work = contact_work + set%lam(k)*set%item(k)%dgap
+            end do
+            self%ledger%external_work = self%ledger%external_work + sum(system%external*self%du)
+            do i = 1, size(self%du, 2)
+               do a = 1, 2
+                  if (system%numbering%unknown(a, i) > 0) cycle
+                  inner = state%reaction(a, i) - system%inertia(a, i)
+                  self%ledger%external_work = self%ledger%external_work + inner*self%du(a, i) &
+                     + system%inertia(a, i)*0.5_wp*h*(state%v(a, i) + self%v1(a, i))
+               end do
+            end do
+         else
+            contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*self%du)
+            self%ledger%external_work = self%ledger%external_work - contact_work &
+               + 0.5_wp*sum((state%internal + system%response%force)*self%du)
+         end if
+         self%ledger%contact_work = self%ledger%contact_work + contact_work
+      end associate
+   end subroutine book_work
+
+end module emcon_march_step

@@ -1,0 +1,116 @@
+!> The velocity jump that gives back the energy of closing contacts.
+module test_velocity_update
+   use check, only : check_near, check_true, test_case_t
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_scene, only : scene_t
+   use emcon_system, only : mass_times, pose_t, system_begin_step, system_init, system_t
+   use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
+   use small_scenes, only : add_step, block_t, make_two_blocks, shake
+   implicit none
+   private
+   public :: collect_velocity_update
+
+   real(wp), parameter :: tol = 450.0_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+
+contains
+
+   subroutine collect_velocity_update(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("restores while bodies part", test_parting), &
+         test_case_t("restores while bodies approach", test_approaching), &
+         test_case_t("no jump without a loss", test_no_loss), &
+         test_case_t("no jump without contact", test_no_contact)]
+   end subroutine collect_velocity_update
+
+   !> A step that closes the gaps of 1/8 under multipliers `lam`, then the jump on top of random
+   !> velocities and a relative one of `speed`, > 0: parting.
+   subroutine jump(lam, speed, gain, lost, change, error)
+      real(wp), intent(in) :: lam, speed
+      real(wp), intent(out) :: gain              !! of kinetic energy
+      real(wp), intent(out) :: lost              !! work of the multipliers, taken from the bodies
+      real(wp), intent(out) :: change(3)         !! of px, py, lz
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(velocity_update_t) :: update
+      type(pose_t) :: pose
+      real(wp), allocatable :: u0(:, :), v0(:, :), v1(:, :), du(:, :), p0(:, :), p1(:, :), x1(:, :)
+      real(wp) :: restored
+      logical :: has_root
+
+      call make_two_blocks(scene, 0.125_wp, lower, upper)
+      call add_step(scene, .false., 0.1_wp, 1)
+      call system_init(system, scene, error)
+      if (allocated(error)) return
+      call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      allocate(u0, v0, v1, du, p0, p1, x1, source=0.0_wp*scene%x)
+      call shake(v0, 0.1_wp)
+      v0(2, 11:) = v0(2, 11:) + speed
+      du(2, 11:) = -0.125_wp
+      call system%contact(1)%contact%begin_step(scene%x, u0, du)
+      call constraints_select(set, [1, 2, 3])
+      set%lam = lam
+      call constraints_evaluate(set, system, scene, pose, u0, du)
+      lost = -sum(set%lam*set%item%dgap)
+      v1 = v0
+      call velocity_update_apply(update, system, set, v1, restored, has_root, error)
+      if (allocated(error)) return
+      call mass_times(system, v0, p0)
+      call mass_times(system, v1, p1)
+      gain = 0.5_wp*(sum(v1*p1) - sum(v0*p0))
+      x1 = scene%x + du
+      change = [sum(p1 - p0, dim=2), sum(x1(1, :)*(p1(2, :) - p0(2, :)) &
+         - x1(2, :)*(p1(1, :) - p0(1, :)))]
+      call update%mass%free()
+      call check_near(error, gain, restored, tol, 10.0_wp, "gain and what is said of it")
+   end subroutine jump
+
+   subroutine test_parting(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: gain, lost, change(3)
+
+      call jump(1.0_wp, 2.0_wp, gain, lost, change, error)
+      if (allocated(error)) return
+      call check_near(error, lost, 0.375_wp, tol, 1.0_wp, "three multipliers of 1 over 1/8")
+      call check_near(error, gain, lost, tol, 10.0_wp, "energy")
+      call check_near(error, change, [0.0_wp, 0.0_wp, 0.0_wp], tol, 10.0_wp, "momenta")
+   end subroutine test_parting
+
+   subroutine test_approaching(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: gain, lost, change(3)
+
+      call jump(1.0_wp, -2.0_wp, gain, lost, change, error)
+      if (allocated(error)) return
+      call check_near(error, gain, lost, tol, 10.0_wp, "energy")
+      call check_near(error, change, [0.0_wp, 0.0_wp, 0.0_wp], tol, 10.0_wp, "momenta")
+   end subroutine test_approaching
+
+   !> Multipliers that pull have taken nothing.
+   subroutine test_no_loss(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: gain, lost, change(3)
+
+      call jump(-1.0_wp, 2.0_wp, gain, lost, change, error)
+      if (allocated(error)) return
+      call check_true(error, lost < 0.0_wp, "the bodies have gained")
+      call check_near(error, gain, 0.0_wp, 0.0_wp, 1.0_wp, "energy")
+   end subroutine test_no_loss
+
+   subroutine test_no_contact(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: gain, lost, change(3)
+
+      call jump(0.0_wp, 2.0_wp, gain, lost, change, error)
+      if (allocated(error)) return
+      call check_near(error, [gain, change], spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, "no jump")
+   end subroutine test_no_contact
+
+end module test_velocity_update
