@@ -27,7 +27,7 @@ CRASH = re.compile(
 
 
 def emcon(*arguments, timeout=120, **options):
-    """Call the program; exit code and texts as of `subprocess.run`. Never a crash, whatever asked."""
+    """Call the program; exit code and texts as of `subprocess.run`. It must never crash."""
     done = subprocess.run(
         [PROGRAM, *map(str, arguments)],
         capture_output=True,

@@ -55,20 +55,24 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       type(error_t), allocatable, intent(out) :: error
-      integer :: starts(size(self%node)), i, k
+      integer :: starts(size(self%node)), ends(size(self%node)), i, k, end_node
 
       allocate(self%previous(self%n_edge), source=0)
       allocate(self%next(self%n_edge), source=0)
       starts = 0
+      ends = 0
       do i = 1, self%n_edge
          k = find_sorted(self%node, self%edge(1, i))
-         if (starts(k) > 0) then
+         end_node = find_sorted(self%node, self%edge(2, i))
+         if (starts(k) > 0 .or. ends(end_node) > 0) then
+            if (starts(k) == 0) k = end_node
             call raise(error, err_input, where_text(scene, surface%origin) // ": surface " // &
                surface%name // " is not a chain: it branches at node " // &
-               to_text(scene%node_label(self%edge(1, i))))
+               to_text(scene%node_label(self%node(k))))
             return
          end if
          starts(k) = i
+         ends(end_node) = i
       end do
       do i = 1, self%n_edge
          k = starts(find_sorted(self%node, self%edge(2, i)))

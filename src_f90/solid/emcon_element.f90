@@ -80,14 +80,16 @@ contains
       class(law_t), intent(in) :: law
       real(wp), intent(in) :: strain(3), f(2, 2)
       real(wp), parameter :: largest = huge(1.0_wp)**0.2_wp   ! its powers in energies are finite
-      real(wp) :: volume
+      real(wp), parameter :: noise = 64.0_wp*epsilon(1.0_wp)
+      real(wp) :: volume, terms
 
       is_regular = maxval(abs(f)) < largest .and. maxval(abs(strain)) < largest
       if (.not. is_regular) return
-      volume = 1.0_wp
-      if (law%has_volume) volume = &
-         (1.0_wp + 2.0_wp*strain(1))*(1.0_wp + 2.0_wp*strain(2)) - strain(3)**2
-      is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp .and. volume > 0.0_wp
+      is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp
+      if (.not. (is_regular .and. law%has_volume)) return
+      terms = (1.0_wp + 2.0_wp*abs(strain(1)))*(1.0_wp + 2.0_wp*abs(strain(2))) + strain(3)**2
+      volume = (1.0_wp + 2.0_wp*strain(1))*(1.0_wp + 2.0_wp*strain(2)) - strain(3)**2
+      is_regular = volume > noise*terms          ! det C, where it is more than round-off
    end function is_regular
 
    !> grad(a, b) = d u_a / d X_b at quadrature point `k`.

@@ -178,11 +178,7 @@ contains
       dlocal = 0.0_wp
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
-         do i = 1, n
-            node = self%node(i, e)
-            local0(:, i) = u0(:, node)
-            dlocal(:, i) = du(:, node)
-         end do
+         call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
          call element_respond(self%geometry(e), self%law(self%law_of(e))%law, local0, dlocal, &
             nlgeom, with_tangent, part)
          if (part%is_inverted) then
@@ -190,7 +186,6 @@ contains
             return
          end if
          response%energy(e) = part%energy
-         largest = maxval(abs(local0(:, :n) + dlocal(:, :n)))
          do i = 1, n
             node = self%node(i, e)
             response%force(:, node) = response%force(:, node) + part%force(:, i)
@@ -204,6 +199,23 @@ contains
       end do
    end subroutine solid_respond
 
+   !> Displacements of the nodes of an element relative to its first node, which does not round them
+   !> with the distance that a body has flown, and the largest displacement at the end.
+   pure subroutine gather(node, u0, du, local0, dlocal, largest)
+      integer, intent(in) :: node(:)
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      real(wp), intent(inout) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      real(wp), intent(out) :: largest
+      integer :: i
+
+      largest = 0.0_wp
+      do i = 1, size(node)
+         local0(:, i) = u0(:, node(i)) - u0(:, node(1))
+         dlocal(:, i) = du(:, node(i)) - du(:, node(1))
+         largest = max(largest, maxval(abs(u0(:, node(i)) + du(:, node(i)))))
+      end do
+   end subroutine gather
+
    !> Add `factor` times the tangent of the step times `direction` to `product`. Elements that
    !> `direction` does not touch are passed over.
    pure subroutine solid_tangent_times(self, u0, du, nlgeom, factor, direction, product)
@@ -213,7 +225,7 @@ contains
       real(wp), intent(in) :: factor
       real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
       type(element_response_t) :: part
-      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
       real(wp) :: image(2*max_element_nodes)
       integer :: e, i, n, node
 
@@ -222,10 +234,7 @@ contains
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          if (.not. any(abs(direction(:, self%node(:n, e))) > 0.0_wp)) cycle
-         do i = 1, n
-            local0(:, i) = u0(:, self%node(i, e))
-            dlocal(:, i) = du(:, self%node(i, e))
-         end do
+         call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
          call element_respond(self%geometry(e), self%law(self%law_of(e))%law, local0, dlocal, &
             nlgeom, .true., part)
          if (part%is_inverted) return

@@ -133,11 +133,15 @@ def test_static_contact(tmp_path):
     deck = Deck.read(DECKS / "two_blocks_static.inp")
     base = run_deck(deck, tmp_path / "base").fields()
     length, stress = 7, -11
-    deck.map_numbers("*NODE", lambda w: [w[0], *(number(np.ldexp(float(t), length)) for t in w[1:])])
-    deck.map_numbers("*HYPERELASTIC", lambda w: [number(np.ldexp(float(w[0]), stress)), w[1]])
-    deck.map_numbers("*SOLID SECTION", lambda w: [number(np.ldexp(float(w[0]), length))])
-    deck.set_parameter("pressure", number(np.ldexp(10, stress)))
-    deck.set_parameter("approach", number(np.ldexp(-0.002, length)))
+
+    def scaled(text, exponent):
+        return number(np.ldexp(float(text), exponent))
+
+    deck.map_numbers("*NODE", lambda w: [w[0], scaled(w[1], length), scaled(w[2], length)])
+    deck.map_numbers("*HYPERELASTIC", lambda w: [scaled(w[0], stress), w[1]])
+    deck.map_numbers("*SOLID SECTION", lambda w: [scaled(w[0], length)])
+    deck.set_parameter("pressure", scaled(10, stress))
+    deck.set_parameter("approach", scaled(-0.002, length))
     fields = run_deck(deck, tmp_path / "scaled").fields()
     for name, exponent in (("displacement", length), ("contact_force", stress + 2*length)):
         np.testing.assert_array_equal(np.ldexp(fields[name], -exponent), base[name], name)

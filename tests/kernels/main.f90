@@ -34,8 +34,10 @@ program main
    use test_search, only : collect_search
    use test_shape, only : collect_shape
    use test_solid, only : collect_solid
+   use test_system, only : collect_system
    use test_triple_product, only : collect_triple_product
    use test_umfpack, only : collect_umfpack
+   use test_velocity_update, only : collect_velocity_update
    implicit none
 
    abstract interface
@@ -78,7 +80,9 @@ program main
    call run("constraints", collect_constraints)
    call run("null_space", collect_null_space)
    call run("saddle_point", collect_saddle_point)
+   call run("system", collect_system)
    call run("newton", collect_newton)
+   call run("velocity_update", collect_velocity_update)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("march", collect_march)

@@ -65,7 +65,8 @@ def test_patch_pressure(tmp_path):
 def test_cantilever(tmp_path):
     deck = DECKS / "cantilever.inp"
     u = figures(deck, r"middle of the tip: u = \((\S+), (\S+)\)")
-    vertical, horizontal = figures(deck, r"reaction at the wall: vertical (\S+), horizontal (\S+)\.")
+    pattern = r"reaction at the wall: vertical (\S+), horizontal (\S+)\."
+    vertical, horizontal = figures(deck, pattern)
     run = run_deck(deck, tmp_path)
     fields = run.fields()
     tip = np.flatnonzero((fields.x[:, 0] == 10) & (fields.x[:, 1] == fields.x[:, 1].mean()))
@@ -88,7 +89,7 @@ def test_two_blocks(tmp_path):
     assert on_small[slave].all()
     accuracy = 1e-9*total
     assert force[slave, 1].sum() == pytest.approx(total, abs=accuracy)
-    np.testing.assert_allclose(force[slave].sum(axis=0) + force[~slave].sum(axis=0), 0, atol=accuracy)
+    np.testing.assert_allclose(force.sum(axis=0), 0, atol=accuracy)
     bottom = x[:, 1] == x[:, 1].min()
     reaction = fields["reaction_force"][-1]
     assert reaction[bottom, 1].sum() == pytest.approx(total, abs=accuracy)

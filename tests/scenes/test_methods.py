@@ -23,9 +23,8 @@ def assert_same_fields(first, second, tolerance):
 @pytest.fixture(scope="module")
 def pressed(tmp_path_factory):
     """The ring, deformed on the foundation and thrown down once more, as a deck."""
-    run = run_deck(
-        DECK, tmp_path_factory.mktemp("pressed"), h=0.01, t_end=0.4, frame=0.4, initiation="ADMISSIBLE"
-    )
+    folder = tmp_path_factory.mktemp("pressed")
+    run = run_deck(DECK, folder, h=0.01, t_end=0.4, frame=0.4, initiation="ADMISSIBLE")
     fields = run.fields()
     assert fields["contact_active"][-1].sum() >= 2
     fields["velocity"][-1, :N_RING_NODE, 1] -= 3.0
