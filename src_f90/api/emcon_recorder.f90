@@ -335,7 +335,7 @@ contains
          else if (output%frequency == 0) then
             is_due = .false.
          else
-            is_due = mod(state%n_grid, output%frequency) == 0
+            is_due = mod(state%increment - state%n_before, output%frequency) == 0
          end if
          is_due = is_due .or. (output%frequency > 0 .and. state%n_grid >= stepper%march%n_grid)
       end associate
@@ -378,7 +378,7 @@ contains
       type(stepper_t), intent(inout) :: stepper
       type(error_t), allocatable, intent(out) :: error
       logical :: due, has_request
-      integer :: i, stride
+      integer :: i
 
       due = self%fields%n_frame == 0
       has_request = .false.
@@ -390,9 +390,8 @@ contains
          end do
       end associate
       if (.not. has_request) then
-         stride = max(1, stepper%march%n_grid/default_frames)
-         due = due .or. mod(stepper%march%state%n_grid, stride) == 0 &
-            .or. stepper%march%state%n_grid >= stepper%march%n_grid
+         due = due .or. default_frame(stepper, stepper%march%state%time) &
+            > default_frame(stepper, self%last_time)
       end if
       if (.not. due) return
       call vtkhdf_begin_frame(self%fields, real(stepper%march%state%time, dp))
@@ -402,6 +401,18 @@ contains
       end do
       call vtkhdf_end_frame(self%fields, error)
    end subroutine write_fields
+
+   !> Number of the frame that `time` falls into, of those that every step gets by default.
+   pure integer function default_frame(stepper, time)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: time
+      real(wp) :: part
+
+      associate (state => stepper%march%state)
+         part = (time - state%start_time)/stepper%scene%step(state%i_step)%duration
+         default_frame = floor(real(default_frames, wp)*max(0.0_wp, part) + sqrt(epsilon(1.0_wp)))
+      end associate
+   end function default_frame
 
    !> The fields that belong to one variable, e.g. stress and von Mises stress to S.
    subroutine write_variable(self, stepper, variable, error)

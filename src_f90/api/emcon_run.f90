@@ -265,7 +265,8 @@ contains
       associate (state => run%stepper%march%state, &
             frequency => run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency)
          if (frequency == 0) return
-         if (mod(state%n_grid, frequency) == 0 .or. stepper_is_done(run%stepper)) then
+         if (mod(state%increment - state%n_before, frequency) == 0 &
+            .or. stepper_is_done(run%stepper)) then
             call save(run, error)
          end if
       end associate

@@ -19,6 +19,10 @@ module emcon_nts
    !> Corners sharper than this (cosine of the turn) end the surface: the bisector degenerates.
    real(wp), parameter :: sharpest_cosine = -0.9_wp
 
+   !> So far past the end of a surface, per edge, a node is still over it: a node that meets the end
+   !> exactly (as on a plane of symmetry) must not be lost to round-off.
+   real(wp), parameter :: end_tol = 1.0e-3_wp
+
    type, extends(contact_t) :: nts_t
       type(chain_t) :: slave
       type(chain_t) :: master
@@ -226,7 +230,7 @@ contains
       if (state%gap1 < 0.0_wp .and. state%gap0 > 0.0_wp) then
          xi = xi0 + (state%gap0/(state%gap0 - state%gap1))*(xi1 - xi0)
       end if
-      state%is_over = (before > 0 .or. xi >= 0.0_wp) .and. (after > 0 .or. xi <= 1.0_wp)
+      state%is_over = (before > 0 .or. xi >= -end_tol) .and. (after > 0 .or. xi <= 1.0_wp + end_tol)
       state%is_covered = .true.
       if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, x, u0, du)
    end function nts_gap_state

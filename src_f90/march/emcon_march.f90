@@ -29,7 +29,7 @@ module emcon_march
    !> Increments without a cut after which an automatic increment is doubled.
    integer, parameter :: easy_increments = 5
    !> Corners of master surfaces are rounded over this fraction of an edge if a step is static.
-   real(wp), parameter :: static_rounding = 0.01_wp
+   real(wp), parameter :: static_rounding = 1.0e-4_wp
    !> Closer than this a step's duration counts as a whole number of increments.
    real(wp), parameter :: whole = 1.0e3_wp*epsilon(1.0_wp)
 

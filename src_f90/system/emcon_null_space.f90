@@ -24,6 +24,7 @@ module emcon_null_space
       logical :: is_possible = .false.           !! each constraint has an unknown of its own
       integer :: n_free = 0                      !! independent unknowns
       integer, allocatable :: dependent(:)       !! (n) one unknown per constraint
+      integer, allocatable :: place(:, :)        !! (2, n) its direction, and its node in the constraint
       integer, allocatable :: free(:)            !! (n_unknown) number if independent, else 0
       type(csr_t) :: p                           !! (n_unknown x n_free)
       type(csr_t) :: d                           !! (n_unknown x n_free) DF
@@ -72,8 +73,8 @@ contains
          do i = 1, rows%row_start(set%n + 1)
             used(rows%column(i) + 1) = used(rows%column(i) + 1) + 1
          end do
-         if (allocated(self%dependent)) deallocate(self%dependent)
-         allocate(self%dependent(set%n), source=0)
+         if (allocated(self%dependent)) deallocate(self%dependent, self%place)
+         allocate(self%dependent(set%n), self%place(2, set%n), source=0)
          do k = 1, set%n
             slave = numbering%unknown(:, set%item(k)%node(1))
             best = 0.0_dp
@@ -89,6 +90,11 @@ contains
             end do
             self%is_possible = best > poor_pivot**2*largest
             if (.not. self%is_possible) return
+            do i = 1, set%item(k)%n_node
+               slave = numbering%unknown(:, set%item(k)%node(i))
+               if (slave(1) == self%dependent(k)) self%place(:, k) = [1, i]
+               if (slave(2) == self%dependent(k)) self%place(:, k) = [2, i]
+            end do
          end do
       end associate
       self%is_possible = .true.
@@ -204,8 +210,7 @@ contains
       integer :: k
 
       do k = 1, set%n
-         lam(k) = residual(self%dependent(k)) &
-            /real(set%force_rows%value(csr_find(set%force_rows, k, self%dependent(k))), wp)
+         lam(k) = residual(self%dependent(k))/set%item(k)%g(self%place(1, k), self%place(2, k))
       end do
    end subroutine null_space_multipliers
 
