@@ -117,11 +117,16 @@ contains
       if (abs(value) >= 1.0e-3_wp .and. abs(value) < 10.0_wp**min(n, 15)) then
          write(form, "('(f0.', i0, ')')") max(0, n - 1 - floor(log10(abs(value))))
       else
-         write(form, "('(es48.', i0, 'e3)')") n - 1
+         write(form, "('(es48.', i0, 'e4)')") n - 1
       end if
       write(buffer, form) value
       text = trim(adjustl(buffer))
       i_exponent = scan(text, "E")
+      if (i_exponent > 0) then
+         do while (len(text) > i_exponent + 3 .and. text(i_exponent + 2:i_exponent + 2) == "0")
+            text = text(:i_exponent + 1) // text(i_exponent + 3:)
+         end do
+      end if
       if (i_exponent == 0 .and. index(text, ".") > 0) then
          last = verify(text, "0", back=.true.)
          text = text(:last)

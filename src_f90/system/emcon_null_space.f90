@@ -24,7 +24,7 @@ module emcon_null_space
       logical :: is_possible = .false.           !! each constraint has an unknown of its own
       integer :: n_free = 0                      !! independent unknowns
       integer, allocatable :: dependent(:)       !! (n) one unknown per constraint
-      integer, allocatable :: place(:, :)        !! (2, n) its direction, and its node in the constraint
+      integer, allocatable :: place(:, :)        !! (2, n) its direction and local node
       integer, allocatable :: free(:)            !! (n_unknown) number if independent, else 0
       type(csr_t) :: p                           !! (n_unknown x n_free)
       type(csr_t) :: d                           !! (n_unknown x n_free) DF

@@ -34,11 +34,13 @@ def whole(deck, tmp_path_factory):
 
 
 def start(*arguments, **options):
+    """Run the program in the background; Ctrl-C reaches it even where this process ignores it."""
     return subprocess.Popen(
         [PROGRAM, *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         **options,
     )
 

@@ -131,7 +131,7 @@ def test_parameters(page):
         decks = [word for word in words if re.fullmatch(r"input_decks/\w+\.inp", word)]
         for option, value in zip(words, words[1:], strict=False):
             if decks and option == "--set":
-                Deck.read(ROOT / decks[0]).parameter(value.split("=")[0])
+                Deck.read(ROOT / decks[0]).set_parameter(value.split("=")[0], "0")
 
 
 # ---- figures of the README ----------------------------------------------------------------------
