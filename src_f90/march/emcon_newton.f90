@@ -29,10 +29,14 @@ module emcon_newton
    real(wp), parameter :: polish_gain = 0.5_wp
    !> A correction that inverts an element is halved so often at most.
    integer, parameter :: most_halvings = 6
-   !> Iterations without a new smallest residual after which the step has failed.
-   integer, parameter :: most_stalls = 6
-   !> A residual that stalls below this multiple of epsilon has converged.
+   !> A new best residual is at least this much smaller. After so many iterations without one the
+   !> step has failed; after a few it has converged, if it is below this multiple of epsilon.
+   real(wp), parameter :: stall_gain = 0.9_wp
+   integer, parameter :: most_stalls = 6, few_stalls = 2
    real(wp), parameter :: stall_floor = 1.0e4_wp*epsilon(1.0_wp)
+
+   !> What follows an evaluation.
+   integer, parameter :: next_done = 0, next_tangent = 1, next_old_tangent = 2, next_give_up = 3
 
    !> Settings, work space and report of the solver.
    type :: newton_t
@@ -48,6 +52,12 @@ module emcon_newton
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) contact forces
       !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
+      ! how the present solve goes:
+      real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far
+      real(wp) :: best = 0.0_wp
+      integer :: n_stall = 0                     !! iterations since the best one
+      integer :: n_polish = 0                    !! corrections with the old tangent
+      logical :: is_polish = .false.             !! within tolerance: down to round-off from here
    end type newton_t
 
 contains
@@ -80,26 +90,16 @@ contains
       real(wp), intent(inout), contiguous :: du(:, :)
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: norm, last, best, defect
-      logical :: with_tangent, is_polish, is_singular, is_rounding, is_driven
-      integer :: n_polish, n_stall
+      real(wp) :: norm, defect
+      logical :: is_rounding, is_driven
+      integer :: next
 
-      if (allocated(self%dlam)) deallocate(self%dlam)
-      allocate(self%dlam(set%n))
-      self%n_iteration = 0
-      self%n_solve = 0
-      self%n_history = 0
+      call begin(self, set%n)
       is_driven = any(abs(self%driven) > 0.0_wp) .and. size(self%residual) > 0
       if (is_driven) du = du - self%driven
-      n_polish = 0
-      n_stall = 0
-      is_polish = .false.
-      best = huge(best)
-      last = huge(last)
       do
-         with_tangent = .not. is_polish
-         call evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, &
-            with_tangent, du, norm, defect, is_rounding, status, error)
+         call evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, du, &
+            norm, defect, is_rounding, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (is_driven) then
             call start_driven(self, system, correction, set, pose, u0, du, status, error)
@@ -107,48 +107,101 @@ contains
             is_driven = .false.
             cycle
          end if
-         self%n_history = self%n_history + 1
-         self%history(self%n_history) = max(norm, defect)
-
-         if (max(norm, defect) <= floor) return
-         if (is_polish .and. max(norm, defect) > polish_gain*last) return
-         if (n_polish == most_polish) return
-         last = max(norm, defect)
-         is_polish = is_polish .or. last <= self%tolerance .or. is_rounding
-         if (last < 0.9_wp*best) then
-            n_stall = 0
-            best = last
-         else
-            n_stall = n_stall + 1
-         end if
-         status = newton_diverged
-         if (.not. is_polish) then
-            if (n_stall > 2 .and. last <= stall_floor) then
-               status = newton_converged
-               return
-            end if
-            if (n_stall > most_stalls .or. self%n_iteration == self%maximum) return
-         end if
-         if (.not. last < huge(last)) return
-
-         if (is_polish .and. self%n_iteration > 0) then
-            n_polish = n_polish + 1
-         else
-            call correction_factorise(correction, system, set, is_singular, error)
-            if (allocated(error)) return
-            self%n_iteration = self%n_iteration + 1
-            if (is_singular) then
-               status = newton_singular
-               return
-            end if
-         end if
-         call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
+         call judge(self, max(norm, defect), is_rounding, next)
+         select case (next)
+         case (next_done)
+            return
+         case (next_give_up)
+            status = newton_diverged
+            return
+         case (next_tangent)
+            call factorise(self, system, correction, set, status, error)
+            if (allocated(error) .or. status /= newton_converged) return
+         end select
+         call correct(self, system, correction, set, du, error)
          if (allocated(error)) return
-         self%n_solve = self%n_solve + 1
-         call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
-         set%lam = set%lam + self%dlam
       end do
    end subroutine newton_solve
+
+   !> Clear the record of the last solve.
+   pure subroutine begin(self, n_constraint)
+      type(newton_t), intent(inout) :: self
+      integer, intent(in) :: n_constraint
+
+      if (allocated(self%dlam)) deallocate(self%dlam)
+      allocate(self%dlam(n_constraint))
+      self%n_iteration = 0
+      self%n_solve = 0
+      self%n_history = 0
+      self%n_polish = 0
+      self%n_stall = 0
+      self%best = huge(self%best)
+      self%last = huge(self%last)
+      self%is_polish = .false.
+   end subroutine begin
+
+   !> What to do next, now that the largest relative residual is `size`: once it is within the
+   !> tolerance, or nothing but round-off, go on with the old tangent as long as that gains.
+   pure subroutine judge(self, size, is_rounding, next)
+      type(newton_t), intent(inout) :: self
+      real(wp), intent(in) :: size
+      logical, intent(in) :: is_rounding
+      integer, intent(out) :: next               !! one of the `next_` codes
+      logical :: has_gained
+
+      self%n_history = self%n_history + 1
+      self%history(self%n_history) = size
+      has_gained = size <= polish_gain*self%last
+      self%last = size
+      next = next_done
+      if (size <= floor) return
+      if (self%is_polish .and. (self%n_polish == most_polish .or. .not. has_gained)) return
+      self%is_polish = self%is_polish .or. size <= self%tolerance .or. is_rounding
+      if (self%is_polish) then
+         next = next_tangent                     ! the first guess was good enough
+         if (self%n_iteration > 0) next = next_old_tangent
+         self%n_polish = self%n_polish + 1
+         return
+      end if
+      self%n_stall = self%n_stall + 1
+      if (size < stall_gain*self%best) self%n_stall = 0
+      self%best = min(self%best, size)
+      if (self%n_stall > few_stalls .and. size <= stall_floor) return
+      next = next_tangent
+      if (self%n_stall > most_stalls .or. self%n_iteration == self%maximum &
+         .or. .not. size < huge(size)) next = next_give_up
+   end subroutine judge
+
+   !> Factorise for the present tangent.
+   subroutine factorise(self, system, correction, set, status, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(correction_t), intent(inout) :: correction
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(out) :: status
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_singular
+
+      call correction_factorise(correction, system, set, is_singular, error)
+      self%n_iteration = self%n_iteration + 1
+      status = merge(newton_singular, newton_converged, is_singular)
+   end subroutine factorise
+
+   !> Correct `du` and the multipliers for the present residual.
+   subroutine correct(self, system, correction, set, du, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(correction_t), intent(inout) :: correction
+      type(constraint_set_t), intent(inout) :: set
+      real(wp), intent(inout), contiguous :: du(:, :)
+      type(error_t), allocatable, intent(out) :: error
+
+      call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
+      if (allocated(error)) return
+      self%n_solve = self%n_solve + 1
+      call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
+      set%lam = set%lam + self%dlam
+   end subroutine correct
 
    !> First correction: what the prescribed motion does by the tangent at its start. Elements at
    !> driven nodes would be squeezed if these moved alone.
@@ -162,7 +215,6 @@ contains
       real(wp), intent(inout), contiguous :: du(:, :)
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_singular
       integer :: k, i
 
       call system_tangent_times(system, pose, u0, du, self%driven, self%contact)
@@ -174,22 +226,15 @@ contains
                + dot_product(set%item(k)%c(:, i), self%driven(:, set%item(k)%node(i)))
          end do
       end do
-      call correction_factorise(correction, system, set, is_singular, error)
-      if (allocated(error)) return
-      status = merge(newton_singular, newton_converged, is_singular)
-      if (is_singular) return
-      self%n_iteration = 1
-      call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
-      if (allocated(error)) return
-      self%n_solve = 1
-      call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
+      call factorise(self, system, correction, set, status, error)
+      if (allocated(error) .or. status /= newton_converged) return
+      call correct(self, system, correction, set, du, error)
       du = du + self%driven
-      set%lam = set%lam + self%dlam
    end subroutine start_driven
 
    !> Residual at `du`; the last correction is halved as long as an element is inverted.
-   subroutine evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, &
-      with_tangent, du, norm, defect, is_rounding, status, error)
+   subroutine evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, du, &
+      norm, defect, is_rounding, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
@@ -197,7 +242,6 @@ contains
       type(constraint_set_t), intent(inout) :: set
       type(pose_t), intent(in) :: pose
       real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), offset(:, :)
-      logical, intent(in) :: with_tangent
       real(wp), intent(inout), contiguous :: du(:, :)
       real(wp), intent(out) :: norm, defect
       logical, intent(out) :: is_rounding
@@ -210,7 +254,8 @@ contains
       norm = huge(norm)
       defect = huge(defect)
       do i = 0, most_halvings
-         call system_respond(system, scene, pose, u0, v0, du, offset, with_tangent)
+         call system_respond(system, scene, pose, u0, v0, du, offset, &
+            with_tangent=.not. self%is_polish)
          self%inverted_element = system%response%inverted_element
          if (self%inverted_element == 0) exit
          if (i == most_halvings .or. self%n_solve == 0) return
