@@ -145,6 +145,8 @@ contains
          state%contact = self%newton%contact
          state%internal = system%response%force
          state%energy = system%response%energy
+         if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
+            "active constraints share their unknowns: solved as a saddle point")
          increment%residual = self%newton%history(:self%newton%n_history)
          increment%deepest = min(increment%deepest, self%active%deepest)
          state%is_active = .false.

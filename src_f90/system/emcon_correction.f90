@@ -22,6 +22,7 @@ module emcon_correction
    type :: correction_t
       integer :: method = method_null_space      !! as the deck asks
       logical :: uses_null_space = .false.       !! for the present constraints
+      logical :: fell_back = .false.             !! asked for, but no constraint has its own unknown
       integer :: n_factorisation = 0             !! made so far
       type(umfpack_t) :: solver                  !! no active constraint
       type(csr_t) :: merged                      !! N with constraints
@@ -80,6 +81,7 @@ contains
          if (allocated(error)) return
          self%uses_null_space = self%null_space%is_possible
       end if
+      self%fell_back = self%method == method_null_space .and. .not. self%uses_null_space
       if (.not. self%uses_null_space) then
          call saddle_point_init(self%saddle_point, set, self%merged, error)
       end if
