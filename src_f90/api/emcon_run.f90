@@ -2,7 +2,7 @@
 module emcon_run
    use emcon_blas, only : blas_keep_memory, blas_single_thread
    use emcon_errors, only : err_file, err_input, err_interrupt, error_t, raise
-   use emcon_files, only : file_exists, make_directory, survive_file_size_limit
+   use emcon_files, only : file_exists, file_remove, make_directory, survive_file_size_limit
    use emcon_kinds, only : dp, wp
    use emcon_log, only : log_close, log_line, log_open, log_t
    use emcon_march, only : increment_t
@@ -106,6 +106,8 @@ contains
       call log_open(run%log, run%base // ".log", .false., error)
       if (allocated(error)) return
       call recorder_open(run%recorder, run%stepper, run%base, error)
+      ! The state of an earlier run does not belong to the results that begin here.
+      if (.not. allocated(error)) call file_remove(run%base // ".rst.h5", error)
       if (.not. allocated(error)) then
          call log_start(run%log, run%stepper, report%diagnostic, path)
          call recorder_write(run%recorder, run%stepper, nothing, cpu_seconds(), error)

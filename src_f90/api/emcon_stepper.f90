@@ -16,7 +16,7 @@ module emcon_stepper
    use emcon_text, only : notes_t, string_t
    implicit none
    private
-   public :: stepper_t, stepper_open, stepper_open_source, stepper_advance, stepper_is_done
+   public :: stepper_t, stepper_open, stepper_advance, stepper_is_done
    public :: stepper_close, stepper_fraction, stepper_save, stepper_load, contact_gaps
 
    type :: stepper_t

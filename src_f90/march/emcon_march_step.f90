@@ -98,9 +98,10 @@ contains
                   state%u_start(a, i), u, v)
                self%du(a, i) = u - state%u(a, i)
                self%v1(a, i) = v
-               if (.not. self%scheme%has_inertia) self%newton%driven(a, i) = self%du(a, i)
                if (self%scheme%has_inertia) then
                   self%offset(a, i) = 0.5_wp*h*(state%v(a, i) + v) - self%du(a, i)
+               else
+                  self%newton%driven(a, i) = self%du(a, i)
                end if
             end associate
          end do

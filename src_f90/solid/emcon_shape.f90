@@ -4,7 +4,7 @@ module emcon_shape
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: shape_t, shape_create, shape_values, max_gauss_points
+   public :: shape_t, shape_create, shape_values
 
    integer, parameter :: max_gauss_points = 4
 

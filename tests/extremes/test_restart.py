@@ -357,3 +357,20 @@ def test_restart_with_results_of_fewer_increments(stopped):
     done = emcon("restart", stopped.file(".rst.h5"), "--quiet")
     assert done.returncode in (2, 4)
     assert "ring.h5" in done.stderr
+
+
+def test_a_new_run_drops_the_restart_file_of_an_earlier_one(tmp_path):
+    """Killed before it wrote one itself, it must not go on from the state of another run."""
+    deck = DECKS / "ring.inp"
+    run_deck(deck, tmp_path, h=0.05, t_end=0.1)
+    restart = tmp_path / "ring.rst.h5"
+    assert restart.exists()
+    process = start(deck, "--quiet", "--output", tmp_path, "--set=h=0.001")
+    deadline = time.monotonic() + 30.0
+    while restart.exists() and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.kill()
+    process.communicate()
+    assert not restart.exists()
+    done = emcon("restart", restart)
+    assert done.returncode == 2 and "no such file" in done.stderr
