@@ -8,11 +8,14 @@ module emcon_scene
    implicit none
    private
    public :: origin_t, named_set_t, surface_t, material_t, section_t, amplitude_t
-   public :: contact_pair_t, prescribed_t, load_t, output_t, step_t, scene_t
+   public :: contact_pair_t, contact_options_t, prescribed_t, load_t, output_t, step_t, scene_t
    public :: where_text, find_amplitude_value
    public :: law_linear, law_neo_hooke, law_coupled_neo_hooke
    public :: load_point, load_pressure, load_gravity
-   public :: formulation_nts
+   public :: formulation_nts, formulation_segment, formulation_mortar
+   public :: integration_segments, integration_elements
+   public :: multiplier_standard, multiplier_dual
+   public :: normal_edge, normal_nodal, smoothing_none, smoothing_hermite
    public :: procedure_static, procedure_dynamic
    public :: initiation_persistent, initiation_admissible, initiation_velocity_update
    public :: method_null_space, method_saddle_point
@@ -22,7 +25,11 @@ module emcon_scene
    !> Constitutive laws. `law_linear` is linear elasticity, under NLGEOM St. Venant-Kirchhoff.
    integer, parameter :: law_linear = 1, law_neo_hooke = 2, law_coupled_neo_hooke = 3
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3
-   integer, parameter :: formulation_nts = 1
+   integer, parameter :: formulation_nts = 1, formulation_segment = 2, formulation_mortar = 3
+   integer, parameter :: integration_segments = 1, integration_elements = 2
+   integer, parameter :: multiplier_standard = 1, multiplier_dual = 2
+   integer, parameter :: normal_edge = 1, normal_nodal = 2
+   integer, parameter :: smoothing_none = 1, smoothing_hermite = 2
    integer, parameter :: procedure_static = 1, procedure_dynamic = 2
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
       initiation_velocity_update = 3
@@ -87,6 +94,18 @@ module emcon_scene
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
    end type contact_pair_t
 
+   !> How the contact of a step is computed: *MORTAR and *SURFACE SMOOTHING.
+   type :: contact_options_t
+      integer :: integration = integration_segments
+      integer :: n_point = 0                         !! POINTS=; 0: not given
+      integer :: multiplier = multiplier_dual
+      integer :: normal = normal_nodal
+      integer :: smoothing = smoothing_none
+      !> Turns sharper than this are corners: normals are not averaged, surfaces not smoothed there
+      real(wp) :: normal_angle = 60.0_wp             !! [degrees]
+      real(wp) :: smoothing_angle = 60.0_wp          !! [degrees]
+   end type contact_options_t
+
    !> One prescribed degree of freedom: u = `value` times the amplitude.
    !>
    !> Without amplitude: in a static step u runs linearly from what it is at the start of the step
@@ -137,6 +156,7 @@ module emcon_scene
       integer :: constraint_method = method_null_space
       integer :: initiation = initiation_persistent
       real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
+      type(contact_options_t) :: contact
       real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
       integer :: newton_maximum = 20
       integer :: restart_frequency = 0               !! 0: no restart file

@@ -1,0 +1,15 @@
+!> Discrete-gradient arithmetic over 17 variables: the plane coordinates of eight nodes, and the
+!> unknown of an implicit equation (`dg_root`).
+!>
+!> Source: docs/theory.md, section 2.
+module emcon_dgrad17
+   use emcon_dgrad_series, only : atanh_excess, expm1_of, log1p_excess, log1p_of, sinh_ratio
+   use emcon_kinds, only : wp
+   implicit none
+   private
+
+   integer, parameter :: n_var = 17
+
+   include "emcon_dgrad.inc"
+
+end module emcon_dgrad17
