@@ -121,9 +121,10 @@ contains
             associate (contact => system%contact(pair)%contact)
                contact%reach = 0.0_wp      ! which gaps are measured must not depend on the past
                call contact%begin_step(self%scene%x, u, system%zero)
+               call contact%measure(self%scene%x, u, system%zero)
                do i = 1, contact%n_constraint
                   id = system%first_constraint(pair) + i
-                  state = contact%gap_state(i, self%scene%x, u, system%zero)
+                  state = contact%state(i)
                   is_near(id) = state%is_near .and. state%is_over
                   if (is_near(id)) gap(id) = state%gap0
                end do

@@ -4,24 +4,23 @@
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
    use emcon_kinds, only : wp
+   use emcon_scene, only : contact_options_t
    implicit none
    private
-   public :: contact_t, contact_box_t, constraint_t, gap_state_t, max_constraint_nodes
+   public :: contact_t, contact_box_t, constraint_t, constraint_resize, gap_state_t
 
-   integer, parameter :: max_constraint_nodes = 5
-
-   !> One constraint over a step, on its own nodes.
+   !> One constraint over a step, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: constraint_t
       integer :: n_node = 0
-      integer :: node(max_constraint_nodes) = 0       !! the first one is the slave node
-      real(wp) :: gap0 = 0.0_wp                       !! [L], > 0 open
-      real(wp) :: gap1 = 0.0_wp
+      integer, allocatable :: node(:)                 !! (>= n_node) the first is the slave node
+      real(wp) :: gap0 = 0.0_wp                       !! f at the start [L], > 0 open
+      real(wp) :: gap1 = 0.0_wp                       !! at the end
       real(wp) :: dgap = 0.0_wp                       !! gap1 - gap0, to relative accuracy
-      real(wp) :: size = 0.0_wp                       !! length of the master edge [L]
-      real(wp) :: g(2, max_constraint_nodes) = 0.0_wp   !! discrete gradient
-      real(wp) :: c(2, max_constraint_nodes) = 0.0_wp   !! gradient at the end
+      real(wp) :: size = 0.0_wp                       !! length of an edge [L]
+      real(wp), allocatable :: g(:, :)                !! (2, >= n_node) discrete gradient
+      real(wp), allocatable :: c(:, :)                !! (2, >= n_node) gradient at the end
       !> (i, j): derivative of g(i) by end coordinate j, coordinates node by node
-      real(wp) :: h(2*max_constraint_nodes, 2*max_constraint_nodes) = 0.0_wp
+      real(wp), allocatable :: h(:, :)
    end type constraint_t
 
    !> Where one possible constraint stands at both ends of a step.
@@ -29,7 +28,7 @@ module emcon_contact
       logical :: is_near = .false.                    !! false: no surface within reach
       logical :: is_over = .false.                    !! over the surface (not past its end)
       logical :: is_covered = .true.                  !! the stencil still holds at the end
-      real(wp) :: gap0 = 0.0_wp
+      real(wp) :: gap0 = 0.0_wp                       !! mean gap Phi/W [L]
       real(wp) :: gap1 = 0.0_wp
       real(wp) :: size = 0.0_wp
    end type gap_state_t
@@ -38,11 +37,16 @@ module emcon_contact
       integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
+      !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
+      !> from there on the other side of a thin body is meant.
+      real(wp) :: deepest_start = 0.0_wp
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
+      type(gap_state_t), allocatable :: state(:)      !! (n_constraint) as last measured
    contains
+      procedure(configure_interface), deferred :: configure
       procedure(begin_interface), deferred :: begin_step
-      procedure(state_interface), deferred :: gap_state
+      procedure(measure_interface), deferred :: measure
       procedure(evaluate_interface), deferred :: evaluate
       procedure(area_interface), deferred :: area
    end type contact_t
@@ -54,6 +58,14 @@ module emcon_contact
 
    abstract interface
 
+      !> Take over the options of a step of the deck.
+      pure subroutine configure_interface(self, x, options)
+         import :: contact_t, contact_options_t, wp
+         class(contact_t), intent(inout) :: self
+         real(wp), intent(in), contiguous :: x(:, :)
+         type(contact_options_t), intent(in) :: options
+      end subroutine configure_interface
+
       !> Choose the stencils for a step from `u0` with the expected motion `du`.
       pure subroutine begin_interface(self, x, u0, du)
          import :: contact_t, wp
@@ -61,22 +73,21 @@ module emcon_contact
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node)
       end subroutine begin_interface
 
-      !> Gap of constraint `i` at both ends of the step, cheaply.
-      pure function state_interface(self, i, x, u0, du) result(state)
-         import :: contact_t, gap_state_t, wp
-         class(contact_t), intent(in) :: self
-         integer, intent(in) :: i
+      !> Fill `state`: all gaps at both ends of the step, cheaply.
+      pure subroutine measure_interface(self, x, u0, du)
+         import :: contact_t, wp
+         class(contact_t), intent(inout) :: self
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-         type(gap_state_t) :: state
-      end function state_interface
+      end subroutine measure_interface
 
-      !> Constraint `i` with all its derivatives.
-      pure subroutine evaluate_interface(self, i, x, u0, du, constraint)
+      !> The constraints `wanted` with all their derivatives; `target` are the mean gaps to hold.
+      pure subroutine evaluate_interface(self, wanted, x, u0, du, target, item)
          import :: constraint_t, contact_t, wp
-         class(contact_t), intent(in) :: self
-         integer, intent(in) :: i
+         class(contact_t), intent(inout) :: self
+         integer, intent(in) :: wanted(:)             !! (n) numbers of constraints, ascending
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-         type(constraint_t), intent(inout) :: constraint
+         real(wp), intent(in) :: target(:)            !! (n) [L]
+         type(constraint_t), intent(inout) :: item(:) !! (n)
       end subroutine evaluate_interface
 
       !> Area over which the multiplier of each constraint acts, at x + u.
@@ -88,5 +99,21 @@ module emcon_contact
       end subroutine area_interface
 
    end interface
+
+contains
+
+   !> Make room for `n` nodes and count them.
+   pure subroutine constraint_resize(self, n)
+      type(constraint_t), intent(inout) :: self
+      integer, intent(in) :: n
+
+      self%n_node = n
+      if (allocated(self%node)) then
+         if (size(self%node) >= n) return
+         deallocate(self%node, self%g, self%c, self%h)
+      end if
+      allocate(self%node(n), source=0)
+      allocate(self%g(2, n), self%c(2, n), self%h(2*n, 2*n), source=0.0_wp)
+   end subroutine constraint_resize
 
 end module emcon_contact

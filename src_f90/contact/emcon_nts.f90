@@ -1,12 +1,12 @@
 !> Node-to-segment contact: one constraint per slave node, gap over the nearest master edge.
 module emcon_nts
    use emcon_chain, only : chain_init, chain_t, chain_tributary
-   use emcon_contact, only : constraint_t, contact_t, gap_state_t
+   use emcon_contact, only : constraint_resize, constraint_t, contact_t, gap_state_t
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_nts_gap, only : nts_gap, nts_gap_value
-   use emcon_scene, only : contact_pair_t, scene_t
+   use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_none
    use emcon_search, only : box_distance, candidates_t, search_candidates
    use emcon_sort, only : find_sorted
    implicit none
@@ -22,17 +22,21 @@ module emcon_nts
    !> So far past the end of a surface, per edge, a node is still over it: a node that meets the end
    !> exactly (as on a plane of symmetry) must not be lost to round-off.
    real(wp), parameter :: end_tol = 1.0e-3_wp
+   !> A node counts as outside at the start of a step down to this fraction of a master edge.
+   real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
 
    type, extends(contact_t) :: nts_t
       type(chain_t) :: slave
       type(chain_t) :: master
+      integer :: smoothing = smoothing_none
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
       type(candidates_t) :: candidates
       real(wp), allocatable :: u_slave(:, :)          !! displacements when the list was made
       real(wp), allocatable :: u_master(:, :)
    contains
       procedure :: begin_step => nts_begin_step
-      procedure :: gap_state => nts_gap_state
+      procedure :: configure => nts_configure
+      procedure :: measure => nts_measure
       procedure :: evaluate => nts_evaluate
       procedure :: area => nts_area
    end type nts_t
@@ -54,6 +58,8 @@ contains
       self%node = self%slave%node
       self%n_constraint = size(self%node)
       allocate(self%edge(self%n_constraint), source=0)
+      allocate(self%state(self%n_constraint))
+      self%deepest_start = touch_tol
       allocate(self%thickness(self%n_constraint), source=1.0_wp)
       associate (surface => scene%surface(pair%slave))
          do i = 1, self%slave%n_edge
@@ -208,8 +214,26 @@ contains
       edge_length = sqrt(dot_product(a, a))
    end function edge_length
 
-   pure function nts_gap_state(self, i, x, u0, du) result(state)
-      class(nts_t), intent(in) :: self
+   pure subroutine nts_configure(self, x, options)
+      class(nts_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      type(contact_options_t), intent(in) :: options
+
+      self%smoothing = options%smoothing
+   end subroutine nts_configure
+
+   pure subroutine nts_measure(self, x, u0, du)
+      class(nts_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer :: i
+
+      do i = 1, self%n_constraint
+         self%state(i) = gap_state(self, i, x, u0, du)
+      end do
+   end subroutine nts_measure
+
+   pure function gap_state(self, i, x, u0, du) result(state)
+      type(nts_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
@@ -233,7 +257,7 @@ contains
       state%is_over = (before > 0 .or. xi >= -end_tol) .and. (after > 0 .or. xi <= 1.0_wp + end_tol)
       state%is_covered = .true.
       if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, x, u0, du)
-   end function nts_gap_state
+   end function gap_state
 
    !> Is the edge or one of its neighbours the nearest at the end of the step, rather than the edges
    !> after next?
@@ -274,26 +298,30 @@ contains
 
    end function is_covered
 
-   pure subroutine nts_evaluate(self, i, x, u0, du, constraint)
-      class(nts_t), intent(in) :: self
-      integer, intent(in) :: i
+   pure subroutine nts_evaluate(self, wanted, x, u0, du, target, item)
+      class(nts_t), intent(inout) :: self
+      integer, intent(in) :: wanted(:)
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      type(constraint_t), intent(inout) :: constraint
-      integer :: n, before, after
+      real(wp), intent(in) :: target(:)
+      type(constraint_t), intent(inout) :: item(:)
+      integer :: n, node(5), before, after, k
       real(wp) :: local(2, 5), dlocal(2, 5)
       type(dg_t) :: gap
 
-      call stencil(self, i, x, u0, n, constraint%node, before, after)
-      call gather(x, u0, du, n, constraint%node, local, dlocal)
-      constraint%n_node = n
-      constraint%size = edge_length(x, constraint%node)
-      gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*constraint%size)
-      constraint%gap0 = gap%f0
-      constraint%gap1 = gap%f1
-      constraint%dgap = gap%df
-      constraint%g = reshape(gap%g, [2, 5])
-      constraint%c = reshape(gap%c, [2, 5])
-      constraint%h = gap%h
+      do k = 1, size(wanted)
+         call stencil(self, wanted(k), x, u0, n, node, before, after)
+         call gather(x, u0, du, n, node, local, dlocal)
+         call constraint_resize(item(k), n)
+         item(k)%node(:n) = node(:n)
+         item(k)%size = edge_length(x, node)
+         gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*item(k)%size)
+         item(k)%gap0 = gap%f0 - target(k)
+         item(k)%gap1 = gap%f1 - target(k)
+         item(k)%dgap = gap%df
+         item(k)%g(:, :n) = reshape(gap%g(:2*n), [2, n])
+         item(k)%c(:, :n) = reshape(gap%c(:2*n), [2, n])
+         item(k)%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+      end do
    end subroutine nts_evaluate
 
    pure subroutine nts_area(self, x, u, area)
@@ -332,7 +360,7 @@ contains
          end if
       end do
       zero = 0.0_wp
-      state = self%gap_state(i, x, u, zero)
+      state = gap_state(self, i, x, u, zero)
       gap = state%gap0
       is_over = state%is_over
    end subroutine nts_nearest

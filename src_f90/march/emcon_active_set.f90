@@ -26,13 +26,14 @@ module emcon_active_set
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
    real(wp), parameter :: force_noise = 1.0e3_wp*epsilon(1.0_wp)
-   !> A node counts as outside at the start of a step down to this fraction of a master edge.
+   !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
    !> Sets tried in one step at most.
    integer, parameter :: most_sets = 40
 
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start
+      logical :: has_inertia = .true.            !! energy is to be kept
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
       logical, allocatable :: is_active(:)       !! (n_constraint)
@@ -110,18 +111,17 @@ contains
       type(scene_t), intent(in) :: scene
       type(state_t), intent(in) :: state
       real(wp), intent(in), contiguous :: du(:, :)
-      type(gap_state_t) :: gap
       integer :: pair, i, id
 
       self%is_active = .false.
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             call contact%begin_step(scene%x, state%u, du)
+            call contact%measure(scene%x, state%u, system%zero)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
-               if (.not. state%is_active(id)) cycle
-               gap = contact%gap_state(i, scene%x, state%u, system%zero)
-               self%is_active(id) = gap%is_near .and. gap%is_over
+               self%is_active(id) = state%is_active(id) .and. contact%state(i)%is_near &
+                  .and. contact%state(i)%is_over
             end do
          end associate
       end do
@@ -130,21 +130,25 @@ contains
    !> Hand the present set to the constraints, with the gaps to hold; multipliers carry over.
    subroutine select_active(self, system, scene, u0, du)
       type(active_set_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
+      type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      type(gap_state_t) :: state
       integer :: k, pair, i
 
       if (self%set%n == 0 .and. .not. any(self%is_active)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
+      do pair = 1, size(system%contact)
+         call system%contact(pair)%contact%measure(scene%x, u0, du)
+      end do
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
-         if (.not. self%holds_gap) cycle
          call constraint_place(system, self%set%id(k), pair, i)
-         state = system%contact(pair)%contact%gap_state(i, scene%x, u0, du)
-         self%set%target(k) = state%gap0
-         self%set%is_kept(k) = .true.
+         associate (gap => system%contact(pair)%contact%state(i))
+            ! What is closed too far is never pushed out: that would make energy.
+            self%set%is_kept(k) = self%holds_gap .or. &
+               (self%has_inertia .and. gap%gap0 < -touch_tol*gap%size)
+            if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
+         end associate
       end do
    end subroutine select_active
 
@@ -170,11 +174,12 @@ contains
          associate (contact => system%contact(pair)%contact)
             ! The motion may be more than was expected.
             call contact%begin_step(scene%x, state%u, du)
+            call contact%measure(scene%x, state%u, du)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
+               gap = contact%state(i)
                if (self%is_active(id)) then
                   k = k + 1
-                  gap = contact%gap_state(i, scene%x, state%u, du)
                   self%deepest = min(self%deepest, gap%gap1/gap%size)
                   if (.not. gap%is_covered) status = step_too_far
                   if (self%holds_gap .and. .not. state%is_active(id)) then
@@ -184,9 +189,9 @@ contains
                   if (only_adds .or. self%set%lam(k) >= -noise) cycle
                   self%is_active(id) = .false.
                else
-                  gap = contact%gap_state(i, scene%x, state%u, du)
                   if (.not. (gap%is_near .and. gap%is_over)) cycle
-                  if (gap%gap0 < -touch_tol*gap%size .and. .not. state%is_active(id)) cycle
+                  if (gap%gap0 < -contact%deepest_start*gap%size .and. &
+                     .not. state%is_active(id)) cycle
                   self%deepest = min(self%deepest, gap%gap1/gap%size)
                   if (gap%gap1 >= -gap_noise*gap%size) cycle
                   if (.not. gap%is_covered) status = step_too_far

@@ -116,8 +116,10 @@ contains
          call velocity_update_reset(self%velocity_update)
          self%active%holds_gap = step%initiation == initiation_persistent &
             .and. self%scheme%has_inertia
+         self%active%has_inertia = self%scheme%has_inertia
          self%active%gap_tolerance = step%gap_tolerance
          do i = 1, size(self%system%contact)
+            call self%system%contact(i)%contact%configure(scene%x, step%contact)
             self%system%contact(i)%contact%rounding = merge(static_rounding, 0.0_wp, &
                any(scene%step%procedure == procedure_static))
          end do

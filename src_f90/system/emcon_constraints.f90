@@ -1,9 +1,9 @@
 !> The active constraints of a step: values, gradients, multipliers.
 !>
-!> One set serves all contact pairs. Constraint k demands gap_k(q1) = target_k; its multiplier
-!> lam_k >= 0 is the contact force. Sign: docs/theory.md, eq. (1).
+!> One set serves all contact pairs. Constraint k demands that its mean gap be target_k at the end;
+!> its multiplier lam_k >= 0 is the contact force. Sign: docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_contact, only : constraint_t, max_constraint_nodes
+   use emcon_contact, only : constraint_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_kinds, only : dp, wp
    use emcon_numbering, only : numbering_t
@@ -20,10 +20,10 @@ module emcon_constraints
       integer :: n = 0
       integer, allocatable :: id(:)              !! (n) numbers over all pairs
       type(constraint_t), allocatable :: item(:) !! (n) values and derivatives
-      real(wp), allocatable :: target(:)         !! (n) gap to hold [L]
+      real(wp), allocatable :: target(:)         !! (n) mean gap to hold [L]
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
       real(wp), allocatable :: lam(:)            !! (n) multipliers [M L/T^2]
-      real(wp), allocatable :: defect(:)         !! (n) gap(q1) - target
+      real(wp), allocatable :: defect(:)         !! (n) f(q1), what is left of the gap to the target
       type(csr_t) :: force_rows                  !! (n x n_unknown) discrete gradients
       type(csr_t) :: gap_rows                    !! (n x n_unknown) gradients at the end
    end type constraint_set_t
@@ -61,21 +61,32 @@ contains
       type(scene_t), intent(in) :: scene
       type(pose_t), intent(in) :: pose
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      integer :: k, pair, i
+      integer :: k, pair, i, first, last, number(self%n)
 
+      if (self%n == 0) return
       if (pose%is_end) system%u_work = u0 + du
       do k = 1, self%n
          call constraint_place(system, self%id(k), pair, i)
-         associate (contact => system%contact(pair)%contact, item => self%item(k))
+         number(k) = i
+      end do
+      last = 0
+      do pair = 1, size(system%contact)
+         first = last + 1
+         last = count(self%id <= system%first_constraint(pair + 1))
+         if (last < first) cycle
+         associate (contact => system%contact(pair)%contact, wanted => number(first:last), &
+               target => self%target(first:last))
             if (pose%is_end) then
-               call contact%evaluate(i, scene%x, system%u_work, system%zero, item)
-               item%h = 2.0_wp*item%h
+               call contact%evaluate(wanted, scene%x, system%u_work, system%zero, target, &
+                  self%item(first:last))
             else
-               call contact%evaluate(i, scene%x, u0, du, item)
+               call contact%evaluate(wanted, scene%x, u0, du, target, self%item(first:last))
             end if
-            self%defect(k) = item%gap1 - self%target(k)
-            if (self%is_kept(k)) self%defect(k) = item%dgap
          end associate
+      end do
+      do k = 1, self%n
+         if (pose%is_end) self%item(k)%h = 2.0_wp*self%item(k)%h
+         self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
       end do
    end subroutine constraints_evaluate
 
@@ -83,10 +94,12 @@ contains
    subroutine constraints_rows(self, numbering)
       type(constraint_set_t), intent(inout) :: self
       type(numbering_t), intent(in) :: numbering
-      integer :: k, i, a, n, unknown, order(2*max_constraint_nodes), m
-      integer :: column(2*max_constraint_nodes)
-      real(wp) :: g(2*max_constraint_nodes), c(2*max_constraint_nodes)
+      integer :: k, i, a, n, unknown, m, most
+      integer, allocatable :: column(:), order(:)
+      real(wp), allocatable :: g(:), c(:)
 
+      most = 2*maxval([0, (self%item(k)%n_node, k = 1, self%n)])
+      allocate(column(most), order(most), g(most), c(most))
       call reset(self%force_rows)
       call reset(self%gap_rows)
       n = 0
@@ -114,18 +127,21 @@ contains
 
    contains
 
+      !> Room for all coordinates of all constraints.
       subroutine reset(rows)
          type(csr_t), intent(inout) :: rows
+         integer :: n_entry
 
+         n_entry = 2*sum([(self%item(k)%n_node, k = 1, self%n)])
          rows%n_row = self%n
          rows%n_col = numbering%n_unknown
          if (allocated(rows%row_start)) then
-            if (size(rows%row_start) == self%n + 1) return
+            if (size(rows%row_start) == self%n + 1 .and. size(rows%column) == n_entry) return
             deallocate(rows%row_start, rows%column, rows%value)
          end if
          allocate(rows%row_start(self%n + 1), source=0)
-         allocate(rows%column(2*max_constraint_nodes*self%n), source=0)
-         allocate(rows%value(2*max_constraint_nodes*self%n), source=0.0_dp)
+         allocate(rows%column(n_entry), source=0)
+         allocate(rows%value(n_entry), source=0.0_dp)
       end subroutine reset
 
    end subroutine constraints_rows

@@ -76,7 +76,7 @@ contains
       type(nts_t), intent(inout) :: contact
       type(notes_t), intent(inout) :: notes
       type(gap_state_t) :: state
-      type(constraint_t) :: constraint
+      type(constraint_t) :: constraint(1)
       real(wp) :: zero(size(scene%x, 1), size(scene%x, 2)), largest
       logical :: is_meant
       integer :: i, k, n_moved
@@ -85,11 +85,12 @@ contains
       zero = 0.0_wp
       contact%reach = 0.0_wp
       call contact%begin_step(scene%x, scene%u0, zero)
+      call contact%measure(scene%x, scene%u0, zero)
       largest = 0.0_wp
       n_moved = 0
       do i = 1, contact%n_constraint
          if (contact%edge(i) == 0) cycle
-         state = contact%gap_state(i, scene%x, scene%u0, zero)
+         state = contact%state(i)
          is_meant = state%gap0 <= pair%adjust_distance
          if (pair%adjust_set > 0) is_meant = &
             find_sorted(scene%node_set(pair%adjust_set)%item, contact%node(i)) > 0
@@ -97,12 +98,12 @@ contains
          largest = max(largest, abs(state%gap0))
          n_moved = n_moved + 1
          do k = 1, most_moves
-            call contact%evaluate(i, scene%x, scene%u0, zero, constraint)
-            associate (normal => constraint%c(:, 1))
+            call contact%evaluate([i], scene%x, scene%u0, zero, [0.0_wp], constraint)
+            associate (normal => constraint(1)%c(:, 1))
                scene%x(:, contact%node(i)) = scene%x(:, contact%node(i)) &
-                  - constraint%gap1*normal/dot_product(normal, normal)
+                  - constraint(1)%gap1*normal/dot_product(normal, normal)
             end associate
-            if (abs(constraint%gap1) <= epsilon(1.0_wp)*constraint%size) exit
+            if (abs(constraint(1)%gap1) <= epsilon(1.0_wp)*constraint(1)%size) exit
          end do
       end do
       call note_add(notes, where_text(scene, pair%origin) // ": ADJUST moves " // &
@@ -124,12 +125,13 @@ contains
       noise = rounding*maxval(abs(scene%x))
       contact%reach = 0.0_wp
       call contact%begin_step(scene%x, scene%u0, zero)
+      call contact%measure(scene%x, scene%u0, zero)
       allocate(found(contact%n_constraint))
       n = 0
       deepest = 0.0_wp
       do i = 1, contact%n_constraint
          if (contact%edge(i) == 0) cycle
-         state = contact%gap_state(i, scene%x, scene%u0, zero)
+         state = contact%state(i)
          if (.not. state%is_over .or. state%gap0 >= -noise) cycle
          n = n + 1
          deepest = max(deepest, -state%gap0)

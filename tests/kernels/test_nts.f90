@@ -48,7 +48,8 @@ contains
       call check_equal(error, nts%node, [11, 12, 13], "slave nodes")
       call check_equal(error, nts%edge, [3, 2, 1], "edges under them, counted from the right")
       do i = 1, 3
-         state = nts%gap_state(i, scene%x, scene%u0, du)
+         call nts%measure(scene%x, scene%u0, du)
+         state = nts%state(i)
          call check_true(error, state%is_near .and. state%is_over .and. state%is_covered, "near")
          call check_near(error, [state%gap0, state%gap1, state%size], [0.25_wp, -0.125_wp, &
             1.0_wp], tol, 1.0_wp, "gap")
@@ -74,13 +75,15 @@ contains
       do k = 1, 3
          u(1, 11:) = way(k)                      ! the right node is at 1.125 + way
          call nts%begin_step(scene%x, u, du)
-         state = nts%gap_state(3, scene%x, u, du)
+         call nts%measure(scene%x, u, du)
+         state = nts%state(3)
          call check_true(error, state%is_over .eqv. k < 3, "over the surface " // to_text(k))
       end do
       u(1, 11:) = 0.5_wp                         ! flies over the end on its way down
       du(1, 11:) = 1.0_wp
       call nts%begin_step(scene%x, u, du)
-      state = nts%gap_state(3, scene%x, u, du)
+      call nts%measure(scene%x, u, du)
+      state = nts%state(3)
       call check_true(error, .not. state%is_over, "past the end where the gap closes")
    end subroutine test_past_end
 
@@ -185,7 +188,7 @@ contains
       type(block_t) :: lower, upper
       type(nts_t) :: nts
       type(gap_state_t) :: state
-      type(constraint_t) :: constraint
+      type(constraint_t) :: item(1)
       real(wp), allocatable :: u(:, :), du(:, :)
       integer :: i, k, n
 
@@ -198,14 +201,17 @@ contains
          call shake(du, 0.2_wp)
          call nts%begin_step(scene%x, u, du)
          do i = 1, 3
-            state = nts%gap_state(i, scene%x, u, du)
-            call nts%evaluate(i, scene%x, u, du, constraint)
-            n = constraint%n_node
-            call check_equal(error, constraint%node(1), nts%node(i), "slave node first")
-            call check_near(error, [constraint%gap0, constraint%gap1, constraint%size], &
-               [state%gap0, state%gap1, state%size], tol, 1.0_wp, "values")
-            call check_near(error, sum(constraint%g(:, :n)*du(:, constraint%node(:n))), &
-               constraint%dgap, tol, 1.0_wp, "identity")
+            call nts%measure(scene%x, u, du)
+            state = nts%state(i)
+            call nts%evaluate([i], scene%x, u, du, [0.0_wp], item)
+            associate (constraint => item(1))
+               n = constraint%n_node
+               call check_equal(error, constraint%node(1), nts%node(i), "slave node first")
+               call check_near(error, [constraint%gap0, constraint%gap1, constraint%size], &
+                  [state%gap0, state%gap1, state%size], tol, 1.0_wp, "values")
+               call check_near(error, sum(constraint%g(:, :n)*du(:, constraint%node(:n))), &
+                  constraint%dgap, tol, 1.0_wp, "identity")
+            end associate
          end do
       end do
    end subroutine test_evaluate
