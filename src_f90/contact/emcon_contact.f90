@@ -12,6 +12,7 @@ module emcon_contact
    !> One constraint over a step, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: constraint_t
       integer :: n_node = 0
+      integer :: n_slave = 0                          !! nodes 1..n_slave are on the slave side
       integer, allocatable :: node(:)                 !! (>= n_node) the first is the slave node
       real(wp) :: gap0 = 0.0_wp                       !! f at the start [L], > 0 open
       real(wp) :: gap1 = 0.0_wp                       !! at the end

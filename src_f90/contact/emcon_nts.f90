@@ -312,6 +312,7 @@ contains
          call stencil(self, wanted(k), x, u0, n, node, before, after)
          call gather(x, u0, du, n, node, local, dlocal)
          call constraint_resize(item(k), n)
+         item(k)%n_slave = 1
          item(k)%node(:n) = node(:n)
          item(k)%size = edge_length(x, node)
          gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*item(k)%size)

@@ -2,6 +2,7 @@
 module random_constraints
    use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
       constraints_merge_pattern, constraints_rows, constraints_select
+   use emcon_contact, only : constraint_resize
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_kinds, only : dp, wp
    use emcon_numbering, only : numbering_init, numbering_t
@@ -42,7 +43,7 @@ contains
       call constraints_select(problem%set, [(k, k = 1, n_constraint)])
       do k = 1, n_constraint
          associate (item => problem%set%item(k))
-            item%n_node = 3 + mod(k, 3)
+            call constraint_resize(item, 3 + mod(k, 3))
             call random_number(u)
             item%node(:item%n_node) = [k, 11 + int(5.0_wp*u(:item%n_node - 1)) &
                + [(5*(i - 1), i = 1, item%n_node - 1)]]
