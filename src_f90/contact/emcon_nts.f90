@@ -5,17 +5,14 @@ module emcon_nts
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
+   use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_nts_gap, only : nts_gap, nts_gap_value
    use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_none
-   use emcon_search, only : box_distance, candidates_t, search_candidates
    use emcon_sort, only : find_sorted
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
 
-   !> Reach of the candidate search as a fraction of the mean master edge, at least; and as a
-   !> multiple of the largest motion expected in one step, at least.
-   real(wp), parameter :: reach_per_edge = 0.5_wp, reach_per_motion = 8.0_wp
    !> Corners sharper than this (cosine of the turn) end the surface: the bisector degenerates.
    real(wp), parameter :: sharpest_cosine = -0.9_wp
 
@@ -30,9 +27,7 @@ module emcon_nts
       type(chain_t) :: master
       integer :: smoothing = smoothing_none
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
-      type(candidates_t) :: candidates
-      real(wp), allocatable :: u_slave(:, :)          !! displacements when the list was made
-      real(wp), allocatable :: u_master(:, :)
+      type(near_list_t) :: near
    contains
       procedure :: begin_step => nts_begin_step
       procedure :: configure => nts_configure
@@ -70,27 +65,23 @@ contains
             end do
          end do
       end associate
-      self%u_slave = scene%u0(:, self%slave%node)
-      self%u_master = scene%u0(:, self%master%node)
+      call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), self%master%edge, &
+         scene%u0)
    end subroutine nts_init
 
    !> Choose for each slave node the nearest master edge at the start of the step.
    pure subroutine nts_begin_step(self, x, u0, du)
       class(nts_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp) :: step_motion, motion
       integer :: i, k, e
       real(wp) :: distance, best
 
-      step_motion = max(largest(du(:, self%slave%node)), largest(du(:, self%master%node)))
-      motion = max(largest(u0(:, self%slave%node) - self%u_slave), &
-         largest(u0(:, self%master%node) - self%u_master)) + step_motion
-      if (.not. 2.0_wp*motion < self%reach) call new_candidates(self, x, u0, step_motion)
+      call near_list_update(self%near, x, u0, du, self%reach)
       do i = 1, self%n_constraint
          self%edge(i) = 0
          best = huge(best)
-         do k = self%candidates%start(i), self%candidates%start(i + 1) - 1
-            e = self%candidates%edge(k)
+         do k = self%near%candidates%start(i), self%near%candidates%start(i + 1) - 1
+            e = self%near%candidates%edge(k)
             distance = edge_distance(x, u0, self%node(i), self%master%edge(:, e))
             if (distance < best) then
                best = distance
@@ -99,42 +90,6 @@ contains
          end do
       end do
    end subroutine nts_begin_step
-
-   !> Make the candidate list anew at `u0`. Surfaces far apart get a reach as large as their
-   !> distance and an empty list: then nothing is done until one has moved half of that.
-   pure subroutine new_candidates(self, x, u0, step_motion)
-      type(nts_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp), intent(in) :: step_motion
-      real(wp) :: point(2, self%n_constraint)
-      real(wp) :: low(2, self%master%n_edge), high(2, self%master%n_edge), ends(2, 2), apart
-      integer :: i
-
-      self%u_slave = u0(:, self%slave%node)
-      self%u_master = u0(:, self%master%node)
-      point = x(:, self%slave%node) + self%u_slave
-      do i = 1, self%master%n_edge
-         ends = x(:, self%master%edge(:, i)) + u0(:, self%master%edge(:, i))
-         low(:, i) = min(ends(:, 1), ends(:, 2))
-         high(:, i) = max(ends(:, 1), ends(:, 2))
-      end do
-      apart = box_distance(minval(point, 2), maxval(point, 2), minval(low, 2), maxval(high, 2))
-      self%reach = max(reach_per_edge*sum(high - low)/real(self%master%n_edge, wp), &
-         reach_per_motion*step_motion, 0.99_wp*apart)
-      call search_candidates(point, low, high, self%reach, self%candidates)
-   end subroutine new_candidates
-
-   !> Largest of the lengths of the columns of `v`.
-   pure real(wp) function largest(v)
-      real(wp), intent(in) :: v(:, :)
-      integer :: i
-
-      largest = 0.0_wp
-      do i = 1, size(v, 2)
-         largest = max(largest, v(1, i)**2 + v(2, i)**2)
-      end do
-      largest = sqrt(largest)
-   end function largest
 
    !> Distance of a node from an edge as a segment.
    pure real(wp) function edge_distance(x, u, node, edge)

@@ -4,7 +4,8 @@
 !> restart file can carry the deck it belongs to.
 module emcon_deck
    use emcon_deck_cards, only : read_cards
-   use emcon_deck_check, only : check_materials, check_nodes, check_pairs
+   use emcon_deck_check, only : check_materials, check_nodes
+   use emcon_deck_check_contact, only : check_pairs
    use emcon_deck_contact, only : read_interactions, read_pairs
    use emcon_deck_geometry, only : check_shapes
    use emcon_deck_materials, only : read_materials, read_sections

@@ -2,13 +2,14 @@
 module emcon_deck_contact
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, get_real, &
       next_line
-   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t, &
-      refuse_option
+   use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
+      option_name, reader_t, refuse_option
    use emcon_deck_sets, only : find_set, set_names
    use emcon_deck_surfaces, only : find_surface, surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, formulation_nts, scene_t
+   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
+      formulation_segment, origin_t, scene_t, where_text
    use emcon_text, only : read_real, to_text
    implicit none
    private
@@ -81,8 +82,9 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
       type(contact_pair_t), allocatable :: pair(:)
+      type(origin_t), allocatable :: line(:)       !! of each pair
       type(data_t) :: data
-      integer :: i, n, n_before, most
+      integer :: formulation, i, n, n_before, most
 
       most = 0
       do i = 1, size(reader%card)
@@ -90,21 +92,48 @@ contains
             most = most + reader%card(i)%last - reader%card(i)%first + 1
          end if
       end do
-      allocate(pair(most))
+      allocate(pair(most), line(most))
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "CONTACTPAIR") cycle
          n_before = n
+         call read_formulation(reader, reader%card(i), formulation)
          call data_open(data, reader%card(i))
          do while (next_line(reader, data))
             n = n + 1
+            line(n) = line_origin(reader, data%i_line)
             pair(n)%origin = reader%card(i)%origin
+            pair(n)%formulation = formulation
             call read_surfaces_of_pair(reader, data, scene, pair(n))
+            call check_nodal(reader, data, scene, pair(n))
+            call check_repeated(reader, data, scene, pair(:n), line)
          end do
          call read_pair_options(reader, reader%card(i), scene, pair(n_before + 1:n))
       end do
       scene%pair = pair(:n)
    end subroutine read_pairs
+
+   !> TYPE of a card; 0 if it is refused.
+   subroutine read_formulation(reader, card, formulation)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      integer, intent(out) :: formulation
+      character(len=*), parameter :: known = "NODE TO SURFACE, SEGMENT, MORTAR"
+
+      formulation = 0
+      select case (option_name(card, "TYPE"))
+      case ("", "NODETOSURFACE")
+         formulation = formulation_nts
+      case ("SEGMENT")
+         formulation = formulation_segment
+      case ("MORTAR", "LINMORTAR", "PGLINMORTAR", "SURFACETOSURFACE")
+         formulation = formulation_mortar
+      case ("MASSLESS")
+         call refuse_option(reader, card, "TYPE", known, "nodes keep their mass")
+      case default
+         call refuse_option(reader, card, "TYPE", known // ", SURFACE TO SURFACE", "")
+      end select
+   end subroutine read_formulation
 
    !> Data line: slave, master. A surface that is in doubt stays 0.
    subroutine read_surfaces_of_pair(reader, data, scene, pair)
@@ -131,16 +160,58 @@ contains
       end do
       pair%slave = i_surface(1)
       pair%master = i_surface(2)
-      if (any(i_surface == 0)) return
-      if (pair%slave == pair%master) then
-         call data_error(reader, data, "slave and master are the same surface, " // quoted(name))
-         pair%master = 0
-      else if (scene%surface(pair%master)%is_nodal) then
-         call data_error(reader, data, "the master surface " // quoted(name) &
-            // " has TYPE=NODE; only the slave surface may")
-         pair%master = 0
-      end if
    end subroutine read_surfaces_of_pair
+
+   !> A surface of nodes has no edges: it may only be the slave of another one, node to surface.
+   !> A master that is refused becomes 0.
+   subroutine check_nodal(reader, data, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair
+      logical :: is_integrated
+      character(len=*), parameter :: advice = "define it by element faces (*SURFACE, TYPE=ELEMENT)"
+
+      if (pair%slave == 0 .or. pair%master == 0) return
+      is_integrated = any(pair%formulation == [formulation_segment, formulation_mortar])
+      associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
+         if (pair%slave == pair%master .and. slave%is_nodal) then
+            call data_error(reader, data, "the surface " // quoted(slave%name) // " has TYPE=NODE" &
+               // " and cannot be in contact with itself; " // advice)
+            pair%master = 0
+            return
+         end if
+         if (is_integrated .and. slave%is_nodal) call data_error(reader, data, &
+            "the slave surface " // quoted(slave%name) // " has TYPE=NODE, but SEGMENT and MORTAR" &
+            // " integrate over edges; " // advice // ", or use TYPE=NODE TO SURFACE")
+         if (master%is_nodal) call data_error(reader, data, "the master surface " &
+            // quoted(master%name) // " has TYPE=NODE; only the slave surface may, and " &
+            // "only under NODE TO SURFACE; " // advice)
+         if ((is_integrated .and. slave%is_nodal) .or. master%is_nodal) pair%master = 0
+      end associate
+   end subroutine check_nodal
+
+   !> The last of `pair` must not be there already. Slave and master in turn is another pair.
+   subroutine check_repeated(reader, data, scene, pair, line)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair(:)
+      type(origin_t), intent(in) :: line(:)
+      integer :: i, n
+
+      n = size(pair)
+      if (pair(n)%slave == 0 .or. pair(n)%master == 0) return
+      do i = 1, n - 1
+         if (pair(i)%slave /= pair(n)%slave .or. pair(i)%master /= pair(n)%master) cycle
+         call data_error(reader, data, "the pair of slave surface " &
+            // quoted(scene%surface(pair(n)%slave)%name) // " and master surface " &
+            // quoted(scene%surface(pair(n)%master)%name) // " is given twice; first at " &
+            // where_text(scene, line(i)))
+         pair(n)%master = 0
+         return
+      end do
+   end subroutine check_repeated
 
    !> What a card says of all its pairs.
    subroutine read_pair_options(reader, card, scene, pair)
@@ -161,17 +232,8 @@ contains
       end do
       if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))
-      select case (option_name(card, "TYPE"))
-      case ("", "NODETOSURFACE")
-         common%formulation = formulation_nts
-      case ("MORTAR", "LINMORTAR", "PGLINMORTAR", "SURFACETOSURFACE", "MASSLESS")
-         call refuse_option(reader, card, "TYPE", "NODE TO SURFACE", "not in this version")
-      case default
-         call refuse_option(reader, card, "TYPE", "NODE TO SURFACE", "")
-      end select
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, common)
       do i = 1, size(pair)
-         pair(i)%formulation = common%formulation
          pair(i)%adjust_distance = common%adjust_distance
          pair(i)%adjust_set = common%adjust_set
       end do

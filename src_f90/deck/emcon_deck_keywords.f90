@@ -63,6 +63,8 @@ module emcon_deck_keywords
       keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY,!USER"), &
       keyword_t("CONSTRAINT METHOD", in_step, "TYPE="), &
       keyword_t("CONTACT INITIATION", in_step, "TYPE=,GAPTOLERANCE="), &
+      keyword_t("MORTAR", in_step, "INTEGRATION=,POINTS=,MULTIPLIER=,NORMAL=,FEATUREANGLE="), &
+      keyword_t("SURFACE SMOOTHING", in_step, "TYPE=,FEATUREANGLE="), &
       keyword_t("NEWTON", in_step, "TYPE=,TOLERANCE=,MAXIMUM="), &
       keyword_t("TIME INTEGRATION", in_step, "SCHEME=,!TOLERANCE"), &
       keyword_t("NODE FILE", in_step, "NSET=," // filed), &
@@ -74,8 +76,6 @@ module emcon_deck_keywords
       keyword_t("ENERGY PRINT", in_step, "~ELSET,FREQUENCY=,TIMEPOINTS="), &
       keyword_t("RESTART", in_step, "WRITE,FREQUENCY=,~OVERLAY,!READ"), &
       keyword_t("END STEP", in_step), &
-      keyword_t("MORTAR", in_step, "", "contact is node to surface in this version"), &
-      keyword_t("SURFACE SMOOTHING", in_both, "", "contact surfaces are polygons"), &
       keyword_t("TIE", in_model, "", "ties are not in this version"), &
       keyword_t("EQUATION", in_both, "", no_couple), &
       keyword_t("MPC", in_model, "", no_couple), &

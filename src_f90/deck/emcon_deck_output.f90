@@ -40,7 +40,7 @@ module emcon_deck_output
       output_row_t("ELFILE", output_element_file, of_element, ""), &
       output_row_t("ELPRINT", output_element_print, of_element, ""), &
       output_row_t("CONTACTFILE", output_contact_file, of_contact, longer_contact), &
-      output_row_t("CONTACTPRINT", output_contact_print, of_contact, longer_contact), &
+      output_row_t("CONTACTPRINT", output_contact_print, of_contact // " CNUM", longer_contact), &
       output_row_t("ENERGYPRINT", output_energy_print, of_energy, "")]
 
 contains

@@ -1,7 +1,7 @@
 !> What all readers of cards share: the cards with their parameters, the doubts, the messages.
 module emcon_deck_reader
    use emcon_deck_labels, only : label_map_t
-   use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted
+   use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : amplitude_t, origin_t
    use emcon_text, only : read_integer, read_real, squeezed, string_t, to_text
@@ -9,7 +9,8 @@ module emcon_deck_reader
    private
    public :: reader_t, card_t, option_t, max_name
    public :: line_origin, source_line, card_error, card_warning, bare_name
-   public :: has_option, option_name, option_count, option_real, need_name, refuse_option
+   public :: has_option, option_name, option_count, option_real, option_angle, need_name
+   public :: refuse_option
 
    integer, parameter :: max_name = 80             !! characters of a name
 
@@ -141,25 +142,32 @@ contains
       end if
    end subroutine need_name
 
-   !> Value of a parameter that counts, at least `least`; unchanged if it is absent.
-   subroutine option_count(reader, card, name, least, value)
+   !> Value of a parameter that counts, from `least` to `most`; unchanged if it is absent or wrong.
+   subroutine option_count(reader, card, name, least, value, most)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: name
       integer, intent(in) :: least
       integer, intent(inout) :: value
+      integer, intent(in), optional :: most
+      character(len=:), allocatable :: range_text
       integer :: i, number
       logical :: ok
 
       i = find_option(card, name)
       if (i == 0) return
+      range_text = "of at least " // to_text(least)
       call read_integer(card%option(i)%value, number, ok)
       if (ok) ok = number >= least
+      if (present(most)) then
+         range_text = "from " // to_text(least) // " to " // to_text(most)
+         if (ok) ok = number <= most
+      end if
       if (ok) then
          value = number
       else
          call card_error(reader, card, name // "=" // quoted(card%option(i)%value) &
-            // " is not a whole number of at least " // to_text(least))
+            // " is not a whole number " // range_text)
       end if
    end subroutine option_count
 
@@ -185,6 +193,28 @@ contains
       end if
    end subroutine option_real
 
+   !> Value of FEATURE ANGLE: degrees between 0 and 180, both excluded; unchanged if it is absent
+   !> or wrong.
+   subroutine option_angle(reader, card, value)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      real(wp), intent(inout) :: value             !! [degrees]
+      real(wp) :: number
+      integer :: i
+      logical :: ok
+
+      i = find_option(card, "FEATUREANGLE")
+      if (i == 0) return
+      call read_real(card%option(i)%value, number, ok)
+      if (ok) ok = number > 0.0_wp .and. number < 180.0_wp
+      if (ok) then
+         value = number
+      else
+         call card_error(reader, card, "FEATURE ANGLE=" // quoted(card%option(i)%value) &
+            // " is not a number of degrees above 0 and below 180")
+      end if
+   end subroutine option_angle
+
    !> An error: the value of a parameter is none of `known`; a `reason` says why.
    subroutine refuse_option(reader, card, name, known, reason)
       type(reader_t), intent(inout) :: reader
@@ -197,12 +227,28 @@ contains
       i = find_option(card, name)
       if (reason == "") then
          call card_error(reader, card, "unknown " // name // "=" // quoted(card%option(i)%value) &
-            // "; known: " // known)
+            // "; known: " // known &
+            // suggestion(bare_name(card%option(i)%value), split_list(known)))
       else
          call card_error(reader, card, name // "=" // quoted(card%option(i)%value) &
             // " is known but not supported (" // reason // "); supported: " // known)
       end if
    end subroutine refuse_option
+
+   !> The entries of "A, B, C".
+   pure function split_list(text) result(list)
+      character(len=*), intent(in) :: text
+      type(string_t), allocatable :: list(:)
+      integer :: i, first, last
+
+      allocate(list(count([(text(i:i) == ",", i = 1, len(text))]) + 1))
+      first = 1
+      do i = 1, size(list)
+         last = index(text(first:) // ",", ",") + first - 2
+         list(i)%text = text(first:last)
+         first = last + 3
+      end do
+   end function split_list
 
    !> A name as it is compared: upper case, no blanks, no quotes around it.
    pure function bare_name(text) result(name)

@@ -1,11 +1,12 @@
 !> The steps: *STEP, its procedure, its settings, and all that holds in it.
 !>
-!> Settings (constraint method, contact initiation, Newton, restart) stay until a later step
-!> changes them.
+!> Settings (constraint method, contact initiation, mortar, smoothing, Newton, restart) stay until a
+!> later step changes them.
 module emcon_deck_step
    use emcon_deck_conditions, only : conditions_carry, conditions_init, conditions_store, &
       conditions_t
    use emcon_deck_loads, only : read_boundary, read_cload, read_dload
+   use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
@@ -13,7 +14,7 @@ module emcon_deck_step
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
-   use emcon_scene, only : initiation_admissible, initiation_persistent, &
+   use emcon_scene, only : contact_pair_t, initiation_admissible, initiation_persistent, &
       initiation_velocity_update, method_null_space, method_saddle_point, origin_t, &
       procedure_dynamic, procedure_static, scene_t, step_t
    use emcon_text, only : to_text
@@ -51,7 +52,7 @@ contains
          end do
          call inherit(last, scene%step(k))
          scene%step(k)%origin = reader%card(i)%origin
-         call read_settings(reader, i, scene%step(k))
+         call read_settings(reader, i, scene%pair, scene%step(k))
          call conditions_carry(conditions, scene%amplitude, last, time)
          if (k > 1) time = time + last%duration
          call read_conditions(reader, i, scene, conditions, requests)
@@ -73,15 +74,17 @@ contains
       step%constraint_method = last%constraint_method
       step%initiation = last%initiation
       step%gap_tolerance = last%gap_tolerance
+      step%contact = last%contact
       step%newton_tolerance = last%newton_tolerance
       step%newton_maximum = last%newton_maximum
       step%restart_frequency = last%restart_frequency
    end subroutine inherit
 
    !> Procedure and settings of the step whose first card is `i_first`.
-   subroutine read_settings(reader, i_first, step)
+   subroutine read_settings(reader, i_first, pair, step)
       type(reader_t), intent(inout) :: reader
       integer, intent(in) :: i_first
+      type(contact_pair_t), intent(in) :: pair(:)
       type(step_t), intent(inout) :: step
       integer :: i
 
@@ -98,6 +101,10 @@ contains
                call read_constraint_method(reader, card, step)
             case ("CONTACTINITIATION")
                call read_initiation(reader, card, step)
+            case ("MORTAR")
+               call read_mortar(reader, card, pair, step%contact)
+            case ("SURFACESMOOTHING")
+               call read_smoothing(reader, card, pair, step%contact)
             case ("NEWTON")
                call read_newton(reader, card, step)
             case ("TIMEINTEGRATION")

@@ -5,12 +5,12 @@
 module emcon_system
    use emcon_bodies, only : bodies_find
    use emcon_contact, only : contact_box_t
+   use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
-   use emcon_nts, only : nts_init, nts_t
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t, &
@@ -130,16 +130,13 @@ contains
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(nts_t), allocatable :: nts
       integer :: i
 
       allocate(self%contact(size(scene%pair)))
       allocate(self%first_constraint(size(scene%pair) + 1), source=0)
       do i = 1, size(scene%pair)
-         allocate(nts)
-         call nts_init(nts, scene, scene%pair(i), error)
+         call new_contact(scene, scene%pair(i), self%contact(i)%contact, error)
          if (allocated(error)) return
-         call move_alloc(nts, self%contact(i)%contact)
          self%n_constraint = self%n_constraint + self%contact(i)%contact%n_constraint
          self%first_constraint(i + 1) = self%n_constraint
       end do

@@ -1,0 +1,190 @@
+!> What a slave edge gives to the constraints of its two nodes: integrals over its covered part.
+!>
+!> Source: docs/theory.md, section 4, weighted gaps.
+module emcon_edge_form
+   use emcon_contact, only : constraint_resize, constraint_t
+   use emcon_dgrad_wide, only : wide_add, wide_add_product, wide_clear, wide_t
+   use emcon_kinds, only : wp
+   use emcon_mortar_frame, only : moment_area, moment_area_xi, moment_cover, moment_gap, &
+      moment_gap_xi, n_moment
+   implicit none
+   private
+   public :: edge_form_t, form_begin, form_share, form_constraint
+
+   !> Covered but for round-off: the dual basis needs no care.
+   real(wp), parameter :: whole = 256.0_wp*epsilon(1.0_wp)
+
+   type :: edge_form_t
+      real(wp) :: value(n_moment, 0:1) = 0.0_wp  !! the moments at both ends of the step
+      integer :: n_node = 0
+      integer :: n_slave = 0                     !! the slave nodes come first, those of the edge too
+      integer, allocatable :: node(:)            !! (>= n_node)
+      type(wide_t) :: moment(n_moment)           !! over the coordinates of the nodes
+   end type edge_form_t
+
+contains
+
+   !> Begin to sum moments over the nodes `node`.
+   pure subroutine form_begin(self, node, n_slave)
+      type(edge_form_t), intent(inout) :: self
+      integer, intent(in) :: node(:), n_slave
+      integer :: i
+
+      if (allocated(self%node)) then
+         if (size(self%node) < size(node)) deallocate(self%node)
+      end if
+      if (.not. allocated(self%node)) allocate(self%node(size(node)))
+      self%n_node = size(node)
+      self%n_slave = n_slave
+      self%node(:self%n_node) = node
+      do i = 1, n_moment
+         call wide_clear(self%moment(i), 2*self%n_node)
+      end do
+   end subroutine form_begin
+
+   !> Share of the edge's node `side` (1, 2) in the weighted gap and the covered area, at both ends.
+   !>
+   !> The weight is N_1 + theta (N_1 - N_2) or N_2 - theta (N_1 - N_2): theta = 1 is the dual basis,
+   !> 0 the standard one. Where the edge is covered in part, theta is the square of the part, so
+   !> that the integral of a weight is never negative.
+   pure subroutine form_share(self, side, is_dual, gap, area)
+      type(edge_form_t), intent(in) :: self
+      integer, intent(in) :: side
+      logical, intent(in) :: is_dual
+      real(wp), intent(out) :: gap(0:1), area(0:1)
+      real(wp) :: theta(0:1)
+
+      theta = 0.0_wp
+      if (is_dual) theta = self%value(moment_cover, :)**2
+      gap = share(self%value(moment_gap, :), self%value(moment_gap_xi, :))
+      area = share(self%value(moment_area, :), self%value(moment_area_xi, :))
+
+   contains
+
+      pure function share(full, xi) result(part)
+         real(wp), intent(in) :: full(0:1), xi(0:1)
+         real(wp) :: part(0:1)
+
+         if (side == 1) then
+            part = (full - xi) + theta*(full - 2.0_wp*xi)
+         else
+            part = xi - theta*(full - 2.0_wp*xi)
+         end if
+      end function share
+
+   end subroutine form_share
+
+   !> The constraint (Phi - target W)/scale of a slave node, from the edges that end there and begin
+   !> there, numbers `e` in `form`; one of them may be absent, 0.
+   pure subroutine form_constraint(form, e, node, is_dual, target, scale, work, item)
+      type(edge_form_t), intent(in) :: form(:)
+      integer, intent(in) :: e(2), node
+      logical, intent(in) :: is_dual
+      real(wp), intent(in) :: target, scale
+      type(wide_t), intent(inout) :: work(3)
+      type(constraint_t), intent(inout) :: item
+      integer :: list(1 + sum(form(pack(e, e > 0))%n_node)), n, k, i
+      integer :: place(size(list))
+
+      list(1) = node
+      n = 1
+      do k = 1, 2
+         if (e(k) > 0) call append(form(e(k))%node(:form(e(k))%n_slave), list, n)
+      end do
+      item%n_slave = n
+      do k = 1, 2
+         if (e(k) > 0) call append(form(e(k))%node(form(e(k))%n_slave + 1:form(e(k))%n_node), &
+            list, n)
+      end do
+      call constraint_resize(item, n)
+      item%node(:n) = list(:n)
+      item%gap0 = 0.0_wp
+      item%gap1 = 0.0_wp
+      item%dgap = 0.0_wp
+      item%g = 0.0_wp
+      item%c = 0.0_wp
+      item%h = 0.0_wp
+      do k = 1, 2
+         if (e(k) == 0) cycle
+         associate (edge => form(e(k)))
+            call weighted(edge, 3 - k, is_dual, target, work(1), work(2), work(3))
+            do i = 1, edge%n_node
+               place(i) = findloc(list(:n), edge%node(i), 1)
+            end do
+            call add(work(1), place(:edge%n_node), 1.0_wp/scale, item)
+         end associate
+      end do
+   end subroutine form_constraint
+
+   pure subroutine append(node, list, n)
+      integer, intent(in) :: node(:)
+      integer, intent(inout) :: list(:), n
+      integer :: i
+
+      do i = 1, size(node)
+         if (any(list(:n) == node(i))) cycle
+         n = n + 1
+         list(n) = node(i)
+      end do
+   end subroutine append
+
+   !> Share of node `side` in Phi - target W.
+   pure subroutine weighted(edge, side, is_dual, target, part, skew, theta)
+      type(edge_form_t), intent(in) :: edge
+      integer, intent(in) :: side
+      logical, intent(in) :: is_dual
+      real(wp), intent(in) :: target
+      type(wide_t), intent(inout) :: part
+      type(wide_t), intent(inout) :: skew, theta         !! work space
+      real(wp) :: sign_skew
+
+      associate (moment => edge%moment, n => 2*edge%n_node)
+         call wide_clear(part, n)
+         call wide_clear(skew, n)
+         call wide_add(skew, 1.0_wp, moment(moment_gap))
+         call wide_add(skew, -2.0_wp, moment(moment_gap_xi))
+         call wide_add(skew, -target, moment(moment_area))
+         call wide_add(skew, 2.0_wp*target, moment(moment_area_xi))
+         call wide_add(part, 1.0_wp, moment(moment_gap_xi))
+         call wide_add(part, -target, moment(moment_area_xi))
+         if (side == 1) call wide_add(part, 1.0_wp, skew)
+         if (.not. is_dual) return
+         sign_skew = merge(1.0_wp, -1.0_wp, side == 1)
+         if (all(abs([moment(moment_cover)%f0, moment(moment_cover)%f1] - 1.0_wp) <= whole)) then
+            call wide_add(part, sign_skew, skew)
+         else
+            call wide_clear(theta, n)
+            call wide_add_product(theta, 1.0_wp, moment(moment_cover), moment(moment_cover))
+            call wide_add_product(part, sign_skew, theta, skew)
+         end if
+      end associate
+   end subroutine weighted
+
+   !> Add `factor` times `part`, whose nodes are at `place`, to a constraint.
+   pure subroutine add(part, place, factor, item)
+      type(wide_t), intent(in) :: part
+      integer, intent(in) :: place(:)
+      real(wp), intent(in) :: factor
+      type(constraint_t), intent(inout) :: item
+      integer :: i, j, a, b, row, column
+
+      item%gap0 = item%gap0 + factor*part%f0
+      item%gap1 = item%gap1 + factor*part%f1
+      item%dgap = item%dgap + factor*part%df
+      do j = 1, size(place)
+         do b = 1, 2
+            column = 2*(place(j) - 1) + b
+            item%g(b, place(j)) = item%g(b, place(j)) + factor*part%g(2*(j - 1) + b)
+            item%c(b, place(j)) = item%c(b, place(j)) + factor*part%c(2*(j - 1) + b)
+            do i = 1, size(place)
+               do a = 1, 2
+                  row = 2*(place(i) - 1) + a
+                  item%h(row, column) = item%h(row, column) &
+                     + factor*part%h(2*(i - 1) + a, 2*(j - 1) + b)
+               end do
+            end do
+         end do
+      end do
+   end subroutine add
+
+end module emcon_edge_form

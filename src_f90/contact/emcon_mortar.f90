@@ -1,0 +1,433 @@
+!> Mortar contact: gaps between a slave edge and the master edges that it faces, integrated over
+!> the segments that they share, or at Gauss points of the slave edge.
+!>
+!> Which edges make pairs is chosen once per step. Source: docs/theory.md, section 4, mortar;
+!> paper eqs. (2) and (3).
+module emcon_mortar
+   use emcon_chain, only : chain_corners, chain_distance
+   use emcon_edge_form, only : form_begin
+   use emcon_dgrad13, only : dg13_t => dg_t
+   use emcon_dgrad17, only : dg17_t => dg_t, operator(*)
+   use emcon_dgrad_wide, only : wide_add_part
+   use emcon_errors, only : error_t
+   use emcon_gauss, only : gauss_points
+   use emcon_kinds, only : wp
+   use emcon_mortar_frame, only : frame_hit, frame_init, frame_moments, frame_point, &
+      frame_project, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, &
+      moment_gap_xi, n_moment, n_place, pair_stencil_t, place_after, place_before, place_master
+   use emcon_mortar_pair2, only : segment_moments2 => segment_moments
+   use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
+   use emcon_mortar_stencil, only : frame_faces, stencil_gather, stencil_master, stencil_slave
+   use emcon_near_list, only : near_list_init, near_list_t, near_list_update
+   use emcon_scene, only : contact_options_t, contact_pair_t, integration_elements, &
+      multiplier_dual, normal_nodal, scene_t, smoothing_hermite
+   use emcon_weighted, only : weighted_init, weighted_t
+   implicit none
+   private
+   public :: mortar_t, mortar_init
+
+   !> A pair is kept though its edges do not overlap if they miss each other by less than this
+   !> fraction of the slave edge: they may come to overlap within the step.
+   real(wp), parameter :: margin = 0.25_wp
+   !> Of two master edges that cover the same part of a slave edge, more than this fraction of the
+   !> smaller part, the nearer one is meant.
+   real(wp), parameter :: same_part = 0.5_wp
+   !> Gauss points unless the deck gives them: exact for straight edges.
+   integer, parameter :: segment_points = 2, element_points = 3
+
+   type, extends(weighted_t) :: mortar_t
+      type(contact_options_t) :: options
+      type(near_list_t) :: near
+      logical, allocatable :: slave_corner(:)         !! (n_edge) at the first node of each edge
+      logical, allocatable :: master_corner(:)
+      real(wp), allocatable :: point(:), weight(:)    !! quadrature on 0..1
+      integer, allocatable :: start(:)                !! (n_edge + 1) pairs of each slave edge
+      type(pair_stencil_t), allocatable :: pair(:)    !! (>= number of pairs)
+      integer, allocatable :: seen(:, :)              !! (n_point, n_edge) pair at a Gauss point; 0
+   contains
+      procedure :: configure => mortar_configure
+      procedure :: begin_step => mortar_begin_step
+      procedure :: measure_edges => mortar_measure_edges
+      procedure :: form_edge => mortar_form_edge
+   end type mortar_t
+
+contains
+
+   !> Set up the pair `pair` of `scene`.
+   subroutine mortar_init(self, scene, pair, error)
+      type(mortar_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+
+      call weighted_init(self, scene, pair, error)
+      if (allocated(error)) return
+      call near_list_init(self%near, self%slave%edge, self%master%edge, scene%u0)
+      allocate(self%start(self%slave%n_edge + 1), source=1)
+      allocate(self%pair(0))
+      call self%configure(scene%x, self%options)
+   end subroutine mortar_init
+
+   pure subroutine mortar_configure(self, x, options)
+      class(mortar_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      type(contact_options_t), intent(in) :: options
+      integer :: n
+
+      self%options = options
+      self%is_dual = options%multiplier == multiplier_dual
+      self%reach = 0.0_wp
+      if (.not. allocated(self%slave_corner)) allocate(self%slave_corner(self%slave%n_edge), &
+         self%master_corner(self%master%n_edge))
+      call chain_corners(self%slave, x, options%normal_angle, self%slave_corner)
+      call chain_corners(self%master, x, options%smoothing_angle, self%master_corner)
+      n = merge(element_points, segment_points, options%integration == integration_elements)
+      if (options%n_point > 0) n = options%n_point
+      if (allocated(self%point)) deallocate(self%point, self%weight, self%seen)
+      allocate(self%point(n), self%weight(n))
+      call gauss_points(self%point, self%weight)
+      allocate(self%seen(n, self%slave%n_edge), source=0)
+   end subroutine mortar_configure
+
+   !> Choose the pairs of edges for the step.
+   pure subroutine mortar_begin_step(self, x, u0, du)
+      class(mortar_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer :: e, n
+
+      call near_list_update(self%near, x, u0, du, self%reach)
+      n = 0
+      do e = 1, self%slave%n_edge
+         self%start(e) = n + 1
+         self%seen(:, e) = 0
+         call choose_pairs(self, e, x, u0, du, n)
+         if (self%options%integration == integration_elements) call choose_points(self, e, n, x, &
+            u0, du)
+      end do
+      self%start(e) = n + 1
+   end subroutine mortar_begin_step
+
+   !> The master edges that slave edge `e` faces within the step, appended to the `n` pairs so far.
+   pure subroutine choose_pairs(self, e, x, u0, du, n)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer, intent(inout) :: n
+      type(pair_stencil_t) :: stencil
+      type(frame_t) :: frame(0:1)
+      real(wp) :: local(2, n_place), dlocal(2, n_place)
+      integer :: k, m
+      logical :: is_wide
+
+      associate (list => self%near%candidates, options => self%options)
+         is_wide = options%integration == integration_elements
+         if (list%start(e + 1) > list%start(e)) call stencil_slave(stencil, self%slave, e, &
+            options%normal == normal_nodal, self%slave_corner)
+         do k = list%start(e), list%start(e + 1) - 1
+            m = list%edge(k)
+            if (self%is_self) then
+               if (self%slave%place(m) < self%slave%place(e) &
+                  .or. chain_distance(self%slave, e, m) < 2) cycle
+            end if
+            call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
+               is_wide, self%master_corner)
+            call stencil_gather(stencil, x, u0, du, local, dlocal)
+            call frame_init(frame(0), stencil, local)
+            call frame_init(frame(1), stencil, local + dlocal)
+            if (.not. is_meant(self, stencil, frame)) cycle
+            if (is_wide) call cut_corners(stencil, frame(0))
+            call append(self%pair, n, stencil)
+         end do
+      end associate
+      call drop_far_layers(self, e, n, x, u0)
+   end subroutine choose_pairs
+
+   !> Do the edges face each other and overlap, or nearly so, the master not behind the slave?
+   pure logical function is_meant(self, stencil, frame)
+      type(mortar_t), intent(in) :: self
+      type(pair_stencil_t), intent(in) :: stencil
+      type(frame_t), intent(in) :: frame(0:1)
+      real(wp) :: low, high, eta, gap
+      integer :: k
+
+      is_meant = frame_faces(frame(0), 1, 2) .and. frame_faces(frame(1), 1, 2) &
+         .and. minval(frame(0)%edge_along) > 0.0_wp .and. minval(frame(1)%edge_along) > 0.0_wp
+      if (.not. is_meant) return
+      is_meant = .false.
+      do k = 0, 1
+         low = frame_project(frame(k), 2)
+         high = frame_project(frame(k), 1)
+         is_meant = is_meant .or. (high > -margin .and. low < 1.0_wp + margin)
+         if (k == 0 .and. min(high, 1.0_wp) > max(low, 0.0_wp)) then
+            call frame_hit(frame(0), stencil, 0.5_wp*(min(high, 1.0_wp) + max(low, 0.0_wp)), eta, &
+               gap)
+            if (.not. gap > -self%deepest_start*frame(0)%length) exit
+         end if
+      end do
+      is_meant = is_meant .and. k > 0
+   end function is_meant
+
+   !> Leave out neighbours of the master edge that the slave edge does not face.
+   pure subroutine cut_corners(stencil, frame)
+      type(pair_stencil_t), intent(inout) :: stencil
+      type(frame_t), intent(in) :: frame
+
+      if (.not. frame_faces(frame, 3, 1)) stencil%node(place_master(3)) = 0
+      if (.not. frame_faces(frame, 2, 4)) stencil%node(place_master(4)) = 0
+   end subroutine cut_corners
+
+   pure subroutine append(list, n, stencil)
+      type(pair_stencil_t), allocatable, intent(inout) :: list(:)
+      integer, intent(inout) :: n
+      type(pair_stencil_t), intent(in) :: stencil
+      type(pair_stencil_t), allocatable :: longer(:)
+
+      if (n == size(list)) then
+         allocate(longer(2*n + 16))
+         longer(:n) = list
+         call move_alloc(longer, list)
+      end if
+      n = n + 1
+      list(n) = stencil
+   end subroutine append
+
+   !> Keep the nearer one of two pairs that cover the same part of slave edge `e`.
+   pure subroutine drop_far_layers(self, e, n, x, u0)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      integer, intent(inout) :: n
+      real(wp), dimension(n - self%start(e) + 1) :: low, high, gap
+      logical :: is_far(n - self%start(e) + 1)
+      type(frame_t) :: frame
+      real(wp) :: local(2, n_place), dlocal(2, n_place), eta
+      integer :: i, j
+
+      do i = 1, size(low)
+         associate (stencil => self%pair(self%start(e) + i - 1))
+            call stencil_gather(stencil, x, u0, u0, local, dlocal)
+            call frame_init(frame, stencil, local)
+            low(i) = max(0.0_wp, frame_project(frame, 2))
+            high(i) = min(1.0_wp, frame_project(frame, 1))
+            call frame_hit(frame, stencil, max(0.0_wp, min(1.0_wp, 0.5_wp*(low(i) + high(i)))), &
+               eta, gap(i))
+         end associate
+      end do
+      is_far = .false.
+      do i = 1, size(low)
+         do j = 1, size(low)
+            if (gap(j) < gap(i) .and. min(high(i), high(j)) - max(low(i), low(j)) > &
+               same_part*min(high(i) - low(i), high(j) - low(j)) .and. high(j) > low(j)) &
+               is_far(i) = is_far(i) .or. high(i) > low(i)
+         end do
+      end do
+      n = self%start(e) - 1
+      do i = 1, size(low)
+         if (is_far(i)) cycle
+         n = n + 1
+         self%pair(n) = self%pair(self%start(e) + i - 1)
+      end do
+   end subroutine drop_far_layers
+
+   !> The pair that each Gauss point of slave edge `e` looks at, at the start of the step or else at
+   !> its expected end.
+   pure subroutine choose_points(self, e, n, x, u0, du)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e, n
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(frame_t) :: frame(0:1)
+      real(wp) :: local(2, n_place), dlocal(2, n_place), eta, gap
+      integer :: time_level, i, k, p
+
+      do k = self%start(e), n
+         call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
+         call frame_init(frame(0), self%pair(k), local)
+         call frame_init(frame(1), self%pair(k), local + dlocal)
+         do time_level = 0, 1
+            do i = 1, size(self%point)
+               p = self%seen(i, e)
+               if (abs(p) > 0 .and. (time_level == 1 .or. p > 0)) cycle
+               call frame_hit(frame(time_level), self%pair(k), self%point(i), eta, gap)
+               if (eta < 0.0_wp .or. eta > 1.0_wp) cycle
+               self%seen(i, e) = merge(k, -k, time_level == 0)
+            end do
+         end do
+      end do
+      self%seen(:, e) = abs(self%seen(:, e))
+   end subroutine choose_points
+
+   pure subroutine mortar_measure_edges(self, x, u0, du)
+      class(mortar_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(frame_t) :: frame
+      real(wp) :: local(2, n_place), dlocal(2, n_place)
+      integer :: e, k, i
+
+      do e = 1, self%slave%n_edge
+         associate (value => self%form(e)%value)
+            value = 0.0_wp
+            do k = self%start(e), self%start(e + 1) - 1
+               call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
+               do i = 0, 1
+                  call frame_init(frame, self%pair(k), local + i*dlocal)
+                  if (self%options%integration == integration_elements) then
+                     value(:, i) = value(:, i) + point_moments(self, e, k, frame)
+                  else
+                     value(:, i) = value(:, i) + frame_moments(frame, self%pair(k), self%point, &
+                        self%weight)
+                  end if
+               end do
+            end do
+         end associate
+      end do
+   end subroutine mortar_measure_edges
+
+   !> Moments of the Gauss points of edge `e` that look at pair `k`.
+   pure function point_moments(self, e, k, frame) result(moment)
+      type(mortar_t), intent(in) :: self
+      integer, intent(in) :: e, k
+      type(frame_t), intent(in) :: frame
+      real(wp) :: moment(n_moment)
+      real(wp) :: eta, gap, area
+      integer :: i
+
+      moment = 0.0_wp
+      do i = 1, size(self%point)
+         if (self%seen(i, e) /= k) cycle
+         call frame_point(frame, self%pair(k), self%point(i), eta, gap)
+         area = self%weight(i)*frame%length
+         moment = moment + [area*gap, area*gap*self%point(i), area, area*self%point(i), &
+            self%weight(i)]
+      end do
+   end function point_moments
+
+   pure subroutine mortar_form_edge(self, e, x, u0, du)
+      class(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp) :: local(2, n_place), dlocal(2, n_place)
+      integer :: k, i, variable(2*n_place)
+
+      call begin_form(self, e)
+      do k = self%start(e), self%start(e + 1) - 1
+         call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
+         associate (form => self%form(e), node => self%pair(k)%node)
+            do i = 1, n_place
+               variable(2*i) = 0
+               if (node(i) > 0) variable(2*i) = 2*findloc(form%node(:form%n_node), node(i), 1)
+               variable(2*i - 1) = max(0, variable(2*i) - 1)
+            end do
+         end associate
+         if (self%options%integration == integration_elements) then
+            call add_points(self, e, k, local, dlocal, variable)
+         else if (self%pair(k)%n_master == 2) then
+            call add_segment2(self, e, k, local, dlocal, variable(:12))
+         else
+            call add_segment4(self, e, k, local, dlocal, variable)
+         end if
+      end do
+   end subroutine mortar_form_edge
+
+   !> List the nodes of the pairs of slave edge `e`, slave nodes first.
+   pure subroutine begin_form(self, e)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e
+      integer :: list(n_place*(self%start(e + 1) - self%start(e)) + 2), n, n_slave, k
+
+      list(:2) = self%slave%edge(:, e)
+      n = 2
+      do k = self%start(e), self%start(e + 1) - 1
+         call collect(self%pair(k)%node([place_before, place_after]), list, n)
+      end do
+      n_slave = n
+      do k = self%start(e), self%start(e + 1) - 1
+         call collect(self%pair(k)%node(place_master), list, n)
+      end do
+      call form_begin(self%form(e), list(:n), n_slave)
+   end subroutine begin_form
+
+   !> Append those of `node` that are there and not on the list yet.
+   pure subroutine collect(node, list, n)
+      integer, intent(in) :: node(:)
+      integer, intent(inout) :: list(:), n
+      integer :: i
+
+      do i = 1, size(node)
+         if (node(i) == 0 .or. any(list(:n) == node(i))) cycle
+         n = n + 1
+         list(n) = node(i)
+      end do
+   end subroutine collect
+
+   !> Add the moments of the segment of pair `k` to those of slave edge `e`.
+   pure subroutine add_segment2(self, e, k, local, dlocal, variable)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e, k, variable(:)
+      real(wp), intent(in) :: local(:, :), dlocal(:, :)
+      type(dg13_t) :: moment(n_moment)
+      logical :: is_covering
+      integer :: i
+
+      call segment_moments2(self%pair(k), local, dlocal, self%point, self%weight, moment, &
+         is_covering)
+      if (.not. is_covering) return
+      do i = 1, n_moment
+         associate (part => moment(i))
+            call wide_add_part(self%form(e)%moment(i), 1.0_wp, part%f0, part%f1, part%df, part%g, &
+               part%c, part%h, variable)
+         end associate
+      end do
+   end subroutine add_segment2
+
+   pure subroutine add_segment4(self, e, k, local, dlocal, variable)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e, k, variable(:)
+      real(wp), intent(in) :: local(:, :), dlocal(:, :)
+      type(dg17_t) :: moment(n_moment)
+      logical :: is_covering
+      integer :: i
+
+      call segment_moments4(self%pair(k), local, dlocal, self%point, self%weight, moment, &
+         is_covering)
+      if (.not. is_covering) return
+      do i = 1, n_moment
+         call add_part(self, e, i, 1.0_wp, moment(i), variable)
+      end do
+   end subroutine add_segment4
+
+   !> Add the moments of the Gauss points of slave edge `e` that look at pair `k`.
+   pure subroutine add_points(self, e, k, local, dlocal, variable)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e, k, variable(:)
+      real(wp), intent(in) :: local(:, :), dlocal(:, :)
+      type(dg17_t) :: gap, length
+      integer :: i
+
+      do i = 1, size(self%point)
+         if (self%seen(i, e) /= k) cycle
+         call point_gap(self%pair(k), local, dlocal, self%point(i), gap, length)
+         associate (xi => self%point(i), weight => self%weight(i))
+            gap = gap*length
+            call add_part(self, e, moment_gap, weight, gap, variable)
+            call add_part(self, e, moment_gap_xi, weight*xi, gap, variable)
+            call add_part(self, e, moment_area, weight, length, variable)
+            call add_part(self, e, moment_area_xi, weight*xi, length, variable)
+            associate (cover => self%form(e)%moment(moment_cover))
+               cover%f0 = cover%f0 + weight
+               cover%f1 = cover%f1 + weight
+            end associate
+         end associate
+      end do
+   end subroutine add_points
+
+   pure subroutine add_part(self, e, i, factor, part, variable)
+      type(mortar_t), intent(inout) :: self
+      integer, intent(in) :: e, i, variable(:)
+      real(wp), intent(in) :: factor
+      type(dg17_t), intent(in) :: part
+
+      call wide_add_part(self%form(e)%moment(i), factor, part%f0, part%f1, part%df, part%g, &
+         part%c, part%h, variable)
+   end subroutine add_part
+
+end module emcon_mortar

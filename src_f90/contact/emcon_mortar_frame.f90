@@ -1,0 +1,201 @@
+!> A slave edge and a master edge seen along the normal field of the slave edge, as plain values.
+!>
+!> The slave point x(xi) = x1 + xi a, a = x2 - x1, looks along n(xi), which is t(xi) turned by -90
+!> degrees, t(xi) = (1 - xi) t1 + xi t2. A node y stands at (y - x).t along the tangent and at the
+!> height (y - x) x t over the point. Source: docs/theory.md, section 4.
+module emcon_mortar_frame
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_hit, frame_point, &
+      frame_moments
+   public :: place_first, place_last, place_before, place_after, place_master
+   public :: moment_gap, moment_gap_xi, moment_area, moment_area_xi, moment_cover, n_moment
+   public :: n_place
+
+   !> Local numbers of the nodes: slave edge, master edge, neighbours of either.
+   integer, parameter :: n_place = 8, place_first = 1, place_last = 2, place_before = 5, &
+      place_after = 6, place_master(4) = [3, 4, 7, 8]
+
+   !> What is integrated over the covered part of a slave edge: the gap and 1, with weights 1 and
+   !> xi, over the area; and the covered fraction.
+   integer, parameter :: n_moment = 5, moment_gap = 1, moment_gap_xi = 2, moment_area = 3, &
+      moment_area_xi = 4, moment_cover = 5
+
+   !> Nodes and constants of a pair of edges.
+   type :: pair_stencil_t
+      integer :: node(n_place) = 0               !! 0: absent
+      integer :: n_master = 2                    !! 2: polygon; 4: with the master's neighbours
+      logical :: has_field = .false.             !! t1 and t2 differ: averaged normals
+      integer :: tangent(2, 2) = 0               !! tip and tail of t1 and t2, local
+      real(wp) :: weight(2) = 0.0_wp             !! factors that make t1 and t2 about 1 long [1/L]
+      logical :: is_smooth = .false.             !! cubic master, else a polygon
+      real(wp) :: shape(0:3, 4) = 0.0_wp         !! its coefficients: power of eta, node
+   end type pair_stencil_t
+
+   !> One configuration. First index: with t1, with t2; second: master node.
+   type :: frame_t
+      real(wp) :: along(2, 4) = 0.0_wp           !! (y - x1).t [L]
+      real(wp) :: above(2, 4) = 0.0_wp           !! (y - x1) x t [L]
+      real(wp) :: edge_along(2) = 0.0_wp         !! a.t
+      real(wp) :: edge_above(2) = 0.0_wp         !! a x t
+      real(wp) :: square(3) = 0.0_wp             !! t1.t1, t1.t2, t2.t2
+      real(wp) :: length = 0.0_wp                !! |a|
+   end type frame_t
+
+   integer, parameter :: most_iterations = 50
+
+contains
+
+   !> The frame of local positions `x`.
+   pure subroutine frame_init(self, stencil, x)
+      type(frame_t), intent(out) :: self
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: x(:, :)            !! (2, n_place)
+      real(wp) :: a(2), b(2), t(2, 2)
+      integer :: i, k
+
+      a = x(:, place_last) - x(:, place_first)
+      do i = 1, 2
+         t(:, i) = stencil%weight(i)*(x(:, stencil%tangent(1, i)) - x(:, stencil%tangent(2, i)))
+         self%edge_along(i) = dot_product(a, t(:, i))
+         self%edge_above(i) = cross(a, t(:, i))
+         do k = 1, stencil%n_master
+            if (stencil%node(place_master(k)) == 0) cycle
+            b = x(:, place_master(k)) - x(:, place_first)
+            self%along(i, k) = dot_product(b, t(:, i))
+            self%above(i, k) = cross(b, t(:, i))
+         end do
+      end do
+      self%square = [dot_product(t(:, 1), t(:, 1)), dot_product(t(:, 1), t(:, 2)), &
+         dot_product(t(:, 2), t(:, 2))]
+      self%length = sqrt(dot_product(a, a))
+   end subroutine frame_init
+
+   !> Where master node `k` projects to: xi on the line of the edge; beyond its ends the field is
+   !> that of the end.
+   pure real(wp) function frame_project(self, k)
+      type(frame_t), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp) :: a, b, c
+
+      associate (p => self%along(:, k), q => self%edge_along)
+         if (p(1) <= 0.0_wp) then
+            frame_project = p(1)/q(1)
+         else if (p(2) >= q(2)) then
+            frame_project = p(2)/q(2)
+         else
+            a = q(1) - q(2)
+            b = (p(2) - p(1)) - q(1)
+            c = p(1)
+            frame_project = 2.0_wp*c/(sqrt(max(0.0_wp, b*b - 4.0_wp*a*c)) - b)
+         end if
+      end associate
+   end function frame_project
+
+   !> The master nodes as the slave point `xi` sees them, and the length of its t.
+   pure subroutine look(self, xi, along, above, norm)
+      type(frame_t), intent(in) :: self
+      real(wp), intent(in) :: xi
+      real(wp), intent(out) :: along(4), above(4), norm
+      real(wp) :: weight(2)
+
+      weight = [1.0_wp - xi, xi]
+      along = weight(1)*self%along(1, :) + xi*self%along(2, :) &
+         - xi*dot_product(weight, self%edge_along)
+      above = weight(1)*self%above(1, :) + xi*self%above(2, :) &
+         - xi*dot_product(weight, self%edge_above)
+      norm = sqrt(weight(1)**2*self%square(1) + 2.0_wp*weight(1)*xi*self%square(2) &
+         + xi**2*self%square(3))
+   end subroutine look
+
+   !> Place eta on the master edge that the slave point `xi` looks at, and the gap there.
+   pure subroutine frame_hit(self, stencil, xi, eta, gap)
+      type(frame_t), intent(in) :: self
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: xi
+      real(wp), intent(out) :: eta, gap
+      real(wp) :: along(4), above(4), norm
+
+      call look(self, xi, along, above, norm)
+      eta = along(1)/(along(1) - along(2))
+      if (stencil%is_smooth) then
+         eta = smooth_root(matmul(stencil%shape, along), eta)
+         gap = polynomial(matmul(stencil%shape, above), eta)/norm
+      else
+         gap = (above(1) + eta*(above(2) - above(1)))/norm
+      end if
+   end subroutine frame_hit
+
+   !> The gap at the slave point `xi` over the master edge and, on a polygon, over its neighbours
+   !> where the point looks past its ends.
+   pure subroutine frame_point(self, stencil, xi, eta, gap)
+      type(frame_t), intent(in) :: self
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: xi
+      real(wp), intent(out) :: eta, gap
+      real(wp) :: along(4), above(4), norm, slope
+
+      call frame_hit(self, stencil, xi, eta, gap)
+      if (stencil%is_smooth .or. stencil%n_master < 4) return
+      call look(self, xi, along, above, norm)
+      slope = (above(2) - above(1))/(along(2) - along(1))
+      if (along(2) > 0.0_wp .and. stencil%node(place_master(4)) > 0) gap = gap - along(2)/norm &
+         *((above(4) - above(2))/(along(4) - along(2)) - slope)
+      if (along(1) < 0.0_wp .and. stencil%node(place_master(3)) > 0) gap = gap - along(1)/norm &
+         *((above(1) - above(3))/(along(1) - along(3)) - slope)
+   end subroutine frame_point
+
+   !> The root near `start` of the cubic with coefficients `c`, by Newton's method.
+   pure real(wp) function smooth_root(c, start)
+      real(wp), intent(in) :: c(0:3), start
+      real(wp) :: change, value
+      integer :: i
+
+      smooth_root = start
+      do i = 1, most_iterations
+         value = polynomial(c, smooth_root)
+         change = value/(c(1) + smooth_root*(2.0_wp*c(2) + smooth_root*3.0_wp*c(3)))
+         smooth_root = smooth_root - change
+         if (.not. abs(change) > epsilon(change)) exit
+      end do
+   end function smooth_root
+
+   pure real(wp) function polynomial(c, x)
+      real(wp), intent(in) :: c(0:3), x
+
+      polynomial = c(0) + x*(c(1) + x*(c(2) + x*c(3)))
+   end function polynomial
+
+   !> Moments over the segment that the master edge covers.
+   pure function frame_moments(self, stencil, point, weight) result(moment)
+      type(frame_t), intent(in) :: self
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: point(:), weight(:)        !! quadrature rule on 0..1
+      real(wp) :: moment(n_moment)
+      real(wp) :: low, high, xi, eta, gap, area
+      integer :: i
+
+      moment = 0.0_wp
+      low = max(0.0_wp, min(1.0_wp, frame_project(self, 2)))
+      high = max(0.0_wp, min(1.0_wp, frame_project(self, 1)))
+      if (.not. high > low) return
+      area = (high - low)*self%length
+      do i = 1, size(point)
+         xi = low + (high - low)*point(i)
+         call frame_hit(self, stencil, xi, eta, gap)
+         moment(moment_gap) = moment(moment_gap) + weight(i)*area*gap
+         moment(moment_gap_xi) = moment(moment_gap_xi) + weight(i)*area*gap*xi
+      end do
+      moment(moment_area) = area
+      moment(moment_area_xi) = area*0.5_wp*(low + high)
+      moment(moment_cover) = high - low
+   end function frame_moments
+
+   pure real(wp) function cross(a, b)
+      real(wp), intent(in) :: a(2), b(2)
+
+      cross = a(1)*b(2) - a(2)*b(1)
+   end function cross
+
+end module emcon_mortar_frame

@@ -1,0 +1,17 @@
+!> Mortar integrals of a pair of edges with 2 master nodes: polygons, segment by segment.
+module emcon_mortar_pair2
+   use emcon_dgrad13, only : dg_clip, dg_constant, dg_cross, dg_dot, dg_negative_part, dg_root, &
+      dg_sqrt, dg_t, dg_variable, difference, difference_t, operator(*), operator(+), &
+      operator(-), operator(/)
+   use emcon_kinds, only : wp
+   use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, moment_area, &
+      moment_area_xi, moment_cover, moment_gap, moment_gap_xi, pair_stencil_t, place_first, &
+      place_last, place_master
+   implicit none
+   private
+
+   integer, parameter :: n_master = 2, k_root = 13
+
+   include "emcon_mortar_pair.inc"
+
+end module emcon_mortar_pair2

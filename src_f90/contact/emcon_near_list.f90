@@ -1,0 +1,97 @@
+!> Which master edges each slave node or edge may touch: kept over steps as long as that is safe.
+!>
+!> Source: docs/theory.md, section 4, candidate search.
+module emcon_near_list
+   use emcon_kinds, only : wp
+   use emcon_search, only : box_distance, candidates_t, search_candidates
+   use emcon_sort, only : unique_sorted
+   implicit none
+   private
+   public :: near_list_t, near_list_init, near_list_update
+
+   !> Reach of the candidate search as a fraction of the mean master edge, at least; and as a
+   !> multiple of the largest motion expected in one step, at least.
+   real(wp), parameter :: reach_per_edge = 0.5_wp, reach_per_motion = 8.0_wp
+
+   type :: near_list_t
+      integer, allocatable :: item(:, :)         !! (1 or 2, n_item) nodes of each slave item
+      integer, allocatable :: edge(:, :)         !! (2, n_edge) master edges
+      integer, allocatable :: node(:)            !! distinct nodes of both
+      real(wp), allocatable :: u(:, :)           !! (2, size of `node`) when the list was made
+      type(candidates_t) :: candidates
+   end type near_list_t
+
+contains
+
+   pure subroutine near_list_init(self, item, edge, u0)
+      type(near_list_t), intent(out) :: self
+      integer, intent(in) :: item(:, :), edge(:, :)
+      real(wp), intent(in) :: u0(:, :)           !! (2, n_node)
+
+      self%item = item
+      self%edge = edge
+      self%node = unique_sorted([reshape(item, [size(item)]), reshape(edge, [size(edge)])])
+      self%u = u0(:, self%node)
+   end subroutine near_list_init
+
+   !> Make the list anew if something may have come near: `reach` is the reach of the last search,
+   !> 0 to search in any case.
+   pure subroutine near_list_update(self, x, u0, du, reach)
+      type(near_list_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(inout) :: reach           !! [L]
+      real(wp) :: step_motion, motion
+
+      step_motion = largest(du(:, self%node))
+      motion = largest(u0(:, self%node) - self%u) + step_motion
+      if (.not. 2.0_wp*motion < reach) call search(self, x, u0, step_motion, reach)
+   end subroutine near_list_update
+
+   !> Surfaces far apart get a reach as large as their distance and an empty list: then nothing is
+   !> done until one has moved half of that.
+   pure subroutine search(self, x, u0, step_motion, reach)
+      type(near_list_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp), intent(in) :: step_motion
+      real(wp), intent(out) :: reach
+      real(wp), allocatable :: item(:, :, :), edge(:, :, :)
+      real(wp) :: apart
+
+      self%u = u0(:, self%node)
+      call boxes(x, u0, self%item, item)
+      call boxes(x, u0, self%edge, edge)
+      apart = box_distance(minval(item(:, :, 1), 2), maxval(item(:, :, 2), 2), &
+         minval(edge(:, :, 1), 2), maxval(edge(:, :, 2), 2))
+      reach = max(reach_per_edge*sum(edge(:, :, 2) - edge(:, :, 1))/real(size(edge, 2), wp), &
+         reach_per_motion*step_motion, 0.99_wp*apart)
+      call search_candidates(item(:, :, 1), item(:, :, 2), edge(:, :, 1), edge(:, :, 2), reach, &
+         self%candidates)
+   end subroutine search
+
+   !> Low and high corners (2, n, 2) of the boxes around the nodes of each item.
+   pure subroutine boxes(x, u, item, box)
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      integer, intent(in) :: item(:, :)
+      real(wp), allocatable, intent(out) :: box(:, :, :)
+      integer :: i
+
+      allocate(box(2, size(item, 2), 2))
+      do i = 1, size(item, 2)
+         box(:, i, 1) = minval(x(:, item(:, i)) + u(:, item(:, i)), 2)
+         box(:, i, 2) = maxval(x(:, item(:, i)) + u(:, item(:, i)), 2)
+      end do
+   end subroutine boxes
+
+   !> Largest of the lengths of the columns of `v`.
+   pure real(wp) function largest(v)
+      real(wp), intent(in) :: v(:, :)
+      integer :: i
+
+      largest = 0.0_wp
+      do i = 1, size(v, 2)
+         largest = max(largest, v(1, i)**2 + v(2, i)**2)
+      end do
+      largest = sqrt(largest)
+   end function largest
+
+end module emcon_near_list

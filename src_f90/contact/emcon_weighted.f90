@@ -1,0 +1,167 @@
+!> Contact with integrated gaps: what mortar and segment formulations have in common.
+!>
+!> One constraint per slave node A: the gap integrated over the slave edges with the multiplier
+!> basis of A, as a mean over the covered part. A formulation gives the integrals of each slave
+!> edge. Source: docs/theory.md, section 4, weighted gaps.
+module emcon_weighted
+   use emcon_chain, only : chain_init, chain_t
+   use emcon_contact, only : constraint_t, contact_t
+   use emcon_dgrad_wide, only : wide_t
+   use emcon_edge_form, only : edge_form_t, form_constraint, form_share
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_scene, only : contact_pair_t, scene_t
+   implicit none
+   private
+   public :: weighted_t, weighted_init
+
+   !> A slave node is let go where less than this fraction of its surface is covered: a smaller part
+   !> says hardly more than the constraint of its neighbour.
+   real(wp), parameter :: least_cover = 0.02_wp
+   !> So far, per edge, a mean gap may be closed where contact begins: corners dip into edges.
+   real(wp), parameter :: deepest_mean = 0.2_wp
+
+   type, abstract, extends(contact_t) :: weighted_t
+      type(chain_t) :: slave
+      type(chain_t) :: master
+      logical :: is_self = .false.                    !! a surface in contact with itself
+      logical :: is_dual = .true.                     !! multiplier basis
+      integer, allocatable :: node_edge(:, :)         !! (2, n_constraint) edge before and after; 0
+      real(wp), allocatable :: whole(:)               !! (n_constraint) reference length of a node [L]
+      real(wp), allocatable :: scale(:)               !! (n_constraint) covered part at the start [L]
+      type(edge_form_t), allocatable :: form(:)       !! (n_edge)
+      logical, allocatable :: is_formed(:)            !! (n_edge)
+      type(wide_t) :: work(3)
+   contains
+      procedure :: measure => weighted_measure
+      procedure :: evaluate => weighted_evaluate
+      procedure :: area => weighted_area
+      procedure(measure_interface), deferred :: measure_edges
+      procedure(form_interface), deferred :: form_edge
+   end type weighted_t
+
+   abstract interface
+
+      !> Fill `form%value`: the moments of all slave edges at both ends of the step.
+      pure subroutine measure_interface(self, x, u0, du)
+         import :: weighted_t, wp
+         class(weighted_t), intent(inout) :: self
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      end subroutine measure_interface
+
+      !> Fill `form(e)` with nodes and moments in the arithmetic.
+      pure subroutine form_interface(self, e, x, u0, du)
+         import :: weighted_t, wp
+         class(weighted_t), intent(inout) :: self
+         integer, intent(in) :: e
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      end subroutine form_interface
+
+   end interface
+
+contains
+
+   !> Set up what does not depend on the formulation.
+   subroutine weighted_init(self, scene, pair, error)
+      class(weighted_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, k, n
+
+      call chain_init(self%slave, scene, scene%surface(pair%slave), error)
+      if (allocated(error)) return
+      call chain_init(self%master, scene, scene%surface(pair%master), error)
+      if (allocated(error)) return
+      self%is_self = pair%slave == pair%master
+      self%node = self%slave%node
+      n = size(self%node)
+      self%n_constraint = n
+      self%deepest_start = deepest_mean
+      self%node_edge = self%slave%node_edge
+      allocate(self%state(n), self%form(self%slave%n_edge))
+      allocate(self%is_formed(self%slave%n_edge), source=.false.)
+      allocate(self%thickness(n), self%whole(n), self%scale(n), source=0.0_wp)
+      do i = 1, n
+         do k = 1, 2
+            associate (e => self%node_edge(k, i))
+               if (e == 0) cycle
+               self%whole(i) = self%whole(i) + 0.5_wp*self%slave%length(e)
+               self%thickness(i) = scene%section( &
+                  scene%element_section(scene%surface(pair%slave)%element(e)))%thickness
+            end associate
+         end do
+         self%state(i)%size = self%whole(i)
+         if (all(self%node_edge(:, i) > 0)) cycle
+         self%state(i)%size = 2.0_wp*self%whole(i)       ! the end of a chain has one edge
+      end do
+      self%scale = self%whole
+   end subroutine weighted_init
+
+   !> Mean gaps at both ends of the step. At the start of a contact that just slides onto the
+   !> surface there is none yet: it counts as 0.
+   pure subroutine weighted_measure(self, x, u0, du)
+      class(weighted_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp) :: gap(0:1), area(0:1), part_gap(0:1), part_area(0:1), least
+      integer :: i, k
+
+      call self%measure_edges(x, u0, du)
+      do i = 1, self%n_constraint
+         gap = 0.0_wp
+         area = 0.0_wp
+         do k = 1, 2
+            if (self%node_edge(k, i) == 0) cycle
+            call form_share(self%form(self%node_edge(k, i)), 3 - k, self%is_dual, part_gap, &
+               part_area)
+            gap = gap + part_gap
+            area = area + part_area
+         end do
+         associate (state => self%state(i))
+            least = least_cover*self%whole(i)
+            state%is_near = maxval(area) > 0.0_wp
+            state%is_over = area(1) >= least
+            state%gap0 = 0.0_wp
+            state%gap1 = 0.0_wp
+            if (area(0) >= least) state%gap0 = gap(0)/area(0)
+            if (state%is_over) state%gap1 = gap(1)/area(1)
+            self%scale(i) = max(area(0), least)
+         end associate
+      end do
+   end subroutine weighted_measure
+
+   pure subroutine weighted_evaluate(self, wanted, x, u0, du, target, item)
+      class(weighted_t), intent(inout) :: self
+      integer, intent(in) :: wanted(:)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target(:)
+      type(constraint_t), intent(inout) :: item(:)
+      integer :: i, k, n
+
+      self%is_formed = .false.
+      do n = 1, size(wanted)
+         i = wanted(n)
+         do k = 1, 2
+            associate (e => self%node_edge(k, i))
+               if (e == 0) cycle
+               if (self%is_formed(e)) cycle
+               call self%form_edge(e, x, u0, du)
+               self%is_formed(e) = .true.
+            end associate
+         end do
+         call form_constraint(self%form, self%node_edge(:, i), self%node(i), self%is_dual, &
+            target(n), self%scale(i), self%work, item(n))
+         item(n)%size = self%state(i)%size
+      end do
+   end subroutine weighted_evaluate
+
+   !> The area that the present multipliers were scaled with.
+   pure subroutine weighted_area(self, x, u, area)
+      class(weighted_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp), intent(out) :: area(:)
+
+      area = self%scale*self%thickness
+   end subroutine weighted_area
+
+end module emcon_weighted

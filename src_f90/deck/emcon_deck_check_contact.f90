@@ -1,0 +1,264 @@
+!> The contact pairs, as far as they can be judged before anything moves.
+module emcon_deck_check_contact
+   use emcon_deck_reader, only : reader_t
+   use emcon_deck_surfaces, only : adjacency_init, adjacency_t, n_neighbours
+   use emcon_diagnostics, only : add_error, add_warning, label_list
+   use emcon_element_kinds, only : element_kinds
+   use emcon_kinds, only : wp
+   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
+      formulation_segment, multiplier_standard, scene_t, step_t, surface_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: check_pairs, mark_nodes
+
+   !> A slave surface longer than this times its master gives a warning: force leaks where it
+   !> reaches beyond. The rest is room for curved surfaces on straight ones.
+   real(wp), parameter :: large_ratio = 1.25_wp
+
+contains
+
+   !> The surfaces of contact pairs: chains of free faces, without common nodes, free to move,
+   !> the slave the smaller one.
+   subroutine check_pairs(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t) :: adjacency
+      logical, allocatable :: is_checked(:)
+      logical :: has_common
+      integer :: i, side, surface
+
+      if (size(scene%pair) == 0 .or. reader%doubt_shapes) return
+      call adjacency_init(adjacency, scene)
+      allocate(is_checked(size(scene%surface)), source=.false.)
+      do i = 1, size(scene%pair)
+         do side = 1, 2
+            surface = merge(scene%pair(i)%slave, scene%pair(i)%master, side == 1)
+            if (surface == 0) cycle
+            if (is_checked(surface)) cycle
+            is_checked(surface) = .true.
+            call check_free(reader, scene, adjacency, scene%surface(surface))
+            call check_chain(reader, scene, scene%surface(surface))
+         end do
+         if (scene%pair(i)%slave == 0 .or. scene%pair(i)%master == 0) cycle
+         call check_common_nodes(reader, scene, scene%pair(i), has_common)
+         call check_freedom(reader, scene, scene%pair(i))
+         if (.not. (has_common .or. has_reverse(scene%pair, i))) then
+            call check_lengths(reader, scene, scene%pair(i))
+         end if
+      end do
+   end subroutine check_pairs
+
+   !> A face between two elements cannot touch anything.
+   subroutine check_free(reader, scene, adjacency, surface)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t), intent(in) :: adjacency
+      type(surface_t), intent(in) :: surface
+      logical :: is_inside(size(surface%element))
+      integer :: i
+
+      do i = 1, size(is_inside)
+         is_inside(i) = n_neighbours(scene, adjacency, surface%element(i), surface%face(i)) > 0
+      end do
+      if (any(is_inside)) call add_error(reader%log, surface%origin, "contact surface " &
+         // surface%name // " has faces inside the body, of element " &
+         // label_list(scene%element_label(pack(surface%element, is_inside))))
+   end subroutine check_free
+
+   !> At each node one face may end and one may begin.
+   subroutine check_chain(reader, scene, surface)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, allocatable :: n_end(:, :)
+      logical, allocatable :: is_branch(:)
+      integer :: i, k, node(2)
+
+      allocate(n_end(2, size(scene%node_label)), source=0)
+      do i = 1, size(surface%element)
+         node = face_nodes(scene, surface%element(i), surface%face(i))
+         if (any(node == 0)) return
+         do k = 1, 2
+            n_end(k, node(k)) = n_end(k, node(k)) + 1
+         end do
+      end do
+      is_branch = n_end(1, :) > 1 .or. n_end(2, :) > 1
+      if (any(is_branch)) call add_error(reader%log, surface%origin, "contact surface " &
+         // surface%name // " is no chain of faces: more than two of them meet at node " &
+         // label_list(pack(scene%node_label, is_branch)))
+   end subroutine check_chain
+
+   !> Two surfaces of a pair must not share nodes; a surface in contact with itself is one surface.
+   subroutine check_common_nodes(reader, scene, pair, has_common)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      logical, intent(out) :: has_common
+      logical, allocatable :: is_slave(:), is_master(:)
+      character(len=:), allocatable :: whole
+
+      has_common = .false.
+      if (pair%slave == pair%master) return
+      allocate(is_slave(size(scene%node_label)), is_master(size(scene%node_label)), &
+         source=.false.)
+      associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
+         call mark_nodes(scene, slave, is_slave)
+         call mark_nodes(scene, master, is_master)
+         has_common = any(is_slave .and. is_master)
+         if (.not. has_common) return
+         whole = ""
+         if (all(is_master .or. .not. is_slave)) then
+            whole = master%name
+         else if (all(is_slave .or. .not. is_master) .and. .not. slave%is_nodal) then
+            whole = slave%name
+         end if
+         if (whole /= "") whole = "; for contact of a surface with itself name it twice: " &
+            // whole // ", " // whole
+         call add_error(reader%log, pair%origin, "*CONTACT PAIR: slave surface " // slave%name &
+            // " and master surface " // master%name // " share node " &
+            // label_list(pack(scene%node_label, is_slave .and. is_master)) // whole)
+      end associate
+   end subroutine check_common_nodes
+
+   !> Some node of each constraint must be free to fulfil it.
+   subroutine check_freedom(reader, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      logical, allocatable :: is_slave(:), is_held(:), is_guided(:)
+      integer, allocatable :: n_free(:)
+      integer :: i
+
+      if (pair%formulation == 0) return
+      allocate(is_slave(size(scene%node_label)), is_held(size(scene%node_label)), &
+         is_guided(size(scene%node_label)), source=.false.)
+      call mark_nodes(scene, scene%surface(pair%slave), is_slave)
+      do i = 1, size(scene%step)
+         n_free = constraint_freedom(scene, scene%step(i), pair)
+         is_held = is_held .or. (is_slave .and. n_free == 0)
+         is_guided = is_guided .or. (is_slave .and. n_free < scene%n_dim)
+      end do
+      is_guided = is_guided .and. .not. is_held
+      if (any(is_held) .and. pair%formulation == formulation_nts) then
+         call add_error(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
+            // label_list(pack(scene%node_label, is_held)) // " of surface " &
+            // scene%surface(pair%slave)%name // " is over-constrained: all its degrees of " &
+            // "freedom are prescribed, it cannot follow the master; take it off the surface")
+      else if (any(is_held)) then
+         call add_error(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
+            // label_list(pack(scene%node_label, is_held)) // " of surface " &
+            // scene%surface(pair%slave)%name // " is over-constrained: it and the whole master " &
+            // "surface are prescribed, nothing can fulfil its constraint; take its faces off " &
+            // "the surface")
+      end if
+      if (any(is_guided)) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
+         // label_list(pack(scene%node_label, is_guided)) // " of surface " &
+         // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it " &
+         // "in the other one only, and is singular where the master faces along the first")
+   end subroutine check_freedom
+
+   !> For each slave node: so many degrees of freedom of one node can fulfil its constraint.
+   !>
+   !> Node to surface it is the slave node that must follow. An integrated constraint can be
+   !> fulfilled by the master as well, and under standard multipliers by the neighbours of the
+   !> slave node; dual ones leave these out where the edges are covered.
+   pure function constraint_freedom(scene, step, pair) result(n_free)
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(contact_pair_t), intent(in) :: pair
+      integer :: n_free(size(scene%node_label))
+      integer :: own(size(scene%node_label))
+      logical :: is_master(size(scene%node_label))
+      integer :: k, node(2)
+
+      own = scene%n_dim
+      do k = 1, size(step%prescribed)
+         own(step%prescribed(k)%node) = own(step%prescribed(k)%node) - 1
+      end do
+      n_free = own
+      if (all(pair%formulation /= [formulation_segment, formulation_mortar])) return
+      is_master = .false.
+      call mark_nodes(scene, scene%surface(pair%master), is_master)
+      if (any(is_master .and. own > 0)) then
+         n_free = scene%n_dim
+      else if (step%contact%multiplier == multiplier_standard) then
+         associate (slave => scene%surface(pair%slave))
+            do k = 1, size(slave%element)
+               node = face_nodes(scene, slave%element(k), slave%face(k))
+               if (all(node > 0)) n_free(node) = max(n_free(node), own(node(2:1:-1)))
+            end do
+         end associate
+      end if
+   end function constraint_freedom
+
+   !> Whether the pair `i` is also listed with slave and master in turn.
+   pure logical function has_reverse(pair, i)
+      type(contact_pair_t), intent(in) :: pair(:)
+      integer, intent(in) :: i
+
+      has_reverse = any(pair%slave == pair(i)%master .and. pair%master == pair(i)%slave)
+   end function has_reverse
+
+   !> Warn of a slave surface that is longer than its master.
+   subroutine check_lengths(reader, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      real(wp) :: slave, master
+      integer :: power
+
+      if (reader%doubt_positions) return
+      if (scene%surface(pair%slave)%is_nodal .or. scene%surface(pair%master)%is_nodal) return
+      ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
+      power = -exponent(maxval(abs(scene%x)))
+      slave = surface_length(scene, scene%surface(pair%slave), power)
+      master = surface_length(scene, scene%surface(pair%master), power)
+      if (master <= 0.0_wp .or. slave <= large_ratio*master) return
+      call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave surface " &
+         // scene%surface(pair%slave)%name // " is " // to_text(slave/master, 3) &
+         // " times as long as master surface " // scene%surface(pair%master)%name &
+         // "; the smaller one should be the slave: swap the two")
+   end subroutine check_lengths
+
+   !> Length of the faces in the reference configuration, times 2**`power` [L].
+   pure real(wp) function surface_length(scene, surface, power)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: power
+      integer :: i, node(2)
+
+      surface_length = 0.0_wp
+      do i = 1, size(surface%element)
+         node = face_nodes(scene, surface%element(i), surface%face(i))
+         if (any(node == 0)) cycle
+         surface_length = surface_length + norm2(scale(scene%x(:, node(2)), power) &
+            - scale(scene%x(:, node(1)), power))
+      end do
+   end function surface_length
+
+   !> Mark the nodes of a surface.
+   pure subroutine mark_nodes(scene, surface, is_in)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      logical, intent(inout) :: is_in(:)           !! (n_node)
+      integer :: i, node(2)
+
+      is_in(surface%node) = .true.
+      do i = 1, size(surface%element)
+         node = face_nodes(scene, surface%element(i), surface%face(i))
+         if (all(node > 0)) is_in(node) = .true.
+      end do
+   end subroutine mark_nodes
+
+   !> First and last node of a face, along the boundary; 0 if the element had errors.
+   pure function face_nodes(scene, element, face) result(node)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: element, face
+      integer :: node(2)
+
+      node = scene%element_node( &
+         element_kinds(scene%element_kind(element))%face_node(:, face), element)
+   end function face_nodes
+
+end module emcon_deck_check_contact

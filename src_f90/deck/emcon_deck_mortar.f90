@@ -1,0 +1,154 @@
+!> *MORTAR and *SURFACE SMOOTHING: how the contact of a step is computed.
+!>
+!> What a card does not name stays as it was; only POINTS belongs to the INTEGRATION it was given
+!> with. An option that no pair of the model heeds gives a warning.
+module emcon_deck_mortar
+   use emcon_deck_reader, only : card_t, card_warning, has_option, option_angle, &
+      option_count, option_name, reader_t, refuse_option
+   use emcon_scene, only : contact_options_t, contact_pair_t, formulation_mortar, &
+      formulation_segment, integration_elements, integration_segments, multiplier_dual, &
+      multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
+   implicit none
+   private
+   public :: read_mortar, read_smoothing
+
+   integer, parameter :: most_points = 10          !! of the Gauss rules
+
+contains
+
+   !> *MORTAR: what is integrated, and how.
+   subroutine read_mortar(reader, card, pair, options)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(contact_options_t), intent(inout) :: options
+
+      call read_integration(reader, card, options)
+      select case (option_name(card, "MULTIPLIER"))
+      case ("")
+         continue
+      case ("STANDARD")
+         options%multiplier = multiplier_standard
+      case ("DUAL")
+         options%multiplier = multiplier_dual
+      case default
+         call refuse_option(reader, card, "MULTIPLIER", "STANDARD, DUAL", "")
+      end select
+      select case (option_name(card, "NORMAL"))
+      case ("")
+         continue
+      case ("EDGE")
+         options%normal = normal_edge
+      case ("NODAL")
+         options%normal = normal_nodal
+      case default
+         call refuse_option(reader, card, "NORMAL", "EDGE, NODAL", "")
+      end select
+      call option_angle(reader, card, options%normal_angle)
+      if (.not. in_doubt(reader, pair)) call warn_of_mortar(reader, card, pair, options)
+   end subroutine read_mortar
+
+   !> INTEGRATION, and POINTS: of each slave edge, or of each segment, where one is too few.
+   subroutine read_integration(reader, card, options)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_options_t), intent(inout) :: options
+      integer :: least
+
+      least = merge(1, 2, options%integration == integration_elements)
+      select case (option_name(card, "INTEGRATION"))
+      case ("")
+         continue
+      case ("SEGMENTS")
+         options%integration = integration_segments
+         options%n_point = 0
+         least = 2
+      case ("ELEMENTS")
+         options%integration = integration_elements
+         options%n_point = 0
+         least = 1
+      case default
+         call refuse_option(reader, card, "INTEGRATION", "SEGMENTS, ELEMENTS", "")
+         least = 1
+      end select
+      call option_count(reader, card, "POINTS", least, options%n_point, most_points)
+   end subroutine read_integration
+
+   !> Whether the formulation of some pair is unknown after an error.
+   pure logical function in_doubt(reader, pair)
+      type(reader_t), intent(in) :: reader
+      type(contact_pair_t), intent(in) :: pair(:)
+
+      in_doubt = reader%doubt_names .or. any(pair%formulation == 0)
+   end function in_doubt
+
+   subroutine warn_of_mortar(reader, card, pair, options)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(contact_options_t), intent(in) :: options
+      character(len=:), allocatable :: idle
+      logical :: has_mortar
+
+      has_mortar = any(pair%formulation == formulation_mortar)
+      if (.not. has_mortar .and. all(pair%formulation /= formulation_segment)) then
+         call card_warning(reader, card, &
+            "it has no effect: no *CONTACT PAIR has TYPE=MORTAR or SEGMENT")
+         return
+      end if
+      idle = ""
+      if (.not. has_mortar) then
+         call add_idle("INTEGRATION", "INTEGRATION")
+         call add_idle("POINTS", "POINTS")
+         call add_idle("NORMAL", "NORMAL")
+         call add_idle("FEATUREANGLE", "FEATURE ANGLE")
+         if (idle /= "") call card_warning(reader, card, &
+            idle // ": without effect on pairs of TYPE=SEGMENT; no *CONTACT PAIR has TYPE=MORTAR")
+      else if (options%normal == normal_edge) then
+         call add_idle("FEATUREANGLE", "FEATURE ANGLE")
+         if (idle /= "") call card_warning(reader, card, idle // ": without effect on NORMAL=EDGE")
+      end if
+
+   contains
+
+      subroutine add_idle(option, title)
+         character(len=*), intent(in) :: option, title
+
+         if (.not. has_option(card, option)) return
+         if (idle /= "") idle = idle // ", "
+         idle = idle // title
+      end subroutine add_idle
+
+   end subroutine warn_of_mortar
+
+   !> *SURFACE SMOOTHING: the shape of the master surfaces.
+   subroutine read_smoothing(reader, card, pair, options)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(contact_options_t), intent(inout) :: options
+      character(len=:), allocatable :: kind
+
+      kind = option_name(card, "TYPE")
+      call option_angle(reader, card, options%smoothing_angle)
+      select case (kind)
+      case ("")
+         continue
+      case ("NONE")
+         options%smoothing = smoothing_none
+      case ("HERMITE")
+         options%smoothing = smoothing_hermite
+      case default
+         call refuse_option(reader, card, "TYPE", "NONE, HERMITE", "")
+         return
+      end select
+      if (in_doubt(reader, pair)) return
+      if (size(pair) == 0) then
+         call card_warning(reader, card, "it has no effect: there is no *CONTACT PAIR")
+      else if (options%smoothing == smoothing_none .and. (kind == "" &
+         .or. has_option(card, "FEATUREANGLE"))) then
+         call card_warning(reader, card, "surfaces are not smoothed; give TYPE=HERMITE")
+      end if
+   end subroutine read_smoothing
+
+end module emcon_deck_mortar

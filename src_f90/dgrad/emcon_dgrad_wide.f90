@@ -1,0 +1,114 @@
+!> Discrete-gradient numbers over any number of variables: sums of numbers over few variables.
+!>
+!> For functions that are put together from many parts, each over its own variables: only sums and
+!> products are needed. Source: docs/theory.md, section 2.
+module emcon_dgrad_wide
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: wide_t, wide_clear, wide_constant, wide_add, wide_add_product, wide_add_part
+
+   !> As dg_t of emcon_dgrad.inc, with room for more variables than are used.
+   type :: wide_t
+      integer :: n = 0                           !! variables
+      real(wp) :: f0 = 0.0_wp
+      real(wp) :: f1 = 0.0_wp
+      real(wp) :: df = 0.0_wp
+      real(wp), allocatable :: g(:)              !! (>= n)
+      real(wp), allocatable :: c(:)
+      real(wp), allocatable :: h(:, :)
+   end type wide_t
+
+contains
+
+   !> Zero, over `n` variables.
+   pure subroutine wide_clear(self, n)
+      type(wide_t), intent(inout) :: self
+      integer, intent(in) :: n
+
+      if (allocated(self%g)) then
+         if (size(self%g) < n) deallocate(self%g, self%c, self%h)
+      end if
+      if (.not. allocated(self%g)) allocate(self%g(n), self%c(n), self%h(n, n))
+      self%n = n
+      self%f0 = 0.0_wp
+      self%f1 = 0.0_wp
+      self%df = 0.0_wp
+      self%g(:n) = 0.0_wp
+      self%c(:n) = 0.0_wp
+      self%h(:n, :n) = 0.0_wp
+   end subroutine wide_clear
+
+   pure subroutine wide_constant(self, n, value)
+      type(wide_t), intent(inout) :: self
+      integer, intent(in) :: n
+      real(wp), intent(in) :: value
+
+      call wide_clear(self, n)
+      self%f0 = value
+      self%f1 = value
+   end subroutine wide_constant
+
+   !> Add `factor` times `a`, over the same variables.
+   pure subroutine wide_add(self, factor, a)
+      type(wide_t), intent(inout) :: self
+      real(wp), intent(in) :: factor
+      type(wide_t), intent(in) :: a
+
+      associate (n => self%n)
+         self%f0 = self%f0 + factor*a%f0
+         self%f1 = self%f1 + factor*a%f1
+         self%df = self%df + factor*a%df
+         self%g(:n) = self%g(:n) + factor*a%g(:n)
+         self%c(:n) = self%c(:n) + factor*a%c(:n)
+         self%h(:n, :n) = self%h(:n, :n) + factor*a%h(:n, :n)
+      end associate
+   end subroutine wide_add
+
+   !> Add `factor` times `a` times `b`, over the same variables.
+   pure subroutine wide_add_product(self, factor, a, b)
+      type(wide_t), intent(inout) :: self
+      real(wp), intent(in) :: factor
+      type(wide_t), intent(in) :: a, b
+      real(wp) :: ma, mb
+      integer :: j
+
+      ma = 0.5_wp*factor*(a%f0 + a%f1)
+      mb = 0.5_wp*factor*(b%f0 + b%f1)
+      associate (n => self%n)
+         self%f0 = self%f0 + factor*a%f0*b%f0
+         self%f1 = self%f1 + factor*a%f1*b%f1
+         self%df = self%df + (ma*b%df + mb*a%df)
+         self%g(:n) = self%g(:n) + (ma*b%g(:n) + mb*a%g(:n))
+         self%c(:n) = self%c(:n) + (factor*a%f1*b%c(:n) + factor*b%f1*a%c(:n))
+         do j = 1, n
+            self%h(:n, j) = self%h(:n, j) + (ma*b%h(:n, j) + mb*a%h(:n, j) &
+               + (0.5_wp*factor*a%c(j))*b%g(:n) + (0.5_wp*factor*b%c(j))*a%g(:n))
+         end do
+      end associate
+   end subroutine wide_add_product
+
+   !> Add `factor` times a part given by its components over its own variables; its variable i is
+   !> number `variable(i)` here, 0: none.
+   pure subroutine wide_add_part(self, factor, f0, f1, df, g, c, h, variable)
+      type(wide_t), intent(inout) :: self
+      real(wp), intent(in) :: factor, f0, f1, df, g(:), c(:), h(:, :)
+      integer, intent(in) :: variable(:)
+      integer :: i, j, row, column
+
+      self%f0 = self%f0 + factor*f0
+      self%f1 = self%f1 + factor*f1
+      self%df = self%df + factor*df
+      do j = 1, size(variable)
+         column = variable(j)
+         if (column == 0) cycle
+         self%g(column) = self%g(column) + factor*g(j)
+         self%c(column) = self%c(column) + factor*c(j)
+         do i = 1, size(variable)
+            row = variable(i)
+            if (row > 0) self%h(row, column) = self%h(row, column) + factor*h(i, j)
+         end do
+      end do
+   end subroutine wide_add_part
+
+end module emcon_dgrad_wide
