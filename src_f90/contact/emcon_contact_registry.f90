@@ -4,7 +4,8 @@ module emcon_contact_registry
    use emcon_errors, only : error_t
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_nts, only : nts_init, nts_t
-   use emcon_scene, only : contact_pair_t, formulation_mortar, scene_t
+   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_segment, scene_t
+   use emcon_segment, only : segment_init, segment_t
    implicit none
    private
    public :: new_contact
@@ -19,12 +20,17 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(mortar_t), allocatable :: mortar
       type(nts_t), allocatable :: nts
+      type(segment_t), allocatable :: segment
 
       select case (pair%formulation)
       case (formulation_mortar)
          allocate(mortar)
          call mortar_init(mortar, scene, pair, error)
          call move_alloc(mortar, contact)
+      case (formulation_segment)
+         allocate(segment)
+         call segment_init(segment, scene, pair, error)
+         call move_alloc(segment, contact)
       case default
          allocate(nts)
          call nts_init(nts, scene, pair, error)

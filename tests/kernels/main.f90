@@ -17,6 +17,7 @@ program main
    use test_dgrad, only : collect_dgrad
    use test_dgrad_series, only : collect_dgrad_series
    use test_element, only : collect_element
+   use test_hermite_gap, only : collect_hermite_gap
    use test_lapack, only : collect_lapack
    use test_law, only : collect_law
    use test_loads, only : collect_loads
@@ -73,6 +74,7 @@ program main
    call run("search", collect_search)
    call run("nts_gap", collect_nts_gap)
    call run("nts", collect_nts)
+   call run("hermite_gap", collect_hermite_gap)
    call run("numbering", collect_numbering)
    call run("bodies", collect_bodies)
    call run("loads", collect_loads)

@@ -2,9 +2,9 @@
 module test_dgrad
    use check, only : check_near, check_true, test_case_t
    use emcon_dgrad10, only : dg10_t => dg_t, dg_cross, dg_dot, difference
-   use emcon_dgrad3, only : dg_abs, dg_constant, dg_excess, dg_expm1, dg_log1p, dg_negative_part, &
-      dg_sqrt, dg_t, dg_variable, operator(*), operator(+), operator(-), &
-      operator(/)
+   use emcon_dgrad3, only : dg_abs, dg_clip, dg_constant, dg_excess, dg_expm1, dg_log1p, &
+      dg_negative_part, dg_root, dg_sqrt, dg_t, dg_variable, operator(*), operator(+), &
+      operator(-), operator(/)
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
@@ -15,10 +15,10 @@ module test_dgrad
 
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Operations under test; the last one chains most of the others.
-   integer, parameter :: n_operation = 14
+   integer, parameter :: n_operation = 15
    character(len=14), parameter :: name(n_operation) = [character(len=14) :: "a + b", "a + 1", &
       "-a", "a - b", "3 a", "a b", "a/b", "sqrt", "abs", "negative part", "rounded corner", &
-      "log1p", "excess, expm1", "composite"]
+      "log1p", "excess, expm1", "clip", "composite"]
 
    !> Of the rounded corner.
    real(wp), parameter :: width = 0.25_wp
@@ -36,6 +36,9 @@ contains
          test_case_t("gradient at the end", test_gradient), &
          test_case_t("second derivatives", test_second_derivatives), &
          test_case_t("second derivatives across a change of sign", test_second_across), &
+         test_case_t("clip across its bounds", test_clip), &
+         test_case_t("root of a polynomial", test_root), &
+         test_case_t("second derivatives of a root", test_second_root), &
          test_case_t("constants and zeros", test_constants), &
          test_case_t("dot and cross product", test_bilinear), &
          test_case_t("momenta of dot and cross product", test_momenta)]
@@ -77,6 +80,8 @@ contains
          s = dg_log1p(a)
       case (13)
          s = dg_excess(a) + 0.5_wp*dg_expm1(b)
+      case (14)
+         s = dg_clip(a)
       case default
          s = dg_log1p(a*b)*dg_sqrt(b + c)/(a + dg_expm1(c)) + dg_excess(c)
       end select
@@ -116,6 +121,8 @@ contains
             f = log(1.0_qp + a)
          case (13)
             f = a - log(1.0_qp + a) + 0.5_qp*(exp(b) - 1.0_qp)
+         case (14)
+            f = max(0.0_qp, min(1.0_qp, a))
          case default
             f = log(1.0_qp + a*b)*sqrt(b + c)/(a + exp(c) - 1.0_qp) + c - log(1.0_qp + c)
          end select
@@ -134,14 +141,15 @@ contains
    end subroutine draw
 
    !> What rounding may change of a sum with the terms g_i dx_i; a chained operation has up to
-   !> 20 roundings of a size that its values set. The rounded corner is a difference in itself.
+   !> 20 roundings of a size that its values set. The rounded corner and the clip are
+   !> differences in themselves.
    pure real(wp) function scale_of(which, s, dx)
       integer, intent(in) :: which
       type(dg_t), intent(in) :: s
       real(wp), intent(in) :: dx(3)
 
       scale_of = sum(abs(s%g*dx))
-      if (which == 11) scale_of = abs(dx(1))
+      if (which == 11 .or. which == 14) scale_of = abs(dx(1))
    end function scale_of
 
    subroutine test_identity(error)
@@ -200,7 +208,7 @@ contains
    end subroutine test_change_of_sign
 
    !> `df` stays relatively exact and g.dx equal to it down to the smallest numbers. All functions
-   !> rise with each of their increments but those of case 4, 7 and 14, where terms cancel.
+   !> rise with each of their increments but those of case 4, 7 and 15, where terms cancel.
    subroutine test_small_increments(error)
       type(error_t), allocatable, intent(out) :: error
       type(dg_t) :: s
@@ -315,6 +323,121 @@ contains
             trim(name(which)) // " below zero")
       end do
    end subroutine test_second_across
+
+   !> Steps between all places before, on, between and beyond the bounds.
+   subroutine test_clip(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: at(6) = [-0.7_wp, 0.0_wp, 0.3_wp, 0.8_wp, 1.0_wp, 1.9_wp]
+      real(wp), parameter :: clipped(6) = [0.0_wp, 0.0_wp, 0.3_wp, 0.8_wp, 1.0_wp, 1.0_wp]
+      type(dg_t) :: s
+      real(wp) :: x0(3), dx(3), slope
+      integer :: i, j
+
+      do i = 1, 6
+         do j = 1, 6
+            x0 = [at(i), 1.0_wp, 1.0_wp]
+            dx = [at(j) - at(i), 0.2_wp, 0.1_wp]
+            s = dg_clip(dg_variable(1, x0(1), dx(1)))
+            call check_near(error, [s%f0, s%f1], [clipped(i), clipped(j)], 2.0_wp*eps, 1.0_wp, &
+               "values")
+            call check_near(error, s%df, clipped(j) - clipped(i), 4.0_wp*eps, 2.0_wp, "df")
+            call check_near(error, s%g(1)*dx(1), clipped(j) - clipped(i), 4.0_wp*eps, 2.0_wp, &
+               "g.dx")
+            slope = merge(1.0_wp, 0.0_wp, at(j) > 0.0_wp .and. at(j) < 1.0_wp)
+            if (j == 2 .or. j == 5) cycle        ! no derivative
+            call check_near(error, s%c(1), slope, 0.0_wp, 1.0_wp, "gradient")
+            call check_second(error, 14, x0, dx, "clip, " // to_text(at(i)) // " to " &
+               // to_text(at(j)))
+         end do
+      end do
+   end subroutine test_clip
+
+   !> F = x^3 + p a b x - (a^2 + b) with the variables a, b and x as number 3; p > 0 makes it rise.
+   pure function cubic(x0, dx) result(f)
+      real(wp), intent(in) :: x0(3), dx(3)
+      type(dg_t) :: f, a, b, x
+
+      a = dg_variable(1, x0(1), dx(1))
+      b = dg_variable(2, x0(2), dx(2))
+      x = dg_variable(3, x0(3), dx(3))
+      f = x*x*x + 0.5_wp*(a*b*x) - (a*a + b)
+   end function cubic
+
+   !> Its root, in quadruple precision: Newton's method, which comes from above.
+   pure real(qp) function cubic_root(a, b) result(x)
+      real(qp), intent(in) :: a, b
+      integer :: i
+
+      x = 4.0_qp
+      do i = 1, 40
+         x = x - (x**3 + 0.5_qp*a*b*x - (a*a + b))/(3.0_qp*x**2 + 0.5_qp*a*b)
+      end do
+   end function cubic_root
+
+   !> The root as a number, from the positions of a and b.
+   pure function root_number(x0, dx) result(s)
+      real(wp), intent(in) :: x0(2), dx(2)
+      type(dg_t) :: s
+      real(wp) :: root(2)
+
+      root = real([cubic_root(real(x0(1), qp), real(x0(2), qp)), &
+         cubic_root(real(x0(1), qp) + real(dx(1), qp), real(x0(2), qp) + real(dx(2), qp))], wp)
+      s = dg_root(cubic([x0, root(1)], [dx, root(2) - root(1)]), 3, root(1), root(2))
+   end function root_number
+
+   !> Steps from 1 down to 2^-90, far below the round-off of the roots that are handed in: that
+   !> enters by its product with the unit round-off.
+   subroutine test_root(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(dg_t) :: s
+      real(wp) :: x0(3), dx(3), expected(2)
+      real(qp) :: a, b, x
+      integer :: i
+
+      do i = 0, 90
+         call draw(0.9_wp, x0, dx)
+         dx = scale(dx, -i)
+         s = root_number(x0(:2), dx(:2))
+         a = real(x0(1), qp) + real(dx(1), qp)
+         b = real(x0(2), qp) + real(dx(2), qp)
+         x = cubic_root(a, b)
+         call check_near(error, [s%f0, s%f1], real([cubic_root(real(x0(1), qp), &
+            real(x0(2), qp)), x], wp), eps, 2.0_wp, "values")
+         call check_near(error, dot_product(s%g, dx), s%df, 40.0_wp*eps, &
+            sum(abs(s%g*dx)) + eps, "g.dx = df at 2^-" // to_text(i))
+         call check_near(error, s%df, s%f1 - s%f0, 40.0_wp*eps, 1.0_wp, "df = f1 - f0")
+         expected = real([2.0_qp*a - 0.5_qp*b*x, 1.0_qp - 0.5_qp*a*x]/(3.0_qp*x**2 + 0.5_qp*a*b), &
+            wp)
+         call check_near(error, s%c(:2), expected, 40.0_wp*eps, 2.0_wp, "gradient")
+         call check_near(error, [s%g(3), s%c(3), s%h(3, :), s%h(:, 3)], spread(0.0_wp, 1, 8), &
+            0.0_wp, 1.0_wp, "the unknown is no variable")
+         if (i > digits(1.0_wp) + 4) call check_near(error, s%g, s%c, 40.0_wp*eps, 2.0_wp, &
+            "g = c in the limit")
+      end do
+   end subroutine test_root
+
+   !> Error of a central difference of step eps^(1/3): a few eps^(2/3).
+   subroutine test_second_root(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(dg_t) :: s, up, down
+      real(wp) :: x0(3), dx(3), way(2), step
+      integer :: i, j
+
+      step = eps**(1.0_wp/3.0_wp)
+      do i = 0, 40, 2
+         call draw(0.9_wp, x0, dx)
+         dx = scale(dx, -i)
+         s = root_number(x0(:2), dx(:2))
+         do j = 1, 2
+            way = 0.0_wp
+            way(j) = step
+            up = root_number(x0(:2), dx(:2) + way)
+            down = root_number(x0(:2), dx(:2) - way)
+            call check_near(error, s%h(:, j), (up%g - down%g)/(2.0_wp*step), 40.0_wp*step**2, &
+               1.0_wp + maxval(abs(s%g)), "column " // to_text(j))
+         end do
+      end do
+   end subroutine test_second_root
 
    subroutine test_constants(error)
       type(error_t), allocatable, intent(out) :: error

@@ -1,0 +1,216 @@
+!> Segment contact: gaps of the slave nodes, interpolated on each slave edge and integrated with the
+!> multiplier basis.
+!>
+!> It stands between node to segment, whose gaps it takes, and mortar, whose constraints it makes.
+!> Source: docs/theory.md, section 4, segments; paper, section 2 ("several extensions").
+module emcon_segment
+   use emcon_contact, only : constraint_t
+   use emcon_dgrad10, only : dg_dot, dg_sqrt, dg_t, difference
+   use emcon_dgrad_wide, only : wide_add, wide_add_part, wide_add_product, wide_clear
+   use emcon_edge_form, only : form_begin
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_mortar_frame, only : moment_area, moment_area_xi, moment_cover, moment_gap, &
+      moment_gap_xi, n_moment
+   use emcon_nts, only : nts_init, nts_t
+   use emcon_scene, only : contact_options_t, contact_pair_t, multiplier_dual, scene_t
+   use emcon_sort, only : find_sorted
+   use emcon_weighted, only : weighted_init, weighted_t
+   implicit none
+   private
+   public :: segment_t, segment_init
+
+   type, extends(weighted_t) :: segment_t
+      type(nts_t) :: nts                              !! gaps of the nodes
+      integer, allocatable :: end_node(:, :)          !! (2, n_edge) nodes as numbers of constraints
+      type(constraint_t) :: nodal(2)                  !! of one edge
+   contains
+      procedure :: configure => segment_configure
+      procedure :: begin_step => segment_begin_step
+      procedure :: measure_edges => segment_measure_edges
+      procedure :: form_edge => segment_form_edge
+   end type segment_t
+
+contains
+
+   !> Set up the pair `pair` of `scene`.
+   subroutine segment_init(self, scene, pair, error)
+      type(segment_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+      integer :: e, k
+
+      call weighted_init(self, scene, pair, error)
+      if (allocated(error)) return
+      call nts_init(self%nts, scene, pair, error)
+      if (allocated(error)) return
+      allocate(self%end_node(2, self%slave%n_edge))
+      do e = 1, self%slave%n_edge
+         do k = 1, 2
+            self%end_node(k, e) = find_sorted(self%node, self%slave%edge(k, e))
+         end do
+      end do
+   end subroutine segment_init
+
+   pure subroutine segment_configure(self, x, options)
+      class(segment_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      type(contact_options_t), intent(in) :: options
+
+      self%is_dual = options%multiplier == multiplier_dual
+      call self%nts%configure(x, options)
+   end subroutine segment_configure
+
+   pure subroutine segment_begin_step(self, x, u0, du)
+      class(segment_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+
+      self%nts%reach = self%reach
+      self%nts%rounding = self%rounding
+      call self%nts%begin_step(x, u0, du)
+      self%reach = self%nts%reach
+   end subroutine segment_begin_step
+
+   !> The weights of an edge's nodal gaps in the moments, in units of its length.
+   pure function weights(is_over) result(w)
+      logical, intent(in) :: is_over(2)          !! is the node over the master surface?
+      real(wp) :: w(n_moment, 2)
+
+      w = 0.0_wp
+      if (all(is_over)) then
+         w(moment_gap, :) = 0.5_wp
+         w(moment_gap_xi, :) = [1.0_wp, 2.0_wp]/6.0_wp
+         w(moment_cover, :) = 0.5_wp
+      else
+         ! What is left of the edge belongs to its node over the surface.
+         w(moment_gap, :) = merge(0.5_wp, 0.0_wp, is_over)
+         if (is_over(2)) w(moment_gap_xi, 2) = 0.5_wp
+      end if
+      w(moment_area, :) = w(moment_gap, :)
+      w(moment_area_xi, :) = w(moment_gap_xi, :)
+   end function weights
+
+   pure logical function is_over(self, i)
+      type(segment_t), intent(in) :: self
+      integer, intent(in) :: i
+
+      is_over = self%nts%state(i)%is_near .and. self%nts%state(i)%is_over
+   end function is_over
+
+   pure subroutine segment_measure_edges(self, x, u0, du)
+      class(segment_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp) :: w(n_moment, 2), a(2), b(2), length(0:1)
+      integer :: e, k
+
+      call self%nts%measure(x, u0, du)
+      do e = 1, self%slave%n_edge
+         associate (value => self%form(e)%value, node => self%slave%edge(:, e), &
+               i => self%end_node(:, e))
+            value = 0.0_wp
+            w = weights([is_over(self, i(1)), is_over(self, i(2))])
+            if (all(w <= 0.0_wp)) cycle
+            a = (x(:, node(2)) - x(:, node(1))) + (u0(:, node(2)) - u0(:, node(1)))
+            b = a + (du(:, node(2)) - du(:, node(1)))
+            length = [sqrt(dot_product(a, a)), sqrt(dot_product(b, b))]
+            do k = 1, 2
+               associate (gap => [self%nts%state(i(k))%gap0, self%nts%state(i(k))%gap1])
+                  value(moment_gap, :) = value(moment_gap, :) + w(moment_gap, k)*length*gap
+                  value(moment_gap_xi, :) = value(moment_gap_xi, :) + w(moment_gap_xi, k)*length*gap
+               end associate
+               value(moment_area, :) = value(moment_area, :) + w(moment_area, k)*length
+               value(moment_area_xi, :) = value(moment_area_xi, :) + w(moment_area_xi, k)*length
+               value(moment_cover, :) = value(moment_cover, :) + w(moment_cover, k)
+            end do
+         end associate
+      end do
+   end subroutine segment_measure_edges
+
+   pure subroutine segment_form_edge(self, e, x, u0, du)
+      class(segment_t), intent(inout) :: self
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp) :: w(n_moment, 2)
+      logical :: is_there(2)
+      integer :: k
+
+      is_there = [is_over(self, self%end_node(1, e)), is_over(self, self%end_node(2, e))]
+      w = weights(is_there)
+      do k = 1, 2
+         self%nodal(k)%n_node = 0
+         if (is_there(k)) call self%nts%evaluate([self%end_node(k, e)], x, u0, du, [0.0_wp], &
+            self%nodal(k:k))
+      end do
+      call begin_form(self, e)
+      associate (form => self%form(e), length => self%work(1), gap => self%work(2))
+         call edge_length(self, e, x, u0, du)
+         do k = 1, 2
+            if (.not. is_there(k)) cycle
+            call spread_gap(self, e, k)
+            call wide_add_product(form%moment(moment_gap), w(moment_gap, k), length, gap)
+            call wide_add_product(form%moment(moment_gap_xi), w(moment_gap_xi, k), length, gap)
+            call wide_add(form%moment(moment_area), w(moment_area, k), length)
+            call wide_add(form%moment(moment_area_xi), w(moment_area_xi, k), length)
+            form%moment(moment_cover)%f0 = form%moment(moment_cover)%f0 + w(moment_cover, k)
+            form%moment(moment_cover)%f1 = form%moment(moment_cover)%f1 + w(moment_cover, k)
+         end do
+      end associate
+   end subroutine segment_form_edge
+
+   !> List the nodes that the gaps of edge `e` depend on.
+   pure subroutine begin_form(self, e)
+      type(segment_t), intent(inout) :: self
+      integer, intent(in) :: e
+      integer :: list(2 + sum(self%nodal%n_node)), n, i, k
+
+      list(:2) = self%slave%edge(:, e)
+      n = 2
+      do k = 1, 2
+         do i = 2, self%nodal(k)%n_node
+            if (any(list(:n) == self%nodal(k)%node(i))) cycle
+            n = n + 1
+            list(n) = self%nodal(k)%node(i)
+         end do
+      end do
+      call form_begin(self%form(e), list(:n), 2)
+   end subroutine begin_form
+
+   !> Length of edge `e` into the first work space.
+   pure subroutine edge_length(self, e, x, u0, du)
+      type(segment_t), intent(inout) :: self
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(dg_t) :: length
+      real(wp) :: local(2, 2)
+
+      associate (node => self%slave%edge(:, e))
+         local(:, 1) = 0.0_wp
+         local(:, 2) = (x(:, node(2)) - x(:, node(1))) + (u0(:, node(2)) - u0(:, node(1)))
+         length = dg_sqrt(dg_dot(difference(2, 1, local, du(:, node)), &
+            difference(2, 1, local, du(:, node))))
+      end associate
+      call wide_clear(self%work(1), 2*self%form(e)%n_node)
+      call wide_add_part(self%work(1), 1.0_wp, length%f0, length%f1, length%df, length%g, &
+         length%c, length%h, [1, 2, 3, 4])
+   end subroutine edge_length
+
+   !> Gap of the node `k` of edge `e` into the second work space.
+   pure subroutine spread_gap(self, e, k)
+      type(segment_t), intent(inout) :: self
+      integer, intent(in) :: e, k
+      integer :: i
+
+      associate (form => self%form(e), gap => self%nodal(k))
+         call wide_clear(self%work(2), 2*form%n_node)
+         associate (place => [(findloc(form%node(:form%n_node), gap%node(i), 1), &
+               i = 1, gap%n_node)])
+            call wide_add_part(self%work(2), 1.0_wp, gap%gap0, gap%gap1, gap%dgap, &
+               reshape(gap%g(:, :gap%n_node), [2*gap%n_node]), &
+               reshape(gap%c(:, :gap%n_node), [2*gap%n_node]), gap%h, &
+               [(2*place((i + 1)/2) - mod(i, 2), i = 1, 2*gap%n_node)])
+         end associate
+      end associate
+   end subroutine spread_gap
+
+end module emcon_segment
