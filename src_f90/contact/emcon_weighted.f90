@@ -121,6 +121,7 @@ contains
             least = least_cover*self%whole(i)
             state%is_near = maxval(area) > 0.0_wp
             state%is_over = area(1) >= least
+            state%is_leaving = .not. state%is_over
             state%gap0 = 0.0_wp
             state%gap1 = 0.0_wp
             if (area(0) >= least) state%gap0 = gap(0)/area(0)

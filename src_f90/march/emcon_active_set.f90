@@ -1,8 +1,9 @@
 !> Which constraints act in a step: a primal-dual active set around Newton's method.
 !>
 !> A constraint is taken in when its gap would be negative at the end of the step, and let go when
-!> its multiplier is. If a set comes back, constraints are only added from then on; if that does
-!> not end either, the step has failed and is cut.
+!> its multiplier is. If a set comes back, the step is cut; where that is of no use (a persistent
+!> contact makes no energy if it is held too long) or not allowed any more, the union of the sets is
+!> taken and constraints are only added from then on.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
    use emcon_contact, only : gap_state_t
@@ -42,7 +43,8 @@ module emcon_active_set
       integer :: n_tried = 0
       integer :: n_newton = 0                    !! iterations over all sets of the last step
       real(wp) :: deepest = 0.0_wp               !! smallest gap per edge at the end, 0 if all open
-      integer :: cycling_node = 0                !! slave node of a constraint that comes and goes
+      logical :: may_cut = .true.                !! the step may be tried in smaller parts
+      logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
    end type active_set_t
 
 contains
@@ -52,8 +54,10 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
 
-      if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried)
+      if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
+         self%comes_and_goes)
       allocate(self%is_active(system%n_constraint), source=.false.)
+      allocate(self%comes_and_goes(system%n_constraint), source=.false.)
       allocate(self%lam(system%n_constraint), source=0.0_wp)
       allocate(self%tried(system%n_constraint, most_sets), source=.false.)
       call constraints_select(self%set, [integer ::])
@@ -80,6 +84,7 @@ contains
       self%n_newton = 0
       self%n_tried = 0
       only_adds = .false.
+      self%comes_and_goes = .false.
       do
          call remember(self)
          call select_active(self, system, scene, state%u, du)
@@ -92,37 +97,34 @@ contains
          if (status /= newton_converged .or. system%n_constraint == 0) return
          call update(self, system, scene, state, du, only_adds, has_changed, status)
          if (status /= step_done .or. .not. has_changed) return
-         if (was_tried(self)) then
-            if (only_adds .or. .not. self%holds_gap) status = step_cycling
+         if (first_tried(self) > 0 .or. self%n_tried == most_sets) then
+            call end_cycle(self, only_adds, status)
             if (status /= step_done) return
-            only_adds = .true.
-            self%is_active = self%is_active .or. any(self%tried(:, :self%n_tried), dim=2)
-            if (was_tried(self)) status = step_cycling
          end if
-         if (self%n_tried == most_sets) status = step_cycling
-         if (status /= step_done) return
       end do
    end subroutine active_set_solve
 
-   !> Choose stencils; start from the constraints that acted before and still can.
+   !> Choose stencils; start from the constraints that acted before and still can, also where the
+   !> step is expected to end.
    subroutine begin_contact(self, system, scene, state, du)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(state_t), intent(in) :: state
       real(wp), intent(in), contiguous :: du(:, :)
-      integer :: pair, i, id
+      integer :: pair
 
-      self%is_active = .false.
       do pair = 1, size(system%contact)
-         associate (contact => system%contact(pair)%contact)
+         associate (contact => system%contact(pair)%contact, &
+               first => system%first_constraint(pair) + 1, last => system%first_constraint(pair + 1))
             call contact%begin_step(scene%x, state%u, du)
             call contact%measure(scene%x, state%u, system%zero)
-            do i = 1, contact%n_constraint
-               id = system%first_constraint(pair) + i
-               self%is_active(id) = state%is_active(id) .and. contact%state(i)%is_near &
-                  .and. contact%state(i)%is_over
-            end do
+            self%is_active(first:last) = state%is_active(first:last) .and. contact%state%is_near &
+               .and. contact%state%is_over
+            if (.not. any(self%is_active(first:last))) cycle
+            call contact%measure(scene%x, state%u, du)
+            self%is_active(first:last) = self%is_active(first:last) &
+               .and. .not. contact%state%is_leaving
          end associate
       end do
    end subroutine begin_contact
@@ -198,7 +200,6 @@ contains
                   self%is_active(id) = .true.
                end if
                has_changed = .true.
-               self%cycling_node = contact%node(i)
             end do
          end associate
       end do
@@ -221,14 +222,35 @@ contains
       self%tried(:, self%n_tried) = self%is_active
    end subroutine remember
 
-   pure logical function was_tried(self)
+   !> Number of the present set among those tried, 0 if it is new.
+   pure integer function first_tried(self)
       type(active_set_t), intent(in) :: self
-      integer :: i
 
-      was_tried = .false.
-      do i = 1, self%n_tried
-         was_tried = was_tried .or. all(self%tried(:, i) .eqv. self%is_active)
+      do first_tried = 1, self%n_tried
+         if (all(self%tried(:, first_tried) .eqv. self%is_active)) return
       end do
-   end function was_tried
+      first_tried = 0
+   end function first_tried
+
+   !> The sets since the first coming of the present one are a cycle: end it by their union, from
+   !> which nothing is let go any more, or by a cut.
+   pure subroutine end_cycle(self, only_adds, status)
+      type(active_set_t), intent(inout) :: self
+      logical, intent(inout) :: only_adds
+      integer, intent(inout) :: status
+      integer :: first
+
+      first = max(1, first_tried(self))
+      associate (cycle => self%tried(:, first:self%n_tried))
+         self%comes_and_goes = any(cycle, dim=2) .and. .not. all(cycle, dim=2)
+         self%is_active = any(cycle, dim=2)
+      end associate
+      if (only_adds .or. (self%may_cut .and. .not. self%holds_gap)) then
+         status = step_cycling
+      else
+         only_adds = .true.
+         self%n_tried = 0
+      end if
+   end subroutine end_cycle
 
 end module emcon_active_set

@@ -9,7 +9,7 @@ module emcon_march
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure
    use emcon_loads, only : instant_t
-   use emcon_march_step, only : increment_t, march_step, march_t
+   use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
    use emcon_newton, only : newton_init
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : initiation_persistent, procedure_dynamic, procedure_static, scene_t, &
@@ -277,9 +277,7 @@ contains
       case (step_singular)
          text = "the system is singular"
       case (step_cycling)
-         text = "the contact at slave node " // &
-            to_text(scene%node_label(max(1, self%active%cycling_node))) // &
-            " opens and closes in turn"
+         text = cycling_text(self, scene)
       case (step_too_far)
          text = "a slave node slides over more than two master edges"
       case (step_stands_off)

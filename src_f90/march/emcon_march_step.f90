@@ -3,6 +3,7 @@
 !> `march_t` holds all that a march through time needs; how it cuts and counts: emcon_march.
 module emcon_march_step
    use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_inverted
+   use emcon_constraints, only : constraint_place
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -13,11 +14,14 @@ module emcon_march_step
    use emcon_scheme, only : scheme_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
-   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, march_step
+   public :: march_t, increment_t, march_step, cycling_text
+
+   !> Nodes named in a message.
+   integer, parameter :: most_named = 10
 
    !> What one increment took.
    type :: increment_t
@@ -59,6 +63,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: attempt
 
+      self%active%may_cut = may_cut
       self%active%gap_tolerance = 0.0_wp
       if (may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
       do attempt = 1, 2
@@ -69,8 +74,30 @@ contains
          increment%n_newton = increment%n_newton + self%active%n_newton
          if (status /= step_inverted .or. self%active%n_newton > 0) exit
       end do
-      if (status == step_done) call commit(self, scene, h, increment, error)
+      if (status /= step_done) return
+      if (any(self%active%comes_and_goes)) call note_add(increment%notes, &
+         cycling_text(self, scene) // ": held closed in this step")
+      call commit(self, scene, h, increment, error)
    end subroutine march_step
+
+   !> The contacts of the last step that opened and closed in turn, by their slave nodes.
+   function cycling_text(self, scene) result(text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable :: text
+      type(string_t) :: found(size(self%active%comes_and_goes))
+      integer :: id, n, pair, i
+
+      n = 0
+      do id = 1, size(found)
+         if (.not. self%active%comes_and_goes(id)) cycle
+         n = n + 1
+         call constraint_place(self%system, id, pair, i)
+         found(n)%text = to_text(scene%node_label(self%system%contact(pair)%contact%node(i)))
+      end do
+      text = "contact opens and closes in turn at slave nodes " // joined(found(:n), ", ", &
+         most_named)
+   end function cycling_text
 
    !> First guess of the motion, and the motion and velocity of prescribed freedoms.
    subroutine guess(self, scene, start, h, is_at_rest)

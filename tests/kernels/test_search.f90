@@ -1,5 +1,6 @@
 !> Candidate search against all-against-all, in ordinary and degenerate layouts.
 module test_search
+   use, intrinsic :: ieee_arithmetic, only : ieee_positive_inf, ieee_quiet_nan, ieee_value
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -16,6 +17,12 @@ contains
 
       tests = [ &
          test_case_t("random points and edges", test_random), &
+         test_case_t("random boxes of all sizes", test_boxes), &
+         test_case_t("one box among many a thousandth of it", test_coarse_and_fine), &
+         test_case_t("many equal boxes", test_equal_boxes), &
+         test_case_t("boxes on a lattice", test_lattice), &
+         test_case_t("scaled by powers of two", test_scaled), &
+         test_case_t("boxes that are not finite", test_not_finite), &
          test_case_t("all on a vertical line", test_vertical), &
          test_case_t("all in one point", test_point), &
          test_case_t("clusters far apart", test_clusters), &
@@ -32,29 +39,163 @@ contains
       real(wp), intent(in) :: ends(:, :, :)      !! (2, 2, n_edge)
       real(wp), intent(in) :: reach
       character(len=*), intent(in) :: what
-      type(candidates_t) :: list
-      real(wp) :: low(2, size(ends, 3)), high(2, size(ends, 3))
-      logical :: is_listed(size(ends, 3)), is_near(size(ends, 3))
-      integer :: i, e
 
-      low = minval(ends, dim=2)
-      high = maxval(ends, dim=2)
-      call search_candidates(point, low, high, reach, list)
-      call check_equal(error, size(list%start), size(point, 2) + 1, what // ", points")
-      call check_equal(error, size(list%edge), list%start(size(point, 2) + 1) - 1, what // ", end")
-      do i = 1, size(point, 2)
-         do e = 1, size(ends, 3)
-            is_near(e) = box_distance(point(:, i), point(:, i), low(:, e), high(:, e)) <= reach
+      call check_boxes(error, point, point, minval(ends, dim=2), maxval(ends, dim=2), reach, what)
+   end subroutine check_list
+
+   !> The same for items that are boxes; the lists ascend.
+   subroutine check_boxes(error, item_low, item_high, low, high, reach, what)
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), intent(in) :: item_low(:, :), item_high(:, :), low(:, :), high(:, :), reach
+      character(len=*), intent(in) :: what
+      type(candidates_t) :: list
+      integer :: near(size(low, 2)), i, e, n
+
+      call search_candidates(item_low, item_high, low, high, reach, list)
+      call check_equal(error, size(list%start), size(item_low, 2) + 1, what // ", items")
+      call check_equal(error, list%start(1), 1, what // ", begin")
+      call check_equal(error, size(list%edge), list%start(size(item_low, 2) + 1) - 1, &
+         what // ", end")
+      if (allocated(error)) return
+      do i = 1, size(item_low, 2)
+         n = 0
+         do e = 1, size(low, 2)
+            if (box_distance(item_low(:, i), item_high(:, i), low(:, e), high(:, e)) > reach) cycle
+            n = n + 1
+            near(n) = e
          end do
-         is_listed = .false.
-         is_listed(list%edge(list%start(i):list%start(i + 1) - 1)) = .true.
-         call check_true(error, all(is_listed .or. .not. is_near), &
-            what // ": every near edge of point " // to_text(i) // " is on its list")
-         call check_equal(error, list%start(i + 1) - list%start(i), count(is_near), &
-            what // ": length of the list of point " // to_text(i))
+         call check_equal(error, list%edge(list%start(i):list%start(i + 1) - 1), near(:n), &
+            what // ", list of item " // to_text(i))
          if (allocated(error)) return
       end do
-   end subroutine check_list
+   end subroutine check_boxes
+
+   !> Boxes with corners in the unit square and extents between 1 and 1e-3.
+   subroutine random_boxes(low, high)
+      real(wp), intent(out) :: low(:, :), high(:, :)
+      real(wp) :: u(size(low, 2))
+
+      call random_number(low)
+      call random_number(high)
+      call random_number(u)
+      high(1, :) = low(1, :) + 10.0_wp**(-3.0_wp*u)*high(1, :)
+      high(2, :) = low(2, :) + 10.0_wp**(-3.0_wp*u)*high(2, :)
+   end subroutine random_boxes
+
+   !> Numbers of boxes around the sizes of leaves and powers of two, and several hundreds.
+   subroutine test_boxes(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_box(14) = [1, 2, 3, 7, 8, 9, 15, 16, 17, 33, 64, 65, 300, 777]
+      real(wp), allocatable :: item_low(:, :), item_high(:, :), low(:, :), high(:, :)
+      integer :: k, seed
+
+      do k = 1, size(n_box)
+         allocate(item_low(2, 50), item_high(2, 50), low(2, n_box(k)), high(2, n_box(k)))
+         do seed = 1, 5
+            call random_boxes(item_low, item_high)
+            call random_boxes(low, high)
+            call check_boxes(error, item_low, item_high, low, high, 0.5_wp**seed, &
+               to_text(n_box(k)) // " boxes")
+            if (allocated(error)) return
+         end do
+         deallocate(item_low, item_high, low, high)
+      end do
+   end subroutine test_boxes
+
+   subroutine test_coarse_and_fine(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 1001
+      real(wp) :: low(2, n), high(2, n)
+      integer :: i
+
+      do i = 1, n - 1
+         low(:, i) = 1.0e-3_wp*[real(i, wp), 0.0_wp]
+         high(:, i) = low(:, i) + [1.0e-3_wp, 0.0_wp]
+      end do
+      low(:, n) = [0.0_wp, -1.0e-4_wp]
+      high(:, n) = [1.0_wp, -1.0e-4_wp]
+      call check_boxes(error, low, high, low, high, 0.5e-3_wp, "with the large one")
+      call check_boxes(error, low(:, n:), high(:, n:), low(:, :n - 1), high(:, :n - 1), &
+         0.5e-3_wp, "the large one with the others")
+   end subroutine test_coarse_and_fine
+
+   !> No axis separates them; lists too long for the short sort come back ascending.
+   subroutine test_equal_boxes(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 1000
+      real(wp) :: low(2, n), high(2, n), point(2, 3)
+
+      low = 0.5_wp
+      high = 0.75_wp
+      point(:, 1) = [0.6_wp, 0.7_wp]
+      point(:, 2) = [0.6_wp, 0.8_wp]
+      point(:, 3) = [0.2_wp, 0.6_wp]
+      call check_boxes(error, point, point, low, high, 0.1_wp, "boxes")
+   end subroutine test_equal_boxes
+
+   !> Many equal centres along each axis, boxes that just touch.
+   subroutine test_lattice(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 20
+      real(wp) :: low(2, n*n), high(2, n*n)
+      integer :: i
+
+      do i = 1, n*n
+         low(:, i) = [real(mod(7*i, n), wp), real(i/n, wp)]
+         high(:, i) = low(:, i) + [real(mod(i, 2), wp), 1.0_wp]
+      end do
+      call check_boxes(error, low, high, low, high, 1.0_wp, "reach of one cell")
+      call check_boxes(error, low, high, low, high, 0.5_wp, "reach of half a cell")
+   end subroutine test_lattice
+
+   !> The same lists whatever the unit of length is, as far as it is a power of two.
+   subroutine test_scaled(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: low(2, 200), high(2, 200)
+      type(candidates_t) :: list, scaled
+      integer :: k
+
+      call random_boxes(low, high)
+      call search_candidates(low, high, low, high, 0.1_wp, list)
+      do k = -100, 100, 25
+         call search_candidates(scale(low, k), scale(high, k), scale(low, k), scale(high, k), &
+            scale(0.1_wp, k), scaled)
+         call check_equal(error, scaled%start, list%start, "starts, power " // to_text(k))
+         call check_equal(error, scaled%edge, list%edge, "edges, power " // to_text(k))
+      end do
+   end subroutine test_scaled
+
+   !> They are near nothing, and the others are found as without them.
+   subroutine test_not_finite(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 60
+      real(wp) :: low(2, n), high(2, n), bad_low(2, n), bad_high(2, n), bad
+      type(candidates_t) :: list, expected
+      integer :: k, i
+
+      do k = 1, 3
+         call random_boxes(low, high)
+         bad = ieee_value(bad, ieee_quiet_nan)
+         if (k == 2) bad = ieee_value(bad, ieee_positive_inf)
+         bad_low = low
+         bad_high = high
+         do i = 1, n, 3                          ! what is bad here is out of the way there
+            bad_high(1 + mod(i, 2), i) = bad
+            if (k == 3) bad_low(:, i) = bad
+            low(:, i) = 1.0e3_wp*real(i, wp)
+            high(:, i) = low(:, i)
+         end do
+         call search_candidates(low(:, 2:n:3), high(:, 2:n:3), low, high, 0.1_wp, expected)
+         call search_candidates(low(:, 2:n:3), high(:, 2:n:3), bad_low, bad_high, 0.1_wp, list)
+         call check_true(error, size(list%edge) > 0, "there is something to find")
+         call check_equal(error, list%start, expected%start, "starts, kind " // to_text(k))
+         call check_equal(error, list%edge, expected%edge, "edges, kind " // to_text(k))
+         call search_candidates(bad_low(:, 1:n:3), bad_high(:, 1:n:3), low, high, 0.1_wp, list)
+         call check_equal(error, size(list%edge), 0, "near an item, kind " // to_text(k))
+         call search_candidates(low, high, bad_low(:, 1:n:3), bad_high(:, 1:n:3), 0.1_wp, list)
+         call check_equal(error, size(list%edge), 0, "nothing else, kind " // to_text(k))
+      end do
+   end subroutine test_not_finite
 
    subroutine test_random(error)
       type(error_t), allocatable, intent(out) :: error
@@ -155,7 +296,7 @@ contains
             low(:, i) = [real(i, wp) - 0.5_wp, 0.0_wp]
             high(:, i) = [real(i, wp) + 0.5_wp, 0.0_wp]
          end do
-         call search_candidates(point, low, high, 0.6_wp, list)
+         call search_candidates(point, point, low, high, 0.6_wp, list)
          call check_equal(error, size(list%edge), 3*n - 2, "candidates of " // to_text(n))
          deallocate(point, low, high)
          n = 8*n
