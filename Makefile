@@ -142,6 +142,12 @@ $(BUILD)/kernels: $(call objects,$(KERNEL_SRC)) $(BUILD)/libemcon.a
 
 lib: $(BUILD)/libemcon.a $(BUILD)/libemcon.so.0  ## the library, build/release/libemcon.{a,so}
 app: $(BUILD)/emcon  ## the program, build/release/emcon
+# One program per file, timed, not tested.
+BENCHES := $(patsubst tests/bench/%.f90,$(BUILD)/%,$(wildcard tests/bench/*.f90))
+$(BENCHES): $(BUILD)/%: tests/bench/%.f90 $(BUILD)/libemcon.a
+	@echo "  FC    $<"
+	$(Q)$(FCOMPILE) -I$(BUILD)/mod -o $@ $^ $(LIBS)
+
 kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/kernels [SUITE [TEST]]
 
 # ---- Python extension ---------------------------------------------------------------------------
@@ -191,11 +197,12 @@ test:  ## set up, build, run all tests
 	@$(PY) -m pytest tests
 
 lint: .venv/lint.stamp  ## check the Fortran sources against the written rules
-	.venv/bin/fortitude check src_f90 tests/kernels
-	.venv/bin/fortitude check --preview --select no-real-suffix src_f90 tests/kernels
+	.venv/bin/fortitude check src_f90 tests/kernels tests/bench
+	.venv/bin/fortitude check --preview --select no-real-suffix src_f90 tests/kernels tests/bench
 
 bench:  ## print the timed scenes of tests/bench
-	$(BUILDING) app lib pywrap
+	$(BUILDING) app lib pywrap $(BENCHES)
+	@set -e; for program in $(BENCHES); do $$program; done
 	@set -e; for script in tests/bench/*.py; do $(PY) $$script; done
 
 docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
