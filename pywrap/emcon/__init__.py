@@ -29,11 +29,11 @@ import importlib.metadata
 import tomllib
 from pathlib import Path
 
-from .results import (Bodies, FieldFile, ResultError, ResultPaths, energy_drift, locate,
-                      read_bodies, read_history)
+from .results import (Bodies, FieldFile, Pairs, ResultError, ResultPaths, energy_drift, locate,
+                      read_bodies, read_history, read_pairs)
 
-__all__ = ["Bodies", "FieldFile", "ResultError", "ResultPaths", "__version__", "energy_drift",
-           "locate", "read_bodies", "read_history"]
+__all__ = ["Bodies", "FieldFile", "Pairs", "ResultError", "ResultPaths", "__version__",
+           "energy_drift", "locate", "read_bodies", "read_history", "read_pairs"]
 
 
 def _version() -> str:

@@ -236,6 +236,50 @@ def read_contact_force(paths: ResultPaths) -> tuple[Array, Array] | None:
     return times[:rows], force[:rows].sum(axis=1)
 
 
+@dataclass(frozen=True)
+class Pairs:
+    """What the contact pairs transmit over time; second index the pair, in the order of the deck.
+
+    Forces and moments about the origin are those on the slave side; those on the master side,
+    kept for checks, are opposite to round-off.
+    """
+
+    slave: tuple[str, ...]      #: names of the surfaces
+    master: tuple[str, ...]
+    time: Array                 #: (n_time) [T]
+    force: Array                #: (n_time, n_pair, 2) [M L/T^2]
+    moment: Array               #: (n_time, n_pair) [M L^2/T^2]
+    master_force: Array         #: (n_time, n_pair, 2)
+    master_moment: Array        #: (n_time, n_pair)
+    length: Array               #: (n_time, n_pair) of the slave surface in contact [L]
+    active: NDArray[np.int64]   #: (n_time, n_pair) constraints that act
+
+
+def read_pairs(paths: ResultPaths) -> Pairs | None:
+    """Totals of the contact pairs, /sets/PAIRS in NAME.h5; None if they are not there.
+
+    They are written by `*CONTACT PRINT` with CF and TOTALS=YES or ONLY.
+    """
+    if not paths.history.is_file():
+        return None
+    with _open(paths.history) as file:
+        group = file.get("sets/PAIRS")
+        if not isinstance(group, h5py.Group) or "CF" not in group:
+            return None
+        time, on_slave, on_master, length, active = (
+            _read(group, name) for name in ("CF_time", "CF", "CF_MASTER", "CONTACT_LENGTH", "CNUM"))
+        names = [tuple(str(name) for name in np.char.decode(group[side][()], "utf-8"))
+                 for side in ("SLAVE", "MASTER")]
+    rows = min(map(len, (time, on_slave, on_master, length, active)))
+    n_pair = len(names[0])
+    if (on_slave.shape[1:] != (n_pair, 3) or on_master.shape[1:] != (n_pair, 3)
+            or length.shape[1:] != (n_pair,) or active.shape[1:] != (n_pair,)):
+        raise ResultError(f"{paths.history}: the data sets of /sets/PAIRS do not fit each other")
+    return Pairs(*names, time[:rows], on_slave[:rows, :, :2], on_slave[:rows, :, 2],
+                 on_master[:rows, :, :2], on_master[:rows, :, 2], length[:rows],
+                 active[:rows].astype(np.int64))
+
+
 def read_wall_seconds(paths: ResultPaths) -> float | None:
     """Wall time of the run [s], /sets/RUN/WALL_SECONDS in NAME.h5; None if it is not there."""
     if not paths.history.is_file():

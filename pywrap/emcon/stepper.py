@@ -42,6 +42,20 @@ class Increment:
     active: int
 
 
+@dataclass(frozen=True)
+class PairTotal:
+    """What a contact pair transmits: sums over one side, and what is in contact.
+
+    `slave` and `master` are fx, fy and the moment about the origin on that side, opposite to each
+    other to round-off.
+    """
+
+    slave: NDArray[np.float64]
+    master: NDArray[np.float64]
+    length: float
+    active: int
+
+
 class Stepper:
     """A model read from a deck, at some point of its analysis.
 
@@ -57,7 +71,7 @@ class Stepper:
         sizes, ierr = _flat.model_size(self._handle)
         _check(ierr)
         (self.n_node, self.n_element, self.n_constraint, self.n_body, self.n_unknown,
-         self.n_step) = (int(size) for size in sizes)
+         self.n_step, self.n_pair) = (int(size) for size in sizes)
 
     def close(self) -> None:
         """Free the model. Harmless when closed; any other call then raises `InputError`."""
@@ -131,6 +145,13 @@ class Stepper:
         lam, active, label, ierr = _flat.get_contact(self._handle, self.n_constraint)
         _check(ierr)
         return lam, active.astype(bool), label
+
+    def pairs(self) -> list[PairTotal]:
+        """Totals of the last increment, one for each contact pair in the order of the deck."""
+        total, active, ierr = _flat.get_pairs(self._handle, self.n_pair)
+        _check(ierr)
+        return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n))
+                for row, n in zip(total.T, active)]
 
     def energies(self) -> dict[str, float]:
         """Energies and works: kinetic, strain, external_work, contact_work, total."""

@@ -18,7 +18,7 @@ module emcon_flat
    implicit none
    private
    public :: open_deck, close_model, last_error, model_size, advance, is_done
-   public :: get_positions, get_state, get_contact, get_ledger, law_kernel, nts_kernel
+   public :: get_positions, get_state, get_contact, get_pairs, get_ledger, law_kernel, nts_kernel
 
    integer, parameter :: most_models = 256
 
@@ -127,17 +127,18 @@ contains
       call stepper_close(closed)
    end subroutine close_model
 
-   !> Nodes, elements, possible contact constraints, bodies, unknowns, steps.
+   !> Nodes, elements, possible contact constraints, bodies, unknowns, steps, contact pairs.
    subroutine model_size(handle, n, ierr)
       integer(c_int), intent(in) :: handle
-      integer(c_int), intent(out) :: n(6)
+      integer(c_int), intent(out) :: n(7)
       integer(c_int), intent(out) :: ierr
 
       n = 0
       if (.not. is_open(handle, ierr)) return
       associate (system => slot(handle)%stepper%march%system)
          n = [system%solid%n_node, system%solid%n_element, system%n_constraint, system%n_body, &
-            system%numbering%n_unknown, size(slot(handle)%stepper%scene%step)]
+            system%numbering%n_unknown, size(slot(handle)%stepper%scene%step), &
+            size(system%contact)]
       end associate
    end subroutine model_size
 
@@ -244,6 +245,33 @@ contains
          end do
       end associate
    end subroutine get_contact
+
+   !> Of each contact pair: fx, fy, moment about the origin on the slave side, the same on the
+   !> master side, length in contact; and active constraints.
+   subroutine get_pairs(handle, n_pair, total, active, ierr)
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(in) :: n_pair
+      real(c_double), intent(out) :: total(7, n_pair)
+      integer(c_int), intent(out) :: active(n_pair)
+      integer(c_int), intent(out) :: ierr
+      integer :: k
+
+      total = 0.0_c_double
+      active = 0
+      if (.not. is_open(handle, ierr)) return
+      associate (pair => slot(handle)%stepper%march%state%pairs%total)
+         if (n_pair /= size(pair)) then
+            call fail("the arrays do not have the size of the model", err_input, ierr)
+            return
+         end if
+         do k = 1, n_pair
+            total(1:3, k) = real(pair(k)%slave, c_double)
+            total(4:6, k) = real(pair(k)%master, c_double)
+            total(7, k) = real(pair(k)%length, c_double)
+            active(k) = pair(k)%n_active
+         end do
+      end associate
+   end subroutine get_pairs
 
    !> Kinetic and strain energy, external and contact work, total, px, py, lz.
    subroutine get_ledger(handle, values, ierr)

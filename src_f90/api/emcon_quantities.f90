@@ -7,6 +7,11 @@ module emcon_quantities
    implicit none
    private
    public :: node_quantity, element_quantity, contact_quantity, quantity_components, field_names
+   public :: contact_field, pair_quantity, pair_components, pair_variables
+
+   !> What *CONTACT PRINT, TOTALS= with CF writes of each pair.
+   character(len=*), parameter :: pair_variables(4) = [character(len=14) :: "CF", "CF_MASTER", &
+      "CONTACT_LENGTH", "CNUM"]
 
 contains
 
@@ -146,19 +151,19 @@ contains
       end associate
    end function kinetic_energies
 
-   !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF contact
-   !> force on the slave node (2); second index the possible constraint.
+   !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF force of
+   !> the pair on the slave node (2); second index the possible constraint.
    function contact_quantity(stepper, variable) result(values)
       use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
-      real(wp), allocatable :: gap(:), area(:)
+      real(wp), allocatable :: gap(:)
       logical, allocatable :: is_near(:)
-      integer :: n, pair, first, last
+      integer :: n
 
       n = stepper%march%system%n_constraint
-      associate (state => stepper%march%state, system => stepper%march%system)
+      associate (state => stepper%march%state)
          select case (variable)
          case ("CDIS")
             allocate(gap(n), is_near(n))
@@ -166,24 +171,83 @@ contains
             values = reshape(merge(real(gap, dp), ieee_value(1.0_dp, ieee_quiet_nan), is_near), &
                [1, n])
          case ("CSTR")
-            allocate(area(n), values(2, n))
-            do pair = 1, size(system%contact)
-               first = system%first_constraint(pair) + 1
-               last = system%first_constraint(pair + 1)
-               call system%contact(pair)%contact%area(stepper%scene%x, state%u, area(first:last))
-            end do
+            allocate(values(2, n))
             values(1, :) = 0.0_dp
-            where (area > 0.0_wp) values(1, :) = real(state%lam/area, dp)
+            where (state%pairs%area > 0.0_wp) values(1, :) = real(state%lam/state%pairs%area, dp)
             values(2, :) = merge(1.0_dp, 0.0_dp, state%is_active)
          case default
-            allocate(values(2, n))
-            do pair = 1, size(system%contact)
-               first = system%first_constraint(pair) + 1
-               last = system%first_constraint(pair + 1)
-               values(:, first:last) = real(state%contact(:, system%contact(pair)%contact%node), dp)
-            end do
+            values = real(state%pairs%force, dp)
          end select
       end associate
    end function contact_quantity
+
+   !> The same on all nodes: of a node that is slave in several pairs the smallest gap, the sum of
+   !> the pressures, and active if it is so in one; off the slave nodes NaN gap, and 0. CF (2): the
+   !> contact forces of all pairs, on both sides.
+   function contact_field(stepper, variable) result(values)
+      use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :), at_slave(:, :)
+      integer :: pair, i, id
+
+      if (variable == "CF") then
+         values = real(stepper%march%state%contact, dp)
+         return
+      end if
+      at_slave = contact_quantity(stepper, variable)
+      allocate(values(size(at_slave, 1), size(stepper%scene%x, 2)), source=0.0_dp)
+      if (variable == "CDIS") values = ieee_value(1.0_dp, ieee_quiet_nan)
+      associate (system => stepper%march%system)
+         do pair = 1, size(system%contact)
+            do i = 1, system%contact(pair)%contact%n_constraint
+               id = system%first_constraint(pair) + i
+               associate (value => values(:, system%contact(pair)%contact%node(i)))
+                  if (variable == "CSTR") then
+                     value(1) = value(1) + at_slave(1, id)
+                     value(2) = max(value(2), at_slave(2, id))
+                  else if (ieee_is_nan(value(1))) then
+                     value = at_slave(:, id)
+                  else if (.not. ieee_is_nan(at_slave(1, id))) then
+                     value = min(value, at_slave(:, id))
+                  end if
+               end associate
+            end do
+         end do
+      end associate
+   end function contact_field
+
+   !> Components of what `pair_quantity` gives.
+   pure integer function pair_components(variable)
+      character(len=*), intent(in) :: variable
+
+      pair_components = 1
+      if (variable == "CF" .or. variable == "CF_MASTER") pair_components = 3
+   end function pair_components
+
+   !> Of each contact pair (second index): CF, CF_MASTER force and moment about the origin on the
+   !> slave and on the master side (3); CONTACT_LENGTH; CNUM active constraints (1).
+   function pair_quantity(stepper, variable) result(values)
+      type(stepper_t), intent(in) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :)
+      integer :: k
+
+      associate (total => stepper%march%state%pairs%total)
+         allocate(values(pair_components(variable), size(total)))
+         do k = 1, size(total)
+            select case (variable)
+            case ("CF")
+               values(:, k) = real(total(k)%slave, dp)
+            case ("CF_MASTER")
+               values(:, k) = real(total(k)%master, dp)
+            case ("CNUM")
+               values(:, k) = real(total(k)%n_active, dp)
+            case default
+               values(:, k) = real(total(k)%length, dp)
+            end select
+         end do
+      end associate
+   end function pair_quantity
 
 end module emcon_quantities

@@ -9,10 +9,9 @@ module emcon_recorder
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : body_momenta
    use emcon_march, only : increment_t
-   use emcon_quantities, only : contact_quantity, element_quantity, field_names, node_quantity, &
-      quantity_components
-   use emcon_scene, only : output_contact_file, output_contact_print, output_element_file, &
-      output_element_print, output_node_file, output_node_print, output_t, scene_t
+   use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
+   use emcon_quantities, only : contact_field, element_quantity, field_names, node_quantity
+   use emcon_scene, only : output_contact_file, scene_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : string_t
    use emcon_version, only : version
@@ -30,22 +29,12 @@ module emcon_recorder
       "h", "kinetic", "strain", "external_work", "contact_work", "total", "px", "py", "lz", &
       "active", "newton", "cuts", "cpu"]
 
-   !> One requested quantity of one set, in the history.
-   type :: series_t
-      integer :: step = 0                        !! of the deck
-      integer :: request = 0                     !! of that step
-      character(len=8) :: variable = ""
-      integer :: i_set = 0                       !! as the history counts
-      integer, allocatable :: item(:)            !! nodes, elements or constraints
-      logical :: is_total = .false.
-   end type series_t
-
    type :: recorder_t
       type(vtkhdf_t) :: fields
       type(history_t) :: history
       logical :: has_fields = .false.
       type(string_t), allocatable :: variable(:) !! fields that are written
-      type(series_t), allocatable :: series(:)
+      type(series_t), allocatable :: series(:)   !! of PRINT requests
       integer :: momentum_set = 0
       integer :: n_row = 0
       real(wp) :: last_time = -huge(1.0_wp)      !! of the last record
@@ -162,111 +151,18 @@ contains
       end do
    end function fields_of
 
-   !> Declare the sets that PRINT requests name, and the bodies.
+   !> Declare what PRINT requests name, and the bodies.
    subroutine define_sets(self, stepper, error)
       type(recorder_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, j, k, n
-      type(series_t) :: series
+      integer :: k
 
-      allocate(self%series(0))
-      do i = 1, size(stepper%scene%step)
-         do j = 1, size(stepper%scene%step(i)%output)
-            associate (output => stepper%scene%step(i)%output(j))
-               if (all(output%kind /= [output_node_print, output_element_print, &
-                  output_contact_print])) cycle
-               do k = 1, size(output%variable)
-                  series%step = i
-                  series%request = j
-                  series%variable = output%variable(k)%text
-                  if (.not. output%only_totals) call define_series(self, stepper, output, series, &
-                     .false., error)
-                  if (allocated(error)) return
-                  if (output%totals .or. output%only_totals) call define_series(self, stepper, &
-                     output, series, .true., error)
-                  if (allocated(error)) return
-               end do
-            end associate
-         end do
-      end do
-      n = stepper%march%system%n_body
-      call history_set_define(self%history, "BODIES", "MOMENTUM", [(k, k = 1, n)], 3, &
-         self%momentum_set, error)
+      call print_series_define(self%series, self%history, stepper, error)
+      if (allocated(error)) return
+      call history_set_define(self%history, "BODIES", "MOMENTUM", &
+         [(k, k = 1, stepper%march%system%n_body)], 3, self%momentum_set, error)
    end subroutine define_sets
-
-   !> Declare one quantity of one set, or its sum; what an earlier step declared is used again.
-   subroutine define_series(self, stepper, output, series, is_total, error)
-      type(recorder_t), intent(inout) :: self
-      type(stepper_t), intent(in) :: stepper
-      type(output_t), intent(in) :: output
-      type(series_t), intent(inout) :: series
-      logical, intent(in) :: is_total
-      type(error_t), allocatable, intent(out) :: error
-      character(len=:), allocatable :: set, variable
-      integer, allocatable :: label(:)
-      integer :: i
-
-      call find_items(stepper, output, set, series%item, label)
-      series%is_total = is_total
-      variable = trim(series%variable)
-      if (is_total) then
-         variable = "TOTAL_" // variable
-         label = [0]
-      end if
-      do i = 1, size(self%series)
-         if (self%series(i)%step == series%step) cycle
-         if (self%series(i)%variable /= series%variable) cycle
-         if (self%series(i)%is_total .neqv. is_total) cycle
-         if (size(self%series(i)%item) /= size(series%item)) cycle
-         if (any(self%series(i)%item /= series%item)) cycle
-         if (stepper%scene%step(self%series(i)%step)%output(self%series(i)%request)%kind &
-            /= output%kind) cycle
-         series%i_set = self%series(i)%i_set
-         self%series = [self%series, series]
-         return
-      end do
-      call history_set_define(self%history, set, variable, label, &
-         quantity_components(trim(series%variable)), series%i_set, error)
-      self%series = [self%series, series]
-   end subroutine define_series
-
-   !> Name, members and labels of the set that `output` is about.
-   subroutine find_items(stepper, output, set, item, label)
-      type(stepper_t), intent(in) :: stepper
-      type(output_t), intent(in) :: output
-      character(len=:), allocatable, intent(out) :: set
-      integer, allocatable, intent(out) :: item(:), label(:)
-      integer :: i
-
-      associate (scene => stepper%scene, system => stepper%march%system)
-         select case (output%kind)
-         case (output_node_print)
-            set = "ALL_NODES"
-            item = [(i, i = 1, size(scene%node_label))]
-            if (output%set > 0) then
-               set = scene%node_set(output%set)%name
-               item = scene%node_set(output%set)%item
-            end if
-            label = scene%node_label(item)
-         case (output_element_print)
-            set = "ALL_ELEMENTS"
-            item = [(i, i = 1, size(scene%element_label))]
-            if (output%set > 0) then
-               set = scene%element_set(output%set)%name
-               item = scene%element_set(output%set)%item
-            end if
-            label = scene%element_label(item)
-         case default
-            set = "CONTACT"
-            item = [(i, i = 1, system%n_constraint)]
-            allocate(label(0))
-            do i = 1, size(system%contact)
-               label = [label, scene%node_label(system%contact(i)%contact%node)]
-            end do
-         end select
-      end associate
-   end subroutine find_items
 
    !> The masses of the bodies, once.
    subroutine write_masses(self, stepper, error)
@@ -313,64 +209,11 @@ contains
             real(momenta, dp), error)
       end associate
       if (allocated(error)) return
-      call write_series(self, stepper, error)
+      call print_series_write(self%series, self%history, stepper, self%last_time, error)
       if (allocated(error)) return
       call write_fields(self, stepper, error)
       self%last_time = stepper%march%state%time
    end subroutine recorder_write
-
-   !> Is the request due now: at its increments, its time points, or at the end of the step?
-   pure logical function is_due(self, stepper, output)
-      type(recorder_t), intent(in) :: self
-      type(stepper_t), intent(in) :: stepper
-      type(output_t), intent(in) :: output
-      real(wp) :: before, now, slack
-
-      associate (state => stepper%march%state)
-         if (allocated(output%time)) then
-            slack = 0.5_wp*sqrt(epsilon(1.0_wp))*stepper%scene%step(state%i_step)%duration
-            before = self%last_time - state%start_time
-            now = state%time - state%start_time
-            is_due = any(output%time > before + slack .and. output%time <= now + slack)
-         else if (output%frequency == 0) then
-            is_due = .false.
-         else
-            is_due = mod(state%increment - state%n_before, output%frequency) == 0
-         end if
-         is_due = is_due .or. (output%frequency > 0 .and. state%n_grid >= stepper%march%n_grid)
-      end associate
-   end function is_due
-
-   !> Append what PRINT requests of this step are due.
-   subroutine write_series(self, stepper, error)
-      type(recorder_t), intent(inout) :: self
-      type(stepper_t), intent(inout) :: stepper
-      type(error_t), allocatable, intent(out) :: error
-      real(dp), allocatable :: values(:, :)
-      integer :: i
-
-      do i = 1, size(self%series)
-         associate (series => self%series(i), i_step => stepper%march%state%i_step)
-            if (series%step /= i_step) cycle
-            associate (output => stepper%scene%step(i_step)%output(series%request))
-               if (.not. is_due(self, stepper, output)) cycle
-               select case (output%kind)
-               case (output_node_print)
-                  values = node_quantity(stepper, trim(series%variable))
-               case (output_element_print)
-                  values = element_quantity(stepper, trim(series%variable))
-               case default
-                  values = contact_quantity(stepper, trim(series%variable))
-               end select
-            end associate
-            values = values(:, series%item)
-            if (series%is_total) values = reshape(sum(values, dim=2), [size(values, 1), 1])
-            call history_set_append(self%history, series%i_set, &
-               real(stepper%march%state%time, dp), values, error)
-            if (allocated(error)) return
-         end associate
-      end do
-   end subroutine write_series
 
    !> Append a frame if a FILE request is due.
    subroutine write_fields(self, stepper, error)
@@ -386,7 +229,7 @@ contains
          do i = 1, size(step%output)
             if (step%output(i)%kind > output_contact_file) cycle
             has_request = .true.
-            due = due .or. is_due(self, stepper, step%output(i))
+            due = due .or. is_due(stepper, step%output(i), self%last_time)
          end do
       end associate
       if (.not. has_request) then
@@ -428,7 +271,7 @@ contains
       if (fields(1)%is_cell) then
          values = element_quantity(stepper, variable)
       else if (any(variable == ["CDIS", "CSTR", "CF  "])) then
-         values = contact_fields(stepper, variable)
+         values = contact_field(stepper, variable)
       else
          values = node_quantity(stepper, variable)
       end if
@@ -440,31 +283,6 @@ contains
          first = first + fields(i)%n_component
       end do
    end subroutine write_variable
-
-   !> Contact quantities on all nodes.
-   function contact_fields(stepper, variable) result(values)
-      use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
-      type(stepper_t), intent(inout) :: stepper
-      character(len=*), intent(in) :: variable
-      real(dp), allocatable :: values(:, :), at_slave(:, :)
-      integer :: pair, i, id
-
-      if (variable == "CF") then
-         values = real(stepper%march%state%contact, dp)
-         return
-      end if
-      at_slave = contact_quantity(stepper, variable)
-      allocate(values(size(at_slave, 1), size(stepper%scene%x, 2)), source=0.0_dp)
-      if (variable == "CDIS") values = ieee_value(1.0_dp, ieee_quiet_nan)
-      associate (system => stepper%march%system)
-         do pair = 1, size(system%contact)
-            do i = 1, system%contact(pair)%contact%n_constraint
-               id = system%first_constraint(pair) + i
-               values(:, system%contact(pair)%contact%node(i)) = at_slave(:, id)
-            end do
-         end do
-      end associate
-   end function contact_fields
 
    !> Make visible what is written, if it is time or forced.
    subroutine recorder_publish(self, is_forced, error)

@@ -9,7 +9,8 @@ module emcon_run
    use emcon_progress, only : progress_end, progress_show, progress_start, progress_t
    use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
       recorder_resume, recorder_t, recorder_write
-   use emcon_restart, only : restart_get, restart_put, restart_read, restart_t, restart_write
+   use emcon_restart, only : restart_get, restart_put, restart_read, restart_size, restart_t, &
+      restart_write
    use emcon_run_log, only : balance_t, closing_lines, log_increment, log_start, model_lines
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_fraction, stepper_is_done, &
       stepper_load, stepper_open, stepper_save, stepper_t
@@ -288,6 +289,9 @@ contains
          call restart_put(restart, "balance", [balance%total0, balance%largest_drift, &
             balance%largest_energy, balance%deepest])
          call restart_put(restart, "effort", [balance%n_newton, balance%n_cut])
+         if (allocated(balance%largest_force)) then
+            call restart_put(restart, "pair_largest", balance%largest_force)
+         end if
       end associate
       call restart_write(restart, run%base // ".rst.h5", error)
    end subroutine save
@@ -297,7 +301,7 @@ contains
       type(restart_t), intent(in) :: restart
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: balance(4)
-      integer :: effort(2)
+      integer :: effort(2), n
 
       call restart_get(restart, "balance", balance, error)
       if (.not. allocated(error)) call restart_get(restart, "effort", effort, error)
@@ -308,6 +312,10 @@ contains
       run%balance%deepest = balance(4)
       run%balance%n_newton = effort(1)
       run%balance%n_cut = effort(2)
+      n = restart_size(restart, "pair_largest")
+      if (n < 0) return
+      allocate(run%balance%largest_force(n))
+      call restart_get(restart, "pair_largest", run%balance%largest_force, error)
    end subroutine load_balance
 
 end module emcon_run

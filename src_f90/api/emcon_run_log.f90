@@ -4,6 +4,8 @@ module emcon_run_log
    use emcon_kinds, only : wp
    use emcon_log, only : log_line, log_t
    use emcon_march, only : increment_t
+   use emcon_scene, only : contact_options_t, formulation_mortar, formulation_segment, &
+      integration_elements, multiplier_dual, normal_nodal, scene_t, smoothing_hermite
    use emcon_stepper, only : stepper_t
    use emcon_text, only : string_t, to_text
    use emcon_version, only : version
@@ -24,6 +26,7 @@ module emcon_run_log
       real(wp) :: deepest = 0.0_wp               !! smallest gap per master edge, 0 if all open
       integer :: n_newton = 0
       integer :: n_cut = 0
+      real(wp), allocatable :: largest_force(:)  !! (n_pair) on the slave side
    end type balance_t
 
 contains
@@ -57,7 +60,7 @@ contains
    function model_lines(stepper) result(line)
       type(stepper_t), intent(in) :: stepper
       type(string_t), allocatable :: line(:)
-      integer :: k
+      integer :: i, k
 
       allocate(line(0))
       associate (scene => stepper%scene, system => stepper%march%system)
@@ -72,12 +75,18 @@ contains
          do k = 1, size(scene%pair)
             call add("contact: " // scene%surface(scene%pair(k)%slave)%name // " (slave, " // &
                to_text(system%contact(k)%contact%n_constraint) // " nodes) on " // &
-               scene%surface(scene%pair(k)%master)%name)
+               scene%surface(scene%pair(k)%master)%name // ", " // &
+               formulation_text(scene%pair(k)%formulation, scene%step(1)%contact))
          end do
          do k = 1, size(scene%step)
             call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
                ", h = " // to_text(scene%step(k)%h) // &
                merge(", NLGEOM", "        ", scene%step(k)%nlgeom))
+            do i = 1, size(scene%pair)
+               if (.not. has_changed(scene, i, k)) cycle
+               call add("   contact " // pair_text(scene, i) // ": " // &
+                  formulation_text(scene%pair(i)%formulation, scene%step(k)%contact))
+            end do
          end do
       end associate
       do k = 1, stepper%notes%n
@@ -96,6 +105,81 @@ contains
 
    end function model_lines
 
+   !> The surfaces of a pair, the slave first.
+   pure function pair_text(scene, pair) result(text)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: pair
+      character(len=:), allocatable :: text
+
+      text = scene%surface(scene%pair(pair)%slave)%name // " on " // &
+         scene%surface(scene%pair(pair)%master)%name
+   end function pair_text
+
+   !> Is a pair computed otherwise in step `k` than in the step before?
+   pure logical function has_changed(scene, pair, k)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: pair, k
+
+      has_changed = .false.
+      if (k == 1) return
+      associate (formulation => scene%pair(pair)%formulation)
+         has_changed = formulation_text(formulation, scene%step(k)%contact) &
+            /= formulation_text(formulation, scene%step(k - 1)%contact)
+      end associate
+   end function has_changed
+
+   !> How contact is computed: of the options those that the formulation has use for.
+   pure function formulation_text(formulation, options) result(text)
+      integer, intent(in) :: formulation         !! one of the `formulation_` codes
+      type(contact_options_t), intent(in) :: options
+      character(len=:), allocatable :: text
+
+      select case (formulation)
+      case (formulation_mortar)
+         text = "mortar, " // integration_text(options) // ", " // multiplier_text(options) // &
+            ", " // normal_text(options)
+      case (formulation_segment)
+         text = "gaps of nodes integrated over slave edges, " // multiplier_text(options)
+      case default
+         text = "node to segment"
+      end select
+      if (options%smoothing == smoothing_hermite) text = text // &
+         ", smoothed master surface" // corner_text(options%smoothing_angle)
+   end function formulation_text
+
+   pure function integration_text(options) result(text)
+      type(contact_options_t), intent(in) :: options
+      character(len=:), allocatable :: text
+
+      text = "segments"
+      if (options%integration == integration_elements) text = "element-wise integration"
+      if (options%n_point > 0) text = text // " with " // to_text(options%n_point) // " points"
+   end function integration_text
+
+   pure function multiplier_text(options) result(text)
+      type(contact_options_t), intent(in) :: options
+      character(len=:), allocatable :: text
+
+      text = "standard multipliers"
+      if (options%multiplier == multiplier_dual) text = "dual multipliers"
+   end function multiplier_text
+
+   pure function normal_text(options) result(text)
+      type(contact_options_t), intent(in) :: options
+      character(len=:), allocatable :: text
+
+      text = "normals of edges"
+      if (options%normal == normal_nodal) text = "normals of nodes" // &
+         corner_text(options%normal_angle)
+   end function normal_text
+
+   pure function corner_text(angle) result(text)
+      real(wp), intent(in) :: angle              !! [degrees]
+      character(len=:), allocatable :: text
+
+      text = " (corners beyond " // to_text(angle) // " degrees)"
+   end function corner_text
+
    !> One line per increment and its remarks, and the running balance.
    subroutine log_increment(log, stepper, increment, balance)
       type(log_t), intent(inout) :: log
@@ -111,6 +195,7 @@ contains
       balance%n_newton = balance%n_newton + increment%n_newton
       balance%n_cut = balance%n_cut + increment%n_cut
       balance%deepest = min(balance%deepest, increment%deepest)
+      call note_forces(balance, stepper)
       associate (state => stepper%march%state, ledger => stepper%march%ledger)
          balance%largest_energy = max(balance%largest_energy, abs(balance%total0), &
             ledger%kinetic + ledger%strain)
@@ -127,12 +212,29 @@ contains
       call log_line(log, trim(line))
    end subroutine log_increment
 
+   !> Keep the largest force of each pair.
+   subroutine note_forces(balance, stepper)
+      type(balance_t), intent(inout) :: balance
+      type(stepper_t), intent(in) :: stepper
+      integer :: k
+
+      associate (total => stepper%march%state%pairs%total)
+         if (.not. allocated(balance%largest_force)) then
+            allocate(balance%largest_force(size(total)), source=0.0_wp)
+         end if
+         do k = 1, size(total)
+            balance%largest_force(k) = max(balance%largest_force(k), norm2(total(k)%slave(:2)))
+         end do
+      end associate
+   end subroutine note_forces
+
    !> The closing balance and the verdict.
    function closing_lines(stepper, balance) result(line)
       type(stepper_t), intent(in) :: stepper
       type(balance_t), intent(in) :: balance
       type(string_t), allocatable :: line(:)
       real(wp) :: scale
+      integer :: k
 
       allocate(line(0))
       if (stepper%march%state%increment == 0) return
@@ -150,6 +252,11 @@ contains
             to_text(balance%largest_drift/scale, 3) // &
             " of the largest energy, deepest penetration " // to_text(-balance%deepest, 3) // &
             " of an element")
+         do k = 1, size(stepper%scene%pair)
+            call add("contact " // pair_text(stepper%scene, k) // ": " // &
+               to_text(state%pairs%total(k)%n_active) // " active at end, largest force " // &
+               to_text(balance%largest_force(k), 9))
+         end do
          if (.not. stepper%march%scheme%has_inertia) return
          if (balance%largest_drift <= ten_digits*scale) then
             call add("verdict: the energy balance closes to ten digits or better")

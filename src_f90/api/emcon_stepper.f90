@@ -158,7 +158,23 @@ contains
          call restart_put(restart, "lam", state%lam)
          call restart_put(restart, "is_active", merge(1, 0, state%is_active))
       end associate
+      call save_pairs(self, restart)
    end subroutine stepper_save
+
+   subroutine save_pairs(self, restart)
+      type(stepper_t), intent(in) :: self
+      type(restart_t), intent(inout) :: restart
+      integer :: k
+
+      associate (pairs => self%march%state%pairs)
+         call restart_put(restart, "pair_force", pairs%force)
+         call restart_put(restart, "pair_area", pairs%area)
+         call restart_put(restart, "pair_total", reshape([(pairs%total(k)%slave, &
+            pairs%total(k)%master, pairs%total(k)%length, k = 1, size(pairs%total))], &
+            [7, size(pairs%total)]))
+         call restart_put(restart, "pair_active", pairs%total%n_active)
+      end associate
+   end subroutine save_pairs
 
    !> Build the model of a restart file and put it into the state that was saved.
    subroutine stepper_load(self, restart, error)
@@ -182,6 +198,7 @@ contains
       if (.not. allocated(error)) call restart_get(restart, "time", time, error)
       if (.not. allocated(error)) call restart_get(restart, "work", work, error)
       if (.not. allocated(error)) call load_fields(self, restart, error)
+      if (.not. allocated(error)) call load_pairs(self, restart, error)
       if (allocated(error)) return
       allocate(active(size(self%march%state%is_active)))
       call restart_get(restart, "is_active", active, error)
@@ -235,5 +252,27 @@ contains
          if (.not. allocated(error)) call restart_get(restart, "lam", state%lam, error)
       end associate
    end subroutine load_fields
+
+   subroutine load_pairs(self, restart, error)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(in) :: restart
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: total(7, size(self%march%state%pairs%total))
+      integer :: k
+
+      associate (pairs => self%march%state%pairs)
+         call restart_get(restart, "pair_force", pairs%force, error)
+         if (.not. allocated(error)) call restart_get(restart, "pair_area", pairs%area, error)
+         if (.not. allocated(error)) call restart_get(restart, "pair_total", total, error)
+         if (.not. allocated(error)) call restart_get(restart, "pair_active", &
+            pairs%total%n_active, error)
+         if (allocated(error)) return
+         do k = 1, size(pairs%total)
+            pairs%total(k)%slave = total(1:3, k)
+            pairs%total(k)%master = total(4:6, k)
+            pairs%total(k)%length = total(7, k)
+         end do
+      end associate
+   end subroutine load_pairs
 
 end module emcon_stepper

@@ -92,12 +92,14 @@ module emcon_contact
          type(constraint_t), intent(inout) :: item(:) !! (n)
       end subroutine evaluate_interface
 
-      !> Area over which the multiplier of each constraint acts, at x + u.
-      pure subroutine area_interface(self, x, u, area)
+      !> Area over which each multiplier of the last step acts, which ended at x + u: pressure is
+      !> multiplier over area. And the length of slave surface that belongs to it at the end.
+      pure subroutine area_interface(self, x, u, area, length)
          import :: contact_t, wp
          class(contact_t), intent(in) :: self
          real(wp), intent(in), contiguous :: x(:, :), u(:, :)
          real(wp), intent(out) :: area(:)             !! (n_constraint) [L^2]
+         real(wp), intent(out) :: length(:)           !! (n_constraint) [L]
       end subroutine area_interface
 
    end interface

@@ -280,17 +280,14 @@ contains
       end do
    end subroutine nts_evaluate
 
-   pure subroutine nts_area(self, x, u, area)
+   pure subroutine nts_area(self, x, u, area, length)
       class(nts_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp), intent(out) :: area(:)
+      real(wp), intent(out) :: area(:), length(:)
 
-      if (self%slave%n_edge == 0) then
-         area = 0.0_wp
-      else
-         call chain_tributary(self%slave, x, u, area)
-         area = area*self%thickness
-      end if
+      length = 0.0_wp
+      if (self%slave%n_edge > 0) call chain_tributary(self%slave, x, u, length)
+      area = length*self%thickness
    end subroutine nts_area
 
    !> Gap at x + u of slave node `i` over the nearest master edge, searched among all edges.

@@ -29,6 +29,7 @@ module emcon_weighted
       integer, allocatable :: node_edge(:, :)         !! (2, n_constraint) edge before and after; 0
       real(wp), allocatable :: whole(:)               !! (n_constraint) reference length of a node [L]
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered part at the start [L]
+      real(wp), allocatable :: cover(:)               !! (n_constraint) covered part at the end [L]
       type(edge_form_t), allocatable :: form(:)       !! (n_edge)
       logical, allocatable :: is_formed(:)            !! (n_edge)
       type(wide_t) :: work(3)
@@ -81,7 +82,8 @@ contains
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_edge))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)
-      allocate(self%thickness(n), self%whole(n), self%scale(n), source=0.0_wp)
+      allocate(self%thickness(n), self%whole(n), self%scale(n), self%cover(n), &
+         source=0.0_wp)
       do i = 1, n
          do k = 1, 2
             associate (e => self%node_edge(k, i))
@@ -127,6 +129,7 @@ contains
             if (area(0) >= least) state%gap0 = gap(0)/area(0)
             if (state%is_over) state%gap1 = gap(1)/area(1)
             self%scale(i) = max(area(0), least)
+            self%cover(i) = area(1)
          end associate
       end do
    end subroutine weighted_measure
@@ -156,13 +159,14 @@ contains
       end do
    end subroutine weighted_evaluate
 
-   !> The area that the present multipliers were scaled with.
-   pure subroutine weighted_area(self, x, u, area)
+   !> The multipliers are forces by the scale of their constraints.
+   pure subroutine weighted_area(self, x, u, area, length)
       class(weighted_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp), intent(out) :: area(:)
+      real(wp), intent(out) :: area(:), length(:)
 
       area = self%scale*self%thickness
+      length = self%cover
    end subroutine weighted_area
 
 end module emcon_weighted

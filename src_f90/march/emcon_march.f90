@@ -11,6 +11,7 @@ module emcon_march
    use emcon_loads, only : instant_t
    use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
    use emcon_newton, only : newton_init
+   use emcon_pair_record, only : pair_record_init
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : initiation_persistent, procedure_dynamic, procedure_static, scene_t, &
       step_t
@@ -55,6 +56,7 @@ contains
          allocate(state%lam(self%system%n_constraint), source=0.0_wp)
          allocate(state%energy(self%system%solid%n_element), source=0.0_wp)
       end associate
+      call pair_record_init(self%state%pairs, self%system)
       call active_set_init(self%active, self%system)
    end subroutine march_init
 

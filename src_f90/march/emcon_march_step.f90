@@ -10,6 +10,7 @@ module emcon_march_step
    use emcon_ledger, only : ledger_t
    use emcon_loads, only : instant_t, prescribed_motion
    use emcon_newton, only : newton_t
+   use emcon_pair_record, only : pair_record_measure
    use emcon_scene, only : initiation_velocity_update, scene_t
    use emcon_scheme, only : scheme_t
    use emcon_state, only : state_t
@@ -171,6 +172,8 @@ contains
          state%u = state%u + self%du
          state%v = self%v1
          state%contact = self%newton%contact
+         call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%du, &
+            merge(0.5_wp, 0.0_wp, self%scheme%has_inertia))
          state%internal = system%response%force
          state%energy = system%response%energy
          if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &

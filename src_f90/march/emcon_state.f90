@@ -1,6 +1,7 @@
 !> Where an analysis stands: all that the next increment depends on.
 module emcon_state
    use emcon_kinds, only : wp
+   use emcon_pair_record, only : pair_record_t
    implicit none
    private
    public :: state_t
@@ -20,6 +21,7 @@ module emcon_state
       logical, allocatable :: is_active(:)       !! (n_constraint)
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) nodal contact forces
+      type(pair_record_t) :: pairs               !! what each contact pair transmits
       real(wp), allocatable :: reaction(:, :)    !! (2, n_node) forces at prescribed freedoms
       real(wp), allocatable :: internal(:, :)    !! (2, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy

@@ -2,7 +2,7 @@
 !>
 !> NAME.h5: `/history/<column>` (n_row); for each requested set and variable
 !> `/sets/<SET>/<VARIABLE>` (n_time, n_item[, n_component]), `<VARIABLE>_time` (n_time) and
-!> `<VARIABLE>_label` (n_item); the deck and the version under `/run`.
+!> `<VARIABLE>_label` (n_item), and what else was put there; the deck and the version under `/run`.
 module emcon_history
    use emcon_errors, only : error_t, raise, err_internal
    use emcon_files, only : file_close, file_open, file_put, file_remove, file_rename, file_t
@@ -16,7 +16,7 @@ module emcon_history
    implicit none
    private
    public :: column_t, history_t, history_create, history_resume, history_append
-   public :: history_set_define, history_set_append, history_put_run
+   public :: history_set_define, history_set_append, history_set_put, history_put_run
    public :: history_publish, history_close
 
    !> One column of the history.
@@ -45,6 +45,11 @@ module emcon_history
       logical, private :: is_resumed = .false.
       real(dp), private :: time_resumed = 0.0_dp     !! of the last row that was kept [T]
    end type history_t
+
+   !> Data that a set holds once: numbers or texts.
+   interface history_set_put
+      module procedure put_integers, put_texts
+   end interface history_set_put
 
    integer, parameter :: n_wait = 64                 !! rows gathered before they go to NAME.h5
    integer, parameter :: chunk_rows = 256
@@ -225,20 +230,13 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(set_series_t), allocatable :: grown(:)
       type(set_series_t) :: new
-      character(len=:), allocatable :: group, path
+      character(len=:), allocatable :: path
       integer :: row_shape(2)
 
-      group = "/sets/" // link_name(set)
-      path = group // "/" // link_name(variable)
+      path = "/sets/" // link_name(set) // "/" // link_name(variable)
       i_set = size(self%set) + 1
-      if (.not. hdf5_has(self%store%file, group)) then
-         call hdf5_make_group(self%store%file, group, error)
-         if (allocated(error)) return
-      end if
-      if (.not. hdf5_has(self%store%file, path // "_label")) then
-         call hdf5_write_integers(self%store%file, path // "_label", label, error)
-         if (allocated(error)) return
-      end if
+      call put_integers(self, set, link_name(variable) // "_label", label, error)
+      if (allocated(error)) return
       new%n_value = n_component*size(label)
       row_shape = [n_component, size(label)]
       call series_begin(new%time, self%store%file, path // "_time", one_value, chunk_rows, &
@@ -254,6 +252,48 @@ contains
       grown(i_set) = new
       call move_alloc(grown, self%set)
    end subroutine history_set_define
+
+   !> Keep `values` as `name` of the set `set`; what is there stays.
+   subroutine put_integers(self, set, name, values, error)
+      type(history_t), intent(inout) :: self
+      character(len=*), intent(in) :: set, name
+      integer, intent(in), contiguous :: values(:)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: path
+
+      call find_place(self, set, name, path, error)
+      if (allocated(error)) return
+      if (len(path) > 0) call hdf5_write_integers(self%store%file, path, values, error)
+   end subroutine put_integers
+
+   subroutine put_texts(self, set, name, values, error)
+      type(history_t), intent(inout) :: self
+      character(len=*), intent(in) :: set, name
+      type(string_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: path
+
+      call find_place(self, set, name, path, error)
+      if (allocated(error)) return
+      if (len(path) > 0) call hdf5_write_texts(self%store%file, path, values, error)
+   end subroutine put_texts
+
+   !> Path of a data set to be made in the group of `set`, which is made; empty if it is there.
+   subroutine find_place(self, set, name, path, error)
+      type(history_t), intent(inout) :: self
+      character(len=*), intent(in) :: set, name
+      character(len=:), allocatable, intent(out) :: path
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: group
+
+      group = "/sets/" // link_name(set)
+      path = group // "/" // link_name(name)
+      if (.not. hdf5_has(self%store%file, group)) then
+         call hdf5_make_group(self%store%file, group, error)
+      else if (hdf5_has(self%store%file, path)) then
+         path = ""
+      end if
+   end subroutine find_place
 
    !> Rows of `n_value` values that make up some 32 kilobytes.
    pure integer function rows_per_chunk(n_value)

@@ -265,7 +265,7 @@ contains
    pure function format_text() result(text)
       character(len=:), allocatable :: text
 
-      text = "emcon restart 1, reals of " // to_text(storage_size(1.0_wp)) // " bits"
+      text = "emcon restart 2, reals of " // to_text(storage_size(1.0_wp)) // " bits"
    end function format_text
 
    !> Index into `group`.

@@ -4,41 +4,69 @@
 !> [G_u G_d], P = [I; -Gb_d^-1 Gb_u] from the discrete gradients and DF = [I; -G1_d^-1 G1_u] from
 !> the gradients at the end; P^T N DF du = -P^T r is smaller than the saddle-point system, has no
 !> zero block and needs no scale. Source: docs/theory.md, section 5; paper eqs. (5) and (7).
+!>
+!> Every decision here depends on the present gradients and the pattern only, so that a run does
+!> not remember how it came to where it is.
 module emcon_null_space
+   use emcon_band_blocks, only : band_blocks_solve
    use emcon_constraints, only : constraint_set_t
-   use emcon_csr, only : csr_find, csr_multiply, csr_multiply_transposed, csr_t
+   use emcon_csr, only : csr_multiply, csr_multiply_transposed, csr_t
+   use emcon_dependent_block, only : dependent_block_factorise, dependent_block_init, &
+      dependent_block_solve, dependent_block_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : dp, wp
+   use emcon_independent_rows, only : independent_rows_find, independent_rows_t
+   use emcon_kinds, only : dp, int64, wp
    use emcon_numbering, only : numbering_t
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    use emcon_umfpack, only : umfpack_t
    implicit none
    private
-   public :: null_space_t, null_space_init, null_space_factorise, null_space_solve, &
-      null_space_multipliers
+   public :: null_space_t, null_space_init, null_space_update, null_space_factorise, &
+      null_space_solve, null_space_multipliers
+   public :: obstacle_none, obstacle_redundant, obstacle_pivot, obstacle_fill
 
-   !> A pivot below this fraction of its row's largest entry is poor.
-   real(dp), parameter :: poor_pivot = 0.1_dp
+   !> Why the constraints cannot be eliminated.
+   integer, parameter :: obstacle_none = 0, obstacle_redundant = 1, obstacle_pivot = 2, &
+      obstacle_fill = 3
+   !> The choice of dependent unknowns is poor if an entry of P or DF is larger than this.
+   real(dp), parameter :: most_growth = 100.0_dp
+   !> The independent unknowns of coupled constraints all meet in P^T N DF. With more such pairs
+   !> than this multiple of the entries of N, the larger system without them is clearly cheaper.
+   integer, parameter :: most_fill = 1
+   !> Refinements of the multipliers at most: a `dp` solution gains 16 digits or less each time.
+   integer, parameter :: most_refinements = merge(4, 1, epsilon(1.0_wp) < epsilon(1.0_dp))
+
+   !> How the rows of P and DF are made for one choice of dependent unknowns.
+   type :: elimination_t
+      integer, allocatable :: dependent(:)       !! (n) the choice
+      integer, allocatable :: n_column(:)        !! (components) independent unknowns
+      integer, allocatable :: place(:)           !! (entries of the rows) in `g_u`; 0: in G_d
+      integer, allocatable :: slot(:)            !! (size(g_u)) in P and DF
+      real(dp), allocatable :: g_u(:)            !! Gb_u or G1_u, component by component
+   end type elimination_t
 
    type :: null_space_t
-      logical :: is_possible = .false.           !! each constraint has an unknown of its own
+      integer :: obstacle = obstacle_none
+      type(independent_rows_t) :: rows           !! what is redundant, and the choice
+      integer :: n_entry = 0                     !! of N
       integer :: n_free = 0                      !! independent unknowns
-      integer, allocatable :: dependent(:)       !! (n) one unknown per constraint
-      integer, allocatable :: place(:, :)        !! (2, n) its direction and local node
-      integer, allocatable :: free(:)            !! (n_unknown) number if independent, else 0
+      type(dependent_block_t) :: present         !! Gb_d of the last `null_space_update`
+      type(elimination_t) :: elimination         !! as of the last factorisation, like all below
+      type(dependent_block_t) :: force, gap      !! Gb_d and G1_d
       type(csr_t) :: p                           !! (n_unknown x n_free)
       type(csr_t) :: d                           !! (n_unknown x n_free) DF
       type(csr_t) :: reduced                     !! P^T N DF
       type(triple_product_t) :: product
       type(umfpack_t) :: solver
+      integer, allocatable :: owner(:, :)        !! (2, n_node) constraint of a dependent one, or 0
       real(wp), allocatable :: rhs(:), x(:)      !! (n_free)
       real(wp), allocatable :: part(:), image(:) !! (n_unknown)
    end type null_space_t
 
 contains
 
-   !> Choose the dependent unknowns for the active `set` and lay out P, DF and P^T N DF.
-   !> `is_possible` tells whether every constraint has a good unknown that no other one holds.
+   !> Begin with constraints of a new pattern: choose the dependent unknowns, and if that is
+   !> possible lay out P, DF and P^T N DF.
    subroutine null_space_init(self, set, matrix, numbering, error)
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
@@ -46,132 +74,218 @@ contains
       type(numbering_t), intent(in) :: numbering
       type(error_t), allocatable, intent(out) :: error
 
-      call choose_dependent(self, set, numbering)
-      if (.not. self%is_possible) return
-      call lay_out(self, set%force_rows, self%p)
-      self%d = self%p
-      call triple_product_init(self%product, self%p, matrix, self%d, self%reduced, error)
-      if (allocated(error)) return
-      call self%solver%analyse(self%reduced, error)
-      if (allocated(error)) return
-      if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%part, self%image)
+      self%n_entry = size(matrix%column)
+      self%n_free = max(0, matrix%n_row - set%n)
+      if (allocated(self%present%dependent)) deallocate(self%present%dependent)
+      if (allocated(self%elimination%dependent)) deallocate(self%elimination%dependent)
+      if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%part, self%image, self%owner)
       allocate(self%rhs(self%n_free), self%x(self%n_free))
       allocate(self%part(matrix%n_row), self%image(matrix%n_row))
+      allocate(self%owner, source=0*numbering%unknown)
+      call null_space_update(self, set, numbering)
+      if (self%obstacle == obstacle_none) call lay_out(self, set%force_rows, matrix, error)
    end subroutine null_space_init
 
-   !> The slave node's own unknown with the largest entry, or the largest one that no other
-   !> constraint holds where that is poor.
-   subroutine choose_dependent(self, set, numbering)
+   !> Choose the dependent unknowns for the present gradients and factorise Gb_d. `obstacle` tells
+   !> why that is not possible.
+   subroutine null_space_update(self, set, numbering)
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
-      integer :: used(numbering%n_unknown), i, k, slave(2)
-      real(dp) :: entry, best, largest
+      integer :: k, n_dim
 
-      used = 0
-      associate (rows => set%force_rows)
-         do i = 1, rows%row_start(set%n + 1)
-            used(rows%column(i) + 1) = used(rows%column(i) + 1) + 1
-         end do
-         if (allocated(self%dependent)) deallocate(self%dependent, self%place)
-         allocate(self%dependent(set%n), self%place(2, set%n), source=0)
+      call independent_rows_find(self%rows, set, numbering)
+      self%obstacle = obstacle_none
+      if (self%rows%is_poor) self%obstacle = obstacle_pivot
+      if (self%rows%n_redundant > 0) self%obstacle = obstacle_redundant
+      if (self%obstacle /= obstacle_none) return
+      if (.not. is_same(self%present%dependent, self%rows%dependent)) then
+         call dependent_block_init(self%present, set%force_rows, self%rows%dependent)
+         n_dim = size(self%owner, 1)
+         self%owner = 0
          do k = 1, set%n
-            slave = numbering%unknown(:, set%item(k)%node(1))
-            best = 0.0_dp
-            largest = 0.0_dp
-            do i = rows%row_start(k) + 1, rows%row_start(k + 1)
-               entry = min(abs(rows%value(i)), abs(set%gap_rows%value(i)))
-               largest = max(largest, entry)
-               if (used(rows%column(i) + 1) > 1) cycle
-               if (all(slave /= rows%column(i) + 1)) entry = poor_pivot*entry
-               if (entry <= best) cycle
-               best = entry
-               self%dependent(k) = rows%column(i) + 1
-            end do
-            self%is_possible = best > poor_pivot**2*largest
-            if (.not. self%is_possible) return
-            do i = 1, set%item(k)%n_node
-               slave = numbering%unknown(:, set%item(k)%node(i))
-               if (slave(1) == self%dependent(k)) self%place(:, k) = [1, i]
-               if (slave(2) == self%dependent(k)) self%place(:, k) = [2, i]
-            end do
+            associate (dof => numbering%dof(self%present%dependent(k)) - 1)
+               self%owner(1 + mod(dof, n_dim), 1 + dof/n_dim) = k
+            end associate
+         end do
+      end if
+      if (is_too_full(self)) then
+         self%obstacle = obstacle_fill
+         return
+      end if
+      call dependent_block_factorise(self%present, set%force_rows)
+      if (self%present%bands%is_singular) self%obstacle = obstacle_pivot
+   end subroutine null_space_update
+
+   !> The two choices are made and are one.
+   pure logical function is_same(a, b)
+      integer, allocatable, intent(in) :: a(:), b(:)
+
+      is_same = allocated(a) .and. allocated(b)
+      if (is_same) is_same = size(a) == size(b)
+      if (is_same) is_same = all(a == b)
+   end function is_same
+
+   !> Would coupled constraints give P^T N DF, and P, too many entries? Those of a constraint by
+   !> itself meet in N already.
+   pure logical function is_too_full(self)
+      type(null_space_t), intent(in) :: self
+      integer(int64) :: n_pair
+      integer :: b
+
+      n_pair = 0
+      associate (block => self%present)
+         do b = 1, block%bands%n_block
+            associate (m => int(block%column_start(b + 1) - block%column_start(b), int64), &
+                  n => int(block%bands%start(b + 1) - block%bands%start(b), int64))
+               if (n > 1) n_pair = n_pair + m*(m + n)
+            end associate
          end do
       end associate
-      self%is_possible = .true.
-      if (allocated(self%free)) deallocate(self%free)
-      allocate(self%free(numbering%n_unknown), source=1)
-      self%free(self%dependent) = 0
-      self%n_free = 0
-      do i = 1, numbering%n_unknown
-         if (self%free(i) == 0) cycle
-         self%n_free = self%n_free + 1
-         self%free(i) = self%n_free
-      end do
-   end subroutine choose_dependent
+      is_too_full = n_pair > int(most_fill, int64)*self%n_entry
+   end function is_too_full
 
-   !> Pattern of P: the identity, and for each dependent unknown the others of its constraint.
-   subroutine lay_out(self, rows, p)
-      type(null_space_t), intent(in) :: self
-      type(csr_t), intent(in) :: rows
+   !> Lay out P, DF and P^T N DF for the present choice.
+   subroutine lay_out(self, rows, matrix, error)
+      type(null_space_t), intent(inout) :: self
+      type(csr_t), intent(in) :: rows, matrix
+      type(error_t), allocatable, intent(out) :: error
+
+      call lay_out_p(self%present, self%n_free, self%p)
+      self%d = self%p
+      self%force = self%present
+      self%gap = self%present
+      call lay_out_elimination(self%elimination, self%present, rows, self%p)
+      call triple_product_init(self%product, self%p, matrix, self%d, self%reduced, error)
+      if (allocated(error)) return
+      call self%solver%analyse(self%reduced, error)
+   end subroutine lay_out
+
+   !> Pattern of P: the identity, and for each dependent unknown the independent ones of its
+   !> component.
+   pure subroutine lay_out_p(block, n_free, p)
+      type(dependent_block_t), intent(in) :: block
+      integer, intent(in) :: n_free
       type(csr_t), intent(out) :: p
-      integer :: constraint(rows%n_col), i, k, n, pass
+      integer, allocatable :: free(:), owner(:)
+      integer :: i, k, n, n_unknown, pass
 
-      constraint = 0
-      do k = 1, rows%n_row
-         constraint(self%dependent(k)) = k
+      n_unknown = n_free + size(block%dependent)
+      allocate(free(n_unknown), owner(n_unknown), source=0)
+      do k = 1, size(block%dependent)
+         owner(block%dependent(k)) = k
       end do
-      p%n_row = rows%n_col
-      p%n_col = self%n_free
-      allocate(p%row_start(p%n_row + 1), source=0)
+      n = 0
+      do i = 1, n_unknown
+         if (owner(i) > 0) cycle
+         n = n + 1
+         free(i) = n
+      end do
+      p%n_row = n_unknown
+      p%n_col = n_free
+      allocate(p%row_start(n_unknown + 1), source=0)
       do pass = 1, 2
          n = 0
-         do i = 1, p%n_row
-            if (constraint(i) == 0) then
+         do i = 1, n_unknown
+            if (owner(i) == 0) then
                n = n + 1
-               if (pass == 2) p%column(n) = self%free(i) - 1
+               if (pass == 2) p%column(n) = free(i) - 1
             else
-               do k = rows%row_start(constraint(i)) + 1, rows%row_start(constraint(i) + 1)
-                  if (rows%column(k) == i - 1) cycle
-                  n = n + 1
-                  if (pass == 2) p%column(n) = self%free(rows%column(k) + 1) - 1
-               end do
+               associate (b => block%component(owner(i)))
+                  do k = block%column_start(b) + 1, block%column_start(b + 1)
+                     n = n + 1
+                     if (pass == 2) p%column(n) = free(block%column(k)) - 1
+                  end do
+               end associate
             end if
             p%row_start(i + 1) = n
          end do
          if (pass == 1) allocate(p%column(n))
       end do
       allocate(p%value(n), source=1.0_dp)
-   end subroutine lay_out
+   end subroutine lay_out_p
 
-   !> Fill in the rows -G_d^-1 G_u of the dependent unknowns.
-   pure subroutine fill(self, rows, p)
-      type(null_space_t), intent(in) :: self
+   !> Where the entries of the rows go, and where those of G_d^-1 G_u go in P.
+   pure subroutine lay_out_elimination(self, block, rows, p)
+      type(elimination_t), intent(out) :: self
+      type(dependent_block_t), intent(in) :: block
+      type(csr_t), intent(in) :: rows, p
+      integer, allocatable :: place(:)
+      integer :: b, i, j, s, before, n_row
+
+      self%dependent = block%dependent
+      self%n_column = block%column_start(2:) - block%column_start(:block%bands%n_block)
+      associate (start => block%bands%start, column => block%column)
+         allocate(self%place(size(block%slot)), place(rows%n_col), source=0)
+         allocate(self%slot(sum(self%n_column*(start(2:) - start(:block%bands%n_block)))))
+         before = 0
+         do b = 1, block%bands%n_block
+            n_row = start(b + 1) - start(b)
+            do j = 1, self%n_column(b)
+               place(column(block%column_start(b) + j)) = before + n_row*(j - 1)
+            end do
+            do i = 1, n_row
+               associate (k => block%order(start(b) + i))
+                  do s = rows%row_start(k) + 1, rows%row_start(k + 1)
+                     if (block%slot(s) == 0) self%place(s) = place(rows%column(s) + 1) + i
+                  end do
+                  do j = 1, self%n_column(b)
+                     self%slot(before + n_row*(j - 1) + i) = p%row_start(block%dependent(k)) + j
+                  end do
+               end associate
+            end do
+            before = before + n_row*self%n_column(b)
+         end do
+      end associate
+      allocate(self%g_u(size(self%slot)), source=0.0_dp)
+   end subroutine lay_out_elimination
+
+   !> Fill in the rows -G_d^-1 G_u of the dependent unknowns; poor ones are not filled in.
+   subroutine fill(self, block, rows, p, is_poor)
+      type(elimination_t), intent(inout) :: self
+      type(dependent_block_t), intent(inout) :: block
       type(csr_t), intent(in) :: rows
       type(csr_t), intent(inout) :: p
-      integer :: i, k, n
-      real(dp) :: pivot
+      logical, intent(out) :: is_poor
+      integer :: i
 
-      do k = 1, rows%n_row
-         pivot = rows%value(csr_find(rows, k, self%dependent(k)))
-         n = p%row_start(self%dependent(k))
-         do i = rows%row_start(k) + 1, rows%row_start(k + 1)
-            if (rows%column(i) + 1 == self%dependent(k)) cycle
-            n = n + 1
-            p%value(n) = -rows%value(i)/pivot
-         end do
+      call dependent_block_factorise(block, rows)
+      is_poor = block%bands%is_singular
+      if (is_poor) return
+      self%g_u = 0.0_dp
+      do i = 1, size(self%place)
+         if (self%place(i) > 0) self%g_u(self%place(i)) = rows%value(i)
+      end do
+      call band_blocks_solve(block%bands, .false., self%n_column, self%g_u)
+      is_poor = .not. all(abs(self%g_u) <= most_growth)
+      if (is_poor) return
+      do i = 1, size(self%slot)
+         p%value(self%slot(i)) = -self%g_u(i)
       end do
    end subroutine fill
 
-   !> Factorise P^T N DF for the present gradients.
+   !> Factorise P^T N DF for the gradients of the last `null_space_update`. Where the choice turns
+   !> out as poor, `obstacle` tells.
    subroutine null_space_factorise(self, set, matrix, is_singular, error)
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(csr_t), intent(in) :: matrix
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
+      logical :: is_poor(2)
 
-      call fill(self, set%force_rows, self%p)
-      call fill(self, set%gap_rows, self%d)
+      is_singular = .true.
+      if (self%obstacle /= obstacle_none) return
+      if (.not. is_same(self%elimination%dependent, self%present%dependent)) then
+         call lay_out(self, set%force_rows, matrix, error)
+         if (allocated(error)) return
+      end if
+      call fill(self%elimination, self%force, set%force_rows, self%p, is_poor(1))
+      call fill(self%elimination, self%gap, set%gap_rows, self%d, is_poor(2))
+      if (any(is_poor)) then
+         self%obstacle = obstacle_pivot
+         return
+      end if
       call triple_product_update(self%product, self%p, matrix, self%d, self%reduced)
       call self%solver%factorise(self%reduced%value, error)
       is_singular = self%solver%is_singular
@@ -185,13 +299,12 @@ contains
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
       real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
       type(error_t), allocatable, intent(out) :: error
-      integer :: k
+      real(dp) :: defect(set%n)
 
+      defect = real(set%defect, dp)
+      call dependent_block_solve(self%gap, .false., defect)
       self%part = 0.0_wp
-      do k = 1, set%n
-         self%part(self%dependent(k)) = -set%defect(k) &
-            /real(set%gap_rows%value(csr_find(set%gap_rows, k, self%dependent(k))), wp)
-      end do
+      self%part(self%elimination%dependent) = -real(defect, wp)
       call csr_multiply(matrix, self%part, self%image)
       self%image = -(residual + self%image)
       call csr_multiply_transposed(self%p, self%image, self%rhs)
@@ -202,16 +315,60 @@ contains
    end subroutine null_space_solve
 
    !> The multipliers from the dependent rows: Gb_d^T lam = r_d, r without contact forces.
-   pure subroutine null_space_multipliers(self, set, residual, lam)
+   !>
+   !> The factors are of kind `dp`; refinement with gradients of kind `wp` goes on as long as it
+   !> gains and the equations are not yet met to the round-off of each of them.
+   subroutine null_space_multipliers(self, set, residual, lam)
       type(null_space_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: residual(:)                  !! (n_unknown)
       real(wp), intent(out) :: lam(:)                      !! (n)
-      integer :: k
+      real(wp) :: rest(set%n), trial(set%n), best, next
+      real(dp) :: x(set%n)
+      integer :: i
 
-      do k = 1, set%n
-         lam(k) = residual(self%dependent(k))/set%item(k)%g(self%place(1, k), self%place(2, k))
+      rest = residual(self%present%dependent)
+      trial = 0.0_wp
+      best = huge(best)
+      do i = 0, most_refinements
+         x = real(rest, dp)
+         call dependent_block_solve(self%present, .true., x)
+         trial = trial + real(x, wp)
+         call remainder(self, set, residual, trial, rest, next)
+         if (i > 0 .and. .not. next < best) return
+         best = next
+         lam = trial
+         if (best <= epsilon(1.0_wp)) return
       end do
    end subroutine null_space_multipliers
+
+   !> r_d - Gb_d^T lam, and its largest entry relative to the sum of what it consists of.
+   pure subroutine remainder(self, set, residual, lam, rest, relative)
+      type(null_space_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: residual(:), lam(:)
+      real(wp), intent(out) :: rest(:)                     !! (n)
+      real(wp), intent(out) :: relative
+      real(wp) :: magnitude(set%n), term
+      integer :: k, i, a, l
+
+      rest = residual(self%present%dependent)
+      magnitude = abs(rest)
+      do k = 1, set%n
+         do i = 1, set%item(k)%n_node
+            do a = 1, size(self%owner, 1)
+               l = self%owner(a, set%item(k)%node(i))
+               if (l == 0) cycle
+               term = set%item(k)%g(a, i)*lam(k)
+               rest(l) = rest(l) - term
+               magnitude(l) = magnitude(l) + abs(term)
+            end do
+         end do
+      end do
+      relative = 0.0_wp
+      do k = 1, set%n
+         if (magnitude(k) > 0.0_wp) relative = max(relative, abs(rest(k))/magnitude(k))
+      end do
+   end subroutine remainder
 
 end module emcon_null_space

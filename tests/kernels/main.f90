@@ -8,16 +8,19 @@ program main
    use emcon_errors, only : error_t
    use test_active_set, only : collect_active_set
    use test_blas, only : collect_blas
+   use test_band_blocks, only : collect_band_blocks
    use test_bodies, only : collect_bodies
    use test_chain, only : collect_chain
    use test_check, only : collect_check
    use test_cholmod, only : collect_cholmod
    use test_constraints, only : collect_constraints
+   use test_correction, only : collect_correction
    use test_csr, only : collect_csr
    use test_dgrad, only : collect_dgrad
    use test_dgrad_series, only : collect_dgrad_series
    use test_element, only : collect_element
    use test_hermite_gap, only : collect_hermite_gap
+   use test_independent_rows, only : collect_independent_rows
    use test_lapack, only : collect_lapack
    use test_law, only : collect_law
    use test_loads, only : collect_loads
@@ -64,6 +67,7 @@ program main
    call run("umfpack", collect_umfpack)
    call run("cholmod", collect_cholmod)
    call run("lapack", collect_lapack)
+   call run("band_blocks", collect_band_blocks)
    call run("dgrad_series", collect_dgrad_series)
    call run("dgrad", collect_dgrad)
    call run("shape", collect_shape)
@@ -80,8 +84,10 @@ program main
    call run("loads", collect_loads)
    call run("rigid_motion", collect_rigid_motion)
    call run("constraints", collect_constraints)
+   call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)
    call run("saddle_point", collect_saddle_point)
+   call run("correction", collect_correction)
    call run("system", collect_system)
    call run("newton", collect_newton)
    call run("velocity_update", collect_velocity_update)

@@ -10,7 +10,7 @@ module random_constraints
    use small_scenes, only : shake
    implicit none
    private
-   public :: problem_t, make_problem, tol_dp
+   public :: problem_t, make_problem, make_chain, make_rows, full_gradient, tol_dp
 
    integer, parameter :: n_node = 30, n_constraint = 6
    !> Matrices are of kind `dp`; the problems have condition numbers of some 100.
@@ -39,7 +39,7 @@ contains
          held(k)%dof = 1 + mod(k, 2)
       end do
       call numbering_init(problem%numbering, 2, [(1, k = 1, n_node)], held)
-      call make_base(problem%numbering%n_unknown, problem%base)
+      call make_base(problem%numbering%n_unknown, 4, problem%base)
       call constraints_select(problem%set, [(k, k = 1, n_constraint)])
       do k = 1, n_constraint
          associate (item => problem%set%item(k))
@@ -54,31 +54,107 @@ contains
             item%size = 1.0_wp
          end associate
       end do
+      call finish(problem)
+   end subroutine make_problem
+
+   !> Constraints along a chain of slave nodes, as mortar integrals give them: constraint k stands
+   !> at the place at(k) of the chain, on the slave node there, its neighbours and two masters, by
+   !> a normal that turns along the chain. Behind the place `cut` a new chain begins.
+   subroutine make_chain(at, weight, cut, n_each, problem)
+      integer, intent(in) :: at(:)                   !! (n) permutation
+      real(wp), intent(in) :: weight(3)              !! of the node before, its own, the next one
+      integer, intent(in) :: cut
+      integer, intent(in) :: n_each                  !! entries in a row of N
+      type(problem_t), intent(out) :: problem
+      type(prescribed_t) :: nothing(0)
+      integer :: n, i, k, first, last
+      real(wp) :: angle, factor, w(3)
+
+      n = size(at)
+      call numbering_init(problem%numbering, 2, [(1, k = 1, 3*n + 1)], nothing)
+      call make_base(problem%numbering%n_unknown, n_each, problem%base)
+      call constraints_select(problem%set, [(k, k = 1, n)])
+      do k = 1, n
+         first = merge(2, 1, at(k) == 1 .or. at(k) == cut + 1)
+         last = merge(2, 3, at(k) == n .or. at(k) == cut)
+         w = weight
+         w(:first - 1) = 0.0_wp
+         w(last + 1:) = 0.0_wp
+         associate (item => problem%set%item(k))
+            call constraint_resize(item, last - first + 3)
+            item%node(:item%n_node) = [at(k), [(at(k) + i, i = first - 2, -1)], &
+               [(at(k) + i, i = 1, last - 2)], n + at(k), n + at(k) + 1]
+            angle = 4.0_wp*real(at(k), wp)/real(n, wp)
+            do i = 1, item%n_node
+               factor = -0.5_wp*sum(w)
+               if (item%node(i) <= n) factor = w(2 + item%node(i) - at(k))
+               item%g(:, i) = factor*[cos(angle), sin(angle)]
+               item%c(:, i) = factor*[cos(angle + 0.1_wp), sin(angle + 0.1_wp)]
+            end do
+            call shake(item%h, 0.3_wp)
+            item%size = 1.0_wp
+         end associate
+      end do
+      call finish(problem)
+   end subroutine make_chain
+
+   !> Multipliers, right-hand sides, rows and the matrix for the constraints that are there.
+   subroutine finish(problem)
+      type(problem_t), intent(inout) :: problem
+
       call random_number(problem%set%lam)
       call random_number(problem%set%defect)
       allocate(problem%residual(problem%numbering%n_unknown))
       call random_number(problem%residual)
+      call make_rows(problem)
+   end subroutine finish
+
+   !> Rows and matrix anew, after the constraints have been changed.
+   subroutine make_rows(problem)
+      type(problem_t), intent(inout) :: problem
+
       call constraints_rows(problem%set, problem%numbering)
       call constraints_merge_pattern(problem%set, problem%base, problem%matrix, problem%slot)
       problem%matrix%value(problem%slot) = problem%base%value
       call constraints_add_curvature(problem%set, problem%numbering, problem%matrix)
-   end subroutine make_problem
+   end subroutine make_rows
 
-   !> Large diagonal, four random entries beside it in each row.
-   subroutine make_base(n, a)
-      integer, intent(in) :: n
+   !> Gradients of constraint `k` by all unknowns, in full precision: discrete, and at the end.
+   pure subroutine full_gradient(problem, k, g, c)
+      type(problem_t), intent(in) :: problem
+      integer, intent(in) :: k
+      real(wp), intent(out) :: g(:), c(:)            !! (n_unknown)
+      integer :: i, a, unknown
+
+      g = 0.0_wp
+      c = 0.0_wp
+      associate (item => problem%set%item(k))
+         do i = 1, item%n_node
+            do a = 1, 2
+               unknown = problem%numbering%unknown(a, item%node(i))
+               if (unknown == 0) cycle
+               g(unknown) = item%g(a, i)
+               c(unknown) = item%c(a, i)
+            end do
+         end do
+      end associate
+   end subroutine full_gradient
+
+   !> Large diagonal, `n_each` random entries beside it in each row.
+   subroutine make_base(n, n_each, a)
+      integer, intent(in) :: n, n_each
       type(csr_t), intent(out) :: a
-      integer :: row(5*n), column(5*n), i
+      integer :: row((n_each + 1)*n), column((n_each + 1)*n), i
       integer, allocatable :: slot(:)
-      real(wp) :: u(4*n)
+      real(wp) :: u(n_each*n)
 
       call random_number(u)
-      row = [(i, i = 1, n), (1 + mod(i, n), i = 1, 4*n)]
+      row = [(i, i = 1, n), (1 + mod(i, n), i = 1, n_each*n)]
       column = [(i, i = 1, n), 1 + int(u*real(n, wp))]
       call csr_from_entries(a, n, n, row, column, slot)
       call random_number(a%value)
       do i = 1, n
-         a%value(slot(i)) = a%value(slot(i)) + 6.0_dp
+         a%value(slot(i)) = a%value(slot(i)) + real(n_each + 2, dp)
       end do
    end subroutine make_base
 

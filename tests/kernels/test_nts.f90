@@ -222,14 +222,15 @@ contains
       type(scene_t) :: scene
       type(block_t) :: lower, upper
       type(nts_t) :: nts
-      real(wp) :: area(3)
+      real(wp) :: area(3), length(3)
 
       call make_two_blocks(scene, 0.25_wp, lower, upper)
       scene%section(1)%thickness = 0.5_wp
       call nts_init(nts, scene, scene%pair(1), error)
       if (allocated(error)) return
-      call nts%area(scene%x, 2.0_wp*scene%x, area)
+      call nts%area(scene%x, 2.0_wp*scene%x, area, length)
       call check_near(error, area, [0.75_wp, 1.5_wp, 0.75_wp], tol, 1.0_wp, "areas at scale 3")
+      call check_near(error, length, 2.0_wp*area, tol, 1.0_wp, "lengths")
    end subroutine test_area
 
 end module test_nts

@@ -1,0 +1,126 @@
+!> What the contact pairs transmitted in the last step: per slave node, and in sum per pair.
+!>
+!> Forces and moments belong to the configuration that the step's gradients are those of; areas and
+!> lengths to the multipliers of the step. Signs: docs/theory.md, eq. (1).
+module emcon_pair_record
+   use emcon_constraints, only : constraint_set_t
+   use emcon_contact, only : constraint_t
+   use emcon_kinds, only : wp
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: pair_total_t, pair_record_t, pair_record_init, pair_record_measure
+
+   !> Sums over one pair. The forces on its sides, and their moments, are opposite to round-off.
+   type :: pair_total_t
+      real(wp) :: slave(3) = 0.0_wp              !! fx, fy [M L/T^2], moment about the origin
+      real(wp) :: master(3) = 0.0_wp             !! the same on the master side
+      real(wp) :: length = 0.0_wp                !! of the slave surface in contact [L]
+      integer :: n_active = 0                    !! constraints that act
+   end type pair_total_t
+
+   type :: pair_record_t
+      type(pair_total_t), allocatable :: total(:)   !! (n_pair)
+      real(wp), allocatable :: force(:, :)       !! (2, n_constraint) by its pair on the slave node
+      real(wp), allocatable :: area(:)           !! (n_constraint) of each multiplier [L^2]
+   end type pair_record_t
+
+contains
+
+   !> A record for the pairs of `system` in which nothing has acted.
+   pure subroutine pair_record_init(self, system)
+      type(pair_record_t), intent(out) :: self
+      type(system_t), intent(in) :: system
+
+      allocate(self%total(size(system%contact)))
+      allocate(self%force(2, system%n_constraint), source=0.0_wp)
+      allocate(self%area(system%n_constraint), source=0.0_wp)
+   end subroutine pair_record_init
+
+   !> Take over the constraints that acted in the step to `u`. Their forces act at u - lag du: half
+   !> a step back for discrete gradients, at the end (0) in statics.
+   subroutine pair_record_measure(self, system, set, x, u, du, lag)
+      type(pair_record_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (2, n_node)
+      real(wp), intent(in) :: lag
+      integer :: pair, first, last
+
+      last = 0
+      do pair = 1, size(self%total)
+         first = last + 1
+         last = count(set%id <= system%first_constraint(pair + 1))
+         call add_up(self%total(pair), set%item(first:last), set%lam(first:last), x, u, du, lag)
+         call measure_nodes(self, system, pair, set%item(first:last), set%lam(first:last))
+         call measure_areas(self, system, pair, set%id(first:last), x, u)
+      end do
+   end subroutine pair_record_measure
+
+   !> Forces and moments on both sides of a pair.
+   pure subroutine add_up(total, item, lam, x, u, du, lag)
+      type(pair_total_t), intent(out) :: total
+      type(constraint_t), intent(in) :: item(:)
+      real(wp), intent(in) :: lam(:), lag
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)
+      real(wp) :: place(2), force(3)
+      integer :: k, i
+
+      total%n_active = size(item)
+      do k = 1, size(item)
+         do i = 1, item(k)%n_node
+            associate (node => item(k)%node(i))
+               place = x(:, node) + (u(:, node) - lag*du(:, node))
+            end associate
+            force(:2) = lam(k)*item(k)%g(:, i)
+            force(3) = place(1)*force(2) - place(2)*force(1)
+            if (i <= item(k)%n_slave) then
+               total%slave = total%slave + force
+            else
+               total%master = total%master + force
+            end if
+         end do
+      end do
+   end subroutine add_up
+
+   !> Forces of the pair on its slave nodes.
+   subroutine measure_nodes(self, system, pair, item, lam)
+      type(pair_record_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      integer, intent(in) :: pair
+      type(constraint_t), intent(in) :: item(:)
+      real(wp), intent(in) :: lam(:)
+      integer :: k, i, first
+
+      first = system%first_constraint(pair)
+      associate (force => system%f_work, node => system%contact(pair)%contact%node)
+         do i = 1, size(node)
+            force(:, node(i)) = 0.0_wp
+         end do
+         do k = 1, size(item)
+            do i = 1, item(k)%n_slave
+               force(:, item(k)%node(i)) = force(:, item(k)%node(i)) + lam(k)*item(k)%g(:, i)
+            end do
+         end do
+         do i = 1, size(node)
+            self%force(:, first + i) = force(:, node(i))
+         end do
+      end associate
+   end subroutine measure_nodes
+
+   !> Areas of all multipliers of the pair, and the length over which it acts.
+   subroutine measure_areas(self, system, pair, id, x, u)
+      type(pair_record_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: pair
+      integer, intent(in) :: id(:)               !! constraints of the pair that act
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp) :: length(system%contact(pair)%contact%n_constraint)
+
+      associate (contact => system%contact(pair)%contact, before => system%first_constraint(pair))
+         call contact%area(x, u, self%area(before + 1:before + contact%n_constraint), length)
+         self%total(pair)%length = sum(length(id - before))
+      end associate
+   end subroutine measure_areas
+
+end module emcon_pair_record

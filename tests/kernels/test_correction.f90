@@ -1,0 +1,135 @@
+!> Corrections of the constrained system: which method serves, and what has to be dropped.
+module test_correction
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_correction, only : correction_factorise, correction_free, correction_lay_out, &
+      correction_multipliers, correction_reason, correction_reset, correction_solve, correction_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_scene, only : method_null_space, method_saddle_point
+   use emcon_system, only : system_t
+   use random_constraints, only : make_chain, make_problem, make_rows, problem_t, tol_dp
+   implicit none
+   private
+   public :: collect_correction
+
+contains
+
+   subroutine collect_correction(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("no common pivot: saddle point, as long as it lasts", test_pivot), &
+         test_case_t("too many coupled: saddle point", test_fill), &
+         test_case_t("redundant constraints are named, by either method", test_redundant)]
+   end subroutine collect_correction
+
+   !> Lay out, factorise, solve; the two right-hand sides are those of `problem`.
+   subroutine correct(correction, problem, dq, is_singular, error)
+      type(correction_t), intent(inout) :: correction
+      type(problem_t), intent(inout) :: problem
+      real(wp), allocatable, intent(out) :: dq(:)
+      logical, intent(out) :: is_singular
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      real(wp) :: dlam(problem%set%n)
+
+      is_singular = .true.
+      system%numbering = problem%numbering
+      system%matrix = problem%base
+      allocate(dq, source=problem%residual)
+      call make_rows(problem)
+      call correction_lay_out(correction, system, problem%set, error)
+      if (allocated(error)) return
+      call correction_multipliers(correction, problem%set, problem%residual)
+      call correction_factorise(correction, system, problem%set, is_singular, error)
+      if (allocated(error) .or. is_singular) return
+      call correction_solve(correction, problem%set, problem%residual, dq, dlam, error)
+   end subroutine correct
+
+   !> The matrix holds the multipliers: they are set to zero before each comparison.
+   subroutine compare(correction, problem, falls_back, error)
+      type(correction_t), intent(inout) :: correction
+      type(problem_t), intent(inout) :: problem
+      logical, intent(in) :: falls_back
+      type(error_t), allocatable, intent(out) :: error
+      type(correction_t) :: saddle
+      real(wp), allocatable :: dq(:), expected(:)
+      logical :: is_singular
+      integer :: k
+
+      do k = 1, problem%set%n
+         problem%set%item(k)%h = 0.0_wp
+      end do
+      call correct(correction, problem, dq, is_singular, error)
+      if (allocated(error)) return
+      call check_true(error, .not. is_singular, "regular")
+      call check_true(error, correction%fell_back .eqv. falls_back, "solved as a saddle point")
+      call check_true(error, len(correction_reason(correction)) > 0 .eqv. falls_back, "a reason")
+      if (allocated(error)) return
+      call correction_reset(saddle, method_saddle_point)
+      call correct(saddle, problem, expected, is_singular, error)
+      if (allocated(error)) return
+      call check_true(error, .not. saddle%fell_back, "the saddle point was asked for")
+      call check_near(error, dq, expected, tol_dp, 1.0_wp + maxval(abs(dq)), "dq")
+      call correction_free(saddle)
+   end subroutine compare
+
+   !> The gradient at the end is orthogonal to that of the forces, then parallel again.
+   subroutine test_pivot(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(correction_t) :: correction
+      integer :: k
+
+      call make_problem(problem)
+      call correction_reset(correction, method_null_space)
+      problem%set%item(1)%g = 0.0_wp
+      problem%set%item(1)%g(1, 1) = 1.0_wp
+      do k = 1, 3
+         problem%set%item(1)%c = 0.0_wp
+         problem%set%item(1)%c(merge(2, 1, k == 2), 1) = 1.0_wp
+         ! Otherwise the gap does not depend on what the force moves.
+         problem%set%item(1)%c(1, 2:) = 0.5_wp
+         call compare(correction, problem, k == 2, error)
+         if (allocated(error)) return
+         call check_true(error, correction%uses_null_space .neqv. k == 2, "null space in use")
+      end do
+      call correction_free(correction)
+   end subroutine test_pivot
+
+   subroutine test_fill(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(correction_t) :: correction
+      integer :: k
+
+      call make_chain([(k, k = 1, 30)], [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp, 30, 4, problem)
+      call correction_reset(correction, method_null_space)
+      call compare(correction, problem, .true., error)
+      call correction_free(correction)
+   end subroutine test_fill
+
+   !> Three times the same constraint.
+   subroutine test_redundant(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(correction_t) :: correction
+      real(wp), allocatable :: dq(:)
+      logical :: is_singular
+      integer :: m
+
+      call make_problem(problem)
+      problem%set%item(4) = problem%set%item(2)
+      problem%set%item(5) = problem%set%item(2)
+      do m = 1, 2
+         call correction_reset(correction, merge(method_null_space, method_saddle_point, m == 1))
+         call correct(correction, problem, dq, is_singular, error)
+         if (allocated(error)) return
+         call check_true(error, is_singular, "singular")
+         call check_equal(error, correction%n_redundant, 2, "redundant constraints")
+         call check_equal(error, correction%redundant, [4, 5], "redundant constraints")
+      end do
+      call correction_free(correction)
+   end subroutine test_redundant
+
+end module test_correction
