@@ -10,7 +10,7 @@ module emcon_active_set
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_newton, only : newton_converged, newton_solve, newton_t
+   use emcon_newton, only : newton_converged, newton_redundant, newton_solve, newton_t
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : pose_t, system_t
@@ -20,9 +20,9 @@ module emcon_active_set
    public :: step_done, step_inverted, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off
 
-   !> How a step ended; the first four are those of Newton's method.
+   !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
    integer, parameter :: step_done = 0, step_inverted = 1, step_diverged = 2, step_singular = 3, &
-      step_cycling = 4, step_too_far = 5, step_stands_off = 6
+      step_cycling = 5, step_too_far = 6, step_stands_off = 7
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -45,6 +45,7 @@ module emcon_active_set
       real(wp) :: deepest = 0.0_wp               !! smallest gap per edge at the end, 0 if all open
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
+      logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
    end type active_set_t
 
 contains
@@ -55,9 +56,10 @@ contains
       type(system_t), intent(in) :: system
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
-         self%comes_and_goes)
+         self%comes_and_goes, self%is_dropped)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%comes_and_goes(system%n_constraint), source=.false.)
+      allocate(self%is_dropped(system%n_constraint), source=.false.)
       allocate(self%lam(system%n_constraint), source=0.0_wp)
       allocate(self%tried(system%n_constraint, most_sets), source=.false.)
       call constraints_select(self%set, [integer ::])
@@ -85,6 +87,7 @@ contains
       self%n_tried = 0
       only_adds = .false.
       self%comes_and_goes = .false.
+      self%is_dropped = .false.
       do
          call remember(self)
          call select_active(self, system, scene, state%u, du)
@@ -93,6 +96,10 @@ contains
          if (allocated(error)) return
          self%lam(self%set%id) = self%set%lam
          self%n_newton = self%n_newton + newton%n_iteration
+         if (status == newton_redundant) then
+            call drop(self, correction%redundant(:correction%n_redundant))
+            cycle
+         end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
          if (status /= newton_converged .or. system%n_constraint == 0) return
          call update(self, system, scene, state, du, only_adds, has_changed, status)
@@ -191,7 +198,7 @@ contains
                   if (only_adds .or. self%set%lam(k) >= -noise) cycle
                   self%is_active(id) = .false.
                else
-                  if (.not. (gap%is_near .and. gap%is_over)) cycle
+                  if (self%is_dropped(id) .or. .not. (gap%is_near .and. gap%is_over)) cycle
                   if (gap%gap0 < -contact%deepest_start*gap%size .and. &
                      .not. state%is_active(id)) cycle
                   self%deepest = min(self%deepest, gap%gap1/gap%size)
@@ -214,6 +221,17 @@ contains
       end function stands_off
 
    end subroutine update
+
+   !> Constraints that follow from earlier ones do not act in this step. They stand at the places
+   !> `redundant` of the set; of constraints that depend on each other the last ones go.
+   pure subroutine drop(self, redundant)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(in) :: redundant(:)
+
+      self%is_dropped(self%set%id(redundant)) = .true.
+      self%is_active = self%is_active .and. .not. self%is_dropped
+      self%n_tried = 0
+   end subroutine drop
 
    subroutine remember(self)
       type(active_set_t), intent(inout) :: self

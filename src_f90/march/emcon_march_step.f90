@@ -4,7 +4,7 @@
 module emcon_march_step
    use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_inverted
    use emcon_constraints, only : constraint_place
-   use emcon_correction, only : correction_t
+   use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -78,6 +78,9 @@ contains
       if (status /= step_done) return
       if (any(self%active%comes_and_goes)) call note_add(increment%notes, &
          cycling_text(self, scene) // ": held closed in this step")
+      if (any(self%active%is_dropped)) call note_add(increment%notes, "contact follows from that " &
+         // "of other nodes, and is left out, at slave nodes " // &
+         nodes_text(self, scene, self%active%is_dropped))
       call commit(self, scene, h, increment, error)
    end subroutine march_step
 
@@ -86,19 +89,29 @@ contains
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable :: text
-      type(string_t) :: found(size(self%active%comes_and_goes))
+
+      text = "contact opens and closes in turn at slave nodes " // &
+         nodes_text(self, scene, self%active%comes_and_goes)
+   end function cycling_text
+
+   !> The slave nodes of the constraints that `is_meant` marks.
+   function nodes_text(self, scene, is_meant) result(text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_meant(:)         !! (n_constraint)
+      character(len=:), allocatable :: text
+      type(string_t) :: found(size(is_meant))
       integer :: id, n, pair, i
 
       n = 0
-      do id = 1, size(found)
-         if (.not. self%active%comes_and_goes(id)) cycle
+      do id = 1, size(is_meant)
+         if (.not. is_meant(id)) cycle
          n = n + 1
          call constraint_place(self%system, id, pair, i)
          found(n)%text = to_text(scene%node_label(self%system%contact(pair)%contact%node(i)))
       end do
-      text = "contact opens and closes in turn at slave nodes " // joined(found(:n), ", ", &
-         most_named)
-   end function cycling_text
+      text = joined(found(:n), ", ", most_named)
+   end function nodes_text
 
    !> First guess of the motion, and the motion and velocity of prescribed freedoms.
    subroutine guess(self, scene, start, h, is_at_rest)
@@ -177,7 +190,7 @@ contains
          state%internal = system%response%force
          state%energy = system%response%energy
          if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
-            "active constraints share their unknowns: solved as a saddle point")
+            correction_reason(self%correction) // ": solved as a saddle point")
          increment%residual = self%newton%history(:self%newton%n_history)
          increment%deepest = min(increment%deepest, self%active%deepest)
          state%is_active = .false.

@@ -16,10 +16,11 @@ module emcon_newton
    implicit none
    private
    public :: newton_t, newton_init, newton_solve
-   public :: newton_converged, newton_inverted, newton_diverged, newton_singular
+   public :: newton_converged, newton_inverted, newton_diverged, newton_singular, newton_redundant
 
+   !> How a solve ended; redundant: some constraints depend on others, see `correction%redundant`.
    integer, parameter :: newton_converged = 0, newton_inverted = 1, newton_diverged = 2, &
-      newton_singular = 3
+      newton_singular = 3, newton_redundant = 4
 
    !> A residual below this multiple of epsilon is round-off: of what its contributions are, and of
    !> what the forces' own evaluation rounds.
@@ -100,6 +101,10 @@ contains
       do
          call evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, du, &
             norm, defect, is_rounding, status, error)
+         if (correction%n_redundant > 0 .and. status == newton_converged) then
+            status = newton_redundant
+            if (is_driven) du = du + self%driven
+         end if
          if (allocated(error) .or. status /= newton_converged) return
          if (is_driven) then
             call start_driven(self, system, correction, set, pose, u0, du, status, error)

@@ -175,7 +175,7 @@ contains
          call nts%begin_step(scene%x, u, du)
          if (abs(nts%reach - last) > 0.0_wp) n_list = n_list + 1
          last = nts%reach
-         call check_equal(error, size(nts%candidates%edge), 0, "candidates in step " &
+         call check_equal(error, size(nts%near%candidates%edge), 0, "candidates in step " &
             // to_text(step))
          u = u + du
       end do
