@@ -31,6 +31,8 @@ module emcon_active_set
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
    !> Sets tried in one step at most.
    integer, parameter :: most_sets = 40
+   !> A step is solved again so often at most because stencils were chosen for another motion.
+   integer, parameter :: most_stale = 3
 
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start
@@ -43,6 +45,7 @@ module emcon_active_set
       integer :: n_tried = 0
       integer :: n_newton = 0                    !! iterations over all sets of the last step
       real(wp) :: deepest = 0.0_wp               !! smallest gap per edge at the end, 0 if all open
+      logical :: is_stale = .false.              !! stencils were chosen for another motion
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
@@ -80,7 +83,9 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: only_adds, has_changed
+      integer :: n_stale
 
+      n_stale = 0
       call begin_contact(self, system, scene, state, du)
       self%lam = state%lam
       self%n_newton = 0
@@ -103,6 +108,12 @@ contains
          newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
          if (status /= newton_converged .or. system%n_constraint == 0) return
          call update(self, system, scene, state, du, only_adds, has_changed, status)
+         if (self%is_stale .and. n_stale < most_stale) then
+            n_stale = n_stale + 1
+            self%n_tried = 0
+            cycle
+         end if
+         if (self%is_stale .and. status == step_done) status = step_too_far
          if (status /= step_done .or. .not. has_changed) return
          if (first_tried(self) > 0 .or. self%n_tried == most_sets) then
             call end_cycle(self, only_adds, status)
@@ -177,6 +188,7 @@ contains
 
       status = step_done
       has_changed = .false.
+      self%is_stale = .false.
       self%deepest = 0.0_wp
       k = 0
       do pair = 1, size(system%contact)
@@ -194,8 +206,9 @@ contains
                   if (self%holds_gap .and. .not. state%is_active(id)) then
                      if (stands_off(gap)) status = step_stands_off
                   end if
+                  self%is_stale = self%is_stale .or. has_drifted(k, gap)
                   noise = force_noise*sum(system%magnitude(:, contact%node(i)))
-                  if (only_adds .or. self%set%lam(k) >= -noise) cycle
+                  if (.not. gap%is_leaving .and. (only_adds .or. self%set%lam(k) >= -noise)) cycle
                   self%is_active(id) = .false.
                else
                   if (self%is_dropped(id) .or. .not. (gap%is_near .and. gap%is_over)) cycle
@@ -212,6 +225,17 @@ contains
       end do
 
    contains
+
+      !> Is the gap of active constraint `k` another one with the stencils for the motion that came
+      !> out than with those for the motion that was expected?
+      pure logical function has_drifted(k, gap)
+         integer, intent(in) :: k
+         type(gap_state_t), intent(in) :: gap
+         real(wp) :: held
+
+         held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
+         has_drifted = .not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size
+      end function has_drifted
 
       !> Would a new contact be held at a larger distance than the deck allows?
       pure logical function stands_off(gap)

@@ -281,7 +281,7 @@ contains
       case (step_cycling)
          text = cycling_text(self, scene)
       case (step_too_far)
-         text = "a slave node slides over more than two master edges"
+         text = "a contact slides farther than its stencil was chosen for"
       case (step_stands_off)
          text = "a contact would close over more than the gap tolerance"
       case default
