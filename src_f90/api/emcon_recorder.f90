@@ -294,16 +294,27 @@ contains
       if (.not. allocated(error)) call history_publish(self%history, is_forced, error)
    end subroutine recorder_publish
 
-   !> Note the wall time of the run.
-   subroutine recorder_finish(self, wall, error)
+   !> Note the wall time of the run, and the CPU time that contact took.
+   subroutine recorder_finish(self, wall, contact, error)
       type(recorder_t), intent(inout) :: self
-      real(dp), intent(in) :: wall               !! [s]
+      real(dp), intent(in) :: wall, contact      !! [s]
       type(error_t), allocatable, intent(out) :: error
-      integer :: i_set
 
-      call history_set_define(self%history, "RUN", "WALL_SECONDS", [0], 1, i_set, error)
-      if (.not. allocated(error)) call history_set_append(self%history, i_set, 0.0_dp, &
-         reshape([wall], [1, 1]), error)
+      call put("WALL_SECONDS", wall)
+      if (.not. allocated(error)) call put("CONTACT_CPU_SECONDS", contact)
+
+   contains
+
+      subroutine put(name, seconds)
+         character(len=*), intent(in) :: name
+         real(dp), intent(in) :: seconds
+         integer :: i_set
+
+         call history_set_define(self%history, "RUN", name, [0], 1, i_set, error)
+         if (.not. allocated(error)) call history_set_append(self%history, i_set, 0.0_dp, &
+            reshape([seconds], [1, 1]), error)
+      end subroutine put
+
    end subroutine recorder_finish
 
    !> Complete and close all files; the first failure is told.

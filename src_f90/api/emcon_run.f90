@@ -12,8 +12,8 @@ module emcon_run
    use emcon_restart, only : restart_get, restart_put, restart_read, restart_size, restart_t, &
       restart_write
    use emcon_run_log, only : balance_t, closing_lines, log_increment, log_start, model_lines
-   use emcon_stepper, only : stepper_advance, stepper_close, stepper_fraction, stepper_is_done, &
-      stepper_load, stepper_open, stepper_save, stepper_t
+   use emcon_stepper, only : stepper_advance, stepper_close, stepper_contact_seconds, &
+      stepper_fraction, stepper_is_done, stepper_load, stepper_open, stepper_save, stepper_t
    use emcon_text, only : string_t, to_text
    use emcon_timer, only : cpu_seconds, wall_seconds
    implicit none
@@ -246,7 +246,8 @@ contains
       integer :: i
 
       if (.not. allocated(error)) then
-         call recorder_finish(run%recorder, wall_seconds() - run%wall_start, error)
+         call recorder_finish(run%recorder, wall_seconds() - run%wall_start, &
+            stepper_contact_seconds(run%stepper), error)
       end if
       call recorder_close(run%recorder, second)
       if (.not. allocated(error)) call move_alloc(second, error)

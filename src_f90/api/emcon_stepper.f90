@@ -2,12 +2,13 @@
 !> steppers live side by side.
 module emcon_stepper
    use emcon_contact, only : gap_state_t
+   use emcon_correction, only : correction_seconds
    use emcon_deck, only : deck_read
    use emcon_deck_source, only : deck_open, deck_source_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, error_t, raise
    use emcon_initial_contact, only : initial_contact_prepare
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_measure
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_resume, march_t
@@ -17,7 +18,8 @@ module emcon_stepper
    implicit none
    private
    public :: stepper_t, stepper_open, stepper_advance, stepper_is_done
-   public :: stepper_close, stepper_fraction, stepper_save, stepper_load, contact_gaps
+   public :: stepper_close, stepper_fraction, stepper_save, stepper_load, contact_gaps, &
+      stepper_contact_seconds
 
    type :: stepper_t
       type(scene_t) :: scene
@@ -132,6 +134,14 @@ contains
          end do
       end associate
    end subroutine contact_gaps
+
+   !> CPU time of search, gaps, constraints and null space since the program began [s].
+   pure real(dp) function stepper_contact_seconds(self)
+      type(stepper_t), intent(in) :: self
+
+      stepper_contact_seconds = self%march%system%contact_clock%seconds &
+         + correction_seconds(self%march%correction)
+   end function stepper_contact_seconds
 
    !> Put all that the next increment depends on into `restart`.
    subroutine stepper_save(self, restart)

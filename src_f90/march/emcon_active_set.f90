@@ -14,6 +14,7 @@ module emcon_active_set
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : pose_t, system_t
+   use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_solve
@@ -86,7 +87,9 @@ contains
       integer :: n_stale
 
       n_stale = 0
+      call stopwatch_start(system%contact_clock)
       call begin_contact(self, system, scene, state, du)
+      call stopwatch_stop(system%contact_clock)
       self%lam = state%lam
       self%n_newton = 0
       self%n_tried = 0
@@ -95,7 +98,9 @@ contains
       self%is_dropped = .false.
       do
          call remember(self)
+         call stopwatch_start(system%contact_clock)
          call select_active(self, system, scene, state%u, du)
+         call stopwatch_stop(system%contact_clock)
          call newton_solve(newton, system, scene, correction, self%set, pose, state%u, state%v, &
             offset, du, status, error)
          if (allocated(error)) return
@@ -107,7 +112,9 @@ contains
          end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
          if (status /= newton_converged .or. system%n_constraint == 0) return
+         call stopwatch_start(system%contact_clock)
          call update(self, system, scene, state, du, only_adds, has_changed, status)
+         call stopwatch_stop(system%contact_clock)
          if (self%is_stale .and. n_stale < most_stale) then
             n_stale = n_stale + 1
             self%n_tried = 0

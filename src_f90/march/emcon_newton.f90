@@ -13,6 +13,7 @@ module emcon_newton
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_system, only : pose_t, system_respond, system_tangent_times, system_t
+   use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
    public :: newton_t, newton_init, newton_solve
@@ -268,8 +269,12 @@ contains
          call add_to_dofs(system%numbering, self%correction, -1.0_wp, du)
       end do
       status = newton_converged
-      call constraints_evaluate(set, system, scene, pose, u0, du)
-      if (set%n > 0) call constraints_rows(set, system%numbering)
+      if (set%n > 0) then
+         call stopwatch_start(system%contact_clock)
+         call constraints_evaluate(set, system, scene, pose, u0, du)
+         call constraints_rows(set, system%numbering)
+         call stopwatch_stop(system%contact_clock)
+      end if
       call correction_lay_out(correction, system, set, error)
       if (allocated(error)) return
       call measure(self, system, correction, set, norm, defect, is_rounding)

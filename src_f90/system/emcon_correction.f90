@@ -15,11 +15,13 @@ module emcon_correction
       saddle_point_t
    use emcon_scene, only : method_null_space
    use emcon_system, only : system_t
+   use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    use emcon_umfpack, only : umfpack_t
    implicit none
    private
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
-      correction_multipliers, correction_reset, correction_free, correction_reason
+      correction_multipliers, correction_reset, correction_free, correction_reason, &
+      correction_seconds
 
    type :: correction_t
       integer :: method = method_null_space      !! as the deck asks
@@ -35,6 +37,7 @@ module emcon_correction
       integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
       type(null_space_t) :: null_space
       type(saddle_point_t) :: saddle_point
+      type(stopwatch_t), private :: clock        !! layouts and curvature of the constraints
       logical, private :: has_saddle_point = .false.    !! it is laid out for these rows
       logical, private :: is_reduced = .false.   !! last factorisation: by null space
    end type correction_t
@@ -73,6 +76,7 @@ contains
          if (system%numbering%n_unknown > 0) call self%solver%analyse(system%matrix, error)
          return
       end if
+      call stopwatch_start(self%clock)
       associate (null_space => self%null_space)
          if (.not. has_pattern(self, set)) then
             call take_pattern(self, system, set)
@@ -91,6 +95,7 @@ contains
          self%n_redundant = null_space%rows%n_redundant
          if (self%n_redundant > 0) self%redundant = null_space%rows%redundant(:self%n_redundant)
       end associate
+      call stopwatch_stop(self%clock)
    end subroutine correction_lay_out
 
    !> The constraints stand on the unknowns that the layout was made for.
@@ -135,11 +140,13 @@ contains
       end if
       is_singular = .true.
       if (self%n_redundant > 0) return
+      call stopwatch_start(self%clock)
       self%merged%value = 0.0_dp
       do k = 1, size(self%slot)
          self%merged%value(self%slot(k)) = system%matrix%value(k)
       end do
       call constraints_add_curvature(set, system%numbering, self%merged)
+      call stopwatch_stop(self%clock)
       self%is_reduced = self%method == method_null_space
       self%obstacle = obstacle_none
       if (self%is_reduced) then
@@ -168,6 +175,13 @@ contains
       if (set%n == 0 .or. .not. self%uses_null_space) return
       call null_space_multipliers(self%null_space, set, residual, set%lam)
    end subroutine correction_multipliers
+
+   !> CPU time spent on constraints so far, over what the system without them would take [s].
+   pure real(dp) function correction_seconds(self)
+      type(correction_t), intent(in) :: self
+
+      correction_seconds = self%clock%seconds + self%null_space%clock%seconds
+   end function correction_seconds
 
    !> Why the last factorisation is of the saddle point although the null space was asked for.
    pure function correction_reason(self) result(text)

@@ -17,6 +17,7 @@ module emcon_null_space
    use emcon_independent_rows, only : independent_rows_find, independent_rows_t
    use emcon_kinds, only : dp, int64, wp
    use emcon_numbering, only : numbering_t
+   use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    use emcon_umfpack, only : umfpack_t
    implicit none
@@ -58,6 +59,7 @@ module emcon_null_space
       type(csr_t) :: reduced                     !! P^T N DF
       type(triple_product_t) :: product
       type(umfpack_t) :: solver
+      type(stopwatch_t) :: clock                 !! P, DF and P^T N DF
       integer, allocatable :: owner(:, :)        !! (2, n_node) constraint of a dependent one, or 0
       real(wp), allocatable :: rhs(:), x(:)      !! (n_free)
       real(wp), allocatable :: part(:), image(:) !! (n_unknown)
@@ -280,6 +282,7 @@ contains
          call lay_out(self, set%force_rows, matrix, error)
          if (allocated(error)) return
       end if
+      call stopwatch_start(self%clock)
       call fill(self%elimination, self%force, set%force_rows, self%p, is_poor(1))
       call fill(self%elimination, self%gap, set%gap_rows, self%d, is_poor(2))
       if (any(is_poor)) then
@@ -287,6 +290,7 @@ contains
          return
       end if
       call triple_product_update(self%product, self%p, matrix, self%d, self%reduced)
+      call stopwatch_stop(self%clock)
       call self%solver%factorise(self%reduced%value, error)
       is_singular = self%solver%is_singular
    end subroutine null_space_factorise

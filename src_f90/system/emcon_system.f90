@@ -15,6 +15,7 @@ module emcon_system
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t, &
       solid_tangent_times
+   use emcon_timer, only : stopwatch_t
    implicit none
    private
    public :: system_t, pose_t, system_init, system_begin_step, system_respond, &
@@ -52,6 +53,7 @@ module emcon_system
       real(wp), allocatable :: residual(:, :)    !! (2, n_node) without contact forces
       real(wp), allocatable :: magnitude(:, :)   !! (2, n_node) sum of |contributions| to it
       real(wp), allocatable :: u_work(:, :), f_work(:, :), zero(:, :)
+      type(stopwatch_t) :: contact_clock         !! search, gaps, constraints
    end type system_t
 
 contains
