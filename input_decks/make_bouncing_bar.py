@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from deckwriter import (Part, add_grid, arguments, box, comment, heading, set_lines,
                         surface_lines, write_deck)
+from scenery import CONTACT_CARDS, contact_parameters
 
 LENGTH, WIDTH, HEIGHT = 10.0, 1.0, 5.0
 
@@ -28,15 +29,17 @@ Expected: the lower end meets the floor at t = 1 with velocity -10, rests there 
           Total energy (kinetic + strain - work of gravity) is 0 at the start.
 
 Made by make_bouncing_bar.py. Change a parameter for one run: --set h=0.0025
+with mortar contact: --set formulation=MORTAR
 """
 
-PARAMETERS = """
+PARAMETERS = f"""
 *PARAMETER
 h = 0.005
 t_end = 5.5
 frame = 0.05
 method = NULL SPACE
 initiation = PERSISTENT
+{contact_parameters("NODE TO SURFACE").strip()}
 """
 
 MODEL = """
@@ -51,7 +54,7 @@ MODEL = """
 1.
 *SURFACE INTERACTION, NAME=FRICTIONLESS
 *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD
-*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=NODE TO SURFACE
+*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=<formulation>
 BAR_END, FLOOR_TOP
 *BOUNDARY
 FLOOR, 1, 2
@@ -59,12 +62,13 @@ FLOOR, 1, 2
 0., <t_end>, <frame>
 """
 
-STEP = """
+STEP = f"""
 *STEP, INC=1000000
 *DYNAMIC, DIRECT
 <h>, <t_end>
 *CONSTRAINT METHOD, TYPE=<method>
 *CONTACT INITIATION, TYPE=<initiation>
+{CONTACT_CARDS.strip()}
 *DLOAD
 BAR, GRAV, 10., 0., -1., 0.
 *NODE FILE, TIME POINTS=FRAMES

@@ -12,6 +12,7 @@ import math
 
 from deckwriter import (Grid, Part, Point, add_grid, arguments, box, cells_argument, comment,
                         heading, number, set_lines, surface_lines, write_deck)
+from scenery import CONTACT_CARDS, contact_parameters
 
 R_INNER, R_OUTER = 8.0, 10.0
 GAP = 0.1
@@ -58,10 +59,11 @@ Expected: total energy {energy:.6g} throughout; ring mass {mass:.6g};
           and the treatments of first contact, on 64 x 4 and 60 x 5 elements).
 
 Made by make_ring.py. Change a parameter for one run: emcon run ring.inp --set h=0.005
+with mortar contact: --set formulation=MORTAR
 """
 
 
-PARAMETERS = """
+PARAMETERS = f"""
 *PARAMETER
 h = 0.01
 t_end = 8.
@@ -69,6 +71,7 @@ frame = 0.1
 method = NULL SPACE
 initiation = PERSISTENT
 tolerance = 1e-10
+{contact_parameters("NODE TO SURFACE").strip()}
 """
 
 
@@ -100,7 +103,7 @@ MATERIALS = f"""
 CONTACT = f"""
 *SURFACE INTERACTION, NAME=FRICTIONLESS
 *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD
-*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=NODE TO SURFACE
+*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=<formulation>
 RING_OUTER, BLOCK_TOP
 *BOUNDARY
 BOTTOM, 1, 2
@@ -111,13 +114,14 @@ RING, 2, {number(VELOCITY[1])}
 0., <t_end>, <frame>
 """
 
-STEP = """
+STEP = f"""
 *STEP, NLGEOM, INC=1000000
 *DYNAMIC, DIRECT
 <h>, <t_end>
 *CONSTRAINT METHOD, TYPE=<method>
 *CONTACT INITIATION, TYPE=<initiation>
 *NEWTON, TOLERANCE=<tolerance>
+{CONTACT_CARDS.strip()}
 *NODE FILE, TIME POINTS=FRAMES
 U, V, RF
 *EL FILE, TIME POINTS=FRAMES
