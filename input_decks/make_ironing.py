@@ -23,8 +23,8 @@ Ironing: a curved die is pressed {DEPTH:g} into a block and drawn {PATH:g} along
 After the usual test of sliding contact, static, without friction. Block {LONG:g} x {HIGH:g},
 E = 68.96e7; die of radius {RADIUS:g} over 120 degrees, {THICK:g} thick, E = 68.96e8;
 nu = 0.32, compressible neo-Hookean, plane strain. The block is held below, the back of the die
-is guided: down by {DEPTH:g} in the time 0 to 1, to the right by {PATH:g} from 1 to {PATH + 1:g}. The
-die is the slave.
+is guided: down by {DEPTH:g} in the time 0 to 1, right by {PATH:g} from 1 to {PATH + 1:g}.
+The die is the slave.
 Units: any consistent set (force F, length L; stress F/L^2, thickness 1 L).
 
 What to look at: the reaction of the die while it is drawn, 1 < t < {PATH + 1:g}. Nothing changes

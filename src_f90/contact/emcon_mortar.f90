@@ -1,7 +1,7 @@
 !> Mortar contact: gaps between a slave edge and the master edges that it faces, integrated over
 !> the segments that they share, or at Gauss points of the slave edge.
 !>
-!> Which edges make pairs is chosen once per step. Source: docs/theory.md, section 4, mortar;
+!> Which edges make pairs is chosen once per step. Source: docs/theory.md, sections 4.5 and 4.6;
 !> paper eqs. (2) and (3).
 module emcon_mortar
    use emcon_chain, only : chain_corners, chain_distance
@@ -14,13 +14,16 @@ module emcon_mortar
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_moments, frame_point, &
       frame_project, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, &
-      moment_gap_xi, n_moment, n_place, pair_stencil_t, place_after, place_before, place_master
+      moment_gap_xi, n_moment, n_place, pair_stencil_t, place_after, place_before, place_first, &
+      place_last, place_master
    use emcon_mortar_pair2, only : segment_moments2 => segment_moments
    use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
    use emcon_mortar_stencil, only : frame_faces, stencil_gather, stencil_master, stencil_slave
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_scene, only : contact_options_t, contact_pair_t, integration_elements, &
       multiplier_dual, normal_nodal, scene_t, smoothing_hermite
+   use emcon_search, only : box_distance
+   use emcon_sort, only : sort_order
    use emcon_weighted, only : weighted_init, weighted_t
    implicit none
    private
@@ -29,9 +32,9 @@ module emcon_mortar
    !> A pair is kept though its edges do not overlap if they miss each other by less than this
    !> fraction of the slave edge: they may come to overlap within the step.
    real(wp), parameter :: margin = 0.25_wp
-   !> Of two master edges that cover the same part of a slave edge, more than this fraction of the
-   !> smaller part, the nearer one is meant.
-   real(wp), parameter :: same_part = 0.5_wp
+   !> Of two master edges that cover the same part of a slave edge, more than this fraction of it,
+   !> the nearer one is meant.
+   real(wp), parameter :: same_part = 0.01_wp
    !> Gauss points unless the deck gives them: exact for straight edges.
    integer, parameter :: segment_points = 2, element_points = 3
 
@@ -62,7 +65,8 @@ contains
 
       call weighted_init(self, scene, pair, error)
       if (allocated(error)) return
-      call near_list_init(self%near, self%slave%edge, self%master%edge, scene%u0)
+      call near_list_init(self%near, self%slave%edge, self%master%edge, scene%u0, &
+         maxval(self%slave%length))
       allocate(self%start(self%slave%n_edge + 1), source=1)
       allocate(self%pair(0))
       call self%configure(scene%x, self%options)
@@ -134,13 +138,26 @@ contains
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)
+            if (.not. (is_within(self%near%depth, local) .or. &
+               is_within(self%near%depth, local + dlocal))) cycle
             if (.not. is_meant(self, stencil, frame)) cycle
-            if (is_wide) call cut_corners(stencil, frame(0))
+            if (is_wide .and. .not. stencil%is_smooth) call cut_corners(stencil, frame(0))
             call append(self%pair, n, stencil)
          end do
       end associate
       call drop_far_layers(self, e, n, x, u0)
    end subroutine choose_pairs
+
+   !> Are the boxes of both edges no farther apart than `depth`? What the list of candidates holds
+   !> beyond that depends on when it was made.
+   pure logical function is_within(depth, x)
+      real(wp), intent(in) :: depth, x(:, :)     !! (2, n_place)
+
+      associate (slave => x(:, [place_first, place_last]), master => x(:, place_master(:2)))
+         is_within = box_distance(minval(slave, 2), maxval(slave, 2), minval(master, 2), &
+            maxval(master, 2)) <= depth
+      end associate
+   end function is_within
 
    !> Do the edges face each other and overlap, or nearly so, the master not behind the slave?
    pure logical function is_meant(self, stencil, frame)
@@ -197,35 +214,35 @@ contains
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       integer, intent(inout) :: n
-      real(wp), dimension(n - self%start(e) + 1) :: low, high, gap
-      logical :: is_far(n - self%start(e) + 1)
+      real(wp), dimension(n - self%start(e) + 1) :: low, high, height
+      integer :: order(n - self%start(e) + 1), i, j
+      logical :: is_kept(n - self%start(e) + 1)
       type(frame_t) :: frame
       real(wp) :: local(2, n_place), dlocal(2, n_place), eta
-      integer :: i, j
 
+      if (size(low) < 2) return
       do i = 1, size(low)
          associate (stencil => self%pair(self%start(e) + i - 1))
             call stencil_gather(stencil, x, u0, u0, local, dlocal)
             call frame_init(frame, stencil, local)
-            low(i) = max(0.0_wp, frame_project(frame, 2))
-            high(i) = min(1.0_wp, frame_project(frame, 1))
-            call frame_hit(frame, stencil, max(0.0_wp, min(1.0_wp, 0.5_wp*(low(i) + high(i)))), &
-               eta, gap(i))
+            low(i) = max(0.0_wp, min(1.0_wp, frame_project(frame, 2)))
+            high(i) = max(0.0_wp, min(1.0_wp, frame_project(frame, 1)))
+            call frame_hit(frame, stencil, 0.5_wp*(low(i) + high(i)), eta, height(i))
          end associate
       end do
-      is_far = .false.
+      order = sort_order(abs(height))
+      is_kept = .false.
       do i = 1, size(low)
-         do j = 1, size(low)
-            if (gap(j) < gap(i) .and. min(high(i), high(j)) - max(low(i), low(j)) > &
-               same_part*min(high(i) - low(i), high(j) - low(j)) .and. high(j) > low(j)) &
-               is_far(i) = is_far(i) .or. high(i) > low(i)
-         end do
+         associate (this => order(i))
+            is_kept(this) = .not. any(is_kept .and. min(high, high(this)) - max(low, low(this)) &
+               > same_part)
+         end associate
       end do
       n = self%start(e) - 1
-      do i = 1, size(low)
-         if (is_far(i)) cycle
+      do j = 1, size(low)
+         if (.not. is_kept(j)) cycle
          n = n + 1
-         self%pair(n) = self%pair(self%start(e) + i - 1)
+         self%pair(n) = self%pair(self%start(e) + j - 1)
       end do
    end subroutine drop_far_layers
 
@@ -248,7 +265,7 @@ contains
                p = self%seen(i, e)
                if (abs(p) > 0 .and. (time_level == 1 .or. p > 0)) cycle
                call frame_hit(frame(time_level), self%pair(k), self%point(i), eta, gap)
-               if (eta < 0.0_wp .or. eta > 1.0_wp) cycle
+               if (.not. (eta >= 0.0_wp .and. eta <= 1.0_wp)) cycle
                self%seen(i, e) = merge(k, -k, time_level == 0)
             end do
          end do

@@ -120,7 +120,8 @@ contains
       call look(self, xi, along, above, norm)
       eta = along(1)/(along(1) - along(2))
       if (stencil%is_smooth) then
-         eta = smooth_root(matmul(stencil%shape, along), eta)
+         eta = smooth_root(matmul(stencil%shape, along), eta, &
+            is_inside=along(1) >= 0.0_wp .and. along(2) <= 0.0_wp)
          gap = polynomial(matmul(stencil%shape, above), eta)/norm
       else
          gap = (above(1) + eta*(above(2) - above(1)))/norm
@@ -146,17 +147,28 @@ contains
          *((above(1) - above(3))/(along(1) - along(3)) - slope)
    end subroutine frame_point
 
-   !> The root near `start` of the cubic with coefficients `c`, by Newton's method.
-   pure real(wp) function smooth_root(c, start)
+   !> The root near `start` of the cubic with coefficients `c`, by Newton's method; with `is_inside`
+   !> it falls from 0 to 1, and bisection keeps the root there.
+   pure real(wp) function smooth_root(c, start, is_inside)
       real(wp), intent(in) :: c(0:3), start
-      real(wp) :: change, value
+      logical, intent(in) :: is_inside
+      real(wp) :: change, value, low, high, next
       integer :: i
 
+      low = 0.0_wp
+      high = 1.0_wp
       smooth_root = start
       do i = 1, most_iterations
          value = polynomial(c, smooth_root)
          change = value/(c(1) + smooth_root*(2.0_wp*c(2) + smooth_root*3.0_wp*c(3)))
-         smooth_root = smooth_root - change
+         next = smooth_root - change
+         if (is_inside) then
+            if (value > 0.0_wp) low = max(low, smooth_root)
+            if (value < 0.0_wp) high = min(high, smooth_root)
+            if (.not. (next >= low .and. next <= high)) next = 0.5_wp*(low + high)
+            change = smooth_root - next
+         end if
+         smooth_root = next
          if (.not. abs(change) > epsilon(change)) exit
       end do
    end function smooth_root

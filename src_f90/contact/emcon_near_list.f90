@@ -19,15 +19,19 @@ module emcon_near_list
       integer, allocatable :: node(:)            !! distinct nodes of both
       real(wp), allocatable :: u(:, :)           !! (2, size of `node`) when the list was made
       type(candidates_t) :: candidates
+      !> Up to this distance the list is complete, whenever it was made [L].
+      real(wp) :: depth = 0.0_wp
    end type near_list_t
 
 contains
 
-   pure subroutine near_list_init(self, item, edge, u0)
+   pure subroutine near_list_init(self, item, edge, u0, depth)
       type(near_list_t), intent(out) :: self
       integer, intent(in) :: item(:, :), edge(:, :)
       real(wp), intent(in) :: u0(:, :)           !! (2, n_node)
+      real(wp), intent(in) :: depth              !! [L]
 
+      self%depth = depth
       self%item = item
       self%edge = edge
       self%node = unique_sorted([reshape(item, [size(item)]), reshape(edge, [size(edge)])])
@@ -44,7 +48,7 @@ contains
 
       step_motion = largest(du(:, self%node))
       motion = largest(u0(:, self%node) - self%u) + step_motion
-      if (.not. 2.0_wp*motion < reach) call search(self, x, u0, step_motion, reach)
+      if (.not. 2.0_wp*motion + self%depth < reach) call search(self, x, u0, step_motion, reach)
    end subroutine near_list_update
 
    !> Surfaces far apart get a reach as large as their distance and an empty list: then nothing is
@@ -63,7 +67,7 @@ contains
       apart = box_distance(minval(item(:, :, 1), 2), maxval(item(:, :, 2), 2), &
          minval(edge(:, :, 1), 2), maxval(edge(:, :, 2), 2))
       reach = max(reach_per_edge*sum(edge(:, :, 2) - edge(:, :, 1))/real(size(edge, 2), wp), &
-         reach_per_motion*step_motion, 0.99_wp*apart)
+         reach_per_motion*step_motion, 0.99_wp*apart) + self%depth
       call search_candidates(item(:, :, 1), item(:, :, 2), edge(:, :, 1), edge(:, :, 2), reach, &
          self%candidates)
    end subroutine search

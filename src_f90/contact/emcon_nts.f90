@@ -66,7 +66,7 @@ contains
          end do
       end associate
       call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), self%master%edge, &
-         scene%u0)
+         scene%u0, 0.0_wp)
    end subroutine nts_init
 
    !> Choose for each slave node the nearest master edge at the start of the step.

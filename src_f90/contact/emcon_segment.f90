@@ -2,7 +2,7 @@
 !> multiplier basis.
 !>
 !> It stands between node to segment, whose gaps it takes, and mortar, whose constraints it makes.
-!> Source: docs/theory.md, section 4, segments; paper, section 2 ("several extensions").
+!> Source: docs/theory.md, section 4.7; paper, section 2 ("several extensions").
 module emcon_segment
    use emcon_contact, only : constraint_t
    use emcon_dgrad10, only : dg_dot, dg_sqrt, dg_t, difference
@@ -15,7 +15,7 @@ module emcon_segment
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : contact_options_t, contact_pair_t, multiplier_dual, scene_t
    use emcon_sort, only : find_sorted
-   use emcon_weighted, only : weighted_init, weighted_t
+   use emcon_weighted, only : weighted_init, weighted_measure, weighted_t
    implicit none
    private
    public :: segment_t, segment_init
@@ -27,6 +27,7 @@ module emcon_segment
    contains
       procedure :: configure => segment_configure
       procedure :: begin_step => segment_begin_step
+      procedure :: measure => segment_measure
       procedure :: measure_edges => segment_measure_edges
       procedure :: form_edge => segment_form_edge
    end type segment_t
@@ -97,6 +98,24 @@ contains
 
       is_over = self%nts%state(i)%is_near .and. self%nts%state(i)%is_over
    end function is_over
+
+   !> The stencils of all nodal gaps that a constraint is made of must hold at the end.
+   pure subroutine segment_measure(self, x, u0, du)
+      class(segment_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer :: i, k
+
+      call weighted_measure(self, x, u0, du)
+      do i = 1, self%n_constraint
+         do k = 1, 2
+            associate (e => self%node_edge(k, i))
+               if (e == 0) cycle
+               self%state(i)%is_covered = self%state(i)%is_covered &
+                  .and. all(self%nts%state(self%end_node(:, e))%is_covered)
+            end associate
+         end do
+      end do
+   end subroutine segment_measure
 
    pure subroutine segment_measure_edges(self, x, u0, du)
       class(segment_t), intent(inout) :: self

@@ -13,7 +13,7 @@ module emcon_weighted
    use emcon_scene, only : contact_pair_t, scene_t
    implicit none
    private
-   public :: weighted_t, weighted_init
+   public :: weighted_t, weighted_init, weighted_measure
 
    !> A slave node is let go where less than this fraction of its surface is covered: a smaller part
    !> says hardly more than the constraint of its neighbour.
@@ -122,6 +122,7 @@ contains
          associate (state => self%state(i))
             least = least_cover*self%whole(i)
             state%is_near = maxval(area) > 0.0_wp
+            state%is_covered = .true.
             state%is_over = area(1) >= least
             state%is_leaving = .not. state%is_over
             state%gap0 = 0.0_wp

@@ -1,9 +1,9 @@
 !> Which constraints act in a step: a primal-dual active set around Newton's method.
 !>
 !> A constraint is taken in when its gap would be negative at the end of the step, and let go when
-!> its multiplier is. If a set comes back, the step is cut; where that is of no use (a persistent
-!> contact makes no energy if it is held too long) or not allowed any more, the union of the sets is
-!> taken and constraints are only added from then on.
+!> its multiplier is. If a set comes back, the union of the sets in the cycle is taken and
+!> constraints are only added from then on: at once for persistent contact, which makes no energy
+!> if it is held too long; else only where the step cannot be cut any more.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
    use emcon_contact, only : gap_state_t
