@@ -94,16 +94,18 @@ contains
       integer, intent(inout) :: i
       character(len=:), allocatable :: text
       integer :: i_first
-      logical :: is_resolved
+      logical :: is_resolved, is_parametric
 
       if (is_card(reader%line(i)%text)) then
          i_first = i
          call gather_card(reader, i, text)
+         is_parametric = index(text, "<") > 0
          call put_parameters(reader, parameters, i_first, text, is_resolved)
          place%n_card = place%n_card + 1
          reader%doubt_names = reader%doubt_names .or. .not. is_resolved
          call read_card(reader, place, text, i_first, reader%card(place%n_card))
          reader%card(place%n_card)%is_unresolved = .not. is_resolved
+         reader%card(place%n_card)%is_parametric = is_parametric
          reader%card(place%n_card)%first = i + 1
          reader%card(place%n_card)%last = i
       else if (is_comment(reader%line(i)%text)) then

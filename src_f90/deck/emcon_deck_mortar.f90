@@ -90,6 +90,8 @@ contains
       character(len=:), allocatable :: idle
       logical :: has_mortar
 
+      ! A card of parameters may serve formulations that another run chooses.
+      if (card%is_parametric) return
       has_mortar = any(pair%formulation == formulation_mortar)
       if (.not. has_mortar .and. all(pair%formulation /= formulation_segment)) then
          call card_warning(reader, card, &

@@ -31,6 +31,7 @@ module emcon_deck_reader
       integer :: step = 0                          !! number of the step it stands in, 0: none
       integer :: first_item = 1, last_item = 0     !! nodes or elements that it defined
       logical :: is_unresolved = .false.           !! it has an unknown parameter, told already
+      logical :: is_parametric = .false.           !! it names parameters: may serve several scenes
    end type card_t
 
    !> The state of a reading. The doubts tell which unknown names may be consequences of errors
