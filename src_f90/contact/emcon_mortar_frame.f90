@@ -120,9 +120,8 @@ contains
       call look(self, xi, along, above, norm)
       eta = along(1)/(along(1) - along(2))
       if (stencil%is_smooth) then
-         eta = smooth_root(matmul(stencil%shape, along), eta, &
-            is_inside=along(1) >= 0.0_wp .and. along(2) <= 0.0_wp)
-         gap = polynomial(matmul(stencil%shape, above), eta)/norm
+         eta = smooth_root(matmul(stencil%shape, along))
+         gap = smooth_value(matmul(stencil%shape, above), eta)/norm
       else
          gap = (above(1) + eta*(above(2) - above(1)))/norm
       end if
@@ -147,37 +146,51 @@ contains
          *((above(1) - above(3))/(along(1) - along(3)) - slope)
    end subroutine frame_point
 
-   !> The root near `start` of the cubic with coefficients `c`, by Newton's method; with `is_inside`
-   !> it falls from 0 to 1, and bisection keeps the root there.
-   pure real(wp) function smooth_root(c, start, is_inside)
-      real(wp), intent(in) :: c(0:3), start
-      logical, intent(in) :: is_inside
-      real(wp) :: change, value, low, high, next
+   !> The root of `smooth_value`, which falls: by Newton's method between bounds, if it is in 0..1.
+   pure real(wp) function smooth_root(c)
+      real(wp), intent(in) :: c(0:3)
+      real(wp) :: low, high, value, last
       integer :: i
 
-      low = 0.0_wp
-      high = 1.0_wp
-      smooth_root = start
-      do i = 1, most_iterations
-         value = polynomial(c, smooth_root)
-         change = value/(c(1) + smooth_root*(2.0_wp*c(2) + smooth_root*3.0_wp*c(3)))
-         next = smooth_root - change
-         if (is_inside) then
-            if (value > 0.0_wp) low = max(low, smooth_root)
-            if (value < 0.0_wp) high = min(high, smooth_root)
-            if (.not. (next >= low .and. next <= high)) next = 0.5_wp*(low + high)
-            change = smooth_root - next
-         end if
-         smooth_root = next
-         if (.not. abs(change) > epsilon(change)) exit
-      end do
+      value = smooth_value(c, 1.0_wp)
+      if (.not. c(0) > 0.0_wp) then
+         smooth_root = -c(0)/c(1)
+      else if (.not. value < 0.0_wp) then
+         smooth_root = 1.0_wp - value/smooth_slope(c, 1.0_wp)
+      else
+         low = 0.0_wp
+         high = 1.0_wp
+         smooth_root = c(0)/(c(0) - value)
+         do i = 1, most_iterations
+            last = smooth_root
+            value = smooth_value(c, last)
+            if (value > 0.0_wp) low = last
+            if (value < 0.0_wp) high = last
+            smooth_root = last - value/smooth_slope(c, last)
+            if (.not. (smooth_root >= low .and. smooth_root <= high)) then
+               smooth_root = 0.5_wp*(low + high)
+            end if
+            if (.not. abs(smooth_root - last) > epsilon(last)) exit
+         end do
+      end if
    end function smooth_root
 
-   pure real(wp) function polynomial(c, x)
+   !> The cubic with coefficients `c` in 0..1, its tangents beyond.
+   pure real(wp) function smooth_value(c, x)
+      real(wp), intent(in) :: c(0:3), x
+      real(wp) :: inner
+
+      inner = max(0.0_wp, min(1.0_wp, x))
+      smooth_value = (c(0) + inner*(c(1) + inner*(c(2) + inner*c(3)))) &
+         + (x - inner)*smooth_slope(c, inner)
+   end function smooth_value
+
+   !> Slope of the cubic at `x` within 0..1.
+   pure real(wp) function smooth_slope(c, x)
       real(wp), intent(in) :: c(0:3), x
 
-      polynomial = c(0) + x*(c(1) + x*(c(2) + x*c(3)))
-   end function polynomial
+      smooth_slope = c(1) + x*(2.0_wp*c(2) + x*3.0_wp*c(3))
+   end function smooth_slope
 
    !> Moments over the segment that the master edge covers.
    pure function frame_moments(self, stencil, point, weight) result(moment)

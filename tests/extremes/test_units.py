@@ -96,6 +96,25 @@ def test_other_treatments_of_first_contact(tmp_path, reference, initiation):
     assert_same_bits(run, reference(**parameters), units)
 
 
+FORMULATIONS = [
+    {"formulation": "NODE TO SURFACE", "smoothing": "HERMITE"},
+    {"formulation": "SEGMENT", "multiplier": "STANDARD"},
+    {"formulation": "MORTAR", "normal": "EDGE", "multiplier": "STANDARD"},
+    {"formulation": "MORTAR", "normal": "NODAL", "multiplier": "DUAL"},
+    {"formulation": "MORTAR", "integration": "ELEMENTS"},
+    {"formulation": "MORTAR", "smoothing": "HERMITE"},
+]
+
+
+@pytest.mark.parametrize("units", [(-10, 20, -7), (100, -90, 60)])
+@pytest.mark.parametrize("choice", FORMULATIONS, ids=lambda choice: ", ".join(choice.values()))
+def test_formulations(tmp_path, reference, choice, units):
+    parameters = {"h": 0.05, "t_end": 1.5, "frame": 0.5, **choice}
+    run = run_deck(in_units(*units, **parameters), tmp_path)
+    assert run.history["active"].any()
+    assert_same_bits(run, reference(**parameters), units)
+
+
 def test_cut_steps(tmp_path, reference):
     """Where Newton's method fails at first, the decisions too are the same."""
     units = (9, -4, -6)

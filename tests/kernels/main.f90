@@ -18,13 +18,17 @@ program main
    use test_csr, only : collect_csr
    use test_dgrad, only : collect_dgrad
    use test_dgrad_series, only : collect_dgrad_series
+   use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
+   use test_gauss, only : collect_gauss
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
    use test_lapack, only : collect_lapack
    use test_law, only : collect_law
    use test_loads, only : collect_loads
    use test_march, only : collect_march
+   use test_mortar, only : collect_mortar
+   use test_mortar_pair, only : collect_mortar_pair
    use test_newton, only : collect_newton
    use test_nts, only : collect_nts
    use test_nts_gap, only : collect_nts_gap
@@ -67,9 +71,11 @@ program main
    call run("umfpack", collect_umfpack)
    call run("cholmod", collect_cholmod)
    call run("lapack", collect_lapack)
+   call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)
    call run("dgrad_series", collect_dgrad_series)
    call run("dgrad", collect_dgrad)
+   call run("dgrad_wide", collect_dgrad_wide)
    call run("shape", collect_shape)
    call run("law", collect_law)
    call run("element", collect_element)
@@ -79,6 +85,8 @@ program main
    call run("nts_gap", collect_nts_gap)
    call run("nts", collect_nts)
    call run("hermite_gap", collect_hermite_gap)
+   call run("mortar_pair", collect_mortar_pair)
+   call run("mortar", collect_mortar)
    call run("numbering", collect_numbering)
    call run("bodies", collect_bodies)
    call run("loads", collect_loads)

@@ -7,7 +7,7 @@ module small_scenes
    implicit none
    private
    public :: block_t, scene_begin, add_block, block_node, add_surface, add_step, prescribe, clamp
-   public :: add_load, make_block, make_two_blocks, shake
+   public :: add_load, make_block, make_two_blocks, bend_scene, shake
    public :: bottom, right, top, left, young, poisson
 
    !> Sides of a block, counter-clockwise.
@@ -234,6 +234,14 @@ contains
       pair%master = 1
       scene%pair = [pair]
    end subroutine make_two_blocks
+
+   !> Move all nodes up by `curvature` x^2/2: a circle of that curvature near x = 0.
+   pure subroutine bend_scene(scene, curvature)
+      type(scene_t), intent(inout) :: scene
+      real(wp), intent(in) :: curvature
+
+      scene%x(2, :) = scene%x(2, :) + 0.5_wp*curvature*scene%x(1, :)**2
+   end subroutine bend_scene
 
    !> Random field of entries in (-size, size).
    subroutine shake(field, size)

@@ -69,6 +69,30 @@ def test_histories(tmp_path, initiation):
     assert_same_fields(first.fields(), second.fields(), 1e-8)
 
 
+COUPLED = [
+    {"formulation": "SEGMENT", "multiplier": "STANDARD"},
+    {"formulation": "MORTAR", "multiplier": "DUAL"},
+    {"formulation": "MORTAR", "multiplier": "STANDARD", "normal": "EDGE"},
+    {"formulation": "MORTAR", "multiplier": "STANDARD", "smoothing": "HERMITE"},
+]
+
+
+@pytest.mark.parametrize("choice", COUPLED, ids=lambda choice: ", ".join(choice.values()))
+def test_coupled_constraints(tmp_path, choice):
+    first, second = (
+        run_deck(DECK, tmp_path / method, h=0.01, t_end=1, method=method, **choice)
+        for method in METHODS
+    )
+    assert first.history["active"].max() >= 3
+    np.testing.assert_array_equal(first.history["active"], second.history["active"])
+    for name in COLUMNS:
+        scale = max(np.abs(first.history[name]).max(), first.history["total"][0])
+        np.testing.assert_allclose(
+            first.history[name], second.history[name], rtol=0, atol=1e-8*scale, err_msg=name
+        )
+    assert_same_fields(first.fields(), second.fields(), 1e-8)
+
+
 def test_static_contact(tmp_path):
     deck = DECKS / "two_blocks_static.inp"
     first, second = (run_deck(deck, tmp_path / m, method=m) for m in METHODS)

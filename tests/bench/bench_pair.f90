@@ -1,0 +1,178 @@
+!> Time per contact kernel: one pair of edges with first and second derivatives.
+!>
+!> Prints a table; asserts nothing. The time is the least of several runs over random pairs, all of
+!> them covered in part. Orientation: a smoothed segment takes some 20 times as long as a node.
+program bench_pair
+   use, intrinsic :: iso_fortran_env, only : output_unit
+   use emcon_chain, only : chain_t
+   use emcon_dgrad10, only : dg10_t => dg_t
+   use emcon_dgrad13, only : dg13_t => dg_t
+   use emcon_dgrad15, only : dg15_t => dg_t
+   use emcon_dgrad17, only : dg17_t => dg_t
+   use emcon_gauss, only : gauss_points
+   use emcon_hermite, only : hermite_stencil_t
+   use emcon_hermite_gap, only : hermite_begin, hermite_gap
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_mortar_frame, only : n_moment, n_place, pair_stencil_t
+   use emcon_mortar_pair2, only : segment_moments2 => segment_moments
+   use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
+   use emcon_mortar_stencil, only : stencil_master, stencil_slave
+   use emcon_nts_gap, only : nts_gap
+   implicit none
+   integer, parameter :: n_case = 200, n_run = 15, n_kind = 9
+   character(len=40), parameter :: name(n_kind) = [character(len=40) :: "node over polygon edge", &
+      "node over smoothed edge", "segment, edge normal", "segment, averaged normal", &
+      "segment, edge normal, smoothed", "segment, averaged normal, smoothed", &
+      "Gauss point, edge normal", "Gauss point, averaged normal", &
+      "Gauss point, averaged normal, smoothed"]
+   !> Slave edge, master edge, nodes beside either; slave node, edge, nodes before and after.
+   real(wp), parameter :: pair_x(2, n_place) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.9_wp, &
+      -0.1_wp, -0.2_wp, -0.1_wp, -0.9_wp, 0.1_wp, 2.1_wp, 0.1_wp, 1.9_wp, -0.2_wp, -1.3_wp, &
+      -0.2_wp], [2, n_place])
+   real(wp), parameter :: node_x(2, 7) = reshape([0.4_wp, 0.1_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+      2.0_wp, -0.1_wp, -0.9_wp, -0.1_wp, 3.0_wp, -0.3_wp, -2.0_wp, -0.3_wp], [2, 7])
+   real(wp) :: point(2), weight(2)
+   integer :: kind
+
+   call gauss_points(point, weight)
+   write(output_unit, "(/, a)") "Contact kernels with first and second derivatives"
+   write(output_unit, "(a40, a12)") "kernel", "ns/call"
+   do kind = 1, n_kind
+      call bench(kind)
+   end do
+
+contains
+
+   subroutine bench(kind)
+      integer, intent(in) :: kind
+      real(wp) :: x0(2, n_place, n_case), dx(2, n_place, n_case), total
+      type(pair_stencil_t) :: stencil
+      real(dp) :: seconds
+      integer(int64) :: begin, end, rate
+      integer :: run, i
+
+      call random_number(x0)
+      call random_number(dx)
+      x0 = 0.1_wp*(x0 - 0.5_wp)
+      dx = 0.1_wp*(dx - 0.5_wp)
+      do i = 1, n_case
+         if (kind <= 2) x0(:, :7, i) = x0(:, :7, i) + node_x
+         if (kind > 2) x0(:, :, i) = x0(:, :, i) + pair_x
+      end do
+      if (kind > 2) stencil = stencil_of(kind)
+      seconds = huge(seconds)
+      total = 0.0_wp
+      do run = 1, n_run
+         call system_clock(begin, rate)
+         do i = 1, n_case
+            call evaluate(kind, stencil, x0(:, :, i), dx(:, :, i), total)
+         end do
+         call system_clock(end)
+         seconds = min(seconds, real(end - begin, dp)/real(rate, dp))
+      end do
+      if (total > huge(total)) write(output_unit, "(a)") "not finite"
+      write(output_unit, "(a40, f12.0)") name(kind), 1.0e9_dp*seconds/real(n_case, dp)
+   end subroutine bench
+
+   function stencil_of(kind) result(stencil)
+      integer, intent(in) :: kind
+      type(pair_stencil_t) :: stencil
+      type(chain_t) :: slave, master
+      logical, parameter :: is_corner(3) = [.true., .false., .false.]
+
+      call make_chain([5, 1, 2, 6], slave)
+      call make_chain([7, 3, 4, 8], master)
+      call stencil_slave(stencil, slave, 2, all(kind /= [3, 5, 7]), is_corner)
+      call stencil_master(stencil, master, 2, any(kind == [5, 6, 9]), kind > 6, is_corner)
+   end function stencil_of
+
+   subroutine make_chain(node, chain)
+      integer, intent(in) :: node(4)
+      type(chain_t), intent(out) :: chain
+
+      allocate(chain%edge, source=reshape(node([1, 2, 2, 3, 3, 4]), [2, 3]))
+      allocate(chain%previous, source=[0, 1, 2])
+      allocate(chain%next, source=[2, 3, 0])
+      allocate(chain%length, source=abs(pair_x(1, node(2:)) - pair_x(1, node(:3))))
+   end subroutine make_chain
+
+   subroutine evaluate(kind, stencil, x0, dx, total)
+      integer, intent(in) :: kind
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: x0(:, :), dx(:, :)
+      real(wp), intent(inout) :: total           !! so that nothing is left out as unused
+
+      select case (kind)
+      case (1)
+         call evaluate_node(x0, dx, total)
+      case (2)
+         call evaluate_smooth_node(x0, dx, total)
+      case (3:4)
+         call evaluate_segment2(stencil, x0, dx, total)
+      case (5:6)
+         call evaluate_segment4(stencil, x0, dx, total)
+      case default
+         call evaluate_point(stencil, x0, dx, total)
+      end select
+   end subroutine evaluate
+
+   subroutine evaluate_node(x0, dx, total)
+      real(wp), intent(in) :: x0(:, :), dx(:, :)
+      real(wp), intent(inout) :: total
+      type(dg10_t) :: gap
+
+      gap = nts_gap(x0(:, :5), dx(:, :5), 5, 4, 0.0_wp)
+      total = total + gap%h(1, 1)
+   end subroutine evaluate_node
+
+   subroutine evaluate_smooth_node(x0, dx, total)
+      real(wp), intent(in) :: x0(:, :), dx(:, :)
+      real(wp), intent(inout) :: total
+      type(hermite_stencil_t) :: stencil
+      type(dg15_t) :: gap
+      real(wp) :: start(3)
+      logical :: is_there
+
+      stencil%node = [6, 4, 2, 3, 5, 7]
+      stencil%length = 1.0_wp
+      call hermite_begin(stencil, x0(:, :7), start)
+      call hermite_gap(stencil, x0(:, :7), dx(:, :7), start, gap, is_there)
+      if (.not. is_there) write(output_unit, "(a)") "no closest point"
+      total = total + gap%h(1, 1)
+   end subroutine evaluate_smooth_node
+
+   subroutine evaluate_segment2(stencil, x0, dx, total)
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: x0(:, :), dx(:, :)
+      real(wp), intent(inout) :: total
+      type(dg13_t) :: moment(n_moment)
+      logical :: is_there
+
+      call segment_moments2(stencil, x0, dx, point, weight, moment, is_there)
+      if (.not. is_there) write(output_unit, "(a)") "no overlap"
+      total = total + moment(1)%h(1, 1)
+   end subroutine evaluate_segment2
+
+   subroutine evaluate_segment4(stencil, x0, dx, total)
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: x0(:, :), dx(:, :)
+      real(wp), intent(inout) :: total
+      type(dg17_t) :: moment(n_moment)
+      logical :: is_there
+
+      call segment_moments4(stencil, x0, dx, point, weight, moment, is_there)
+      if (.not. is_there) write(output_unit, "(a)") "no overlap"
+      total = total + moment(1)%h(1, 1)
+   end subroutine evaluate_segment4
+
+   subroutine evaluate_point(stencil, x0, dx, total)
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: x0(:, :), dx(:, :)
+      real(wp), intent(inout) :: total
+      type(dg17_t) :: gap, length
+
+      call point_gap(stencil, x0, dx, 0.5_wp, gap, length)
+      total = total + gap%h(1, 1) + length%h(1, 1)
+   end subroutine evaluate_point
+
+end program bench_pair
