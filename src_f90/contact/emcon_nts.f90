@@ -1,20 +1,26 @@
 !> Node-to-segment contact: one constraint per slave node, gap over the nearest master edge.
+!>
+!> The master surface is a polygon, or smoothed. A surface may be in contact with itself.
+!> Source: docs/theory.md, section 4.
 module emcon_nts
-   use emcon_chain, only : chain_init, chain_t, chain_tributary
+   use emcon_chain, only : chain_corners, chain_init, chain_t, chain_tributary
    use emcon_contact, only : constraint_resize, constraint_t, contact_t, gap_state_t
-   use emcon_dgrad10, only : dg_t
+   use emcon_dgrad10, only : dg10_t => dg_t
+   use emcon_dgrad15, only : dg15_t => dg_t
    use emcon_errors, only : error_t
+   use emcon_hermite_gap, only : hermite_gap, hermite_gap_value
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_nts_gap, only : nts_gap, nts_gap_value
-   use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_none
+   use emcon_nts_stencil, only : edge_distance, most_nodes, polygon_stencil, smooth_stencil, &
+      smooth_stencil_t, stencil_gather, stencil_length
+   use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite, &
+      smoothing_none
+   use emcon_self_contact, only : self_contact_is_apart, self_contact_may_touch
    use emcon_sort, only : find_sorted
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
-
-   !> Corners sharper than this (cosine of the turn) end the surface: the bisector degenerates.
-   real(wp), parameter :: sharpest_cosine = -0.9_wp
 
    !> So far past the end of a surface, per edge, a node is still over it: a node that meets the end
    !> exactly (as on a plane of symmetry) must not be lost to round-off.
@@ -25,9 +31,15 @@ module emcon_nts
    type, extends(contact_t) :: nts_t
       type(chain_t) :: slave
       type(chain_t) :: master
+      logical :: is_self = .false.                    !! a surface in contact with itself
       integer :: smoothing = smoothing_none
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
       type(near_list_t) :: near
+      logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
+                                                      !! first node
+      type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
+      logical, allocatable :: is_lost(:)              !! (n_constraint) no unique closest point when
+                                                      !! last evaluated, since the last measurement
    contains
       procedure :: begin_step => nts_begin_step
       procedure :: configure => nts_configure
@@ -50,6 +62,7 @@ contains
       if (allocated(error)) return
       call chain_init(self%master, scene, scene%surface(pair%master), error)
       if (allocated(error)) return
+      self%is_self = pair%slave == pair%master
       self%node = self%slave%node
       self%n_constraint = size(self%node)
       allocate(self%edge(self%n_constraint), source=0)
@@ -69,113 +82,70 @@ contains
          scene%u0, 0.0_wp)
    end subroutine nts_init
 
-   !> Choose for each slave node the nearest master edge at the start of the step.
-   pure subroutine nts_begin_step(self, x, u0, du)
-      class(nts_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      integer :: i, k, e
-      real(wp) :: distance, best
-
-      call near_list_update(self%near, x, u0, du, self%reach)
-      do i = 1, self%n_constraint
-         self%edge(i) = 0
-         best = huge(best)
-         do k = self%near%candidates%start(i), self%near%candidates%start(i + 1) - 1
-            e = self%near%candidates%edge(k)
-            distance = edge_distance(x, u0, self%node(i), self%master%edge(:, e))
-            if (distance < best) then
-               best = distance
-               self%edge(i) = e
-            end if
-         end do
-      end do
-   end subroutine nts_begin_step
-
-   !> Distance of a node from an edge as a segment.
-   pure real(wp) function edge_distance(x, u, node, edge)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: node, edge(2)
-      real(wp) :: a(2), b(2), xi
-
-      a = (x(:, edge(2)) - x(:, edge(1))) + (u(:, edge(2)) - u(:, edge(1)))
-      b = (x(:, node) - x(:, edge(1))) + (u(:, node) - u(:, edge(1)))
-      xi = max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))
-      b = b - xi*a
-      edge_distance = sqrt(dot_product(b, b))
-   end function edge_distance
-
-   !> Nodes of the stencil of constraint `i`: slave, edge, and what is there before and after.
-   pure subroutine stencil(self, i, x, u0, n, node, before, after)
-      type(nts_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      integer, intent(out) :: n, node(:), before, after
-      integer :: e
-
-      node(1) = self%node(i)
-      node(2:3) = self%master%edge(:, self%edge(i))
-      n = 3
-      before = 0
-      after = 0
-      e = self%master%previous(self%edge(i))
-      if (e > 0) then
-         if (is_smooth(x, u0, self%master%edge(1, e), node(2), node(3))) then
-            n = n + 1
-            before = n
-            node(n) = self%master%edge(1, e)
-         end if
-      end if
-      e = self%master%next(self%edge(i))
-      if (e > 0) then
-         if (is_smooth(x, u0, node(2), node(3), self%master%edge(2, e))) then
-            n = n + 1
-            after = n
-            node(n) = self%master%edge(2, e)
-         end if
-      end if
-   end subroutine stencil
-
-   !> Is the corner a-b-c blunt enough for a bisector?
-   pure logical function is_smooth(x, u, a, b, c)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: a, b, c
-      real(wp) :: d(2), e(2)
-
-      d = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
-      e = (x(:, c) - x(:, b)) + (u(:, c) - u(:, b))
-      is_smooth = dot_product(d, e) > sharpest_cosine*sqrt(dot_product(d, d)*dot_product(e, e))
-   end function is_smooth
-
-   !> Positions of the stencil's nodes at the start relative to its edge, and their motion.
-   pure subroutine gather(x, u0, du, n, node, local, dlocal)
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      integer, intent(in) :: n, node(:)
-      real(wp), intent(out) :: local(:, :), dlocal(:, :)
-      integer :: k
-
-      do k = 1, n
-         local(:, k) = (x(:, node(k)) - x(:, node(2))) + (u0(:, node(k)) - u0(:, node(2)))
-         dlocal(:, k) = du(:, node(k))
-      end do
-   end subroutine gather
-
-   !> Reference length of the stencil's edge: what gaps are measured against.
-   pure real(wp) function edge_length(x, node)
-      real(wp), intent(in) :: x(:, :)
-      integer, intent(in) :: node(:)
-      real(wp) :: a(2)
-
-      a = x(:, node(3)) - x(:, node(2))
-      edge_length = sqrt(dot_product(a, a))
-   end function edge_length
-
    pure subroutine nts_configure(self, x, options)
       class(nts_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       type(contact_options_t), intent(in) :: options
 
       self%smoothing = options%smoothing
+      if (self%smoothing /= smoothing_hermite) return
+      if (.not. allocated(self%smooth)) then
+         allocate(self%is_corner(self%master%n_edge), self%smooth(self%n_constraint))
+         allocate(self%is_lost(self%n_constraint), source=.false.)
+      end if
+      call chain_corners(self%master, x, options%smoothing_angle, self%is_corner)
    end subroutine nts_configure
+
+   !> Choose for each slave node the nearest master edge at the start of the step.
+   pure subroutine nts_begin_step(self, x, u0, du)
+      class(nts_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer :: i, k
+      real(wp) :: best
+
+      call near_list_update(self%near, x, u0, du, self%reach)
+      do i = 1, self%n_constraint
+         self%edge(i) = 0
+         best = huge(best)
+         do k = self%near%candidates%start(i), self%near%candidates%start(i + 1) - 1
+            call choose_nearer(self, i, self%near%candidates%edge(k), x, u0, best)
+         end do
+         call settle(self, i, x, u0)
+      end do
+   end subroutine nts_begin_step
+
+   !> Take edge `e` for constraint `i` if it is nearer than `best`.
+   pure subroutine choose_nearer(self, i, e, x, u, best)
+      type(nts_t), intent(inout) :: self
+      integer, intent(in) :: i, e
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp), intent(inout) :: best
+      real(wp) :: distance
+
+      distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
+      if (.not. distance < best) return
+      if (self%is_self) then
+         if (.not. self_contact_may_touch(self%slave, i, e, x, u)) return
+      end if
+      best = distance
+      self%edge(i) = e
+   end subroutine choose_nearer
+
+   !> Finish the choice for constraint `i`: a node beside its edge, over others of its own surface
+   !> that it must not touch, has none.
+   pure subroutine settle(self, i, x, u0)
+      type(nts_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+
+      if (self%edge(i) == 0) return
+      if (self%is_self) then
+         if (.not. is_covered(self, i, x, u0)) self%edge(i) = 0
+      end if
+      if (self%smoothing /= smoothing_hermite .or. self%edge(i) == 0) return
+      call smooth_stencil(self%smooth(i), self%master, self%is_corner, self%node(i), &
+         self%edge(i), self%rounding, x, u0)
+   end subroutine settle
 
    pure subroutine nts_measure(self, x, u0, du)
       class(nts_t), intent(inout) :: self
@@ -185,71 +155,141 @@ contains
       do i = 1, self%n_constraint
          self%state(i) = gap_state(self, i, x, u0, du)
       end do
+      if (self%smoothing /= smoothing_hermite) return
+      self%state%is_covered = self%state%is_covered .and. .not. self%is_lost
+      self%is_lost = .false.
    end subroutine nts_measure
 
+   !> Where the smoothed surface has no unique closest point its polygon gives the gap, and the
+   !> stencil does not hold: a step in which the node is to act is cut.
    pure function gap_state(self, i, x, u0, du) result(state)
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
-      integer :: n, node(5), before, after, k
-      real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1, xi
+      logical :: is_found
 
       if (self%edge(i) == 0) return
-      call stencil(self, i, x, u0, n, node, before, after)
-      call gather(x, u0, du, n, node, local, dlocal)
-      state%size = edge_length(x, node)
+      if (self%smoothing == smoothing_hermite) then
+         call smooth_state(self, i, x, u0, du, state, is_found)
+         if (is_found) return
+      end if
+      state = polygon_state(self, i, x, u0, du)
+      if (self%smoothing == smoothing_hermite) state%is_covered = .false.
+   end function gap_state
+
+   pure function polygon_state(self, i, x, u0, du) result(state)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(gap_state_t) :: state
+      integer :: n, node(5), before, after, k
+      real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1
+
+      call polygon_stencil(self%master, self%node(i), self%edge(i), x, u0, n, node, before, after)
+      call stencil_gather(x, u0, du, n, node, local, dlocal)
+      state%size = stencil_length(x, node)
       call nts_gap_value(local(:, :n), before, after, self%rounding*state%size, state%gap0, xi0)
       do k = 1, n
          local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
       end do
       call nts_gap_value(local(:, :n), before, after, self%rounding*state%size, state%gap1, xi1)
       state%is_near = .true.
+      state%is_over = is_over(state, xi0, xi1, [before > 0, after > 0])
+      state%is_covered = .true.
+      if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, x, u0, du)
+   end function polygon_state
+
+   pure subroutine smooth_state(self, i, x, u0, du, state, is_found)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(gap_state_t), intent(out) :: state
+      logical, intent(out) :: is_found
+      real(wp) :: local(2, most_nodes), dlocal(2, most_nodes), place(3), xi0
+      integer :: k
+
+      associate (n => self%smooth(i)%n, node => self%smooth(i)%node, &
+            curve => self%smooth(i)%curve, xi1 => place(1))
+         call stencil_gather(x, u0, du, n, node, local, dlocal)
+         place = self%smooth(i)%place
+         call hermite_gap_value(curve, local(:, :n), place, state%gap0, is_found)
+         if (.not. is_found) return
+         xi0 = place(1)
+         do k = 1, n
+            local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
+         end do
+         call hermite_gap_value(curve, local(:, :n), place, state%gap1, is_found)
+         if (.not. is_found) return
+         state%size = stencil_length(x, node)
+         state%is_near = .true.
+         state%is_over = is_over(state, xi0, xi1, curve%node([2, 5]) > 0 .and. &
+            (curve%has_neighbour .or. .not. curve%is_corner([3, 4])))
+         ! The curve goes on over one edge on either side, unless a corner or an end is there.
+         state%is_covered = (xi1 >= -1.0_wp .or. curve%node(1) == 0 .or. curve%is_corner(3)) .and. &
+            (xi1 <= 2.0_wp .or. curve%node(6) == 0 .or. curve%is_corner(4))
+         if (state%is_covered .and. (xi1 < 0.0_wp .or. xi1 > 1.0_wp)) then
+            state%is_covered = is_covered(self, i, x, u0, du)
+         end if
+      end associate
+   end subroutine smooth_state
+
+   !> Is a node over the surface, from `xi0` to `xi1` along its edge, where the gap closes, or else
+   !> at the start?
+   pure logical function is_over(state, xi0, xi1, goes_on)
+      type(gap_state_t), intent(in) :: state
+      real(wp), intent(in) :: xi0, xi1
+      logical, intent(in) :: goes_on(2)          !! does the surface go on before, after the edge?
+      real(wp) :: xi
+
       xi = xi0
       if (state%gap1 < 0.0_wp .and. state%gap0 > 0.0_wp) then
          xi = xi0 + (state%gap0/(state%gap0 - state%gap1))*(xi1 - xi0)
       end if
-      state%is_over = (before > 0 .or. xi >= -end_tol) .and. (after > 0 .or. xi <= 1.0_wp + end_tol)
-      state%is_covered = .true.
-      if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, x, u0, du)
-   end function gap_state
+      is_over = (goes_on(1) .or. xi >= -end_tol) .and. (goes_on(2) .or. xi <= 1.0_wp + end_tol)
+   end function is_over
 
-   !> Is the edge or one of its neighbours the nearest at the end of the step, rather than the edges
+   !> Is the edge or one of its neighbours the nearest after the motion `du`, rather than the edges
    !> after next?
    pure logical function is_covered(self, i, x, u0, du)
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp), intent(in), contiguous, optional :: du(:, :)
       real(wp) :: inside, outside
       integer :: e, k, side
 
-      inside = end_distance(self%edge(i))
+      inside = distance_of(self%edge(i))
       outside = huge(outside)
       do side = 1, 2
          e = self%edge(i)
          do k = 1, 2
-            if (e == 0) exit
             e = merge(self%master%previous(e), self%master%next(e), side == 1)
             if (e == 0) exit
-            if (k == 1) inside = min(inside, end_distance(e))
-            if (k == 2) outside = min(outside, end_distance(e))
+            if (k == 1) inside = min(inside, distance_of(e))
+            if (k == 1) cycle
+            if (self%is_self) then
+               if (.not. self_contact_is_apart(self%slave, i, e)) exit
+            end if
+            outside = min(outside, distance_of(e))
          end do
       end do
       is_covered = inside <= outside
 
    contains
 
-      !> Distance of the slave node from edge `e` at the end of the step.
-      pure real(wp) function end_distance(e)
+      !> Distance of the slave node from edge `e`.
+      pure real(wp) function distance_of(e)
          integer, intent(in) :: e
          real(wp) :: u(2, 3), local(2, 3)
 
          associate (node => [self%node(i), self%master%edge(:, e)])
             local = x(:, node)
-            u = u0(:, node) + du(:, node)
+            u = u0(:, node)
+            if (present(du)) u = u + du(:, node)
          end associate
-         end_distance = edge_distance(local, u, 1, [2, 3])
-      end function end_distance
+         distance_of = edge_distance(local, u, 1, [2, 3])
+      end function distance_of
 
    end function is_covered
 
@@ -259,26 +299,75 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), intent(in) :: target(:)
       type(constraint_t), intent(inout) :: item(:)
-      integer :: n, node(5), before, after, k
-      real(wp) :: local(2, 5), dlocal(2, 5)
-      type(dg_t) :: gap
+      integer :: k
+      logical :: is_found
 
       do k = 1, size(wanted)
-         call stencil(self, wanted(k), x, u0, n, node, before, after)
-         call gather(x, u0, du, n, node, local, dlocal)
-         call constraint_resize(item(k), n)
-         item(k)%n_slave = 1
-         item(k)%node(:n) = node(:n)
-         item(k)%size = edge_length(x, node)
-         gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*item(k)%size)
-         item(k)%gap0 = gap%f0 - target(k)
-         item(k)%gap1 = gap%f1 - target(k)
-         item(k)%dgap = gap%df
-         item(k)%g(:, :n) = reshape(gap%g(:2*n), [2, n])
-         item(k)%c(:, :n) = reshape(gap%c(:2*n), [2, n])
-         item(k)%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+         if (self%smoothing == smoothing_hermite) then
+            call smooth_constraint(self%smooth(wanted(k)), x, u0, du, target(k), item(k), is_found)
+            self%is_lost(wanted(k)) = .not. is_found
+            if (is_found) cycle
+         end if
+         call polygon_constraint(self, wanted(k), x, u0, du, target(k), item(k))
       end do
    end subroutine nts_evaluate
+
+   pure subroutine polygon_constraint(self, i, x, u0, du, target, item)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target
+      type(constraint_t), intent(inout) :: item
+      integer :: n, node(5), before, after
+      real(wp) :: local(2, 5), dlocal(2, 5)
+      type(dg10_t) :: gap
+
+      call polygon_stencil(self%master, self%node(i), self%edge(i), x, u0, n, node, before, after)
+      call stencil_gather(x, u0, du, n, node, local, dlocal)
+      call begin_constraint(item, x, node(:n))
+      gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*item%size)
+      item%gap0 = gap%f0 - target
+      item%gap1 = gap%f1 - target
+      item%dgap = gap%df
+      item%g(:, :n) = reshape(gap%g(:2*n), [2, n])
+      item%c(:, :n) = reshape(gap%c(:2*n), [2, n])
+      item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+   end subroutine polygon_constraint
+
+   pure subroutine smooth_constraint(smooth, x, u0, du, target, item, is_found)
+      type(smooth_stencil_t), intent(in) :: smooth
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target
+      type(constraint_t), intent(inout) :: item
+      logical, intent(out) :: is_found
+      real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
+      type(dg15_t) :: gap
+
+      associate (n => smooth%n, node => smooth%node)
+         call stencil_gather(x, u0, du, n, node, local, dlocal)
+         call hermite_gap(smooth%curve, local(:, :n), dlocal(:, :n), smooth%place, gap, is_found)
+         if (.not. is_found) return
+         call begin_constraint(item, x, node(:n))
+         item%gap0 = gap%f0 - target
+         item%gap1 = gap%f1 - target
+         item%dgap = gap%df
+         item%g(:, :n) = reshape(gap%g(:2*n), [2, n])
+         item%c(:, :n) = reshape(gap%c(:2*n), [2, n])
+         item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+      end associate
+   end subroutine smooth_constraint
+
+   !> Nodes and size of a constraint over `node`: slave node, edge, further ones.
+   pure subroutine begin_constraint(item, x, node)
+      type(constraint_t), intent(inout) :: item
+      real(wp), intent(in) :: x(:, :)
+      integer, intent(in) :: node(:)
+
+      call constraint_resize(item, size(node))
+      item%n_slave = 1
+      item%node(:size(node)) = node
+      item%size = stencil_length(x, node)
+   end subroutine begin_constraint
 
    pure subroutine nts_area(self, x, u, area, length)
       class(nts_t), intent(in) :: self
@@ -297,8 +386,8 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       real(wp), intent(out) :: gap
-      logical, intent(out) :: is_over
-      real(wp) :: distance, best
+      logical, intent(out) :: is_over            !! .false. also if there is no edge
+      real(wp) :: best
       real(wp) :: zero(size(x, 1), size(x, 2))
       type(gap_state_t) :: state
       integer :: e
@@ -306,12 +395,9 @@ contains
       best = huge(best)
       self%edge(i) = 0
       do e = 1, self%master%n_edge
-         distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
-         if (distance < best) then
-            best = distance
-            self%edge(i) = e
-         end if
+         call choose_nearer(self, i, e, x, u, best)
       end do
+      call settle(self, i, x, u)
       zero = 0.0_wp
       state = gap_state(self, i, x, u, zero)
       gap = state%gap0

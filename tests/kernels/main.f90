@@ -23,6 +23,7 @@ program main
    use test_gauss, only : collect_gauss
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
+   use test_initial_contact, only : collect_initial_contact
    use test_lapack, only : collect_lapack
    use test_law, only : collect_law
    use test_loads, only : collect_loads
@@ -70,6 +71,7 @@ program main
    call run("triple_product", collect_triple_product)
    call run("umfpack", collect_umfpack)
    call run("cholmod", collect_cholmod)
+   call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)

@@ -5,10 +5,11 @@ module test_nts
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_nts, only : nts_init, nts_nearest, nts_t
-   use emcon_scene, only : contact_pair_t, scene_t
+   use emcon_nts_stencil, only : smooth_stencil, smooth_stencil_t
+   use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite
    use emcon_text, only : to_text
-   use small_scenes, only : add_block, add_surface, block_t, bottom, left, make_two_blocks, right, &
-      scene_begin, shake, top
+   use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, &
+      make_two_blocks, right, scene_begin, shake, top
    implicit none
    private
    public :: collect_nts
@@ -26,7 +27,11 @@ contains
          test_case_t("nearest edge all along a random walk", test_walk), &
          test_case_t("no candidates while far apart", test_apart), &
          test_case_t("evaluation equals the state", test_evaluate), &
-         test_case_t("areas", test_area)]
+         test_case_t("areas", test_area), &
+         test_case_t("smoothed: values, identity, momenta", test_smooth), &
+         test_case_t("smoothed: lost near the centre of curvature", test_lost), &
+         test_case_t("smoothed surface ends at its own slave node", test_own_node), &
+         test_case_t("a strip in contact with itself", test_self)]
    end subroutine collect_nts
 
    !> A gap of 1/4 that closes by 3/8 in the middle of the step.
@@ -232,5 +237,204 @@ contains
       call check_near(error, area, [0.75_wp, 1.5_wp, 0.75_wp], tol, 1.0_wp, "areas at scale 3")
       call check_near(error, length, 2.0_wp*area, tol, 1.0_wp, "lengths")
    end subroutine test_area
+
+   !> Both blocks in contact over a smoothed surface, smooth and with corners.
+   subroutine make_smooth(scene, nts, angle, error)
+      type(scene_t), intent(out) :: scene
+      type(nts_t), intent(out) :: nts
+      real(wp), intent(in) :: angle              !! of corners [degrees]
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_options_t) :: options
+      type(block_t) :: lower, upper
+
+      call make_two_blocks(scene, 0.25_wp, lower, upper)
+      call nts_init(nts, scene, scene%pair(1), error)
+      if (allocated(error)) return
+      options%smoothing = smoothing_hermite
+      options%smoothing_angle = angle
+      call nts%configure(scene%x, options)
+   end subroutine make_smooth
+
+   !> What is evaluated is what is measured; the discrete gradient makes up the difference of the
+   !> gaps and has neither force nor moment. A place or a normal is known to some 100 roundings.
+   subroutine test_smooth(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(nts_t) :: nts
+      type(constraint_t) :: item(1)
+      real(wp), allocatable :: u(:, :), du(:, :)
+      real(wp) :: middle(2), moment
+      integer :: i, j, k, n, most
+
+      most = 0
+      do k = 1, 60
+         call make_smooth(scene, nts, 60.0_wp, error)
+         if (allocated(error)) return
+         if (mod(k, 3) == 0) nts%is_corner([2, 4]) = .true.
+         nts%rounding = merge(1.0e-2_wp, 0.0_wp, mod(k, 2) == 0)
+         allocate(u, du, source=0.0_wp*scene%x)
+         call shake(u, 0.1_wp)
+         call shake(du, 0.2_wp)
+         call nts%begin_step(scene%x, u, du)
+         call nts%measure(scene%x, u, du)
+         do i = 1, 3
+            call nts%evaluate([i], scene%x, u, du, [0.125_wp], item)
+            associate (constraint => item(1), state => nts%state(i))
+               n = constraint%n_node
+               most = max(most, n)
+               call check_equal(error, constraint%node(1), nts%node(i), "slave node first")
+               call check_near(error, [constraint%gap0, constraint%gap1, constraint%size], &
+                  [state%gap0 - 0.125_wp, state%gap1 - 0.125_wp, state%size], 16.0_wp*tol, 1.0_wp, &
+                  "values")
+               call check_near(error, sum(constraint%g(:, :n)*du(:, constraint%node(:n))), &
+                  constraint%dgap, 16.0_wp*tol, 1.0_wp, "identity")
+               call check_near(error, constraint%dgap, constraint%gap1 - constraint%gap0, &
+                  16.0_wp*tol, 1.0_wp, "difference of the gaps")
+               call check_near(error, sum(constraint%g(:, :n), dim=2), [0.0_wp, 0.0_wp], &
+                  16.0_wp*tol, 1.0_wp, "force")
+               moment = 0.0_wp
+               do j = 1, n
+                  middle = scene%x(:, constraint%node(j)) + u(:, constraint%node(j)) &
+                     + 0.5_wp*du(:, constraint%node(j))
+                  moment = moment + middle(1)*constraint%g(2, j) - middle(2)*constraint%g(1, j)
+               end do
+               call check_near(error, moment, 0.0_wp, 16.0_wp*tol, 2.0_wp, "moment")
+            end associate
+         end do
+         if (allocated(error)) return
+         deallocate(u, du)
+      end do
+      call check_equal(error, most, 6, "nodes of the largest stencil: four edges")
+      call check_true(error, .not. any(nts%is_lost), "no closest point was lost")
+   end subroutine test_smooth
+
+   !> In the middle of a circular dent each point of the surface is equally close: the polygon takes
+   !> over in what is measured and evaluated, and the stencil does not hold.
+   subroutine test_lost(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(nts_t) :: nts, polygon
+      type(constraint_t) :: item(1)
+      real(wp), allocatable :: u(:, :), zero(:, :)
+      real(wp), parameter :: radius = 5.0_wp
+      real(wp) :: angle, middle(2), below(2)     ! the edge from 0 to 1 is below
+      integer :: i
+
+      call make_smooth(scene, nts, 60.0_wp, error)
+      if (allocated(error)) return
+      call nts_init(polygon, scene, scene%pair(1), error)
+      allocate(u, zero, source=0.0_wp*scene%x)
+      do i = 6, 10
+         angle = scene%x(1, i)/radius
+         u(:, i) = radius*[sin(angle), 1.0_wp - cos(angle)] - scene%x(:, i)
+      end do
+      middle = [0.0_wp, radius]
+      below = radius*[sin(0.5_wp/radius), -cos(0.5_wp/radius)]
+      u(:, 12) = middle + 0.05_wp*below - scene%x(:, 12)
+      nts%reach = 0.0_wp
+      zero(2, 12) = 1.0_wp                       ! so far the search has to reach
+      call nts%begin_step(scene%x, u, zero)
+      call polygon%begin_step(scene%x, u, zero)
+      zero = 0.0_wp
+      call nts%measure(scene%x, u, zero)
+      call polygon%measure(scene%x, u, zero)
+      call nts%evaluate([2], scene%x, u, zero, [0.0_wp], item)
+      call check_true(error, nts%state(2)%is_near, "still measured")
+      call check_true(error, .not. nts%state(2)%is_covered, "stencil does not hold")
+      call check_near(error, [nts%state(2)%gap0, nts%state(2)%gap1], polygon%state(2)%gap0 &
+         *[1.0_wp, 1.0_wp], 0.0_wp, 1.0_wp, "gap of the polygon")
+      call check_near(error, item(1)%gap1, polygon%state(2)%gap1, tol, radius, "evaluated")
+      u(:, 12) = middle + 0.5_wp*below - scene%x(:, 12)
+      call nts%begin_step(scene%x, u, zero)
+      call nts%evaluate([2], scene%x, u, zero, [0.0_wp], item)
+      call nts%measure(scene%x, u, zero)
+      call check_true(error, nts%state(2)%is_covered, "found nearer to the surface")
+   end subroutine test_lost
+
+   !> The third edge of a closed surface, with the slave node at the beginning of the first one.
+   subroutine test_own_node(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(contact_pair_t) :: pair
+      type(nts_t) :: nts
+      type(smooth_stencil_t) :: stencil
+      logical :: is_corner(8)
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [3, 1], [0.0_wp, 0.0_wp], [3.0_wp, 1.0_wp], block)
+      call add_surface(scene, "ALL", block, [bottom, right, top, left])
+      pair%slave = 1
+      pair%master = 1
+      call nts_init(nts, scene, pair, error)
+      if (allocated(error)) return
+      is_corner = .false.
+      call smooth_stencil(stencil, nts%master, is_corner, 1, 3, 0.0_wp, scene%x, scene%u0)
+      call check_equal(error, stencil%node(:stencil%n), [1, 3, 4, 2, 8, 7], "nodes")
+      call check_equal(error, stencil%curve%node, [0, 4, 2, 3, 5, 6], "nodes along the surface")
+   end subroutine test_own_node
+
+   !> A strip bent into a U, its top inside. The surface runs along the outside from the left to the
+   !> right end and back inside: nodes of the right leg are slaves of edges of the left one.
+   subroutine test_self(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(contact_pair_t) :: pair
+      type(nts_t) :: nts, all
+      real(wp), allocatable :: u(:, :), du(:, :)
+      real(wp), parameter :: leg = 4.0_wp, radius = 1.5_wp, thickness = 0.5_wp
+      real(wp), parameter :: pi = acos(-1.0_wp)
+      integer, parameter :: n = 24
+      real(wp) :: gap, s
+      logical :: is_over
+      integer :: i, k, side, node
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [n, 1], [0.0_wp, 0.0_wp], &
+         [2.0_wp*leg + pi*radius, thickness], block)
+      call add_surface(scene, "ALL", block, [bottom, right, top, left])
+      pair%slave = 1
+      pair%master = 1
+      call nts_init(nts, scene, pair, error)
+      if (allocated(error)) return
+      call nts_init(all, scene, pair, error)
+      allocate(u, du, source=0.0_wp*scene%x)
+      do k = 1, size(u, 2)
+         u(:, k) = bent(scene%x(:, k)) - scene%x(:, k)
+      end do
+      du(1, :) = 0.4_wp                          ! the search reaches from leg to leg
+      call nts%begin_step(scene%x, u, du)
+      do side = 0, 1
+         do i = 1, n - 1
+            node = block_node(block, i, side)
+            k = findloc(nts%node, node, 1)
+            s = scene%x(1, node)
+            call nts_nearest(all, k, scene%x, u, gap, is_over)
+            call check_equal(error, nts%edge(k), all%edge(k), "edge among the candidates")
+            if (side == 1 .and. s > leg + pi*radius + 1.0_wp) then
+               call check_near(error, gap, 2.0_wp*(radius - thickness), tol, 10.0_wp, &
+                  "distance of the legs at node " // to_text(node))
+               call check_true(error, is_over, "over the other leg")
+            else if (side == 0 .or. s < leg) then
+               call check_equal(error, all%edge(k), 0, "no edge for node " // to_text(node))
+            end if
+         end do
+      end do
+
+   contains
+
+      !> Down the left leg, around the bottom, up the right leg.
+      pure function bent(x) result(y)
+         real(wp), intent(in) :: x(2)
+         real(wp) :: y(2), angle
+
+         angle = max(0.0_wp, min(pi, (x(1) - leg)/radius))
+         y = (radius - x(2))*[-cos(angle), -sin(angle)]
+         if (x(1) < leg) y(2) = leg - x(1)
+         if (x(1) > leg + pi*radius) y(2) = x(1) - leg - pi*radius
+      end function bent
+
+   end subroutine test_self
 
 end module test_nts

@@ -1,0 +1,166 @@
+!> Which nodes the gap of a slave node over a master edge depends on, and where they are.
+module emcon_nts_stencil
+   use emcon_chain, only : chain_t
+   use emcon_hermite, only : hermite_stencil_t
+   use emcon_hermite_gap, only : hermite_begin
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: smooth_stencil_t, polygon_stencil, smooth_stencil
+   public :: stencil_gather, stencil_length, edge_distance
+   public :: most_nodes
+
+   !> Nodes of a stencil at most: slave node and five edges.
+   integer, parameter :: most_nodes = 7
+   !> Corners sharper than this (cosine of the turn) end the polygon: the bisector degenerates.
+   real(wp), parameter :: sharpest_cosine = -0.9_wp
+
+   !> A smoothed surface near a slave node; chosen for a step. Slave node and edge come first.
+   type :: smooth_stencil_t
+      type(hermite_stencil_t) :: curve
+      integer :: n = 0
+      integer :: node(most_nodes) = 0
+      real(wp) :: place(3) = 0.0_wp              !! where closest points are looked for
+   end type smooth_stencil_t
+
+contains
+
+   !> Nodes over the polygon: slave, edge, and what is there before and after.
+   pure subroutine polygon_stencil(master, slave, edge, x, u0, n, node, before, after)
+      type(chain_t), intent(in) :: master
+      integer, intent(in) :: slave, edge
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      integer, intent(out) :: n, node(:), before, after
+      integer :: e
+
+      node(1) = slave
+      node(2:3) = master%edge(:, edge)
+      n = 3
+      before = 0
+      after = 0
+      e = master%previous(edge)
+      if (e > 0) then
+         if (is_blunt(x, u0, master%edge(1, e), node(2), node(3))) then
+            n = n + 1
+            before = n
+            node(n) = master%edge(1, e)
+         end if
+      end if
+      e = master%next(edge)
+      if (e > 0) then
+         if (is_blunt(x, u0, node(2), node(3), master%edge(2, e))) then
+            n = n + 1
+            after = n
+            node(n) = master%edge(2, e)
+         end if
+      end if
+   end subroutine polygon_stencil
+
+   !> Is the corner a-b-c blunt enough for a bisector?
+   pure logical function is_blunt(x, u, a, b, c)
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      integer, intent(in) :: a, b, c
+      real(wp) :: d(2), e(2)
+
+      d = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
+      e = (x(:, c) - x(:, b)) + (u(:, c) - u(:, b))
+      is_blunt = dot_product(d, e) > sharpest_cosine*sqrt(dot_product(d, d)*dot_product(e, e))
+   end function is_blunt
+
+   !> The smoothed surface around `edge`, over two edges on either side of it, for a step from
+   !> `u0`. It ends where an edge of a surface in contact with itself begins at the slave node.
+   pure subroutine smooth_stencil(self, master, is_corner, slave, edge, rounding, x, u0)
+      type(smooth_stencil_t), intent(out) :: self
+      type(chain_t), intent(in) :: master
+      logical, intent(in) :: is_corner(:)        !! (n_edge) at the first node of each
+      integer, intent(in) :: slave, edge
+      real(wp), intent(in) :: rounding           !! of corners, as a fraction of the edge
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
+      integer :: near(5), k, number
+
+      near = 0
+      near(3) = edge
+      near(2) = beside(master%previous(edge))
+      near(4) = beside(master%next(edge))
+      if (near(2) > 0) near(1) = beside(master%previous(near(2)))
+      if (near(4) > 0) near(5) = beside(master%next(near(4)))
+      self%node(:3) = [slave, master%edge(:, edge)]
+      self%n = 3
+      self%curve%node(3:4) = [2, 3]
+      self%curve%rounding = rounding*master%length(edge)
+      do k = 1, 5
+         if (near(k) == 0) cycle
+         self%curve%length(k) = master%length(near(k))
+         self%curve%is_corner(k) = is_corner(near(k))
+         if (k < 3) call add_node(self, master%edge(1, near(k)), number)
+         if (k < 3) self%curve%node(k) = number
+         if (k > 3) call add_node(self, master%edge(2, near(k)), number)
+         if (k > 3) self%curve%node(k + 1) = number
+      end do
+      call stencil_gather(x, u0, u0, self%n, self%node, local, dlocal)
+      call hermite_begin(self%curve, local(:, :self%n), self%place)
+
+   contains
+
+      !> Edge `e`, or 0 if the slave node is its own.
+      pure integer function beside(e)
+         integer, intent(in) :: e
+
+         beside = e
+         if (e == 0) return
+         if (any(master%edge(:, e) == slave)) beside = 0
+      end function beside
+
+   end subroutine smooth_stencil
+
+   !> Number of `node` in the stencil; the nodes of a short closed surface come up twice.
+   pure subroutine add_node(self, node, number)
+      type(smooth_stencil_t), intent(inout) :: self
+      integer, intent(in) :: node
+      integer, intent(out) :: number
+
+      do number = 1, self%n
+         if (self%node(number) == node) return
+      end do
+      self%n = number
+      self%node(number) = node
+   end subroutine add_node
+
+   !> Positions of the stencil's nodes at the start relative to its edge, and their motion.
+   pure subroutine stencil_gather(x, u0, du, n, node, local, dlocal)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer, intent(in) :: n, node(:)
+      real(wp), intent(out) :: local(:, :), dlocal(:, :)
+      integer :: k
+
+      do k = 1, n
+         local(:, k) = (x(:, node(k)) - x(:, node(2))) + (u0(:, node(k)) - u0(:, node(2)))
+         dlocal(:, k) = du(:, node(k))
+      end do
+   end subroutine stencil_gather
+
+   !> Reference length of the stencil's edge: what gaps are measured against.
+   pure real(wp) function stencil_length(x, node)
+      real(wp), intent(in) :: x(:, :)
+      integer, intent(in) :: node(:)
+      real(wp) :: a(2)
+
+      a = x(:, node(3)) - x(:, node(2))
+      stencil_length = sqrt(dot_product(a, a))
+   end function stencil_length
+
+   !> Distance of a node from an edge as a segment.
+   pure real(wp) function edge_distance(x, u, node, edge)
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      integer, intent(in) :: node, edge(2)
+      real(wp) :: a(2), b(2), xi
+
+      a = (x(:, edge(2)) - x(:, edge(1))) + (u(:, edge(2)) - u(:, edge(1)))
+      b = (x(:, node) - x(:, edge(1))) + (u(:, node) - u(:, edge(1)))
+      xi = max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))
+      b = b - xi*a
+      edge_distance = sqrt(dot_product(b, b))
+   end function edge_distance
+
+end module emcon_nts_stencil

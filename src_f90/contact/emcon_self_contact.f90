@@ -1,0 +1,116 @@
+!> Which edges a slave node may touch where a surface may be in contact with itself.
+!>
+!> Of two edges that meet, the one that comes first along the surface is the slave.
+!> Source: docs/theory.md, section 4.
+module emcon_self_contact
+   use emcon_chain, only : chain_distance, chain_t
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: self_contact_may_touch, self_contact_is_apart, chain_faces
+
+   !> Edges face each other if their normals have a cosine below minus this; one lies above the
+   !> other if the way to it and the normal have a cosine above this.
+   real(wp), parameter :: least_facing = 0.05_wp
+   !> Within this distance, per slave edge, they may touch or overlap; a node farther behind an edge
+   !> is on the other side of a strip.
+   real(wp), parameter :: deepest = 0.2_wp
+
+contains
+
+   !> May node `k` of the chain touch edge `e` at x + u? That must be no neighbour, come later along
+   !> the surface, and face the node; unless they touch, each must lie above the other.
+   pure logical function self_contact_may_touch(chain, k, e, x, u) result(may_touch)
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: k                   !! index into the nodes of `chain`
+      integer, intent(in) :: e
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
+      real(wp) :: a(2), b(2), mean(2), length, distance
+      integer :: own, first, n, side
+
+      may_touch = self_contact_is_apart(chain, k, e)
+      if (.not. may_touch) return
+      first = huge(first)
+      length = 0.0_wp
+      n = 0
+      do side = 1, 2
+         own = chain%node_edge(side, k)
+         if (own == 0) cycle
+         first = min(first, chain%place(own))
+         length = length + norm2(way(x, u, chain%edge(:, own)))
+         n = n + 1
+      end do
+      may_touch = chain%place(e) > first
+      if (may_touch) may_touch = chain_faces(chain, k, chain%edge(:, e), x, u)
+      if (.not. may_touch) return
+      a = way(x, u, chain%edge(:, e))
+      b = way(x, u, [chain%edge(1, e), chain%node(k)])
+      b = b - max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))*a
+      distance = norm2(b)
+      if (distance*real(n, wp) <= deepest*length) return
+      mean = mean_along(chain, k, x, u)
+      may_touch = cross(b, a) > least_facing*distance*norm2(a) &
+         .and. cross(mean, b) > least_facing*distance*norm2(mean)
+   end function self_contact_may_touch
+
+   !> Are the edges at node `k` of the chain neither edge `e` nor neighbours of it?
+   pure logical function self_contact_is_apart(chain, k, e) result(is_apart)
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: k, e
+      integer :: side
+
+      is_apart = .true.
+      do side = 1, 2
+         associate (own => chain%node_edge(side, k))
+            if (own > 0) is_apart = is_apart .and. chain_distance(chain, own, e) > 1
+         end associate
+      end do
+   end function self_contact_is_apart
+
+   !> Does the edge between the two of `edge`, of any surface, face the chain at its node `k`?
+   pure logical function chain_faces(chain, k, edge, x, u)
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: k
+      integer, intent(in) :: edge(2)             !! nodes of the scene
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      real(wp) :: a(2), mean(2)
+
+      mean = mean_along(chain, k, x, u)
+      a = way(x, u, edge)
+      chain_faces = dot_product(mean, a) < -least_facing*norm2(mean)*norm2(a)
+   end function chain_faces
+
+   !> Sum of the unit tangents of the edges at node `k`.
+   pure function mean_along(chain, k, x, u) result(mean)
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: k
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      real(wp) :: mean(2), a(2)
+      integer :: side
+
+      mean = 0.0_wp
+      do side = 1, 2
+         associate (own => chain%node_edge(side, k))
+            if (own == 0) cycle
+            a = way(x, u, chain%edge(:, own))
+            mean = mean + a/norm2(a)
+         end associate
+      end do
+   end function mean_along
+
+   pure real(wp) function cross(a, b)
+      real(wp), intent(in) :: a(2), b(2)
+
+      cross = a(1)*b(2) - a(2)*b(1)
+   end function cross
+
+   !> The way from the first to the second of `node` at x + u, differences first.
+   pure function way(x, u, node)
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      integer, intent(in) :: node(2)
+      real(wp) :: way(2)
+
+      way = (x(:, node(2)) - x(:, node(1))) + (u(:, node(2)) - u(:, node(1)))
+   end function way
+
+end module emcon_self_contact
