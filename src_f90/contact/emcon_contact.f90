@@ -28,6 +28,7 @@ module emcon_contact
    type :: gap_state_t
       logical :: is_near = .false.                    !! false: no surface within reach
       logical :: is_over = .false.                    !! over the surface (not past its end)
+      logical :: is_arriving = .false.                !! too little is covered at the start
       logical :: is_leaving = .false.                 !! too little is covered at the end
       logical :: is_covered = .true.                  !! the stencil still holds at the end
       real(wp) :: gap0 = 0.0_wp                       !! mean gap Phi/W [L]

@@ -125,9 +125,10 @@ contains
             state%is_covered = .true.
             state%is_over = area(1) >= least
             state%is_leaving = .not. state%is_over
+            state%is_arriving = area(0) < least
             state%gap0 = 0.0_wp
             state%gap1 = 0.0_wp
-            if (area(0) >= least) state%gap0 = gap(0)/area(0)
+            if (.not. state%is_arriving) state%gap0 = gap(0)/area(0)
             if (state%is_over) state%gap1 = gap(1)/area(1)
             self%scale(i) = max(area(0), least)
             self%cover(i) = area(1)

@@ -219,6 +219,8 @@ contains
                   self%is_active(id) = .false.
                else
                   if (self%is_dropped(id) .or. .not. (gap%is_near .and. gap%is_over)) cycle
+                  ! With nothing to hold at its start, a contact begins with the next step.
+                  if (gap%is_arriving .and. self%has_inertia) cycle
                   if (gap%gap0 < -contact%deepest_start*gap%size .and. &
                      .not. state%is_active(id)) cycle
                   self%deepest = min(self%deepest, gap%gap1/gap%size)
