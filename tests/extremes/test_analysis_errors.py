@@ -108,7 +108,7 @@ def test_touching_is_no_penetration(tmp_path):
 
 def test_adjust_moves_slave_nodes_onto_the_surface(tmp_path):
     deck = ring_moved_down(0.25)
-    deck.replace("TYPE=NODE TO SURFACE", "TYPE=NODE TO SURFACE, ADJUST=0.0")
+    deck.replace("TYPE=<formulation>", "TYPE=<formulation>, ADJUST=0.0")
     done, result = run(deck, tmp_path, h=0.05, t_end=1)
     assert done.returncode == 0, done.stderr
     assert "ADJUST moves 3 slave nodes, by 0.15 at most" in result.log
@@ -123,7 +123,7 @@ def test_adjust_moves_slave_nodes_onto_the_surface(tmp_path):
 
 def test_adjust_closes_gaps_up_to_its_distance(tmp_path):
     deck = ring()
-    deck.replace("TYPE=NODE TO SURFACE", "TYPE=NODE TO SURFACE, ADJUST=0.12")
+    deck.replace("TYPE=<formulation>", "TYPE=<formulation>, ADJUST=0.12")
     done, result = run(deck, tmp_path, h=0.05, t_end=0.1)
     assert done.returncode == 0, done.stderr
     assert "ADJUST moves 1 slave nodes" in result.log
