@@ -11,7 +11,7 @@ module emcon_mortar
    use emcon_dgrad_wide, only : wide_add_part
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_moments, frame_point, &
       frame_project, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, &
       moment_gap_xi, n_moment, n_place, pair_stencil_t, place_after, place_before, place_first, &
@@ -230,7 +230,7 @@ contains
             call frame_hit(frame, stencil, 0.5_wp*(low(i) + high(i)), eta, height(i))
          end associate
       end do
-      order = sort_order(abs(height))
+      order = sort_order(real(abs(height), dp))
       is_kept = .false.
       do i = 1, size(low)
          associate (this => order(i))
