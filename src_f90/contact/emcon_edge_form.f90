@@ -17,7 +17,7 @@ module emcon_edge_form
    type :: edge_form_t
       real(wp) :: value(n_moment, 0:1) = 0.0_wp  !! the moments at both ends of the step
       integer :: n_node = 0
-      integer :: n_slave = 0                     !! the slave nodes come first, those of the edge too
+      integer :: n_slave = 0                     !! they come first, the edge's own two before
       integer, allocatable :: node(:)            !! (>= n_node)
       type(wide_t) :: moment(n_moment)           !! over the coordinates of the nodes
    end type edge_form_t

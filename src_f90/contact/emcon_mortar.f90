@@ -11,30 +11,23 @@ module emcon_mortar
    use emcon_dgrad_wide, only : wide_add_part
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
-   use emcon_kinds, only : dp, wp
-   use emcon_mortar_frame, only : frame_hit, frame_init, frame_moments, frame_point, &
-      frame_project, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, &
-      moment_gap_xi, n_moment, n_place, pair_stencil_t, place_after, place_before, place_first, &
-      place_last, place_master
+   use emcon_kinds, only : wp
+   use emcon_mortar_choice, only : pair_append, pair_cut_corners, pair_is_meant, pair_is_within, &
+      pairs_drop_far, pairs_seen
+   use emcon_mortar_frame, only : frame_init, frame_moments, frame_point, frame_t, moment_area, &
+      moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, n_place, pair_stencil_t, &
+      place_after, place_before, place_master
    use emcon_mortar_pair2, only : segment_moments2 => segment_moments
    use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
-   use emcon_mortar_stencil, only : frame_faces, stencil_gather, stencil_master, stencil_slave
+   use emcon_mortar_stencil, only : stencil_gather, stencil_master, stencil_slave
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_scene, only : contact_options_t, contact_pair_t, integration_elements, &
       multiplier_dual, normal_nodal, scene_t, smoothing_hermite
-   use emcon_search, only : box_distance
-   use emcon_sort, only : sort_order
    use emcon_weighted, only : weighted_init, weighted_t
    implicit none
    private
    public :: mortar_t, mortar_init
 
-   !> A pair is kept though its edges do not overlap if they miss each other by less than this
-   !> fraction of the slave edge: they may come to overlap within the step.
-   real(wp), parameter :: margin = 0.25_wp
-   !> Of two master edges that cover the same part of a slave edge, more than this fraction of it,
-   !> the nearer one is meant.
-   real(wp), parameter :: same_part = 0.01_wp
    !> Gauss points unless the deck gives them: exact for straight edges.
    integer, parameter :: segment_points = 2, element_points = 3
 
@@ -103,10 +96,9 @@ contains
       n = 0
       do e = 1, self%slave%n_edge
          self%start(e) = n + 1
-         self%seen(:, e) = 0
          call choose_pairs(self, e, x, u0, du, n)
-         if (self%options%integration == integration_elements) call choose_points(self, e, n, x, &
-            u0, du)
+         if (self%options%integration == integration_elements) call pairs_seen(self%pair, &
+            self%start(e), n, self%point, x, u0, du, self%seen(:, e))
       end do
       self%start(e) = n + 1
    end subroutine mortar_begin_step
@@ -138,140 +130,15 @@ contains
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)
-            if (.not. (is_within(self%near%depth, local) .or. &
-               is_within(self%near%depth, local + dlocal))) cycle
-            if (.not. is_meant(self, stencil, frame)) cycle
-            if (is_wide .and. .not. stencil%is_smooth) call cut_corners(stencil, frame(0))
-            call append(self%pair, n, stencil)
+            if (.not. (pair_is_within(self%near%depth, local) .or. &
+               pair_is_within(self%near%depth, local + dlocal))) cycle
+            if (.not. pair_is_meant(stencil, frame, self%deepest_start)) cycle
+            if (is_wide .and. .not. stencil%is_smooth) call pair_cut_corners(stencil, frame(0))
+            call pair_append(self%pair, n, stencil)
          end do
       end associate
-      call drop_far_layers(self, e, n, x, u0)
+      call pairs_drop_far(self%pair, self%start(e), n, x, u0)
    end subroutine choose_pairs
-
-   !> Are the boxes of both edges no farther apart than `depth`? What the list of candidates holds
-   !> beyond that depends on when it was made.
-   pure logical function is_within(depth, x)
-      real(wp), intent(in) :: depth, x(:, :)     !! (2, n_place)
-
-      associate (slave => x(:, [place_first, place_last]), master => x(:, place_master(:2)))
-         is_within = box_distance(minval(slave, 2), maxval(slave, 2), minval(master, 2), &
-            maxval(master, 2)) <= depth
-      end associate
-   end function is_within
-
-   !> Do the edges face each other and overlap, or nearly so, the master not behind the slave?
-   pure logical function is_meant(self, stencil, frame)
-      type(mortar_t), intent(in) :: self
-      type(pair_stencil_t), intent(in) :: stencil
-      type(frame_t), intent(in) :: frame(0:1)
-      real(wp) :: low, high, eta, gap
-      integer :: k
-
-      is_meant = frame_faces(frame(0), 1, 2) .and. frame_faces(frame(1), 1, 2) &
-         .and. minval(frame(0)%edge_along) > 0.0_wp .and. minval(frame(1)%edge_along) > 0.0_wp
-      if (.not. is_meant) return
-      is_meant = .false.
-      do k = 0, 1
-         low = frame_project(frame(k), 2)
-         high = frame_project(frame(k), 1)
-         is_meant = is_meant .or. (high > -margin .and. low < 1.0_wp + margin)
-         if (k == 0 .and. min(high, 1.0_wp) > max(low, 0.0_wp)) then
-            call frame_hit(frame(0), stencil, 0.5_wp*(min(high, 1.0_wp) + max(low, 0.0_wp)), eta, &
-               gap)
-            if (.not. gap > -self%deepest_start*frame(0)%length) exit
-         end if
-      end do
-      is_meant = is_meant .and. k > 0
-   end function is_meant
-
-   !> Leave out neighbours of the master edge that the slave edge does not face.
-   pure subroutine cut_corners(stencil, frame)
-      type(pair_stencil_t), intent(inout) :: stencil
-      type(frame_t), intent(in) :: frame
-
-      if (.not. frame_faces(frame, 3, 1)) stencil%node(place_master(3)) = 0
-      if (.not. frame_faces(frame, 2, 4)) stencil%node(place_master(4)) = 0
-   end subroutine cut_corners
-
-   pure subroutine append(list, n, stencil)
-      type(pair_stencil_t), allocatable, intent(inout) :: list(:)
-      integer, intent(inout) :: n
-      type(pair_stencil_t), intent(in) :: stencil
-      type(pair_stencil_t), allocatable :: longer(:)
-
-      if (n == size(list)) then
-         allocate(longer(2*n + 16))
-         longer(:n) = list
-         call move_alloc(longer, list)
-      end if
-      n = n + 1
-      list(n) = stencil
-   end subroutine append
-
-   !> Keep the nearer one of two pairs that cover the same part of slave edge `e`.
-   pure subroutine drop_far_layers(self, e, n, x, u0)
-      type(mortar_t), intent(inout) :: self
-      integer, intent(in) :: e
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      integer, intent(inout) :: n
-      real(wp), dimension(n - self%start(e) + 1) :: low, high, height
-      integer :: order(n - self%start(e) + 1), i, j
-      logical :: is_kept(n - self%start(e) + 1)
-      type(frame_t) :: frame
-      real(wp) :: local(2, n_place), dlocal(2, n_place), eta
-
-      if (size(low) < 2) return
-      do i = 1, size(low)
-         associate (stencil => self%pair(self%start(e) + i - 1))
-            call stencil_gather(stencil, x, u0, u0, local, dlocal)
-            call frame_init(frame, stencil, local)
-            low(i) = max(0.0_wp, min(1.0_wp, frame_project(frame, 2)))
-            high(i) = max(0.0_wp, min(1.0_wp, frame_project(frame, 1)))
-            call frame_hit(frame, stencil, 0.5_wp*(low(i) + high(i)), eta, height(i))
-         end associate
-      end do
-      order = sort_order(real(abs(height), dp))
-      is_kept = .false.
-      do i = 1, size(low)
-         associate (this => order(i))
-            is_kept(this) = .not. any(is_kept .and. min(high, high(this)) - max(low, low(this)) &
-               > same_part)
-         end associate
-      end do
-      n = self%start(e) - 1
-      do j = 1, size(low)
-         if (.not. is_kept(j)) cycle
-         n = n + 1
-         self%pair(n) = self%pair(self%start(e) + j - 1)
-      end do
-   end subroutine drop_far_layers
-
-   !> The pair that each Gauss point of slave edge `e` looks at, at the start of the step or else at
-   !> its expected end.
-   pure subroutine choose_points(self, e, n, x, u0, du)
-      type(mortar_t), intent(inout) :: self
-      integer, intent(in) :: e, n
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      type(frame_t) :: frame(0:1)
-      real(wp) :: local(2, n_place), dlocal(2, n_place), eta, gap
-      integer :: time_level, i, k, p
-
-      do k = self%start(e), n
-         call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
-         call frame_init(frame(0), self%pair(k), local)
-         call frame_init(frame(1), self%pair(k), local + dlocal)
-         do time_level = 0, 1
-            do i = 1, size(self%point)
-               p = self%seen(i, e)
-               if (abs(p) > 0 .and. (time_level == 1 .or. p > 0)) cycle
-               call frame_hit(frame(time_level), self%pair(k), self%point(i), eta, gap)
-               if (.not. (eta >= 0.0_wp .and. eta <= 1.0_wp)) cycle
-               self%seen(i, e) = merge(k, -k, time_level == 0)
-            end do
-         end do
-      end do
-      self%seen(:, e) = abs(self%seen(:, e))
-   end subroutine choose_points
 
    pure subroutine mortar_measure_edges(self, x, u0, du)
       class(mortar_t), intent(inout) :: self

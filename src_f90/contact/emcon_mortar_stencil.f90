@@ -83,12 +83,12 @@ contains
       if (is_smooth) self%shape = hermite_shape(length)
    end subroutine stencil_master
 
-   !> Coefficients (powers of eta) of the nodes first, last, before, after in the cubic master edge.
+   !> Coefficients (powers of eta) of the nodes first, last, before, after in a cubic master edge.
    !>
    !> The slopes at its ends are those of the parabola through three nodes; at a corner or an end of
    !> the surface, where there is no third node, that of the parabola with the other end's slope.
    pure function hermite_shape(length) result(shape)
-      real(wp), intent(in) :: length(3)          !! of the edge before, it and the one after; 0: none
+      real(wp), intent(in) :: length(3)          !! of the edge before, it and the one after; 0
       real(wp) :: shape(0:3, 4)
       !> Hermite polynomials of values and slopes at eta = 0 and 1.
       real(wp), parameter :: value(0:3, 2) = reshape([1.0_wp, 0.0_wp, -3.0_wp, 2.0_wp, &
@@ -112,7 +112,8 @@ contains
       do i = 1, 2
          if (length(2*i - 1) > 0.0_wp) cycle
          end_slope(:, i) = [-1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
-         if (length(5 - 2*i) > 0.0_wp) end_slope(:, i) = 2.0_wp*end_slope(:, i) - end_slope(:, 3 - i)
+         if (length(5 - 2*i) > 0.0_wp) end_slope(:, i) = 2.0_wp*end_slope(:, i) &
+            - end_slope(:, 3 - i)
       end do
       shape = 0.0_wp
       shape(:, :2) = value

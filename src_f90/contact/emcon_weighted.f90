@@ -26,10 +26,10 @@ module emcon_weighted
       type(chain_t) :: master
       logical :: is_self = .false.                    !! a surface in contact with itself
       logical :: is_dual = .true.                     !! multiplier basis
-      integer, allocatable :: node_edge(:, :)         !! (2, n_constraint) edge before and after; 0
-      real(wp), allocatable :: whole(:)               !! (n_constraint) reference length of a node [L]
-      real(wp), allocatable :: scale(:)               !! (n_constraint) covered part at the start [L]
-      real(wp), allocatable :: cover(:)               !! (n_constraint) covered part at the end [L]
+      integer, allocatable :: node_edge(:, :)         !! (2, n_constraint) edges before and after
+      real(wp), allocatable :: whole(:)               !! (n_constraint) reference length [L]
+      real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start [L]
+      real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end [L]
       type(edge_form_t), allocatable :: form(:)       !! (n_edge)
       logical, allocatable :: is_formed(:)            !! (n_edge)
       type(wide_t) :: work(3)

@@ -141,7 +141,8 @@ contains
 
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
-               first => system%first_constraint(pair) + 1, last => system%first_constraint(pair + 1))
+               first => system%first_constraint(pair) + 1, &
+               last => system%first_constraint(pair + 1))
             call contact%begin_step(scene%x, state%u, du)
             call contact%measure(scene%x, state%u, system%zero)
             self%is_active(first:last) = state%is_active(first:last) .and. contact%state%is_near &

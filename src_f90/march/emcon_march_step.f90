@@ -78,8 +78,8 @@ contains
       if (status /= step_done) return
       if (any(self%active%comes_and_goes)) call note_add(increment%notes, &
          cycling_text(self, scene) // ": held closed in this step")
-      if (any(self%active%is_dropped)) call note_add(increment%notes, "contact is left out, as it " &
-         // "follows from that of other nodes or has lost its surface, at slave nodes " // &
+      if (any(self%active%is_dropped)) call note_add(increment%notes, "contact is left out, " &
+         // "as it follows from that of other nodes or has lost its surface, at slave nodes " // &
          nodes_text(self, scene, self%active%is_dropped))
       call commit(self, scene, h, increment, error)
    end subroutine march_step

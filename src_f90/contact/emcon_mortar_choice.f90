@@ -1,0 +1,152 @@
+!> Which pairs of slave and master edges are meant in a step.
+!>
+!> Source: docs/theory.md, section 4.5, choice of pairs.
+module emcon_mortar_choice
+   use emcon_kinds, only : dp, wp
+   use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, n_place, &
+      pair_stencil_t, place_first, place_last, place_master
+   use emcon_mortar_stencil, only : frame_faces, stencil_gather
+   use emcon_search, only : box_distance
+   use emcon_sort, only : sort_order
+   implicit none
+   private
+   public :: pair_append, pair_cut_corners, pair_is_meant, pair_is_within, pairs_drop_far, &
+      pairs_seen
+
+   !> A pair is kept though its edges do not overlap if they miss each other by less than this
+   !> fraction of the slave edge: they may come to overlap within the step.
+   real(wp), parameter :: margin = 0.25_wp
+   !> Of two master edges that cover the same part of a slave edge, more than this fraction of it,
+   !> the nearer one is meant.
+   real(wp), parameter :: same_part = 0.01_wp
+
+contains
+
+   !> Are the boxes of both edges no farther apart than `depth`? What the list of candidates holds
+   !> beyond that depends on when it was made.
+   pure logical function pair_is_within(depth, x)
+      real(wp), intent(in) :: depth, x(:, :)     !! (2, n_place)
+
+      associate (slave => x(:, [place_first, place_last]), master => x(:, place_master(:2)))
+         pair_is_within = box_distance(minval(slave, 2), maxval(slave, 2), minval(master, 2), &
+            maxval(master, 2)) <= depth
+      end associate
+   end function pair_is_within
+
+   !> Do the edges face each other and overlap, or nearly so, the master not behind the slave?
+   pure logical function pair_is_meant(stencil, frame, deepest)
+      type(pair_stencil_t), intent(in) :: stencil
+      type(frame_t), intent(in) :: frame(0:1)    !! at the start and at the expected end
+      real(wp), intent(in) :: deepest            !! so far, per slave edge, it may be behind
+      real(wp) :: low(0:1), high(0:1), eta, gap
+      integer :: k
+
+      pair_is_meant = .false.
+      do k = 0, 1
+         if (.not. (frame_faces(frame(k), 1, 2) .and. minval(frame(k)%edge_along) > 0.0_wp)) return
+         low(k) = frame_project(frame(k), 2)
+         high(k) = frame_project(frame(k), 1)
+      end do
+      if (.not. any(high > -margin .and. low < 1.0_wp + margin)) return
+      pair_is_meant = .true.
+      low = max(0.0_wp, low)
+      high = min(1.0_wp, high)
+      if (.not. high(0) > low(0)) return
+      call frame_hit(frame(0), stencil, 0.5_wp*(low(0) + high(0)), eta, gap)
+      pair_is_meant = gap > -deepest*frame(0)%length
+   end function pair_is_meant
+
+   !> Leave out neighbours of the master edge that the slave edge does not face.
+   pure subroutine pair_cut_corners(stencil, frame)
+      type(pair_stencil_t), intent(inout) :: stencil
+      type(frame_t), intent(in) :: frame
+
+      if (.not. frame_faces(frame, 3, 1)) stencil%node(place_master(3)) = 0
+      if (.not. frame_faces(frame, 2, 4)) stencil%node(place_master(4)) = 0
+   end subroutine pair_cut_corners
+
+   pure subroutine pair_append(list, n, stencil)
+      type(pair_stencil_t), allocatable, intent(inout) :: list(:)
+      integer, intent(inout) :: n
+      type(pair_stencil_t), intent(in) :: stencil
+      type(pair_stencil_t), allocatable :: longer(:)
+
+      if (n == size(list)) then
+         allocate(longer(2*n + 16))
+         longer(:n) = list
+         call move_alloc(longer, list)
+      end if
+      n = n + 1
+      list(n) = stencil
+   end subroutine pair_append
+
+   !> Of the pairs of one slave edge, from number `first` to `n`, keep the nearer one of two that
+   !> cover the same part of it.
+   pure subroutine pairs_drop_far(list, first, n, x, u0)
+      type(pair_stencil_t), intent(inout) :: list(:)
+      integer, intent(in) :: first
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      integer, intent(inout) :: n
+      real(wp), dimension(n - first + 1) :: low, high, height
+      integer :: order(n - first + 1), i, j
+      logical :: is_kept(n - first + 1)
+      type(frame_t) :: frame
+      real(wp) :: local(2, n_place), dlocal(2, n_place), eta
+
+      if (size(low) < 2) return
+      do i = 1, size(low)
+         associate (stencil => list(first + i - 1))
+            call stencil_gather(stencil, x, u0, u0, local, dlocal)
+            call frame_init(frame, stencil, local)
+            low(i) = max(0.0_wp, min(1.0_wp, frame_project(frame, 2)))
+            high(i) = max(0.0_wp, min(1.0_wp, frame_project(frame, 1)))
+            call frame_hit(frame, stencil, 0.5_wp*(low(i) + high(i)), eta, height(i))
+         end associate
+      end do
+      order = sort_order(real(abs(height), dp))
+      is_kept = .false.
+      do i = 1, size(low)
+         associate (this => order(i))
+            is_kept(this) = .not. any(is_kept .and. min(high, high(this)) - max(low, low(this)) &
+               > same_part)
+         end associate
+      end do
+      n = first - 1
+      do j = 1, size(low)
+         if (.not. is_kept(j)) cycle
+         n = n + 1
+         list(n) = list(first + j - 1)
+      end do
+   end subroutine pairs_drop_far
+
+   !> The pair, of those from `first` to `last`, that each point of a slave edge looks at, at the
+   !> start of the step or else at its expected end; 0: none.
+   pure subroutine pairs_seen(list, first, last, point, x, u0, du, seen)
+      type(pair_stencil_t), intent(in) :: list(:)
+      integer, intent(in) :: first, last
+      real(wp), intent(in) :: point(:)           !! (n_point) on 0..1
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer, intent(out) :: seen(:)            !! (n_point)
+      type(frame_t) :: frame(0:1)
+      real(wp) :: local(2, n_place), dlocal(2, n_place), eta, gap
+      integer :: time_level, i, k, p
+
+      seen = 0
+      do k = first, last
+         call stencil_gather(list(k), x, u0, du, local, dlocal)
+         call frame_init(frame(0), list(k), local)
+         call frame_init(frame(1), list(k), local + dlocal)
+         do time_level = 0, 1
+            do i = 1, size(point)
+               p = seen(i)
+               if (abs(p) > 0 .and. (time_level == 1 .or. p > 0)) cycle
+               call frame_hit(frame(time_level), list(k), point(i), eta, gap)
+               if (.not. (eta >= 0.0_wp .and. eta <= 1.0_wp)) cycle
+               seen(i) = merge(k, -k, time_level == 0)
+            end do
+         end do
+      end do
+      seen = abs(seen)
+   end subroutine pairs_seen
+
+end module emcon_mortar_choice
