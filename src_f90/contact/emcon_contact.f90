@@ -43,6 +43,9 @@ module emcon_contact
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
       !> from there on the other side of a thin body is meant.
       real(wp) :: deepest_start = 0.0_wp
+      !> So far a contact that holds its gap may stand off: beyond, what it is made of is seen only
+      !> with the motion that would close it [L].
+      real(wp) :: farthest_start = huge(1.0_wp)
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
       type(gap_state_t), allocatable :: state(:)      !! (n_constraint) as last measured

@@ -192,6 +192,7 @@ contains
          s = next
          if (is_last) exit
       end do
+      s = (s + 2.0_wp) - 2.0_wp          ! so that all pieces agree on which side of their ends it is
       call defect(curve, edge, b, s, f, slope, straight)
       is_found = straight > smallest_square*curve%length(3) .and. slope < -focal_limit*straight
    end subroutine hermite_closest
@@ -238,7 +239,8 @@ contains
    end subroutine bracket
 
    !> The curve from `s0` to `s1`, exact also where that goes through several pieces; pieces outside
-   !> do not appear.
+   !> do not appear. A place at the end of a piece is in both: the slope there is their sum, as each
+   !> of the two has a kink.
    pure function hermite_weights(curve, s0, s1) result(w)
       type(hermite_curve_t), intent(in) :: curve
       real(wp), intent(in) :: s0, s1
@@ -247,8 +249,8 @@ contains
       integer :: e, i, e_last
 
       s = dg_variable(1, s0, s1 - s0)
-      w%base = piece_of(curve, 3 + floor(held(min(s0, s1))))
-      e_last = max(w%base, piece_of(curve, 2 + ceiling(held(max(s0, s1)))))
+      w%base = piece_of(curve, 2 + ceiling(held(min(s0, s1))))
+      e_last = piece_of(curve, 3 + floor(held(max(s0, s1))))
       do i = max(1, w%base - 1), min(5, e_last + 1)
          if (.not. any(abs(curve%tangent(i, w%base:e_last + 1)) > 0.0_wp)) cycle
          w%n = w%n + 1
@@ -258,10 +260,10 @@ contains
       do e = w%base, e_last
          call add_piece(curve, e, s + real(3 - e, wp), w)
       end do
-      if (w%base == curve%first .and. min(s0, s1) < real(w%base - 3, wp)) then
+      if (w%base == curve%first .and. min(s0, s1) <= real(w%base - 3, wp)) then
          call add_straight(curve, w%base, dg_negative_part(s + real(3 - w%base, wp), 0.0_wp), w)
       end if
-      if (e_last == curve%last .and. max(s0, s1) > real(e_last - 2, wp)) then
+      if (e_last == curve%last .and. max(s0, s1) >= real(e_last - 2, wp)) then
          call add_straight(curve, e_last + 1, &
             -dg_negative_part(-(s + real(2 - e_last, wp)), 0.0_wp), w)
       end if

@@ -12,7 +12,7 @@ module emcon_mortar
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
    use emcon_kinds, only : wp
-   use emcon_mortar_choice, only : pair_append, pair_cut_corners, pair_is_meant, pair_is_within, &
+   use emcon_mortar_choice, only : pair_append, pair_comes_near, pair_cut_corners, pair_is_meant, &
       pairs_drop_far, pairs_seen
    use emcon_mortar_frame, only : frame_init, frame_moments, frame_point, frame_t, moment_area, &
       moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, n_place, pair_stencil_t, &
@@ -60,6 +60,7 @@ contains
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%edge, self%master%edge, scene%u0, &
          maxval(self%slave%length))
+      self%farthest_start = self%near%depth
       allocate(self%start(self%slave%n_edge + 1), source=1)
       allocate(self%pair(0))
       call self%configure(scene%x, self%options)
@@ -130,8 +131,7 @@ contains
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)
-            if (.not. (pair_is_within(self%near%depth, local) .or. &
-               pair_is_within(self%near%depth, local + dlocal))) cycle
+            if (.not. pair_comes_near(self%near%depth, local, local + dlocal)) cycle
             if (.not. pair_is_meant(stencil, frame, self%deepest_start)) cycle
             if (is_wide .and. .not. stencil%is_smooth) call pair_cut_corners(stencil, frame(0))
             call pair_append(self%pair, n, stencil)

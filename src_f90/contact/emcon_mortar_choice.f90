@@ -6,11 +6,10 @@ module emcon_mortar_choice
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, n_place, &
       pair_stencil_t, place_first, place_last, place_master
    use emcon_mortar_stencil, only : frame_faces, stencil_gather
-   use emcon_search, only : box_distance
    use emcon_sort, only : sort_order
    implicit none
    private
-   public :: pair_append, pair_cut_corners, pair_is_meant, pair_is_within, pairs_drop_far, &
+   public :: pair_append, pair_cut_corners, pair_comes_near, pair_is_meant, pairs_drop_far, &
       pairs_seen
 
    !> A pair is kept though its edges do not overlap if they miss each other by less than this
@@ -22,16 +21,42 @@ module emcon_mortar_choice
 
 contains
 
-   !> Are the boxes of both edges no farther apart than `depth`? What the list of candidates holds
-   !> beyond that depends on when it was made.
-   pure logical function pair_is_within(depth, x)
-      real(wp), intent(in) :: depth, x(:, :)     !! (2, n_place)
+   !> Do the boxes of both edges come within `depth` of each other on the way from `x0` to `x1`, along
+   !> both axes at once? What the list of candidates holds beyond that depends on when it was made.
+   pure logical function pair_comes_near(depth, x0, x1)
+      real(wp), intent(in) :: depth, x0(:, :), x1(:, :)  !! (2, n_place)
+      real(wp) :: d(4, 0:1), first, last
+      integer :: i
+
+      d(:, 0) = box_distances(x0) - depth
+      d(:, 1) = box_distances(x1) - depth
+      first = 0.0_wp
+      last = 1.0_wp
+      pair_comes_near = .false.
+      do i = 1, 4
+         if (maxval(d(i, :)) <= 0.0_wp) cycle
+         if (minval(d(i, :)) > 0.0_wp) return
+         associate (zero => d(i, 0)/(d(i, 0) - d(i, 1)))
+            if (d(i, 0) > 0.0_wp) then
+               first = max(first, zero)
+            else
+               last = min(last, zero)
+            end if
+         end associate
+      end do
+      pair_comes_near = first <= last
+   end function pair_comes_near
+
+   !> By how much the box of the master edge lies above and below that of the slave edge, by axis.
+   pure function box_distances(x) result(d)
+      real(wp), intent(in) :: x(:, :)            !! (2, n_place)
+      real(wp) :: d(4)
 
       associate (slave => x(:, [place_first, place_last]), master => x(:, place_master(:2)))
-         pair_is_within = box_distance(minval(slave, 2), maxval(slave, 2), minval(master, 2), &
-            maxval(master, 2)) <= depth
+         d(:2) = minval(master, 2) - maxval(slave, 2)
+         d(3:) = minval(slave, 2) - maxval(master, 2)
       end associate
-   end function pair_is_within
+   end function box_distances
 
    !> Do the edges face each other and overlap, or nearly so, the master not behind the slave?
    pure logical function pair_is_meant(stencil, frame, deepest)

@@ -226,7 +226,8 @@ contains
                      .not. state%is_active(id)) cycle
                   self%deepest = min(self%deepest, gap%gap1/gap%size)
                   if (gap%gap1 >= -gap_noise*gap%size) cycle
-                  if (.not. gap%is_covered) status = step_too_far
+                  if (.not. gap%is_covered .or. (self%holds_gap .and. &
+                     gap%gap0 > contact%farthest_start)) status = step_too_far
                   self%is_active(id) = .true.
                end if
                has_changed = .true.

@@ -10,9 +10,12 @@ import subprocess
 import sys
 import tempfile
 
+import h5py
+
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
-from scene_tools import DECKS, PROGRAM, Deck, Run, number  # noqa: E402
+from book.common import FORMULATIONS  # noqa: E402
+from scene_tools import DECKS, PROGRAM, Deck, Run, number, overrides  # noqa: E402
 
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 TREATMENTS = ("PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE")
@@ -71,6 +74,23 @@ def bench_ring(folder):
                 treatment, method, cpu, 1e3*cpu/(len(history) - 1), int(history["newton"].sum()),
                 memory, float(drift),
             )  # fmt: skip
+
+
+def bench_formulations(folder):
+    print("\nRing scene, formulations of contact; contact: search, gaps, null space")
+    row = table("formulation                              ", "h", "CPU [s]", "contact [s]",
+                "share [%]", "Newton", "cuts", "MB")  # fmt: skip
+    for name, choice in FORMULATIONS.items():
+        for h in (0.05, 0.01):
+            out = folder / "ring"
+            parameters = overrides({"h": h, "frame": 1, **choice})
+            cpu, _, memory = measure(DECKS / "ring.inp", "--quiet", "--output", out, *parameters)
+            run = Run(out / "ring")
+            with h5py.File(run.file(".h5"), "r") as file:
+                contact = float(file["sets/RUN/CONTACT_CPU_SECONDS"][()].item())
+            history = run.history
+            row(name.replace("`", ""), h, cpu, contact, 100*contact/cpu,
+                int(history["newton"].sum()), int(history["cuts"].sum()), memory)  # fmt: skip
 
 
 def block_text(n_x, n_y, name, first_node, first_element, corner, size):
@@ -153,5 +173,6 @@ def bench_search(folder):
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         bench_ring(pathlib.Path(name))
+        bench_formulations(pathlib.Path(name))
         bench_reading(pathlib.Path(name))
         bench_search(pathlib.Path(name))
