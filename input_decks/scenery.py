@@ -25,7 +25,7 @@ formulation = {formulation}
 multiplier = DUAL
 normal = NODAL
 integration = SEGMENTS
-points = 3
+points = 4
 smoothing = NONE
 """
 

@@ -28,8 +28,10 @@ module emcon_mortar
    private
    public :: mortar_t, mortar_init
 
-   !> Gauss points unless the deck gives them: exact for straight edges.
-   integer, parameter :: segment_points = 2, element_points = 3
+   !> Gauss points unless the deck gives them: two are exact for straight edges. On smoothed edges a
+   !> master node that passes a slave node leaves a jump of the gradient, by the error of the
+   !> quadrature: in statics a few points more bring it below what Newton's method sees.
+   integer, parameter :: segment_points = 2, element_points = 3, smooth_points = 4
 
    type, extends(weighted_t) :: mortar_t
       type(contact_options_t) :: options
@@ -79,7 +81,9 @@ contains
          self%master_corner(self%master%n_edge))
       call chain_corners(self%slave, x, options%normal_angle, self%slave_corner)
       call chain_corners(self%master, x, options%smoothing_angle, self%master_corner)
-      n = merge(element_points, segment_points, options%integration == integration_elements)
+      n = segment_points
+      if (options%smoothing == smoothing_hermite .and. self%rounding > 0.0_wp) n = smooth_points
+      if (options%integration == integration_elements) n = element_points
       if (options%n_point > 0) n = options%n_point
       if (allocated(self%point)) deallocate(self%point, self%weight, self%seen)
       allocate(self%point(n), self%weight(n))

@@ -121,9 +121,9 @@ contains
          self%active%has_inertia = self%scheme%has_inertia
          self%active%gap_tolerance = step%gap_tolerance
          do i = 1, size(self%system%contact)
-            call self%system%contact(i)%contact%configure(scene%x, step%contact)
             self%system%contact(i)%contact%rounding = merge(static_rounding, 0.0_wp, &
                any(scene%step%procedure == procedure_static))
+            call self%system%contact(i)%contact%configure(scene%x, step%contact)
          end do
          call count_grid(self, step)
          self%du = 0.0_wp
