@@ -39,12 +39,13 @@ module emcon_contact
    type, abstract :: contact_t
       integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
+      logical :: meets_statics = .false.              !! a step of the deck is static
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
       !> from there on the other side of a thin body is meant.
       real(wp) :: deepest_start = 0.0_wp
-      !> So far a contact that holds its gap may stand off: beyond, what it is made of is seen only
-      !> with the motion that would close it [L].
+      !> From a larger gap at the start no contact may begin in a step with inertia: what it is made
+      !> of would be seen only with a motion that goes through the surface [L].
       real(wp) :: farthest_start = huge(1.0_wp)
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]

@@ -82,7 +82,7 @@ contains
       call chain_corners(self%slave, x, options%normal_angle, self%slave_corner)
       call chain_corners(self%master, x, options%smoothing_angle, self%master_corner)
       n = segment_points
-      if (options%smoothing == smoothing_hermite .and. self%rounding > 0.0_wp) n = smooth_points
+      if (options%smoothing == smoothing_hermite .and. self%meets_statics) n = smooth_points
       if (options%integration == integration_elements) n = element_points
       if (options%n_point > 0) n = options%n_point
       if (allocated(self%point)) deallocate(self%point, self%weight, self%seen)
@@ -132,6 +132,7 @@ contains
             end if
             call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
                is_wide, self%master_corner)
+            if (is_wide) stencil%rounding = self%rounding*self%master%length(m)
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)

@@ -10,7 +10,7 @@ module emcon_mortar_stencil
 
    !> Edges face each other up to this cosine between their tangents; beyond, the gap along the
    !> normal of one is hardly a distance.
-   real(wp), parameter :: least_facing = 0.05_wp
+   real(wp), parameter :: least_facing = 0.25_wp
 
 contains
 

@@ -219,14 +219,18 @@ contains
                   if (.not. gap%is_leaving .and. (only_adds .or. self%set%lam(k) >= -noise)) cycle
                   self%is_active(id) = .false.
                else
-                  if (self%is_dropped(id) .or. .not. (gap%is_near .and. gap%is_over)) cycle
+                  if (.not. (gap%is_near .and. gap%is_over)) cycle
+                  if (self%is_dropped(id)) then
+                     if (goes_through(gap)) status = step_too_far
+                     cycle
+                  end if
                   ! With nothing to hold at its start, a contact begins with the next step.
                   if (gap%is_arriving .and. self%has_inertia) cycle
                   if (gap%gap0 < -contact%deepest_start*gap%size .and. &
                      .not. state%is_active(id)) cycle
                   self%deepest = min(self%deepest, gap%gap1/gap%size)
                   if (gap%gap1 >= -gap_noise*gap%size) cycle
-                  if (.not. gap%is_covered .or. (self%holds_gap .and. &
+                  if (.not. gap%is_covered .or. (self%has_inertia .and. &
                      gap%gap0 > contact%farthest_start)) status = step_too_far
                   self%is_active(id) = .true.
                end if
@@ -247,6 +251,14 @@ contains
          held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
          has_drifted = .not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size
       end function has_drifted
+
+      !> Does a contact that was left out close all the same? Then it does not follow from others:
+      !> it had lost its surface in an iteration.
+      pure logical function goes_through(gap)
+         type(gap_state_t), intent(in) :: gap
+
+         goes_through = self%may_cut .and. gap%gap1 < min(gap%gap0, 0.0_wp) - touch_tol*gap%size
+      end function goes_through
 
       !> Would a new contact be held at a larger distance than the deck allows?
       pure logical function stands_off(gap)

@@ -29,8 +29,8 @@ module emcon_march
    integer, parameter :: default_levels = 12, most_levels = 24
    !> Increments without a cut after which an automatic increment is doubled.
    integer, parameter :: easy_increments = 5
-   !> Corners of master surfaces are rounded over this fraction of an edge if a step is static.
-   real(wp), parameter :: static_rounding = 1.0e-4_wp
+   !> Corners of master surfaces are rounded over this fraction of an edge.
+   real(wp), parameter :: corner_rounding = 1.0e-4_wp
    !> Closer than this a step's duration counts as a whole number of increments.
    real(wp), parameter :: whole = 1.0e3_wp*epsilon(1.0_wp)
 
@@ -121,9 +121,11 @@ contains
          self%active%has_inertia = self%scheme%has_inertia
          self%active%gap_tolerance = step%gap_tolerance
          do i = 1, size(self%system%contact)
-            self%system%contact(i)%contact%rounding = merge(static_rounding, 0.0_wp, &
-               any(scene%step%procedure == procedure_static))
-            call self%system%contact(i)%contact%configure(scene%x, step%contact)
+            associate (contact => self%system%contact(i)%contact)
+               contact%rounding = corner_rounding
+               contact%meets_statics = any(scene%step%procedure == procedure_static)
+               call contact%configure(scene%x, step%contact)
+            end associate
          end do
          call count_grid(self, step)
          self%du = 0.0_wp
