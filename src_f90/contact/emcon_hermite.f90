@@ -192,7 +192,8 @@ contains
          s = next
          if (is_last) exit
       end do
-      s = (s + 2.0_wp) - 2.0_wp          ! so that all pieces agree on which side of their ends it is
+      ! So that all pieces agree on which side of their ends it is.
+      s = (s + 2.0_wp) - 2.0_wp
       call defect(curve, edge, b, s, f, slope, straight)
       is_found = straight > smallest_square*curve%length(3) .and. slope < -focal_limit*straight
    end subroutine hermite_closest
