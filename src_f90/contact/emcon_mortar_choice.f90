@@ -22,7 +22,7 @@ module emcon_mortar_choice
 contains
 
    !> Do the boxes of both edges come within `depth` of each other on the way from `x0` to `x1`,
-   !> along both axes at once? What the list of candidates holds beyond that depends on when it was made.
+   !> along both axes at once? What the list of candidates holds beyond that depends on its age.
    pure logical function pair_comes_near(depth, x0, x1)
       real(wp), intent(in) :: depth, x0(:, :), x1(:, :)  !! (2, n_place)
       real(wp) :: d(4, 0:1), first, last
