@@ -9,7 +9,7 @@ import math
 
 from deckwriter import (Part, Point, add_grid, arguments, comment, heading, number, surface_lines,
                         write_deck)
-from scenery import (CONTACT_CARDS, Motion, contact_parameters, momenta, momenta_text,
+from scenery import (FREE_STEP, Motion, contact_parameters, momenta, momenta_text,
                      velocity_lines)
 
 LOWER_LEG, UPPER_LEG = 6.0, 5.4
@@ -76,25 +76,6 @@ INSIDE, INSIDE
 0., <t_end>, <frame>
 """
 
-STEP = f"""
-*STEP, NLGEOM, INC=1000000
-*DYNAMIC, DIRECT
-<h>, <t_end>
-*CONSTRAINT METHOD, TYPE=<method>
-*CONTACT INITIATION, TYPE=<initiation>
-*NEWTON, TOLERANCE=<tolerance>
-{CONTACT_CARDS.strip()}
-*NODE FILE, TIME POINTS=FRAMES
-U, V
-*EL FILE, TIME POINTS=FRAMES
-S, ENER
-*CONTACT FILE, TIME POINTS=FRAMES
-CDIS, CSTR, CF
-*CONTACT PRINT, TOTALS=ONLY
-CF
-*END STEP
-"""
-
 
 def main() -> None:
     parser = arguments(__doc__)
@@ -130,7 +111,7 @@ def main() -> None:
     lines += surface_lines("INSIDE", "S3", [column[-1] for column in grid.element])
     lines += comment("Material, contact") + MATERIAL.strip().splitlines()
     lines += comment("Start: node, direction, velocity") + velocity_lines(strip, velocity)
-    lines += comment("The run") + STEP.strip().splitlines()
+    lines += comment("The run") + FREE_STEP.strip().splitlines()
     write_deck(lines, options.output)
 
 

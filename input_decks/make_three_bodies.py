@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from deckwriter import (Part, Point, arguments, comment, heading, number, surface_lines,
                         write_deck)
-from scenery import (CONTACT_CARDS, Momenta, Motion, add_disc, contact_parameters, momenta,
+from scenery import (FREE_STEP, Momenta, Motion, add_disc, contact_parameters, momenta,
                      momenta_text, velocity_lines)
 
 DENSITY = 0.01
@@ -98,25 +98,6 @@ FRAMES = """
 0., <t_end>, <frame>
 """
 
-STEP = f"""
-*STEP, NLGEOM, INC=1000000
-*DYNAMIC, DIRECT
-<h>, <t_end>
-*CONSTRAINT METHOD, TYPE=<method>
-*CONTACT INITIATION, TYPE=<initiation>
-*NEWTON, TOLERANCE=<tolerance>
-{CONTACT_CARDS.strip()}
-*NODE FILE, TIME POINTS=FRAMES
-U, V
-*EL FILE, TIME POINTS=FRAMES
-S, ENER
-*CONTACT FILE, TIME POINTS=FRAMES
-CDIS, CSTR, CF
-*CONTACT PRINT, TOTALS=ONLY
-CF
-*END STEP
-"""
-
 
 def main() -> None:
     parser = arguments(__doc__)
@@ -142,7 +123,7 @@ def main() -> None:
     lines += ["LEFT_RIM, MIDDLE_RIM", "MIDDLE_RIM, RIGHT_RIM"] if options.two_pass else []
     lines += FRAMES.strip().splitlines()
     lines += comment("Start: node, direction, velocity") + start
-    lines += comment("The run") + STEP.strip().splitlines()
+    lines += comment("The run") + FREE_STEP.strip().splitlines()
     write_deck(lines, options.output)
 
 

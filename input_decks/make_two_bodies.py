@@ -9,7 +9,7 @@ import math
 
 from deckwriter import (Grid, Part, Point, add_grid, arguments, cells_argument, comment, heading,
                         number, surface_lines, write_deck)
-from scenery import (CONTACT_CARDS, Motion, add_disc, contact_parameters, momenta, momenta_text,
+from scenery import (FREE_STEP, Motion, add_disc, contact_parameters, momenta, momenta_text,
                      velocity_lines)
 
 R_INNER, R_OUTER, R_DISC = 3.0, 4.0, 5.0
@@ -86,25 +86,6 @@ RING_OUTER, DISC_RIM
 0., <t_end>, <frame>
 """
 
-STEP = f"""
-*STEP, NLGEOM, INC=1000000
-*DYNAMIC, DIRECT
-<h>, <t_end>
-*CONSTRAINT METHOD, TYPE=<method>
-*CONTACT INITIATION, TYPE=<initiation>
-*NEWTON, TOLERANCE=<tolerance>
-{CONTACT_CARDS.strip()}
-*NODE FILE, TIME POINTS=FRAMES
-U, V
-*EL FILE, TIME POINTS=FRAMES
-S, ENER
-*CONTACT FILE, TIME POINTS=FRAMES
-CDIS, CSTR, CF
-*CONTACT PRINT, TOTALS=ONLY
-CF
-*END STEP
-"""
-
 
 def rim(grid: Grid) -> list[int]:
     return [column[0] for column in grid.element]
@@ -137,7 +118,7 @@ def main() -> None:
     lines += comment("Materials, contact") + MATERIAL.strip().splitlines()
     lines += comment("Start: node, direction, velocity")
     lines += velocity_lines(ring, RING.at) + velocity_lines(disc, DISC.at)
-    lines += comment("The run") + STEP.strip().splitlines()
+    lines += comment("The run") + FREE_STEP.strip().splitlines()
     write_deck(lines, options.output)
 
 

@@ -17,6 +17,26 @@ CONTACT_CARDS = """
 *SURFACE SMOOTHING, TYPE=<smoothing>
 """
 
+#: The step of bodies without supports: dynamics, fields for pictures, totals of the contact.
+FREE_STEP = f"""
+*STEP, NLGEOM, INC=1000000
+*DYNAMIC, DIRECT
+<h>, <t_end>
+*CONSTRAINT METHOD, TYPE=<method>
+*CONTACT INITIATION, TYPE=<initiation>
+*NEWTON, TOLERANCE=<tolerance>
+{CONTACT_CARDS.strip()}
+*NODE FILE, TIME POINTS=FRAMES
+U, V
+*EL FILE, TIME POINTS=FRAMES
+S, ENER
+*CONTACT FILE, TIME POINTS=FRAMES
+CDIS, CSTR, CF
+*CONTACT PRINT, TOTALS=ONLY
+CF
+*END STEP
+"""
+
 
 def contact_parameters(formulation: str = "MORTAR") -> str:
     """Lines of `*PARAMETER` that choose the formulation of contact; see docs/deck.md."""

@@ -12,7 +12,8 @@ module emcon_chain
    use emcon_text, only : to_text
    implicit none
    private
-   public :: chain_t, chain_init, chain_tributary, chain_distance, chain_corners, chain_crossing
+   public :: chain_t, chain_init, chain_thickness, chain_tributary, chain_distance, &
+      chain_corners, chain_crossing
 
    type :: chain_t
       integer :: n_edge = 0
@@ -153,6 +154,26 @@ contains
          end if
       end associate
    end function chain_distance
+
+   !> Thickness of the section at each node of the chain of `surface`, 1 where there is none.
+   !> Between two sections that of the edge that begins at the node.
+   pure subroutine chain_thickness(self, scene, surface, thickness)
+      type(chain_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      real(wp), allocatable, intent(out) :: thickness(:)   !! (size of `node`) [L]
+      integer :: i, side
+
+      allocate(thickness(size(self%node)), source=1.0_wp)
+      do i = 1, size(self%node)
+         do side = 1, 2
+            associate (e => self%node_edge(side, i))
+               if (e == 0) cycle
+               thickness(i) = scene%section(scene%element_section(surface%element(e)))%thickness
+            end associate
+         end do
+      end do
+   end subroutine chain_thickness
 
    !> Length that belongs to each node of the chain: half of the edges beside it, at x + u.
    pure subroutine chain_tributary(self, x, u, length)

@@ -3,7 +3,7 @@
 !> The master surface is a polygon, or smoothed. A surface may be in contact with itself.
 !> Source: docs/theory.md, section 4.
 module emcon_nts
-   use emcon_chain, only : chain_corners, chain_init, chain_t, chain_tributary
+   use emcon_chain, only : chain_corners, chain_init, chain_t, chain_thickness, chain_tributary
    use emcon_contact, only : constraint_resize, constraint_t, contact_t, gap_state_t
    use emcon_dgrad10, only : dg10_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
@@ -17,7 +17,6 @@ module emcon_nts
    use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite, &
       smoothing_none
    use emcon_self_contact, only : self_contact_is_apart, self_contact_may_touch
-   use emcon_sort, only : find_sorted
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
@@ -56,7 +55,6 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, j, k
 
       call chain_init(self%slave, scene, scene%surface(pair%slave), error)
       if (allocated(error)) return
@@ -68,16 +66,7 @@ contains
       allocate(self%edge(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint))
       self%deepest_start = touch_tol
-      allocate(self%thickness(self%n_constraint), source=1.0_wp)
-      associate (surface => scene%surface(pair%slave))
-         do i = 1, self%slave%n_edge
-            do j = 1, 2
-               k = find_sorted(self%node, self%slave%edge(j, i))
-               self%thickness(k) = &
-                  scene%section(scene%element_section(surface%element(i)))%thickness
-            end do
-         end do
-      end associate
+      call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
       call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), self%master%edge, &
          scene%u0, 0.0_wp)
    end subroutine nts_init

@@ -4,7 +4,7 @@
 !> basis of A, as a mean over the covered part. A formulation gives the integrals of each slave
 !> edge. Source: docs/theory.md, section 4, weighted gaps.
 module emcon_weighted
-   use emcon_chain, only : chain_init, chain_t
+   use emcon_chain, only : chain_init, chain_t, chain_thickness
    use emcon_contact, only : constraint_t, contact_t
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_form, only : edge_form_t, form_constraint, form_share
@@ -82,15 +82,14 @@ contains
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_edge))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)
-      allocate(self%thickness(n), self%whole(n), self%scale(n), self%cover(n), &
+      call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
+      allocate(self%whole(n), self%scale(n), self%cover(n), &
          source=0.0_wp)
       do i = 1, n
          do k = 1, 2
             associate (e => self%node_edge(k, i))
                if (e == 0) cycle
                self%whole(i) = self%whole(i) + 0.5_wp*self%slave%length(e)
-               self%thickness(i) = scene%section( &
-                  scene%element_section(scene%surface(pair%slave)%element(e)))%thickness
             end associate
          end do
          self%state(i)%size = self%whole(i)
