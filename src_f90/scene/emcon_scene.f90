@@ -9,6 +9,7 @@ module emcon_scene
    private
    public :: origin_t, named_set_t, surface_t, material_t, section_t, amplitude_t
    public :: contact_pair_t, contact_options_t, prescribed_t, load_t, output_t, step_t, scene_t
+   public :: tie_t, tie_rows_t, equation_t
    public :: where_text, find_amplitude_value
    public :: law_linear, law_neo_hooke, law_coupled_neo_hooke
    public :: load_point, load_pressure, load_gravity
@@ -93,6 +94,37 @@ module emcon_scene
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
    end type contact_pair_t
+
+   !> The constraints of a tie: for row k, in either direction, the sum of weight times position over
+   !> its entries is zero. Row k belongs to the multiplier psi_k of slave node k: the entries are
+   !> D_kB = int psi_k N_B for slave nodes and -M_kC = -int psi_k N_C for master nodes.
+   type :: tie_rows_t
+      integer, allocatable :: slave(:)               !! (n) slave nodes, along the chains
+      integer, allocatable :: neighbour(:, :)        !! (2, n) row before and after; 0: an end
+      integer, allocatable :: start(:)               !! (n + 1) entries before each row, from 0
+      integer, allocatable :: node(:)                !! entries; the first is the slave node
+      real(wp), allocatable :: weight(:)             !! [L]; the weights of a row sum up to 0
+      real(wp), allocatable :: size(:)               !! (n) int psi_k, > 0 [L]
+   end type tie_rows_t
+
+   !> Two surfaces that stay together, whatever their meshes.
+   type :: tie_t
+      type(origin_t) :: origin
+      character(len=:), allocatable :: name
+      integer :: slave = 0                           !! index into `scene_t%surface`
+      integer :: master = 0
+      real(wp) :: tolerance = -1.0_wp                !! POSITION TOLERANCE [L]; < 0: not given
+      integer :: multiplier = multiplier_dual
+      type(tie_rows_t) :: rows                       !! frozen before the first step
+   end type tie_t
+
+   !> Sum of coefficient times displacement over some degrees of freedom = 0.
+   type :: equation_t
+      type(origin_t) :: origin
+      integer, allocatable :: node(:)                !! (n) the first is the one to eliminate
+      integer, allocatable :: dof(:)                 !! (n) 1..n_dim
+      real(wp), allocatable :: coefficient(:)        !! (n) the first is not 0
+   end type equation_t
 
    !> How the contact of a step is computed: *MORTAR and *SURFACE SMOOTHING.
    type :: contact_options_t
@@ -184,6 +216,8 @@ module emcon_scene
       type(section_t), allocatable :: section(:)
       type(amplitude_t), allocatable :: amplitude(:)
       type(contact_pair_t), allocatable :: pair(:)
+      type(tie_t), allocatable :: tie(:)
+      type(equation_t), allocatable :: equation(:)
       real(wp), allocatable :: u0(:, :)              !! (n_dim, n_node) initial displacement [L]
       real(wp), allocatable :: v0(:, :)              !! (n_dim, n_node) initial velocity [L/T]
       type(step_t), allocatable :: step(:)
