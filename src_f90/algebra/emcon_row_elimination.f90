@@ -1,0 +1,364 @@
+!> Gaussian elimination of sparse rows in their order: which of them are independent, and which
+!> unknown each can give.
+!>
+!> Two rows of one pattern are eliminated at once and with the same pivots, for constraints that
+!> have a gradient for the forces and another one for the motion; rows of which there is only one
+!> come twice. A row of which nothing but round-off is left depends on rows before it. Columns past
+!> `n_free` never give a pivot. Source: docs/theory.md, section 5.
+module emcon_row_elimination
+   use emcon_kinds, only : dp, hp
+   implicit none
+   private
+   public :: row_elimination_t, elimination_begin, elimination_add, elimination_left
+   public :: elimination_resolve
+   public :: row_kept, row_redundant, row_poor
+
+   !> What became of a row: poor, no unknown is fit to be a pivot of both.
+   integer, parameter :: row_kept = 1, row_redundant = 2, row_poor = 3
+
+   !> What is left of a row is round-off below this multiple of the largest term that entered it.
+   real(hp), parameter :: redundancy_tol = 512.0_hp*epsilon(1.0_dp)
+   !> Unknowns that are not a row's own count by this factor.
+   real(hp), parameter :: other = 0.1_hp
+   !> A later entry is taken only if it is larger by this factor: entries that are equal by the
+   !> symmetry of a scene are not told apart by their round-off.
+   real(hp), parameter :: clearly_larger = 1.1_hp
+   !> A pivot is poor if, relative to what is left of its row, it counts less than this.
+   real(hp), parameter :: poor_pivot = 0.01_hp
+
+   type :: row_elimination_t
+      integer :: n_free = 0                      !! columns that may give a pivot
+      integer :: n_row = 0                       !! rows added so far
+      integer, allocatable :: pivot(:)           !! (rows) column of the pivot; 0: redundant
+      ! The present row, over all columns, both of its kinds:
+      real(hp), allocatable, private :: work(:, :)     !! (2, n_col), 0 outside of the row
+      logical, allocatable, private :: is_listed(:)    !! (n_col)
+      integer, allocatable, private :: list(:)         !! (n_col) its columns
+      integer, private :: n_list = 0
+      real(hp), private :: largest_term(2) = 0.0_hp    !! that entered the row
+      ! The eliminated rows without their pivots:
+      integer, allocatable, private :: pivot_row(:)    !! (n_col) row of the pivot; 0: none
+      integer, allocatable, private :: row_start(:)    !! (rows + 1)
+      integer, allocatable, private :: column(:)
+      real(hp), allocatable, private :: value(:, :)    !! (2, entries)
+      real(hp), allocatable, private :: pivot_value(:, :)   !! (2, rows)
+   end type row_elimination_t
+
+contains
+
+   !> Nothing eliminated yet; room for `n_row` rows over `n_col` columns, kept where it fits.
+   subroutine elimination_begin(self, n_row, n_col, n_free)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: n_row, n_col
+      integer, intent(in) :: n_free              !! the first ones may give pivots
+      integer :: k
+
+      if (allocated(self%list)) then
+         call clear(self)
+         if (size(self%list) /= n_col) deallocate(self%work, self%is_listed, self%list, &
+            self%pivot_row, self%column, self%value)
+      end if
+      if (.not. allocated(self%list)) then
+         allocate(self%work(2, n_col), source=0.0_hp)
+         allocate(self%is_listed(n_col), source=.false.)
+         allocate(self%list(n_col), self%pivot_row(n_col), source=0)
+         allocate(self%column(0), self%value(2, 0))
+      end if
+      if (allocated(self%pivot)) then
+         do k = 1, self%n_row
+            if (self%pivot(k) > 0 .and. self%pivot(k) <= n_col) self%pivot_row(self%pivot(k)) = 0
+         end do
+         if (size(self%pivot) /= n_row) deallocate(self%pivot, self%row_start, self%pivot_value)
+      end if
+      if (.not. allocated(self%pivot)) allocate(self%pivot(n_row), self%row_start(n_row + 1), &
+         self%pivot_value(2, n_row))
+      self%n_free = n_free
+      self%n_row = 0
+      self%pivot = 0
+      self%row_start = 0
+   end subroutine elimination_begin
+
+   !> Eliminate the earlier rows from a new one and choose its pivot. A row without a fit pivot is
+   !> not kept.
+   subroutine elimination_add(self, column, first, second, own, fate)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: column(:)                  !! (entries) from 1
+      real(hp), intent(in) :: first(:), second(:)       !! (entries) both kinds of the row
+      integer, intent(in) :: own(:)                     !! columns to take with preference
+      integer, intent(out) :: fate                      !! one of `row_`
+      real(hp) :: left(2)
+      integer :: from, k
+
+      k = self%n_row + 1
+      self%n_row = k
+      call clear(self)
+      call scatter(self, column, first, second, k, from)
+      call reduce(self, from, k - 1)
+      left = largest_left(self)
+      self%row_start(k + 1) = self%row_start(k)
+      if (any(left <= redundancy_tol*self%largest_term)) then
+         fate = row_redundant
+         return
+      end if
+      call choose(self, k, own, left, fate)
+      if (fate == row_kept) call keep(self, k)
+   end subroutine elimination_add
+
+   !> What the last row holds past the columns `n_free`, of the second kind, and the largest term
+   !> that entered it.
+   pure subroutine elimination_left(self, column, value, largest_term)
+      type(row_elimination_t), intent(in) :: self
+      integer, allocatable, intent(out) :: column(:)
+      real(hp), allocatable, intent(out) :: value(:)
+      real(hp), intent(out) :: largest_term
+
+      column = pack(self%list(:self%n_list), self%list(:self%n_list) > self%n_free)
+      value = self%work(2, column)
+      largest_term = self%largest_term(2)
+   end subroutine elimination_left
+
+   !> Take the present row off the work space.
+   pure subroutine clear(self)
+      type(row_elimination_t), intent(inout) :: self
+
+      self%work(:, self%list(:self%n_list)) = 0.0_hp
+      self%is_listed(self%list(:self%n_list)) = .false.
+      self%n_list = 0
+      self%largest_term = 0.0_hp
+   end subroutine clear
+
+   !> Spread out row `k`; `from` is the first row that has to be eliminated from it.
+   pure subroutine scatter(self, column, first, second, k, from)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: column(:)
+      real(hp), intent(in) :: first(:), second(:)
+      integer, intent(in) :: k
+      integer, intent(out) :: from                      !! k if there is none
+      integer :: s, j
+
+      from = k
+      do s = 1, size(column)
+         j = column(s)
+         call enlist(self, j)
+         self%work(:, j) = self%work(:, j) + [first(s), second(s)]
+         self%largest_term = max(self%largest_term, abs(self%work(:, j)))
+         if (self%pivot_row(j) > 0) from = min(from, self%pivot_row(j))
+      end do
+   end subroutine scatter
+
+   pure subroutine enlist(self, j)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: j
+
+      if (self%is_listed(j)) return
+      self%is_listed(j) = .true.
+      self%n_list = self%n_list + 1
+      self%list(self%n_list) = j
+   end subroutine enlist
+
+   !> Eliminate the rows `from` to `to` from the present one.
+   pure subroutine reduce(self, from, to)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: from, to
+      real(hp) :: factor(2), term(2)
+      integer :: i, j, s
+
+      do i = from, to
+         j = self%pivot(i)
+         if (j == 0) cycle
+         if (.not. self%is_listed(j)) cycle
+         factor = self%work(:, j)/self%pivot_value(:, i)
+         self%work(:, j) = 0.0_hp
+         do s = self%row_start(i) + 1, self%row_start(i + 1)
+            call enlist(self, self%column(s))
+            term = factor*self%value(:, s)
+            self%work(:, self%column(s)) = self%work(:, self%column(s)) - term
+            self%largest_term = max(self%largest_term, abs(term))
+         end do
+      end do
+   end subroutine reduce
+
+   !> Largest entries of the present row that may become a pivot.
+   pure function largest_left(self) result(left)
+      type(row_elimination_t), intent(in) :: self
+      real(hp) :: left(2)
+      integer :: s
+
+      left = 0.0_hp
+      do s = 1, self%n_list
+         if (self%list(s) <= self%n_free) left = max(left, abs(self%work(:, self%list(s))))
+      end do
+   end function largest_left
+
+   !> The unknown with the largest entry: of the two rows the smaller one counts, each relative to
+   !> the largest left in it.
+   pure subroutine choose(self, k, own, left, fate)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: k
+      integer, intent(in) :: own(:)
+      real(hp), intent(in) :: left(:)                   !! (2) largest entries, > 0
+      integer, intent(out) :: fate
+      real(hp) :: weight, best
+      integer :: s, j
+
+      best = -1.0_hp
+      do s = 1, self%n_list
+         j = self%list(s)
+         if (j > self%n_free) cycle
+         weight = minval(abs(self%work(:, j))/left)
+         if (all(own /= j)) weight = other*weight
+         if (weight <= clearly_larger*best) cycle
+         best = weight
+         self%pivot(k) = j
+      end do
+      fate = row_kept
+      if (best <= poor_pivot) fate = row_poor
+   end subroutine choose
+
+   !> Store the present row, less its pivot and less round-off, for later rows.
+   subroutine keep(self, k)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: k
+      integer :: s, j, n
+
+      n = self%row_start(k)
+      call make_room(self, n + self%n_list)
+      self%pivot_value(:, k) = self%work(:, self%pivot(k))
+      self%pivot_row(self%pivot(k)) = k
+      do s = 1, self%n_list
+         j = self%list(s)
+         if (j == self%pivot(k)) cycle
+         if (all(abs(self%work(:, j)) <= epsilon(1.0_hp)*self%largest_term)) cycle
+         n = n + 1
+         self%column(n) = j
+         self%value(:, n) = self%work(:, j)
+      end do
+      self%row_start(k + 1) = n
+   end subroutine keep
+
+   !> At least `n` entries; what is there stays.
+   subroutine make_room(self, n)
+      type(row_elimination_t), intent(inout) :: self
+      integer, intent(in) :: n
+      integer, allocatable :: column(:)
+      real(hp), allocatable :: value(:, :)
+      integer :: n_old
+
+      n_old = size(self%column)
+      if (n <= n_old) return
+      allocate(column(2*n), value(2, 2*n))
+      column(:n_old) = self%column
+      value(:, :n_old) = self%value
+      call move_alloc(column, self%column)
+      call move_alloc(value, self%value)
+   end subroutine make_room
+
+   !> Each pivot as a sum over the columns that are no pivots: x(pivot(k)) = sum of weight(s)
+   !> x(column(s)), s = start(k) + 1 to start(k + 1). From the rows of the second kind; rows that
+   !> were not kept have no terms.
+   subroutine elimination_resolve(self, start, column, weight)
+      type(row_elimination_t), intent(inout) :: self
+      integer, allocatable, intent(out) :: start(:)     !! (rows + 1) from 0
+      integer, allocatable, intent(out) :: column(:)    !! ascending in each row
+      real(hp), allocatable, intent(out) :: weight(:)
+      integer, allocatable :: first(:), last(:)
+      integer :: k, s, n
+
+      ! Later rows first: what earlier rows need of them is there already.
+      allocate(first(self%n_row), last(self%n_row), source=0)
+      allocate(column(size(self%column)), weight(size(self%column)))
+      n = 0
+      do k = self%n_row, 1, -1
+         first(k) = n + 1
+         last(k) = n
+         if (self%pivot(k) == 0) cycle
+         call clear(self)
+         do s = self%row_start(k) + 1, self%row_start(k + 1)
+            call substitute(self%column(s), -self%value(2, s)/self%pivot_value(2, k))
+         end do
+         call store
+      end do
+      call clear(self)
+      call reorder
+
+   contains
+
+      !> Add `factor` times column `j`, or times what it is a sum of.
+      subroutine substitute(j, factor)
+         integer, intent(in) :: j
+         real(hp), intent(in) :: factor
+         integer :: t, i
+
+         i = self%pivot_row(j)
+         if (i == 0) then
+            call enlist(self, j)
+            self%work(2, j) = self%work(2, j) + factor
+            return
+         end if
+         do t = first(i), last(i)
+            call enlist(self, column(t))
+            self%work(2, column(t)) = self%work(2, column(t)) + factor*weight(t)
+         end do
+      end subroutine substitute
+
+      !> Append the present row, its columns ascending; what cancelled is left out.
+      subroutine store
+         integer :: t, place
+         real(hp) :: largest
+
+         if (n + self%n_list > size(column)) call enlarge(column, weight, 2*(n + self%n_list))
+         largest = maxval([0.0_hp, abs(self%work(2, self%list(:self%n_list)))])
+         do t = 1, self%n_list
+            associate (j => self%list(t))
+               if (abs(self%work(2, j)) <= 4.0_hp*epsilon(1.0_hp)*largest) cycle
+               n = n + 1
+               place = n
+               do while (place > first(k))
+                  if (column(place - 1) < j) exit
+                  column(place) = column(place - 1)
+                  weight(place) = weight(place - 1)
+                  place = place - 1
+               end do
+               column(place) = j
+               weight(place) = self%work(2, j)
+            end associate
+         end do
+         last(k) = n
+      end subroutine store
+
+      !> Rows in ascending order.
+      subroutine reorder
+         integer, allocatable :: held_column(:)
+         real(hp), allocatable :: held_weight(:)
+         integer :: i
+
+         allocate(start(self%n_row + 1), source=0)
+         allocate(held_column(n), held_weight(n))
+         do i = 1, self%n_row
+            associate (to => start(i + 1))
+               to = start(i) + last(i) - first(i) + 1
+               held_column(start(i) + 1:to) = column(first(i):last(i))
+               held_weight(start(i) + 1:to) = weight(first(i):last(i))
+            end associate
+         end do
+         call move_alloc(held_column, column)
+         call move_alloc(held_weight, weight)
+      end subroutine reorder
+
+   end subroutine elimination_resolve
+
+   subroutine enlarge(column, weight, n)
+      integer, allocatable, intent(inout) :: column(:)
+      real(hp), allocatable, intent(inout) :: weight(:)
+      integer, intent(in) :: n
+      integer, allocatable :: more(:)
+      real(hp), allocatable :: more_weight(:)
+
+      allocate(more(n), more_weight(n))
+      more(:size(column)) = column
+      more_weight(:size(weight)) = weight
+      call move_alloc(more, column)
+      call move_alloc(more_weight, weight)
+   end subroutine enlarge
+
+end module emcon_row_elimination
