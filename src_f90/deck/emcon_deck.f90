@@ -50,6 +50,7 @@ contains
       reader%doubt_names = .not. source%is_whole
       scene%file = source%file_name
       scene%n_dim = 2
+      allocate(scene%tie(0), scene%equation(0))
       call read_cards(reader, overrides)
       if (size(reader%card) > 0) call read_scene(reader, scene)
       diagnostics = reader%log

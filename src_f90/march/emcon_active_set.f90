@@ -3,7 +3,8 @@
 !> A constraint is taken in when its gap would be negative at the end of the step, and let go when
 !> its multiplier is. If a set comes back, the union of the sets in the cycle is taken and
 !> constraints are only added from then on: at once for persistent contact, which makes no energy
-!> if it is held too long; else only where the step cannot be cut any more.
+!> if it is held too long; else only where the step cannot be cut any more. Linear constraints that
+!> are not eliminated act always.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
    use emcon_contact, only : gap_state_t
@@ -111,7 +112,7 @@ contains
             cycle
          end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
-         if (status /= newton_converged .or. system%n_constraint == 0) return
+         if (status /= newton_converged .or. size(system%contact) == 0) return
          call stopwatch_start(system%contact_clock)
          call update(self, system, scene, state, du, only_adds, has_changed, status)
          call stopwatch_stop(system%contact_clock)
@@ -139,6 +140,7 @@ contains
       real(wp), intent(in), contiguous :: du(:, :)
       integer :: pair
 
+      self%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%is_reduced
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
@@ -171,6 +173,8 @@ contains
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
          call constraint_place(system, self%set%id(k), pair, i)
+         self%set%is_kept(k) = .true.
+         if (pair == 0) cycle
          associate (gap => system%contact(pair)%contact%state(i))
             ! What is closed too far is never pushed out: that would make energy.
             self%set%is_kept(k) = self%holds_gap .or. &
@@ -198,7 +202,7 @@ contains
       has_changed = .false.
       self%is_stale = .false.
       self%deepest = 0.0_wp
-      k = 0
+      k = count(self%is_active(:system%linear%n))
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             ! The motion may be more than was expected.

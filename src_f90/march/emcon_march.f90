@@ -11,6 +11,7 @@ module emcon_march
    use emcon_loads, only : instant_t
    use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
    use emcon_newton, only : newton_init
+   use emcon_numbering, only : spread_dependent
    use emcon_pair_record, only : pair_record_init
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : initiation_persistent, procedure_dynamic, procedure_static, scene_t, &
@@ -34,6 +35,8 @@ module emcon_march
    real(wp), parameter :: static_rounding = 1.0e-4_wp, dynamic_rounding = 1.0e-6_wp
    !> Closer than this a step's duration counts as a whole number of increments.
    real(wp), parameter :: whole = 1.0e3_wp*epsilon(1.0_wp)
+   !> Fields in a deck are rounded by less than this part of their largest value.
+   real(wp), parameter :: deck_rounding = 1.0e-6_wp
 
 contains
 
@@ -84,19 +87,62 @@ contains
       self%state%n_before = self%state%increment
       self%state%start_time = self%state%time
       self%state%u_start = self%state%u
+      if (scene%step(i_step)%procedure == procedure_static) self%state%v = 0.0_wp
+      call system_begin_step(self%system, scene, i_step, error)
+      if (allocated(error)) return
+      call follow_links(self, scene)
       if (scene%step(i_step)%procedure == procedure_static) then
          text = free_motion_text(self%system, scene, scene%step(i_step)%prescribed)
          if (len(text) > 0) then
             call raise(error, err_analysis, "the static problem is singular: " // text)
             return
          end if
-         self%state%v = 0.0_wp
       end if
-      call march_resume(self, scene, error)
+      call prepare(self, scene, error)
    end subroutine march_begin_step
+
+   !> Let displacements and velocities of dependent freedoms follow those of the others.
+   subroutine follow_links(self, scene)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+
+      if (.not. any(self%system%linear%is_used)) return
+      call follow(self%state%u, "displacement")
+      call follow(self%state%v, "velocity")
+
+   contains
+
+      subroutine follow(field, name)
+         real(wp), intent(inout), contiguous :: field(:, :)      !! (2, n_node)
+         character(len=*), intent(in) :: name
+         real(wp) :: change(size(field, 2)), largest
+         integer :: i
+
+         largest = maxval(abs(field))
+         self%du = field
+         call spread_dependent(self%system%linked, field)
+         change = maxval(abs(field - self%du), 1)
+         i = maxloc(change, 1)
+         if (change(i) > deck_rounding*largest) call note_add(self%system%notes, "the " // name // &
+            " at the start does not fit the ties and equations: dependent nodes follow the " // &
+            "others, largest change " // to_text(change(i)) // " at node " // &
+            to_text(scene%node_label(i)))
+      end subroutine follow
+
+   end subroutine follow_links
 
    !> Set up for the step that the state is in.
    subroutine march_resume(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+
+      call system_begin_step(self%system, scene, self%state%i_step, error)
+      if (.not. allocated(error)) call prepare(self, scene, error)
+   end subroutine march_resume
+
+   !> Scheme, solver and contact for the step that the system is in.
+   subroutine prepare(self, scene, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
@@ -104,8 +150,6 @@ contains
       integer :: i
 
       associate (step => scene%step(self%state%i_step), state => self%state)
-         call system_begin_step(self%system, scene, state%i_step, error)
-         if (allocated(error)) return
          if (allocated(self%scheme)) deallocate(self%scheme)
          if (step%procedure == procedure_dynamic) then
             allocate(scheme_energy_momentum_t :: self%scheme)
@@ -142,7 +186,7 @@ contains
          state%energy = self%system%response%energy
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
-   end subroutine march_resume
+   end subroutine prepare
 
    !> Grid increments in the step, and by how much they may grow and shrink.
    subroutine count_grid(self, step)
@@ -207,7 +251,7 @@ contains
          state%n_grid = state%n_grid + stride
          state%increment = state%increment + 1
          state%time = state%start_time + grid_time(self, step, state%n_grid)
-         increment%n_active = count(state%is_active)
+         increment%n_active = count(state%is_active(self%system%linear%n + 1:))
          if (increment%n_cut > 0) then
             state%n_easy = 0
             state%grid_stride = max(1, state%grid_stride/2)

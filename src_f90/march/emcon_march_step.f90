@@ -3,13 +3,14 @@
 !> `march_t` holds all that a march through time needs; how it cuts and counts: emcon_march.
 module emcon_march_step
    use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_inverted
-   use emcon_constraints, only : constraint_place
+   use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_loads, only : instant_t, prescribed_motion
    use emcon_newton, only : newton_t
+   use emcon_numbering, only : gather_dependent, spread_dependent
    use emcon_pair_record, only : pair_record_measure
    use emcon_scene, only : initiation_velocity_update, scene_t
    use emcon_scheme, only : scheme_t
@@ -129,7 +130,7 @@ contains
       self%du = 0.0_wp
       if (self%scheme%has_inertia .and. .not. is_at_rest) self%du = h*self%state%v
       do k = 1, size(self%du, 2)
-         if (self%system%body(k) == 0) self%du(:, k) = 0.0_wp
+         if (.not. self%system%is_alive(k)) self%du(:, k) = 0.0_wp
       end do
       self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%i_step))
@@ -147,6 +148,9 @@ contains
             end associate
          end do
       end associate
+      call spread_dependent(self%system%numbering, self%du)
+      call spread_dependent(self%system%numbering, self%offset)
+      call spread_dependent(self%system%numbering, self%newton%driven)
    end subroutine guess
 
    !> Take over the solved step: works, velocities, contact and reaction forces.
@@ -157,20 +161,26 @@ contains
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: restored
-      logical :: has_root, is_free
+      logical :: has_root
       integer :: i, a, k
 
       associate (state => self%state, system => self%system, set => self%active%set, &
             step => scene%step(self%state%i_step))
          system%residual = system%residual - self%newton%contact
+         call gather_dependent(system%numbering, system%residual)
          do i = 1, size(state%v, 2)
             do a = 1, 2
-               is_free = system%numbering%unknown(a, i) > 0
-               if (is_free) self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), self%du(a, i))
-               state%reaction(a, i) = merge(0.0_wp, system%residual(a, i), is_free)
+               if (system%numbering%unknown(a, i) > 0) then
+                  self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), self%du(a, i))
+                  system%residual(a, i) = 0.0_wp
+               end if
             end do
          end do
-         call book_work(self, h)
+         call spread_dependent(system%numbering, self%v1)
+         state%reaction = system%residual
+         if (any(set%id <= system%linear%n)) call constraints_force(set, &
+            1 + count(set%id <= system%linear%n), self%newton%contact)
+         call book_work(self)
          restored = 0.0_wp
          if (step%initiation == initiation_velocity_update .and. self%scheme%has_inertia) then
             call velocity_update_apply(self%velocity_update, system, set, self%v1, restored, &
@@ -204,11 +214,10 @@ contains
 
    !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
    !> docs/theory.md, section 7); in statics forces are taken as linear over the step.
-   subroutine book_work(self, h)
+   subroutine book_work(self)
       type(march_t), intent(inout) :: self
-      real(wp), intent(in) :: h
-      real(wp) :: contact_work, inner
-      integer :: k, i, a
+      real(wp) :: contact_work
+      integer :: k
 
       associate (state => self%state, system => self%system, set => self%active%set)
          contact_work = 0.0_wp
@@ -216,15 +225,8 @@ contains
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
             end do
-            self%ledger%external_work = self%ledger%external_work + sum(system%external*self%du)
-            do i = 1, size(self%du, 2)
-               do a = 1, 2
-                  if (system%numbering%unknown(a, i) > 0) cycle
-                  inner = state%reaction(a, i) - system%inertia(a, i)
-                  self%ledger%external_work = self%ledger%external_work + inner*self%du(a, i) &
-                     + system%inertia(a, i)*0.5_wp*h*(state%v(a, i) + self%v1(a, i))
-               end do
-            end do
+            self%ledger%external_work = self%ledger%external_work + sum(system%external*self%du) &
+               + sum(state%reaction*self%du) + sum(system%inertia*self%offset)
          else
             contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*self%du)
             self%ledger%external_work = self%ledger%external_work - contact_work &

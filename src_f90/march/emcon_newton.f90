@@ -10,7 +10,7 @@ module emcon_newton
       correction_solve, correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_system, only : pose_t, system_respond, system_tangent_times, system_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop
@@ -51,7 +51,7 @@ module emcon_newton
       integer :: inverted_element = 0
       real(wp), allocatable :: residual(:), scale(:), correction(:)   !! (n_unknown)
       real(wp), allocatable :: dlam(:)
-      real(wp), allocatable :: contact(:, :)     !! (2, n_node) contact forces
+      real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
       !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
       ! how the present solve goes:
@@ -292,19 +292,19 @@ contains
       integer :: k
 
       call pick_unknowns(system%numbering, system%residual, self%residual)
-      call correction_multipliers(correction, set, self%residual)
-      call constraints_force(set, self%contact, system%magnitude)
+      call correction_multipliers(correction, system, set, self%residual)
+      call constraints_force(set, 1, self%contact, system%magnitude)
       if (set%n > 0) then
          system%f_work = system%residual - self%contact
          call pick_unknowns(system%numbering, system%f_work, self%residual)
       end if
-      call pick_unknowns(system%numbering, system%magnitude, self%scale)
+      call pick_magnitudes(system%numbering, system%magnitude, self%scale)
       norm = relative_size(self%residual, self%scale)
       defect = 0.0_wp
       do k = 1, set%n
          defect = max(defect, abs(set%defect(k))/set%item(k)%size)
       end do
-      call pick_unknowns(system%numbering, system%response%rounding, self%scale)
+      call pick_magnitudes(system%numbering, system%response%rounding, self%scale)
       is_rounding = relative_size(self%residual, self%scale) <= floor .and. defect <= floor
    end subroutine measure
 

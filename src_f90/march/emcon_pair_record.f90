@@ -47,7 +47,7 @@ contains
       real(wp), intent(in) :: lag
       integer :: pair, first, last
 
-      last = 0
+      last = count(set%id <= system%linear%n)
       do pair = 1, size(self%total)
          first = last + 1
          last = count(set%id <= system%first_constraint(pair + 1))

@@ -154,15 +154,15 @@ contains
    end subroutine reference_gradient
 
    !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
-   !> to the matrix entries `value`.
-   pure subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value)
+   !> to the matrix entries `value` (slot > 0) and `side` (slot < 0).
+   pure subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
       type(solid_response_t), intent(inout) :: response
       real(wp), intent(in), optional :: factor
-      integer, intent(in), contiguous, optional :: slot(:)       !! as `csr_from_elements` gives it
-      real(dp), intent(inout), contiguous, optional :: value(:)
+      integer, intent(in), contiguous, optional :: slot(:)       !! element matrices by columns
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
       type(element_response_t) :: part
       real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
       logical :: with_tangent
@@ -193,7 +193,7 @@ contains
             response%rounding(:, node) = response%rounding(:, node) + largest*self%stiffness(i, e)
          end do
          if (with_tangent) then
-            call scatter(2*n, part%tangent, factor, slot(first:), value)
+            call scatter(2*n, part%tangent, factor, slot(first:), value, side)
             first = first + 4*n*n
          end if
       end do
@@ -252,17 +252,21 @@ contains
    end subroutine solid_tangent_times
 
    !> Add a square element matrix of `n` unknowns to its places; `slot` runs down the columns.
-   pure subroutine scatter(n, tangent, factor, slot, value)
+   pure subroutine scatter(n, tangent, factor, slot, value, side)
       integer, intent(in) :: n
       real(wp), intent(in) :: tangent(2*max_element_nodes, 2*max_element_nodes), factor
       integer, intent(in) :: slot(:)
-      real(dp), intent(inout) :: value(:)
+      real(dp), intent(inout) :: value(:), side(:)
       integer :: i, j, k
 
       do j = 1, n
          do i = 1, n
             k = slot(i + n*(j - 1))
-            if (k > 0) value(k) = value(k) + real(factor*tangent(i, j), dp)
+            if (k > 0) then
+               value(k) = value(k) + real(factor*tangent(i, j), dp)
+            else if (k < 0) then
+               side(-k) = side(-k) + real(factor*tangent(i, j), dp)
+            end if
          end do
       end do
    end subroutine scatter

@@ -1,11 +1,14 @@
 !> The active constraints of a step: values, gradients, multipliers.
 !>
-!> One set serves all contact pairs. Constraint k demands that its mean gap be target_k at the end;
-!> its multiplier lam_k >= 0 is the contact force. Sign: docs/theory.md, eq. (1).
+!> One set serves contact pairs, ties and equations. A contact constraint demands that its mean gap
+!> be target_k at the end; its multiplier lam_k >= 0 is the contact force. A linear constraint holds
+!> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
+!> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_contact, only : constraint_t
+   use emcon_contact, only : constraint_resize, constraint_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_kinds, only : dp, wp
+   use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : numbering_t
    use emcon_scene, only : scene_t
    use emcon_system, only : pose_t, system_t
@@ -44,14 +47,15 @@ contains
       self%is_kept = .false.
    end subroutine constraints_select
 
-   !> Pair and number within the pair of constraint `id`.
+   !> Pair and number within the pair of constraint `id`; pair 0: a linear one.
    pure subroutine constraint_place(system, id, pair, i)
       type(system_t), intent(in) :: system
       integer, intent(in) :: id
       integer, intent(out) :: pair, i
 
       pair = count(system%first_constraint < id)
-      i = id - system%first_constraint(pair)
+      i = id
+      if (pair > 0) i = id - system%first_constraint(pair)
    end subroutine constraint_place
 
    !> Values and derivatives of all active constraints for the step `u0` to `u0 + du`.
@@ -69,7 +73,10 @@ contains
          call constraint_place(system, self%id(k), pair, i)
          number(k) = i
       end do
-      last = 0
+      last = count(self%id <= system%linear%n)
+      do k = 1, last
+         call evaluate_linear(system%linear, self%id(k), u0, du, self%item(k))
+      end do
       do pair = 1, size(system%contact)
          first = last + 1
          last = count(self%id <= system%first_constraint(pair + 1))
@@ -90,15 +97,54 @@ contains
       end do
    end subroutine constraints_evaluate
 
-   !> Gradients of the active constraints as rows over the unknowns.
+   !> The linear constraint of row `id`.
+   pure subroutine evaluate_linear(linear, id, u0, du, item)
+      type(linear_rows_t), intent(in) :: linear
+      integer, intent(in) :: id
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      type(constraint_t), intent(inout) :: item
+      integer :: s, a, i, node
+
+      associate (from => linear%start(id) + 1, to => linear%start(id + 1))
+         call constraint_resize(item, 1 + to - from)
+         item%n_node = 1
+         item%n_slave = 1
+         item%node(1) = (linear%own(id) + 1)/2
+         item%g = 0.0_wp
+         item%h = 0.0_wp
+         item%gap0 = 0.0_wp
+         item%dgap = 0.0_wp
+         do s = from, to
+            node = (linear%dof(s) + 1)/2
+            a = 2 - mod(linear%dof(s), 2)
+            i = findloc(item%node(:item%n_node), node, 1)
+            if (i == 0) then
+               item%n_node = item%n_node + 1
+               i = item%n_node
+               item%node(i) = node
+            end if
+            item%g(a, i) = item%g(a, i) + linear%weight(s)
+            item%gap0 = item%gap0 + linear%weight(s)*u0(a, node)
+            item%dgap = item%dgap + linear%weight(s)*du(a, node)
+         end do
+      end associate
+      item%c = item%g
+      item%gap1 = item%gap0 + item%dgap
+      item%size = linear%size(id)
+   end subroutine evaluate_linear
+
+   !> Gradients of the active constraints as rows over the unknowns: those by all freedoms, times T.
    subroutine constraints_rows(self, numbering)
       type(constraint_set_t), intent(inout) :: self
       type(numbering_t), intent(in) :: numbering
-      integer :: k, i, a, n, unknown, m, most
+      integer :: k, i, a, n, m, most
       integer, allocatable :: column(:), order(:)
       real(wp), allocatable :: g(:), c(:)
 
-      most = 2*maxval([0, (self%item(k)%n_node, k = 1, self%n)])
+      most = 0
+      do k = 1, self%n
+         most = max(most, room(k))
+      end do
       allocate(column(most), order(most), g(most), c(most))
       call reset(self%force_rows)
       call reset(self%gap_rows)
@@ -107,12 +153,8 @@ contains
          m = 0
          do i = 1, self%item(k)%n_node
             do a = 1, 2
-               unknown = numbering%unknown(a, self%item(k)%node(i))
-               if (unknown == 0) cycle
-               m = m + 1
-               column(m) = unknown - 1
-               g(m) = self%item(k)%g(a, i)
-               c(m) = self%item(k)%c(a, i)
+               call add_terms(2*(self%item(k)%node(i) - 1) + a, self%item(k)%g(a, i), &
+                  self%item(k)%c(a, i))
             end do
          end do
          order(:m) = insertion_order(column(:m))
@@ -127,12 +169,50 @@ contains
 
    contains
 
-      !> Room for all coordinates of all constraints.
+      !> Entries of constraint `k` at most.
+      pure integer function room(k)
+         integer, intent(in) :: k
+         integer :: i
+
+         room = 0
+         do i = 1, self%item(k)%n_node
+            associate (node => self%item(k)%node(i))
+               room = room + numbering%start(2*node + 1) - numbering%start(2*node - 1)
+            end associate
+         end do
+      end function room
+
+      !> Share out the derivatives by freedom `dof`; unknowns that are met again are summed up.
+      subroutine add_terms(dof, dg, dc)
+         integer, intent(in) :: dof
+         real(wp), intent(in) :: dg, dc
+         integer :: t, place
+
+         do t = numbering%start(dof) + 1, numbering%start(dof + 1)
+            if (numbering%column(t) == 0) cycle
+            place = 0
+            if (numbering%n_dependent > 0) place = findloc(column(:m), numbering%column(t) - 1, 1)
+            if (place == 0) then
+               m = m + 1
+               place = m
+               column(m) = numbering%column(t) - 1
+               g(m) = 0.0_wp
+               c(m) = 0.0_wp
+            end if
+            g(place) = g(place) + numbering%weight(t)*dg
+            c(place) = c(place) + numbering%weight(t)*dc
+         end do
+      end subroutine add_terms
+
+      !> Room for all entries of all constraints.
       subroutine reset(rows)
          type(csr_t), intent(inout) :: rows
-         integer :: n_entry
+         integer :: n_entry, k
 
-         n_entry = 2*sum([(self%item(k)%n_node, k = 1, self%n)])
+         n_entry = 0
+         do k = 1, self%n
+            n_entry = n_entry + room(k)
+         end do
          rows%n_row = self%n
          rows%n_col = numbering%n_unknown
          if (allocated(rows%row_start)) then
@@ -248,18 +328,21 @@ contains
       end do
    end subroutine list_rows
 
-   !> Contact forces lam_k g_k on all nodes, and the sum of their sizes.
-   pure subroutine constraints_force(self, force, magnitude)
+   !> Forces lam_k g_k on all nodes of the constraints from the `first` one on, and with `magnitude`
+   !> the sum of their sizes.
+   pure subroutine constraints_force(self, first, force, magnitude)
       type(constraint_set_t), intent(in) :: self
-      real(wp), intent(out), contiguous :: force(:, :)         !! (2, n_node)
-      real(wp), intent(inout), contiguous :: magnitude(:, :)   !! (2, n_node), added to
+      integer, intent(in) :: first
+      real(wp), intent(out), contiguous :: force(:, :)                   !! (2, n_node)
+      real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (2, n_node), added to
       integer :: k, i, node
 
       force = 0.0_wp
-      do k = 1, self%n
+      do k = first, self%n
          do i = 1, self%item(k)%n_node
             node = self%item(k)%node(i)
             force(:, node) = force(:, node) + self%lam(k)*self%item(k)%g(:, i)
+            if (.not. present(magnitude)) cycle
             magnitude(:, node) = magnitude(:, node) + abs(self%lam(k)*self%item(k)%g(:, i))
          end do
       end do
@@ -270,22 +353,46 @@ contains
       type(constraint_set_t), intent(in) :: self
       type(numbering_t), intent(in) :: numbering
       type(csr_t), intent(inout) :: merged
-      integer :: k, i, j, slot, row, column
+      integer :: k, i, j
 
       do k = 1, self%n
          associate (item => self%item(k))
+            if (all(abs(item%h(:2*item%n_node, :2*item%n_node)) <= 0.0_wp)) cycle
             do j = 1, 2*item%n_node
-               column = numbering%unknown(2 - mod(j, 2), item%node((j + 1)/2))
-               if (column == 0) cycle
                do i = 1, 2*item%n_node
-                  row = numbering%unknown(2 - mod(i, 2), item%node((i + 1)/2))
-                  if (row == 0) cycle
-                  slot = csr_find(merged, row, column)
-                  merged%value(slot) = merged%value(slot) - real(self%lam(k)*item%h(i, j), dp)
+                  call subtract_terms(dof_of(item, i), dof_of(item, j), self%lam(k)*item%h(i, j))
                end do
             end do
          end associate
       end do
+
+   contains
+
+      !> Subtract `value` at the freedoms `row`, `column`, shared out over their terms.
+      subroutine subtract_terms(row, column, value)
+         integer, intent(in) :: row, column
+         real(wp), intent(in) :: value
+         integer :: s, t, slot
+
+         do t = numbering%start(column) + 1, numbering%start(column + 1)
+            if (numbering%column(t) == 0) cycle
+            do s = numbering%start(row) + 1, numbering%start(row + 1)
+               if (numbering%column(s) == 0) cycle
+               slot = csr_find(merged, numbering%column(s), numbering%column(t))
+               merged%value(slot) = merged%value(slot) &
+                  - real(numbering%weight(s)*numbering%weight(t)*value, dp)
+            end do
+         end do
+      end subroutine subtract_terms
+
    end subroutine constraints_add_curvature
+
+   !> Degree of freedom of local coordinate `i` of a constraint.
+   pure integer function dof_of(item, i)
+      type(constraint_t), intent(in) :: item
+      integer, intent(in) :: i
+
+      dof_of = 2*(item%node((i + 1)/2) - 1) + 2 - mod(i, 2)
+   end function dof_of
 
 end module emcon_constraints

@@ -167,13 +167,14 @@ contains
 
    !> The multipliers that belong to `residual` (without contact forces), by null space only: the
    !> saddle point has them as unknowns.
-   subroutine correction_multipliers(self, set, residual)
+   subroutine correction_multipliers(self, system, set, residual)
       type(correction_t), intent(in) :: self
+      type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
 
       if (set%n == 0 .or. .not. self%uses_null_space) return
-      call null_space_multipliers(self%null_space, set, residual, set%lam)
+      call null_space_multipliers(self%null_space, set, system%numbering, residual, set%lam)
    end subroutine correction_multipliers
 
    !> CPU time spent on constraints so far, over what the system without them would take [s].

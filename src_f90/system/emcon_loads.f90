@@ -1,9 +1,10 @@
 !> Loads and prescribed motion of one step, as functions of time and configuration.
 module emcon_loads
-   use emcon_csr, only : csr_find, csr_t
+   use emcon_csr, only : csr_t
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : dp, wp
    use emcon_numbering, only : numbering_t
+   use emcon_reduction, only : freedom_numbers, reduction_slot, reduction_t
    use emcon_scene, only : find_amplitude_value, load_gravity, load_point, load_pressure, load_t, &
       prescribed_t, procedure_static, scene_t, step_t
    use emcon_solid, only : solid_t
@@ -30,12 +31,14 @@ module emcon_loads
 contains
 
    !> The loads of `step`; `matrix` is the pattern that pressure stiffness goes into.
-   subroutine loads_init(self, scene, step, numbering, matrix)
+   subroutine loads_init(self, scene, step, numbering, matrix, reduction)
       type(loads_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
       type(numbering_t), intent(in) :: numbering
       type(csr_t), intent(in) :: matrix
+      type(reduction_t), intent(in) :: reduction
+      integer, allocatable :: number(:)
       integer :: i, e, dofs(4), j, k
 
       self%load = step%load
@@ -45,17 +48,17 @@ contains
       self%duration = step%duration
       allocate(self%edge(2, self%n), source=0)
       allocate(self%slot(16, self%n), source=0)
+      allocate(number, source=freedom_numbers(numbering))
       do i = 1, self%n
          if (self%load(i)%kind /= load_pressure) cycle
          e = self%load(i)%target
          self%edge(:, i) = scene%element_node( &
             element_kinds(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
-         dofs = reshape(numbering%unknown(:, self%edge(:, i)), [4])
+         dofs = number([2*self%edge(1, i) - 1, 2*self%edge(1, i), 2*self%edge(2, i) - 1, &
+            2*self%edge(2, i)])
          do k = 1, 4
             do j = 1, 4
-               if (dofs(j) > 0 .and. dofs(k) > 0) then
-                  self%slot(j + 4*(k - 1), i) = csr_find(matrix, dofs(j), dofs(k))
-               end if
+               self%slot(j + 4*(k - 1), i) = reduction_slot(reduction, matrix, dofs(j), dofs(k))
             end do
          end do
       end do
@@ -94,9 +97,9 @@ contains
       call find_amplitude_value(scene%amplitude(i), time, value, rate)
    end subroutine amplitude_at
 
-   !> Add the loads at `instant`, acting on the positions x + u, to `force`; with `value`, also
-   !> subtract `factor` times their derivative by u from the matrix.
-   pure subroutine loads_add(self, scene, solid, instant, u, force, factor, value)
+   !> Add the loads at `instant`, acting on the positions x + u, to `force`; with `value` and `side`,
+   !> also subtract `factor` times their derivative by u from the matrix.
+   pure subroutine loads_add(self, scene, solid, instant, u, force, factor, value, side)
       type(loads_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
@@ -104,7 +107,7 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)          !! (2, n_node)
       real(wp), intent(inout), contiguous :: force(:, :)   !! (2, n_node)
       real(wp), intent(in), optional :: factor
-      real(dp), intent(inout), contiguous, optional :: value(:)
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
       real(wp) :: p
       integer :: i, j, node
 
@@ -124,7 +127,7 @@ contains
                p = p*solid%thickness(load%target)
                call add_pressure(self%edge(:, i), p, scene%x, u, self%nlgeom, force)
                if (present(value) .and. self%nlgeom) then
-                  call add_pressure_stiffness(p*factor, self%slot(:, i), value)
+                  call add_pressure_stiffness(p*factor, self%slot(:, i), value, side)
                end if
             end select
          end associate
@@ -148,10 +151,10 @@ contains
    end subroutine add_pressure
 
    !> The force is linear in the edge: f1 = p (a2 - b2)/2, f2 = p (b1 - a1)/2 on both nodes.
-   pure subroutine add_pressure_stiffness(p, slot, value)
+   pure subroutine add_pressure_stiffness(p, slot, value, side)
       real(wp), intent(in) :: p
       integer, intent(in) :: slot(16)
-      real(dp), intent(inout) :: value(:)
+      real(dp), intent(inout) :: value(:), side(:)
       real(wp), parameter :: turn(2, 2) = reshape([0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp], [2, 2])
       integer :: i, j, a, b, k
       real(wp) :: df
@@ -163,6 +166,7 @@ contains
                   k = slot(a + 2*(i - 1) + 4*(b - 1 + 2*(j - 1)))
                   df = 0.5_wp*p*turn(a, b)*merge(1.0_wp, -1.0_wp, j == 2)
                   if (k > 0) value(k) = value(k) - real(df, dp)
+                  if (k < 0) side(-k) = side(-k) - real(df, dp)
                end do
             end do
          end do

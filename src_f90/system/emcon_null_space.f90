@@ -60,7 +60,7 @@ module emcon_null_space
       type(triple_product_t) :: product
       type(umfpack_t) :: solver
       type(stopwatch_t) :: clock                 !! P, DF and P^T N DF
-      integer, allocatable :: owner(:, :)        !! (2, n_node) constraint of a dependent one, or 0
+      integer, allocatable :: owner(:)           !! (n_unknown) constraint of a dependent one, or 0
       real(wp), allocatable :: rhs(:), x(:)      !! (n_free)
       real(wp), allocatable :: part(:), image(:) !! (n_unknown)
    end type null_space_t
@@ -83,7 +83,7 @@ contains
       if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%part, self%image, self%owner)
       allocate(self%rhs(self%n_free), self%x(self%n_free))
       allocate(self%part(matrix%n_row), self%image(matrix%n_row))
-      allocate(self%owner, source=0*numbering%unknown)
+      allocate(self%owner(matrix%n_row), source=0)
       call null_space_update(self, set, numbering)
       if (self%obstacle == obstacle_none) call lay_out(self, set%force_rows, matrix, error)
    end subroutine null_space_init
@@ -94,7 +94,7 @@ contains
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
-      integer :: k, n_dim
+      integer :: k
 
       call independent_rows_find(self%rows, set, numbering)
       self%obstacle = obstacle_none
@@ -103,13 +103,8 @@ contains
       if (self%obstacle /= obstacle_none) return
       if (.not. is_same(self%present%dependent, self%rows%dependent)) then
          call dependent_block_init(self%present, set%force_rows, self%rows%dependent)
-         n_dim = size(self%owner, 1)
          self%owner = 0
-         do k = 1, set%n
-            associate (dof => numbering%dof(self%present%dependent(k)) - 1)
-               self%owner(1 + mod(dof, n_dim), 1 + dof/n_dim) = k
-            end associate
-         end do
+         self%owner(self%present%dependent) = [(k, k = 1, set%n)]
       end if
       if (is_too_full(self)) then
          self%obstacle = obstacle_fill
@@ -322,9 +317,10 @@ contains
    !>
    !> The factors are of kind `dp`; refinement with gradients of kind `wp` goes on as long as it
    !> gains and the equations are not yet met to the round-off of each of them.
-   subroutine null_space_multipliers(self, set, residual, lam)
+   subroutine null_space_multipliers(self, set, numbering, residual, lam)
       type(null_space_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
+      type(numbering_t), intent(in) :: numbering
       real(wp), intent(in) :: residual(:)                  !! (n_unknown)
       real(wp), intent(out) :: lam(:)                      !! (n)
       real(wp) :: rest(set%n), trial(set%n), best, next
@@ -338,7 +334,7 @@ contains
          x = real(rest, dp)
          call dependent_block_solve(self%present, .true., x)
          trial = trial + real(x, wp)
-         call remainder(self, set, residual, trial, rest, next)
+         call remainder(self, set, numbering, residual, trial, rest, next)
          if (i > 0 .and. .not. next < best) return
          best = next
          lam = trial
@@ -347,25 +343,30 @@ contains
    end subroutine null_space_multipliers
 
    !> r_d - Gb_d^T lam, and its largest entry relative to the sum of what it consists of.
-   pure subroutine remainder(self, set, residual, lam, rest, relative)
+   pure subroutine remainder(self, set, numbering, residual, lam, rest, relative)
       type(null_space_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
+      type(numbering_t), intent(in) :: numbering
       real(wp), intent(in) :: residual(:), lam(:)
       real(wp), intent(out) :: rest(:)                     !! (n)
       real(wp), intent(out) :: relative
       real(wp) :: magnitude(set%n), term
-      integer :: k, i, a, l
+      integer :: k, i, a, t, l, dof
 
       rest = residual(self%present%dependent)
       magnitude = abs(rest)
       do k = 1, set%n
          do i = 1, set%item(k)%n_node
-            do a = 1, size(self%owner, 1)
-               l = self%owner(a, set%item(k)%node(i))
-               if (l == 0) cycle
-               term = set%item(k)%g(a, i)*lam(k)
-               rest(l) = rest(l) - term
-               magnitude(l) = magnitude(l) + abs(term)
+            do a = 1, 2
+               dof = 2*(set%item(k)%node(i) - 1) + a
+               do t = numbering%start(dof) + 1, numbering%start(dof + 1)
+                  if (numbering%column(t) == 0) cycle
+                  l = self%owner(numbering%column(t))
+                  if (l == 0) cycle
+                  term = numbering%weight(t)*set%item(k)%g(a, i)*lam(k)
+                  rest(l) = rest(l) - term
+                  magnitude(l) = magnitude(l) + abs(term)
+               end do
             end do
          end do
       end do

@@ -10,11 +10,15 @@ module emcon_system
    use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_linear_rows, only : linear_rows_begin_step, linear_rows_init, linear_rows_t
    use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
-   use emcon_numbering, only : numbering_init, numbering_t
-   use emcon_scene, only : scene_t
+   use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
+   use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
+   use emcon_unresolved_rows, only : report_unresolved
+   use emcon_scene, only : method_null_space, scene_t
    use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t, &
       solid_tangent_times
+   use emcon_text, only : note_add, notes_t
    use emcon_timer, only : stopwatch_t
    implicit none
    private
@@ -35,17 +39,23 @@ module emcon_system
    type :: system_t
       type(solid_t) :: solid
       type(csr_t) :: mass                        !! node by node, the same in all directions
+      type(linear_rows_t) :: linear              !! constraints of ties and equations, the first ones
       type(contact_box_t), allocatable :: contact(:)
       integer, allocatable :: first_constraint(:)   !! (n_pair + 1) constraints before each pair
       integer :: n_constraint = 0
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: no element
+      logical, allocatable :: is_alive(:)        !! (n_node) in an element or in an equation
       integer :: i_step = 0                      !! step of the deck the rest belongs to
       logical :: nlgeom = .false.
+      type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
+      logical :: is_reduced = .true.             !! `numbering` is that one, else without them
       type(numbering_t) :: numbering
       type(loads_t) :: loads
       type(csr_t) :: matrix                      !! tangent over the unknowns
-      integer, allocatable :: slot(:)            !! element entries in `matrix`
+      integer, allocatable :: slot(:)            !! element entries, as `reduction_slot` gives them
+      type(reduction_t) :: reduction             !! brings dependent freedoms into `matrix`
+      type(notes_t) :: notes                     !! on the linear constraints of the step
       real(dp), allocatable :: mass_value(:)     !! mass in the pattern of `matrix`
       type(solid_response_t) :: response
       real(wp), allocatable :: inertia(:, :)     !! (2, n_node) s M (b du - w v0)
@@ -63,16 +73,22 @@ contains
       type(system_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      integer :: n
+      integer :: i, n
 
       call solid_init(self%solid, scene, error)
       if (allocated(error)) return
       call init_mass(self, error)
       if (allocated(error)) return
+      call linear_rows_init(self%linear, scene)
       call init_contact(self, scene, error)
       if (allocated(error)) return
       n = self%solid%n_node
       call bodies_find(self%solid%node, n, self%body, self%n_body)
+      allocate(self%is_alive(n))
+      self%is_alive = self%body > 0
+      do i = 1, size(scene%equation)
+         self%is_alive(scene%equation(i)%node) = .true.
+      end do
       allocate(self%response%force(2, n), self%response%magnitude(2, n), source=0.0_wp)
       allocate(self%response%rounding(2, n), source=0.0_wp)
       allocate(self%response%energy(self%solid%n_element), source=0.0_wp)
@@ -127,7 +143,7 @@ contains
       list = list(:k)
    end subroutine element_lists
 
-   !> The contact pairs and the numbers of their constraints.
+   !> The contact pairs and the numbers of their constraints, after the linear ones.
    subroutine init_contact(self, scene, error)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -135,7 +151,8 @@ contains
       integer :: i
 
       allocate(self%contact(size(scene%pair)))
-      allocate(self%first_constraint(size(scene%pair) + 1), source=0)
+      allocate(self%first_constraint(size(scene%pair) + 1), source=self%linear%n)
+      self%n_constraint = self%linear%n
       do i = 1, size(scene%pair)
          call new_contact(scene, scene%pair(i), self%contact(i)%contact, error)
          if (allocated(error)) return
@@ -144,35 +161,99 @@ contains
       end do
    end subroutine init_contact
 
-   !> Number the unknowns of step `i_step` of the deck and lay out its matrix.
+   !> Number the unknowns of step `i_step` of the deck and lay out its matrix. Linear constraints are
+   !> eliminated, unless the deck asks for multipliers or their rows are too long.
    subroutine system_begin_step(self, scene, i_step, error)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_step
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: start(:), list(:)
-      integer :: k
+      logical :: is_too_full
 
       self%i_step = i_step
       self%nlgeom = scene%step(i_step)%nlgeom
-      call numbering_init(self%numbering, 2, self%body, scene%step(i_step)%prescribed)
-      call element_lists(self%solid, 2, start, list)
-      do k = 1, size(list)
-         list(k) = self%numbering%unknown(2 - mod(list(k), 2), (list(k) + 1)/2)
-      end do
-      call csr_from_elements(self%matrix, self%numbering%n_unknown, start, list, self%slot, error)
+      call begin_linear(self, scene, error)
       if (allocated(error)) return
+      self%is_reduced = scene%step(i_step)%constraint_method == method_null_space
+      call number_and_lay_out(self, scene, is_too_full, error)
+      if (allocated(error)) return
+      if (is_too_full) then
+         call note_add(self%notes, "ties or equations with long rows: solved with their " // &
+            "multipliers, as a saddle point; dual multipliers keep rows short")
+         self%is_reduced = .false.
+         call number_and_lay_out(self, scene, is_too_full, error)
+         if (allocated(error)) return
+      end if
       call place_mass(self)
-      call loads_init(self%loads, scene, scene%step(i_step), self%numbering, self%matrix)
+      call loads_init(self%loads, scene, scene%step(i_step), self%numbering, self%matrix, &
+         self%reduction)
    end subroutine system_begin_step
+
+   !> The linear constraints of the step, less those that follow from others.
+   subroutine begin_linear(self, scene, error)
+      type(system_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(unresolved_t), allocatable :: unresolved(:)
+      integer :: k
+
+      self%notes = notes_t()
+      call linear_rows_begin_step(self%linear, scene, scene%step(self%i_step)%prescribed)
+      if (self%linear%n == 0) return
+      call numbering_init(self%linked, 2, self%is_alive, scene%step(self%i_step)%prescribed, &
+         self%linear, unresolved)
+      do k = 1, size(unresolved)
+         self%linear%is_used(unresolved(k)%row) = .false.
+      end do
+      call report_unresolved(scene, self%i_step, self%linear, unresolved, self%notes, error)
+   end subroutine begin_linear
+
+   !> Unknowns, and the pattern of the matrix with the places of element entries in it.
+   subroutine number_and_lay_out(self, scene, is_too_full, error)
+      type(system_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      logical, intent(out) :: is_too_full
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: full
+      integer, allocatable :: start(:), list(:), number(:)
+
+      if (self%is_reduced .and. self%linear%n > 0) then
+         self%numbering = self%linked
+      else
+         call numbering_init(self%numbering, 2, self%is_alive, &
+            scene%step(self%i_step)%prescribed)
+      end if
+      call element_lists(self%solid, 2, start, list)
+      call append_bare_nodes(self, start, list)
+      allocate(number, source=freedom_numbers(self%numbering))
+      list = number(list)
+      call csr_from_elements(full, self%numbering%n_unknown + self%numbering%n_dependent, start, &
+         list, self%slot, error)
+      if (allocated(error)) return
+      call reduction_init(self%reduction, self%numbering, full, self%matrix, self%slot, &
+         is_too_full)
+   end subroutine number_and_lay_out
+
+   !> Nodes without element that stand in equations, as lists of one freedom each.
+   pure subroutine append_bare_nodes(self, start, list)
+      type(system_t), intent(in) :: self
+      integer, allocatable, intent(inout) :: start(:), list(:)
+      integer, allocatable :: bare(:)
+      integer :: i, n
+
+      bare = pack([(i, i = 1, size(self%body))], self%is_alive .and. self%body == 0)
+      if (size(bare) == 0) return
+      n = size(list)
+      list = [list, [(2*bare(i) - 1, 2*bare(i), i = 1, size(bare))]]
+      start = [start, [(n + 1 + i, i = 1, 2*size(bare))]]
+   end subroutine append_bare_nodes
 
    !> Put the mass into the pattern of the matrix.
    subroutine place_mass(self)
       type(system_t), intent(inout) :: self
       integer :: e, i, j, a, k, n, before
 
-      if (allocated(self%mass_value)) deallocate(self%mass_value)
-      allocate(self%mass_value(size(self%matrix%value)), source=0.0_dp)
+      self%matrix%value = 0.0_dp
       before = 0
       do e = 1, self%solid%n_element
          n = element_kinds(self%solid%kind(e))%n_node
@@ -180,13 +261,17 @@ contains
             do i = 1, n
                do a = 1, 2
                   k = self%slot(before + 2*(i - 1) + a + 2*n*(2*(j - 1) + a - 1))
-                  if (k == 0) cycle
-                  self%mass_value(k) = self%mass_value(k) + real(self%solid%mass(i, j, e), dp)
+                  associate (mass => real(self%solid%mass(i, j, e), dp))
+                     if (k > 0) self%matrix%value(k) = self%matrix%value(k) + mass
+                     if (k < 0) self%reduction%side%value(-k) = self%reduction%side%value(-k) + mass
+                  end associate
                end do
             end do
          end do
          before = before + 4*n*n
       end do
+      call reduction_add(self%reduction, self%matrix)
+      self%mass_value = self%matrix%value
    end subroutine place_mass
 
    !> Residual of the step from `u0`, `v0` to `u0 + du` without contact forces, and with
@@ -232,9 +317,10 @@ contains
 
          if (with_tangent) then
             call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
-               solid_factor, self%slot, self%matrix%value)
+               solid_factor, self%slot, self%matrix%value, self%reduction%side%value)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
-               self%external, load_factor, self%matrix%value)
+               self%external, load_factor, self%matrix%value, self%reduction%side%value)
+            call reduction_add(self%reduction, self%matrix)
          else
             call solid_respond(self%solid, start, step, self%nlgeom, self%response)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &

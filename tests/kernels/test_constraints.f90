@@ -146,7 +146,7 @@ contains
          end associate
       end do
       magnitude = 5.0_wp
-      call constraints_force(problem%set, force, magnitude)
+      call constraints_force(problem%set, 1, force, magnitude)
       call check_near(error, force, expected, tol_dp, 1.0_wp, "force")
       call check_near(error, magnitude, sizes, tol_dp, 1.0_wp, "magnitude")
    end subroutine test_force

@@ -40,7 +40,7 @@ contains
       call make_rows(problem)
       call correction_lay_out(correction, system, problem%set, error)
       if (allocated(error)) return
-      call correction_multipliers(correction, problem%set, problem%residual)
+      call correction_multipliers(correction, system, problem%set, problem%residual)
       call correction_factorise(correction, system, problem%set, is_singular, error)
       if (allocated(error) .or. is_singular) return
       call correction_solve(correction, problem%set, problem%residual, dq, dlam, error)

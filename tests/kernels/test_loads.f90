@@ -167,7 +167,7 @@ contains
       call shake(u, 0.2_wp)
       up = 0.0_wp
       call loads_add(system%loads, scene, system%solid, instant_t(), u, up, 0.5_wp, &
-         system%matrix%value)
+         system%matrix%value, system%reduction%side%value)
       n = system%numbering%n_unknown
       do j = 1, n
          u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) = &

@@ -137,7 +137,7 @@ contains
       if (allocated(error)) return
       call csr_multiply(problem%matrix, dq, rest)
       rest = rest + problem%residual
-      call null_space_multipliers(null_space, problem%set, rest, lam)
+      call null_space_multipliers(null_space, problem%set, problem%numbering, rest, lam)
    end subroutine solve
 
    !> N dq - Gb^T lam = -r and G1 dq = -defect.
@@ -217,7 +217,7 @@ contains
             call full_gradient(problem, k, g, c)
             force = force + problem%set%lam(k)*g
          end do
-         call null_space_multipliers(null_space, problem%set, force, lam)
+         call null_space_multipliers(null_space, problem%set, problem%numbering, force, lam)
          call check_near(error, lam, problem%set%lam, 100.0_wp*epsilon(1.0_wp), 1.0_wp, "lam")
          deallocate(lam, g, c, force)
          if (allocated(error)) return
@@ -319,14 +319,14 @@ contains
       call null_space_solve(null_space, problem%set, problem%matrix, problem%residual, dq(:, 2), &
          error)
       if (allocated(error)) return
-      call null_space_multipliers(null_space, problem%set, problem%residual, lam(:, 1))
+      call null_space_multipliers(null_space, problem%set, problem%numbering, problem%residual, lam(:, 1))
       call null_space_init(new, problem%set, problem%matrix, problem%numbering, error)
       if (allocated(error)) return
       call null_space_factorise(new, problem%set, problem%matrix, is_singular, error)
       if (allocated(error)) return
       call null_space_solve(new, problem%set, problem%matrix, problem%residual, dq(:, 3), error)
       if (allocated(error)) return
-      call null_space_multipliers(new, problem%set, problem%residual, lam(:, 2))
+      call null_space_multipliers(new, problem%set, problem%numbering, problem%residual, lam(:, 2))
       call check_near(error, dq(:, 2), dq(:, 3), 0.0_wp, 1.0_wp, "dq, to the last bit")
       call check_near(error, lam(:, 1), lam(:, 2), 0.0_wp, 1.0_wp, "lam, to the last bit")
       call null_space%solver%free()

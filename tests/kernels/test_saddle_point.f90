@@ -86,7 +86,7 @@ contains
             problem%residual - contact, dq(:, 2), error)
          if (allocated(error)) return
          rest = problem%residual + matmul(real(dense_of(problem%matrix), wp), dq(:, 2))
-         call null_space_multipliers(null_space, problem%set, rest, lam(:, 2))
+         call null_space_multipliers(null_space, problem%set, problem%numbering, rest, lam(:, 2))
 
          call check_near(error, dq(:, 1), dq(:, 2), tol_dp, 1.0_wp + maxval(abs(dq)), "dq")
          call check_near(error, lam(:, 1), lam(:, 2), tol_dp, 10.0_wp + maxval(abs(lam)), "lam")

@@ -1,0 +1,140 @@
+!> What is said of linear constraints that follow from others, or contradict what is prescribed.
+module emcon_unresolved_rows
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_linear_rows, only : linear_rows_t
+   use emcon_numbering, only : unresolved_t
+   use emcon_scene, only : prescribed_t, scene_t, where_text
+   use emcon_sort, only : unique_sorted
+   use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   implicit none
+   private
+   public :: report_unresolved
+
+   !> Nodes named in a message.
+   integer, parameter :: most_named = 10
+   !> Prescribed values fulfil a constraint up to this part of the largest one: decks round them.
+   real(wp), parameter :: rounding = 1.0e-6_wp
+
+contains
+
+   !> Note the redundant rows; an error if prescribed values of step `i_step` contradict one.
+   subroutine report_unresolved(scene, i_step, linear, unresolved, notes, error)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step
+      type(linear_rows_t), intent(in) :: linear
+      type(unresolved_t), intent(in) :: unresolved(:)
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, t
+
+      do k = 1, size(unresolved)
+         if (is_met(scene, i_step, unresolved(k))) cycle
+         call raise(error, err_input, contradiction_text(scene, linear, unresolved(k)))
+         return
+      end do
+      do t = 0, size(scene%tie)
+         if (any(linear%tie(unresolved%row) == t)) call note_redundant(scene, linear, &
+            pack(unresolved%row, linear%tie(unresolved%row) == t), notes)
+      end do
+   end subroutine report_unresolved
+
+   !> Do the values that step `i_step` prescribes fulfil the row, at all times? Freedoms that share
+   !> an amplitude, or that stay where they are, have to do so together.
+   pure logical function is_met(scene, i_step, item)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step
+      type(unresolved_t), intent(in) :: item
+      real(wp) :: total(0:size(scene%amplitude)), largest(0:size(scene%amplitude)), part
+      integer :: i, k
+
+      total = 0.0_wp
+      largest = 0.0_wp
+      associate (prescribed => scene%step(i_step)%prescribed)
+         do k = 1, size(prescribed)
+            if (prescribed(k)%is_frozen) cycle
+            do i = 1, size(item%dof)
+               if (item%dof(i) /= 2*(prescribed(k)%node - 1) + prescribed(k)%dof) cycle
+               part = item%weight(i)*prescribed(k)%value
+               associate (a => prescribed(k)%amplitude)
+                  total(a) = total(a) + part
+                  largest(a) = max(largest(a), abs(part))
+               end associate
+            end do
+         end do
+      end associate
+      is_met = all(abs(total) <= rounding*largest)
+   end function is_met
+
+   function contradiction_text(scene, linear, item) result(text)
+      type(scene_t), intent(in) :: scene
+      type(linear_rows_t), intent(in) :: linear
+      type(unresolved_t), intent(in) :: item
+      character(len=:), allocatable :: text
+
+      text = row_text(scene, linear, item%row) // " contradicts what is prescribed at " // &
+         nodes_text(scene, (item%dof + 1)/2) // &
+         ": the model is over-constrained; take *BOUNDARY off one side"
+   end function contradiction_text
+
+   !> Which constraint a row is.
+   function row_text(scene, linear, row) result(text)
+      type(scene_t), intent(in) :: scene
+      type(linear_rows_t), intent(in) :: linear
+      integer, intent(in) :: row
+      character(len=:), allocatable :: text
+
+      associate (k => linear%place(row), t => linear%tie(row))
+         if (t == 0) then
+            text = where_text(scene, scene%equation(k)%origin) // ": *EQUATION " // to_text(k)
+         else
+            text = where_text(scene, scene%tie(t)%origin) // ": *TIE " // scene%tie(t)%name // &
+               " in " // direction(linear%own(row)) // " at slave node " // &
+               to_text(scene%node_label(scene%tie(t)%rows%slave(k)))
+         end if
+      end associate
+   end function row_text
+
+   pure character(len=1) function direction(dof)
+      integer, intent(in) :: dof
+
+      direction = merge("x", "y", mod(dof, 2) == 1)
+   end function direction
+
+   function nodes_text(scene, node) result(text)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: node(:)
+      character(len=:), allocatable :: text
+      type(string_t), allocatable :: label(:)
+      integer, allocatable :: distinct(:)
+      integer :: i
+
+      allocate(distinct, source=unique_sorted(node))
+      allocate(label(size(distinct)))
+      do i = 1, size(distinct)
+         label(i)%text = to_text(scene%node_label(distinct(i)))
+      end do
+      text = "node" // trim(merge("s", " ", size(distinct) /= 1)) // " " // &
+         joined(label, ", ", most_named)
+   end function nodes_text
+
+   !> One note on the rows `row` of one tie, or of the equations.
+   subroutine note_redundant(scene, linear, row, notes)
+      type(scene_t), intent(in) :: scene
+      type(linear_rows_t), intent(in) :: linear
+      integer, intent(in) :: row(:)
+      type(notes_t), intent(inout) :: notes
+      integer :: t
+
+      t = linear%tie(row(1))
+      if (t == 0) then
+         call note_add(notes, row_text(scene, linear, row(1)) // " follows from other " // &
+            "constraints: left out (such equations: " // to_text(size(row)) // ")")
+      else
+         call note_add(notes, "*TIE " // scene%tie(t)%name // ": constraints at slave " // &
+            nodes_text(scene, (linear%own(row) + 1)/2) // &
+            " follow from others or from *BOUNDARY: left out")
+      end if
+   end subroutine note_redundant
+
+end module emcon_unresolved_rows
