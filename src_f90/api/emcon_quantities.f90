@@ -152,7 +152,7 @@ contains
    end function kinetic_energies
 
    !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF force of
-   !> the pair on the slave node (2); second index the possible constraint.
+   !> the pair on the slave node, or both at a joint (2); second index the possible constraint.
    function contact_quantity(stepper, variable) result(values)
       use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
       type(stepper_t), intent(inout) :: stepper
@@ -182,10 +182,11 @@ contains
    end function contact_quantity
 
    !> The same on all nodes: of a node that is slave in several pairs the smallest gap, the sum of
-   !> the pressures, and active if it is so in one; off the slave nodes NaN gap, and 0. CF (2): the
-   !> contact forces of all pairs, on both sides.
+   !> the pressures, and active if it is so in one; off the slave nodes NaN gap, and 0. Both nodes
+   !> at a joint of tied pieces have the values of their constraint. CF (2): the contact forces of
+   !> all pairs, on both sides.
    function contact_field(stepper, variable) result(values)
-      use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
+      use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :), at_slave(:, :)
@@ -202,20 +203,32 @@ contains
          do pair = 1, size(system%contact)
             do i = 1, system%contact(pair)%contact%n_constraint
                id = system%first_constraint(pair) + i
-               associate (value => values(:, system%contact(pair)%contact%node(i)))
-                  if (variable == "CSTR") then
-                     value(1) = value(1) + at_slave(1, id)
-                     value(2) = max(value(2), at_slave(2, id))
-                  else if (ieee_is_nan(value(1))) then
-                     value = at_slave(:, id)
-                  else if (.not. ieee_is_nan(at_slave(1, id))) then
-                     value = min(value, at_slave(:, id))
-                  end if
+               associate (node => system%contact(pair)%contact%node(i), &
+                     twin => system%contact(pair)%contact%twin(i))
+                  call take_over(variable, at_slave(:, id), values(:, node))
+                  if (twin > 0) call take_over(variable, at_slave(:, id), values(:, twin))
                end associate
             end do
          end do
       end associate
    end function contact_field
+
+   !> Add to the value of a node that of a constraint there.
+   pure subroutine take_over(variable, more, value)
+      use, intrinsic :: ieee_arithmetic, only : ieee_is_nan
+      character(len=*), intent(in) :: variable
+      real(dp), intent(in) :: more(:)
+      real(dp), intent(inout) :: value(:)
+
+      if (variable == "CSTR") then
+         value(1) = value(1) + more(1)
+         value(2) = max(value(2), more(2))
+      else if (ieee_is_nan(value(1))) then
+         value = more
+      else if (.not. ieee_is_nan(more(1))) then
+         value = min(value, more)
+      end if
+   end subroutine take_over
 
    !> Components of what `pair_quantity` gives.
    pure integer function pair_components(variable)

@@ -14,7 +14,8 @@ module emcon_stepper
       march_is_done, march_resume, march_t
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
    use emcon_scene, only : scene_t
-   use emcon_text, only : notes_t, string_t
+   use emcon_text, only : notes_append, notes_t, string_t
+   use emcon_ties, only : ties_move_nodes, ties_prepare
    implicit none
    private
    public :: stepper_t, stepper_open, stepper_advance, stepper_is_done
@@ -65,11 +66,16 @@ contains
          call raise(error, err_input, self%diagnostic(1)%text)
          return
       end if
+      call ties_prepare(self%scene, self%notes, error)
+      if (allocated(error)) return
       call initial_contact_prepare(self%scene, self%notes, error)
+      if (allocated(error)) return
+      call ties_move_nodes(self%scene, self%notes, error)    ! contact may have moved masters
       if (allocated(error)) return
       call march_init(self%march, self%scene, error)
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
+      if (.not. allocated(error)) call notes_append(self%notes, self%march%system%notes)
    end subroutine stepper_open_source
 
    !> Free what libraries hold for `self`; call it before the object goes, also after an error.
@@ -97,8 +103,11 @@ contains
       if (march_is_done(self%march)) then
          call march_begin_step(self%march, self%scene, self%march%state%i_step + 1, error)
          if (allocated(error)) return
+         call march_increment(self%march, self%scene, increment, error)
+         call notes_append(increment%notes, self%march%system%notes)
+      else
+         call march_increment(self%march, self%scene, increment, error)
       end if
-      call march_increment(self%march, self%scene, increment, error)
    end subroutine stepper_advance
 
    !> Part of the analysis that is done, by time: 0..1.

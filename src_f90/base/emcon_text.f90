@@ -4,7 +4,7 @@ module emcon_text
    use emcon_kinds, only : int64, wp
    implicit none
    private
-   public :: string_t, notes_t, note_add
+   public :: string_t, notes_t, note_add, notes_append
    public :: to_upper, squeezed, to_text, read_integer, read_real, nearest_word, joined
 
    !> A text of its own length, for lists of texts.
@@ -60,6 +60,17 @@ contains
       notes%n = notes%n + 1
       notes%item(notes%n)%text = text
    end subroutine note_add
+
+   !> Add all of `more`.
+   pure subroutine notes_append(notes, more)
+      type(notes_t), intent(inout) :: notes
+      type(notes_t), intent(in) :: more
+      integer :: i
+
+      do i = 1, more%n
+         call note_add(notes, more%item(i)%text)
+      end do
+   end subroutine notes_append
 
    !> `text` with the ASCII letters in upper case.
    pure function to_upper(text) result(upper)

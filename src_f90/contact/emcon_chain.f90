@@ -12,8 +12,8 @@ module emcon_chain
    use emcon_text, only : to_text
    implicit none
    private
-   public :: chain_t, chain_init, chain_thickness, chain_tributary, chain_distance, &
-      chain_corners, chain_crossing
+   public :: chain_t, chain_init, chain_number, chain_thickness, chain_tributary, &
+      chain_distance, chain_is_joint, chain_touches, chain_corners, chain_crossing
 
    type :: chain_t
       integer :: n_edge = 0
@@ -21,7 +21,9 @@ module emcon_chain
       integer, allocatable :: previous(:)        !! (n_edge) edge before; 0: an end
       integer, allocatable :: next(:)            !! (n_edge) edge after
       real(wp), allocatable :: length(:)         !! (n_edge) in the reference configuration [L]
-      integer, allocatable :: node(:)            !! (n_node) ascending distinct nodes
+      integer, allocatable :: node(:)            !! (n_node) ascending; of a joint one node only
+      integer, allocatable :: twin(:)            !! (n_node) the other node of a joint; 0: none
+      integer, allocatable :: end_node(:, :)     !! (2, n_edge) the ends as indices into `node`
       integer, allocatable :: node_edge(:, :)    !! (2, n_node) edges that end and begin there or 0
       integer, allocatable :: part(:)            !! (n_edge) connected part the edge belongs to
       integer, allocatable :: place(:)           !! (n_edge) 1..n_edge along each part in turn
@@ -67,7 +69,7 @@ contains
       end do
       call link_edges(self, scene, surface, error)
       if (allocated(error)) return
-      call number_edges(self)
+      call chain_number(self)
    end subroutine chain_init
 
    !> Find the neighbours of each edge.
@@ -81,9 +83,12 @@ contains
       allocate(self%previous(self%n_edge), source=0)
       allocate(self%next(self%n_edge), source=0)
       allocate(self%node_edge(2, size(self%node)), source=0)
+      allocate(self%twin(size(self%node)), source=0)
+      allocate(self%end_node(2, self%n_edge))
       do i = 1, self%n_edge
          k = find_sorted(self%node, self%edge(1, i))
          end_node = find_sorted(self%node, self%edge(2, i))
+         self%end_node(:, i) = [k, end_node]
          if (self%node_edge(2, k) > 0 .or. self%node_edge(1, end_node) > 0) then
             if (self%node_edge(2, k) == 0) k = end_node
             call raise(error, err_input, where_text(scene, surface%origin) // ": surface " // &
@@ -102,12 +107,13 @@ contains
    end subroutine link_edges
 
    !> Number the parts, in the order of their lowest edges, and the places along them.
-   pure subroutine number_edges(self)
+   pure subroutine chain_number(self)
       type(chain_t), intent(inout) :: self
       integer :: i, e, first, n_part, n
       integer :: start(self%n_edge + 1)
       logical :: is_closed(self%n_edge)
 
+      if (allocated(self%part)) deallocate(self%part, self%place, self%start, self%is_closed)
       allocate(self%part(self%n_edge), source=0)
       allocate(self%place(self%n_edge), source=0)
       start(1) = 1
@@ -136,7 +142,7 @@ contains
       end do
       allocate(self%start(n_part + 1), source=start(:n_part + 1))
       allocate(self%is_closed(n_part), source=is_closed(:n_part))
-   end subroutine number_edges
+   end subroutine chain_number
 
    !> Steps along the chain from edge `a` to edge `b`, the shorter way around a closed part;
    !> huge(1) if they are in different parts.
@@ -154,6 +160,26 @@ contains
          end if
       end associate
    end function chain_distance
+
+   !> Do edges `a` and `b` follow each other over a joint, whose nodes may be a little apart?
+   pure logical function chain_is_joint(self, a, b) result(is_joint)
+      type(chain_t), intent(in) :: self
+      integer, intent(in) :: a, b
+
+      is_joint = .false.
+      if (self%next(a) == b) is_joint = self%edge(2, a) /= self%edge(1, b)
+      if (self%next(b) == a .and. .not. is_joint) is_joint = self%edge(2, b) /= self%edge(1, a)
+   end function chain_is_joint
+
+   !> Does edge `e` end or begin at `node`, or at a joint with it?
+   pure logical function chain_touches(self, e, node) result(touches)
+      type(chain_t), intent(in) :: self
+      integer, intent(in) :: e
+      integer, intent(in) :: node                !! of the scene
+
+      touches = any(self%node(self%end_node(:, e)) == node) &
+         .or. any(self%twin(self%end_node(:, e)) == node)
+   end function chain_touches
 
    !> Thickness of the section at each node of the chain of `surface`, 1 where there is none.
    !> Between two sections that of the edge that begins at the node.

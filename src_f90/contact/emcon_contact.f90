@@ -48,6 +48,8 @@ module emcon_contact
       !> of would be seen only with a motion that goes through the surface [L].
       real(wp) :: farthest_start = huge(1.0_wp)
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
+      !> (n_constraint) the other slave node at the same place of a surface of tied pieces; 0: none
+      integer, allocatable :: twin(:)
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
       type(gap_state_t), allocatable :: state(:)      !! (n_constraint) as last measured
    contains

@@ -103,7 +103,7 @@ contains
          self%start(e) = n + 1
          call choose_pairs(self, e, x, u0, du, n)
          if (self%options%integration == integration_elements) call pairs_seen(self%pair, &
-            self%start(e), n, self%point, x, u0, du, self%seen(:, e))
+            self%master, self%start(e), n, self%point, x, u0, du, self%seen(:, e))
       end do
       self%start(e) = n + 1
    end subroutine mortar_begin_step
@@ -142,7 +142,7 @@ contains
             call pair_append(self%pair, n, stencil)
          end do
       end associate
-      call pairs_drop_far(self%pair, self%start(e), n, x, u0)
+      call pairs_drop_far(self%pair, self%master, self%start(e), n, x, u0)
    end subroutine choose_pairs
 
    pure subroutine mortar_measure_edges(self, x, u0, du)

@@ -2,6 +2,7 @@
 !>
 !> Source: docs/theory.md, section 4.5, choice of pairs.
 module emcon_mortar_choice
+   use emcon_chain, only : chain_is_joint, chain_t
    use emcon_kinds, only : dp, wp
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, n_place, &
       pair_stencil_t, place_first, place_last, place_master
@@ -106,9 +107,10 @@ contains
    end subroutine pair_append
 
    !> Of the pairs of one slave edge, from number `first` to `n`, keep the nearer one of two that
-   !> cover the same part of it.
-   pure subroutine pairs_drop_far(list, first, n, x, u0)
+   !> cover the same part of it; not of two that overlap a little at a joint of the master.
+   pure subroutine pairs_drop_far(list, master, first, n, x, u0)
       type(pair_stencil_t), intent(inout) :: list(:)
+      type(chain_t), intent(in) :: master
       integer, intent(in) :: first
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       integer, intent(inout) :: n
@@ -132,8 +134,14 @@ contains
       is_kept = .false.
       do i = 1, size(low)
          associate (this => order(i))
-            is_kept(this) = .not. any(is_kept .and. min(high, high(this)) - max(low, low(this)) &
-               > same_part)
+            is_kept(this) = .true.
+            do j = 1, size(low)
+               if (j == this .or. .not. is_kept(j)) cycle
+               if (min(high(j), high(this)) - max(low(j), low(this)) <= same_part) cycle
+               if (chain_is_joint(master, list(first + j - 1)%edge, &
+                  list(first + this - 1)%edge)) cycle
+               is_kept(this) = .false.
+            end do
          end associate
       end do
       n = first - 1
@@ -145,33 +153,76 @@ contains
    end subroutine pairs_drop_far
 
    !> The pair, of those from `first` to `last`, that each point of a slave edge looks at, at the
-   !> start of the step or else at its expected end; 0: none.
-   pure subroutine pairs_seen(list, first, last, point, x, u0, du, seen)
+   !> start of the step or else at its expected end; 0: none. A point that looks between the nodes
+   !> of a joint of the master sees one of the edges there.
+   pure subroutine pairs_seen(list, master, first, last, point, x, u0, du, seen)
       type(pair_stencil_t), intent(in) :: list(:)
+      type(chain_t), intent(in) :: master
       integer, intent(in) :: first, last
       real(wp), intent(in) :: point(:)           !! (n_point) on 0..1
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       integer, intent(out) :: seen(:)            !! (n_point)
-      type(frame_t) :: frame(0:1)
-      real(wp) :: local(2, n_place), dlocal(2, n_place), eta, gap
-      integer :: time_level, i, k, p
+      real(wp) :: beyond(2)
+      integer :: k
 
       seen = 0
       do k = first, last
-         call stencil_gather(list(k), x, u0, du, local, dlocal)
-         call frame_init(frame(0), list(k), local)
-         call frame_init(frame(1), list(k), local + dlocal)
-         do time_level = 0, 1
-            do i = 1, size(point)
-               p = seen(i)
-               if (abs(p) > 0 .and. (time_level == 1 .or. p > 0)) cycle
-               call frame_hit(frame(time_level), list(k), point(i), eta, gap)
-               if (.not. (eta >= 0.0_wp .and. eta <= 1.0_wp)) cycle
-               seen(i) = merge(k, -k, time_level == 0)
-            end do
-         end do
+         call see_pair(list(k), k, [0.0_wp, 0.0_wp], point, x, u0, du, seen)
+      end do
+      seen = abs(seen)
+      if (all(seen > 0)) return
+      do k = first, last
+         beyond = joint_width(master, list(k)%edge, x, u0)
+         if (any(beyond > 0.0_wp)) call see_pair(list(k), k, beyond, point, x, u0, du, seen)
       end do
       seen = abs(seen)
    end subroutine pairs_seen
+
+   !> Enter number `k` for the points that look at `stencil`, up to `beyond` past its ends: those of
+   !> the start over those of the end, which are entered as -k.
+   pure subroutine see_pair(stencil, k, beyond, point, x, u0, du, seen)
+      type(pair_stencil_t), intent(in) :: stencil
+      integer, intent(in) :: k
+      real(wp), intent(in) :: beyond(2), point(:)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer, intent(inout) :: seen(:)
+      type(frame_t) :: frame(0:1)
+      real(wp) :: local(2, n_place), dlocal(2, n_place), eta, gap
+      integer :: time_level, i, p
+
+      call stencil_gather(stencil, x, u0, du, local, dlocal)
+      call frame_init(frame(0), stencil, local)
+      call frame_init(frame(1), stencil, local + dlocal)
+      do time_level = 0, 1
+         do i = 1, size(point)
+            p = seen(i)
+            if (abs(p) > 0 .and. (time_level == 1 .or. p > 0)) cycle
+            call frame_hit(frame(time_level), stencil, point(i), eta, gap)
+            if (.not. (eta >= -beyond(1) .and. eta <= 1.0_wp + beyond(2))) cycle
+            seen(i) = merge(k, -k, time_level == 0)
+         end do
+      end do
+   end subroutine see_pair
+
+   !> Distance of the nodes of a joint at either end of edge `e`, relative to its length; 0 where
+   !> there is none.
+   pure function joint_width(master, e, x, u0) result(width)
+      type(chain_t), intent(in) :: master
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp) :: width(2)
+      integer :: side
+
+      width = 0.0_wp
+      associate (beside => [master%previous(e), master%next(e)])
+         do side = 1, 2
+            if (beside(side) == 0) cycle
+            associate (a => master%edge(side, e), b => master%edge(3 - side, beside(side)))
+               if (a /= b) width(side) = norm2((x(:, b) - x(:, a)) + (u0(:, b) - u0(:, a))) &
+                  /master%length(e)
+            end associate
+         end do
+      end associate
+   end function joint_width
 
 end module emcon_mortar_choice

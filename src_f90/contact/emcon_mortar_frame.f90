@@ -25,6 +25,7 @@ module emcon_mortar_frame
    !> Nodes and constants of a pair of edges.
    type :: pair_stencil_t
       integer :: node(n_place) = 0               !! 0: absent
+      integer :: edge = 0                        !! number of the master edge
       integer :: n_master = 2                    !! 2: polygon; 4: with the master's neighbours
       logical :: has_field = .false.             !! t1 and t2 differ: averaged normals
       integer :: tangent(2, 2) = 0               !! tip and tail of t1 and t2, local

@@ -64,6 +64,7 @@ contains
       logical, intent(in) :: is_corner(:)
       real(wp) :: length(3)
 
+      self%edge = m
       self%node(place_master(:2)) = chain%edge(:, m)
       self%node(place_master(3:)) = 0
       self%is_smooth = is_smooth

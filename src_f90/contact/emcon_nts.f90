@@ -9,6 +9,7 @@ module emcon_nts
    use emcon_dgrad15, only : dg15_t => dg_t
    use emcon_errors, only : error_t
    use emcon_hermite_gap, only : hermite_gap, hermite_gap_value
+   use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_nts_gap, only : nts_gap, nts_gap_value
@@ -32,6 +33,7 @@ module emcon_nts
       type(chain_t) :: master
       logical :: is_self = .false.                    !! a surface in contact with itself
       integer :: smoothing = smoothing_none
+      integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
       type(near_list_t) :: near
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
@@ -50,26 +52,49 @@ module emcon_nts
 contains
 
    !> Set up the pair `pair` of `scene`.
-   subroutine nts_init(self, scene, pair, error)
+   subroutine nts_init(self, scene, pair, error, has_twins)
       type(nts_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
+      logical, intent(in), optional :: has_twins !! both nodes of a joint have a gap: as parts of
+                                                 !! other constraints
+      integer :: i
 
       call chain_init(self%slave, scene, scene%surface(pair%slave), error)
       if (allocated(error)) return
       call chain_init(self%master, scene, scene%surface(pair%master), error)
       if (allocated(error)) return
+      call chain_join(self%slave, scene)
+      call chain_join(self%master, scene)
       self%is_self = pair%slave == pair%master
       self%node = self%slave%node
+      self%twin = self%slave%twin
+      self%chain_node = [(i, i = 1, size(self%node))]
+      if (present(has_twins)) then
+         if (has_twins) call add_twins(self)
+      end if
       self%n_constraint = size(self%node)
       allocate(self%edge(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint))
       self%deepest_start = touch_tol
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
+      self%thickness = self%thickness(self%chain_node)
       call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), self%master%edge, &
          scene%u0, 0.0_wp)
    end subroutine nts_init
+
+   !> Append the twins to the nodes.
+   pure subroutine add_twins(self)
+      type(nts_t), intent(inout) :: self
+
+      associate (twin => self%slave%twin)
+         self%node = [self%node, pack(twin, twin > 0)]
+         self%chain_node = [self%chain_node, pack(self%chain_node, twin > 0)]
+      end associate
+      deallocate(self%twin)
+      allocate(self%twin(size(self%node)), source=0)
+   end subroutine add_twins
 
    pure subroutine nts_configure(self, x, options)
       class(nts_t), intent(inout) :: self
@@ -114,7 +139,7 @@ contains
       distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
       if (.not. distance < best) return
       if (self%is_self) then
-         if (.not. self_contact_may_touch(self%slave, i, e, x, u)) return
+         if (.not. self_contact_may_touch(self%slave, self%chain_node(i), e, x, u)) return
       end if
       best = distance
       self%edge(i) = e
@@ -258,7 +283,7 @@ contains
             if (k == 1) inside = min(inside, distance_of(e))
             if (k == 1) cycle
             if (self%is_self) then
-               if (.not. self_contact_is_apart(self%slave, i, e)) exit
+               if (.not. self_contact_is_apart(self%slave, self%chain_node(i), e)) exit
             end if
             outside = min(outside, distance_of(e))
          end do

@@ -1,6 +1,6 @@
 !> Which nodes the gap of a slave node over a master edge depends on, and where they are.
 module emcon_nts_stencil
-   use emcon_chain, only : chain_t
+   use emcon_chain, only : chain_t, chain_touches
    use emcon_hermite, only : hermite_stencil_t
    use emcon_hermite_gap, only : hermite_begin
    use emcon_kinds, only : wp
@@ -25,7 +25,8 @@ module emcon_nts_stencil
 
 contains
 
-   !> Nodes over the polygon: slave, edge, and what is there before and after.
+   !> Nodes over the polygon: slave, edge, and what is there before and after. At a joint, here as
+   !> in all stencils, the neighbour is taken to meet the edge at the edge's own node.
    pure subroutine polygon_stencil(master, slave, edge, x, u0, n, node, before, after)
       type(chain_t), intent(in) :: master
       integer, intent(in) :: slave, edge
@@ -109,7 +110,7 @@ contains
 
          beside = e
          if (e == 0) return
-         if (any(master%edge(:, e) == slave)) beside = 0
+         if (chain_touches(master, e, slave)) beside = 0
       end function beside
 
    end subroutine smooth_stencil

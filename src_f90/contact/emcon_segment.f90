@@ -14,7 +14,6 @@ module emcon_segment
       moment_gap_xi, n_moment
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : contact_options_t, contact_pair_t, multiplier_dual, scene_t
-   use emcon_sort, only : find_sorted
    use emcon_weighted, only : weighted_init, weighted_measure, weighted_t
    implicit none
    private
@@ -22,7 +21,7 @@ module emcon_segment
 
    type, extends(weighted_t) :: segment_t
       type(nts_t) :: nts                              !! gaps of the nodes
-      integer, allocatable :: end_node(:, :)          !! (2, n_edge) nodes as numbers of constraints
+      integer, allocatable :: end_node(:, :)          !! (2, n_edge) nodes as numbers in `nts`
       type(constraint_t) :: nodal(2)                  !! of one edge
    contains
       procedure :: configure => segment_configure
@@ -44,12 +43,12 @@ contains
 
       call weighted_init(self, scene, pair, error)
       if (allocated(error)) return
-      call nts_init(self%nts, scene, pair, error)
+      call nts_init(self%nts, scene, pair, error, has_twins=.true.)
       if (allocated(error)) return
       allocate(self%end_node(2, self%slave%n_edge))
       do e = 1, self%slave%n_edge
          do k = 1, 2
-            self%end_node(k, e) = find_sorted(self%node, self%slave%edge(k, e))
+            self%end_node(k, e) = findloc(self%nts%node, self%slave%edge(k, e), 1)
          end do
       end do
    end subroutine segment_init

@@ -9,6 +9,7 @@ module emcon_weighted
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_form, only : edge_form_t, form_constraint, form_share
    use emcon_errors, only : error_t
+   use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, scene_t
    implicit none
@@ -74,8 +75,11 @@ contains
       if (allocated(error)) return
       call chain_init(self%master, scene, scene%surface(pair%master), error)
       if (allocated(error)) return
+      call chain_join(self%slave, scene)
+      call chain_join(self%master, scene)
       self%is_self = pair%slave == pair%master
       self%node = self%slave%node
+      self%twin = self%slave%twin
       n = size(self%node)
       self%n_constraint = n
       self%deepest_start = deepest_mean

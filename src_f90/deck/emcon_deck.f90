@@ -6,7 +6,10 @@ module emcon_deck
    use emcon_deck_cards, only : read_cards
    use emcon_deck_check, only : check_materials, check_nodes
    use emcon_deck_check_contact, only : check_pairs
+   use emcon_deck_check_surfaces, only : check_surfaces
+   use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
+   use emcon_deck_equations, only : read_equations
    use emcon_deck_geometry, only : check_shapes
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
@@ -17,6 +20,7 @@ module emcon_deck
    use emcon_deck_step, only : read_steps
    use emcon_deck_surfaces, only : read_surfaces
    use emcon_deck_tables, only : read_amplitudes, read_initial_conditions, read_time_points
+   use emcon_deck_ties, only : read_ties
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_scene, only : scene_t
    use emcon_text, only : string_t
@@ -30,7 +34,7 @@ contains
    !> The scene that `source` describes. It is complete only if no error was added.
    !>
    !> The cards are read in passes, so that before the first step they may stand in any order:
-   !> mesh, sets, surfaces, materials, tables, contact, then the steps one by one.
+   !> mesh, sets, surfaces, materials, tables, contact, ties, equations, then the steps one by one.
    subroutine deck_read(source, overrides, is_lenient, scene, diagnostics)
       type(deck_source_t), intent(in), target :: source
       type(string_t), intent(in) :: overrides(:)            !! NAME=VALUE for *PARAMETER
@@ -50,7 +54,6 @@ contains
       reader%doubt_names = .not. source%is_whole
       scene%file = source%file_name
       scene%n_dim = 2
-      allocate(scene%tie(0), scene%equation(0))
       call read_cards(reader, overrides)
       if (size(reader%card) > 0) call read_scene(reader, scene)
       diagnostics = reader%log
@@ -72,11 +75,15 @@ contains
       call read_initial_conditions(reader, scene)
       call read_interactions(reader)
       call read_pairs(reader, scene)
+      call read_ties(reader, scene)
+      call read_equations(reader, scene)
       call read_steps(reader, scene)
       call check_shapes(reader, scene)
       call check_materials(reader, scene)
       call check_nodes(reader, scene)
+      call check_surfaces(reader, scene)
       call check_pairs(reader, scene)
+      call check_ties(reader, scene)
    end subroutine read_scene
 
    !> The lines of *HEADING, with line ends between them.

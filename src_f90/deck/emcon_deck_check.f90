@@ -1,6 +1,6 @@
 !> What the scene must fulfil as a whole, and can be seen without mechanics.
 module emcon_deck_check
-   use emcon_deck_check_contact, only : mark_nodes
+   use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_element_kinds, only : element_kinds
@@ -68,14 +68,15 @@ contains
    end function first_true
 
    !> Nodes without element have no mass and no stiffness: a warning, an error if a force acts on
-   !> them.
+   !> them. In the degrees of freedom that stand in an equation they are part of the model.
    subroutine check_nodes(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_bare(:), is_loaded(:)
+      logical, allocatable :: is_bare(:), is_idle(:), is_loaded(:), is_coupled(:, :)
       integer :: i, k
 
-      if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_positions) return
+      if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_positions &
+         .or. reader%doubt_equations) return
       if (any(scene%element_node(1, :) == 0)) return
       allocate(is_bare(size(scene%node_label)), source=.true.)
       do i = 1, size(scene%element_label)
@@ -84,31 +85,69 @@ contains
          end do
       end do
       if (.not. any(is_bare) .or. all(is_bare)) return
-      call add_warning(reader%log, scene%node_origin(first_true(is_bare)), "node " &
-         // label_list(pack(scene%node_label, is_bare)) // " belongs to no element; it is left out")
-      allocate(is_loaded(size(is_bare)), source=.false.)
-      do i = 1, size(scene%step)
-         associate (load => scene%step(i)%load)
-            do k = 1, size(load)
-               if (load(k)%kind == load_point .and. abs(load(k)%value) > 0.0_wp) then
-                  is_loaded(load(k)%target) = .true.
-               end if
-            end do
-         end associate
-      end do
-      is_loaded = is_loaded .and. is_bare
-      if (any(is_loaded)) call add_error(reader%log, scene%node_origin(first_true(is_loaded)), &
-         "node " // label_list(pack(scene%node_label, is_loaded)) &
-         // " belongs to no element, but *CLOAD acts on it")
+      call mark_coupled(scene, is_coupled)
+      is_idle = is_bare .and. .not. any(is_coupled, 1)
+      if (any(is_idle)) call add_warning(reader%log, scene%node_origin(first_true(is_idle)), &
+         "node " // label_list(pack(scene%node_label, is_idle)) &
+         // " belongs to no element; it is left out")
+      call mark_loaded(scene, is_coupled, is_loaded)
+      call tell_bare(is_loaded .and. is_idle, "but *CLOAD acts on it")
+      call tell_bare(is_loaded .and. is_bare .and. .not. is_idle, &
+         "but *CLOAD acts on it in a direction that is in no *EQUATION")
       is_loaded = .false.
       do i = 1, size(scene%pair)
          if (scene%pair(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%pair(i)%slave), &
             is_loaded)
       end do
-      is_loaded = is_loaded .and. is_bare
-      if (any(is_loaded)) call add_error(reader%log, scene%node_origin(first_true(is_loaded)), &
-         "node " // label_list(pack(scene%node_label, is_loaded)) &
-         // " belongs to no element, but is a slave node of *CONTACT PAIR")
+      call tell_bare(is_loaded .and. is_bare, "but is a slave node of *CONTACT PAIR")
+
+   contains
+
+      subroutine tell_bare(is_wrong, text)
+         logical, intent(in) :: is_wrong(:)
+         character(len=*), intent(in) :: text
+
+         if (any(is_wrong)) call add_error(reader%log, scene%node_origin(first_true(is_wrong)), &
+            "node " // label_list(pack(scene%node_label, is_wrong)) // " belongs to no element, " &
+            // text)
+      end subroutine tell_bare
+
    end subroutine check_nodes
+
+   !> The nodes on which a force acts in a direction that is not coupled.
+   pure subroutine mark_loaded(scene, is_coupled, is_loaded)
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_coupled(:, :)                    !! (n_dim, n_node)
+      logical, allocatable, intent(out) :: is_loaded(:)          !! (n_node)
+      integer :: i, k
+
+      allocate(is_loaded(size(scene%node_label)), source=.false.)
+      do i = 1, size(scene%step)
+         associate (load => scene%step(i)%load)
+            do k = 1, size(load)
+               if (load(k)%kind /= load_point .or. .not. abs(load(k)%value) > 0.0_wp) cycle
+               if (.not. is_coupled(load(k)%place, load(k)%target)) then
+                  is_loaded(load(k)%target) = .true.
+               end if
+            end do
+         end associate
+      end do
+   end subroutine mark_loaded
+
+   !> The degrees of freedom that stand in equations.
+   pure subroutine mark_coupled(scene, is_coupled)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: is_coupled(:, :)      !! (n_dim, n_node)
+      integer :: i, k
+
+      allocate(is_coupled(scene%n_dim, size(scene%node_label)), source=.false.)
+      do i = 1, size(scene%equation)
+         associate (equation => scene%equation(i))
+            do k = 1, size(equation%node)
+               is_coupled(equation%dof(k), equation%node(k)) = .true.
+            end do
+         end associate
+      end do
+   end subroutine mark_coupled
 
 end module emcon_deck_check

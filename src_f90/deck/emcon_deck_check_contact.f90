@@ -1,16 +1,15 @@
 !> The contact pairs, as far as they can be judged before anything moves.
 module emcon_deck_check_contact
+   use emcon_deck_check_surfaces, only : face_nodes, mark_nodes
    use emcon_deck_reader, only : reader_t
-   use emcon_deck_surfaces, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_diagnostics, only : add_error, add_warning, label_list
-   use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
       formulation_segment, multiplier_standard, scene_t, step_t, surface_t
    use emcon_text, only : to_text
    implicit none
    private
-   public :: check_pairs, mark_nodes
+   public :: check_pairs
 
    !> A slave surface longer than this times its master gives a warning: force leaks where it
    !> reaches beyond. The rest is room for curved surfaces on straight ones.
@@ -18,28 +17,15 @@ module emcon_deck_check_contact
 
 contains
 
-   !> The surfaces of contact pairs: chains of free faces, without common nodes, free to move,
-   !> the slave the smaller one.
+   !> The surfaces of contact pairs: without common nodes, free to move, the slave the smaller one.
    subroutine check_pairs(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      type(adjacency_t) :: adjacency
-      logical, allocatable :: is_checked(:)
       logical :: has_common
-      integer :: i, side, surface
+      integer :: i
 
-      if (size(scene%pair) == 0 .or. reader%doubt_shapes) return
-      call adjacency_init(adjacency, scene)
-      allocate(is_checked(size(scene%surface)), source=.false.)
+      if (reader%doubt_shapes) return
       do i = 1, size(scene%pair)
-         do side = 1, 2
-            surface = merge(scene%pair(i)%slave, scene%pair(i)%master, side == 1)
-            if (surface == 0) cycle
-            if (is_checked(surface)) cycle
-            is_checked(surface) = .true.
-            call check_free(reader, scene, adjacency, scene%surface(surface))
-            call check_chain(reader, scene, scene%surface(surface))
-         end do
          if (scene%pair(i)%slave == 0 .or. scene%pair(i)%master == 0) cycle
          call check_common_nodes(reader, scene, scene%pair(i), has_common)
          call check_freedom(reader, scene, scene%pair(i))
@@ -48,46 +34,6 @@ contains
          end if
       end do
    end subroutine check_pairs
-
-   !> A face between two elements cannot touch anything.
-   subroutine check_free(reader, scene, adjacency, surface)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(in) :: scene
-      type(adjacency_t), intent(in) :: adjacency
-      type(surface_t), intent(in) :: surface
-      logical :: is_inside(size(surface%element))
-      integer :: i
-
-      do i = 1, size(is_inside)
-         is_inside(i) = n_neighbours(scene, adjacency, surface%element(i), surface%face(i)) > 0
-      end do
-      if (any(is_inside)) call add_error(reader%log, surface%origin, "contact surface " &
-         // surface%name // " has faces inside the body, of element " &
-         // label_list(scene%element_label(pack(surface%element, is_inside))))
-   end subroutine check_free
-
-   !> At each node one face may end and one may begin.
-   subroutine check_chain(reader, scene, surface)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      integer, allocatable :: n_end(:, :)
-      logical, allocatable :: is_branch(:)
-      integer :: i, k, node(2)
-
-      allocate(n_end(2, size(scene%node_label)), source=0)
-      do i = 1, size(surface%element)
-         node = face_nodes(scene, surface%element(i), surface%face(i))
-         if (any(node == 0)) return
-         do k = 1, 2
-            n_end(k, node(k)) = n_end(k, node(k)) + 1
-         end do
-      end do
-      is_branch = n_end(1, :) > 1 .or. n_end(2, :) > 1
-      if (any(is_branch)) call add_error(reader%log, surface%origin, "contact surface " &
-         // surface%name // " is no chain of faces: more than two of them meet at node " &
-         // label_list(pack(scene%node_label, is_branch)))
-   end subroutine check_chain
 
    !> Two surfaces of a pair must not share nodes; a surface in contact with itself is one surface.
    subroutine check_common_nodes(reader, scene, pair, has_common)
@@ -236,29 +182,5 @@ contains
             - scale(scene%x(:, node(1)), power))
       end do
    end function surface_length
-
-   !> Mark the nodes of a surface.
-   pure subroutine mark_nodes(scene, surface, is_in)
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      logical, intent(inout) :: is_in(:)           !! (n_node)
-      integer :: i, node(2)
-
-      is_in(surface%node) = .true.
-      do i = 1, size(surface%element)
-         node = face_nodes(scene, surface%element(i), surface%face(i))
-         if (all(node > 0)) is_in(node) = .true.
-      end do
-   end subroutine mark_nodes
-
-   !> First and last node of a face, along the boundary; 0 if the element had errors.
-   pure function face_nodes(scene, element, face) result(node)
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: element, face
-      integer :: node(2)
-
-      node = scene%element_node( &
-         element_kinds(scene%element_kind(element))%face_node(:, face), element)
-   end function face_nodes
 
 end module emcon_deck_check_contact

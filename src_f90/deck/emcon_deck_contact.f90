@@ -1,11 +1,10 @@
 !> *SURFACE INTERACTION, *SURFACE BEHAVIOR, *FRICTION and *CONTACT PAIR.
 module emcon_deck_contact
-   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, get_real, &
-      next_line
+   use emcon_deck_fields, only : data_error, data_open, data_t, get_real, next_line
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_sets, only : find_set, set_names
-   use emcon_deck_surfaces, only : find_surface, surface_names
+   use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
@@ -53,7 +52,10 @@ contains
       select case (option_name(card, "PRESSURE-OVERCLOSURE"))
       case ("", "HARD")
          continue
-      case ("LINEAR", "EXPONENTIAL", "TABULAR", "TIED", "SCALEFACTOR")
+      case ("TIED")
+         call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", &
+            "surfaces are tied by *TIE")
+      case ("LINEAR", "EXPONENTIAL", "TABULAR", "SCALEFACTOR")
          call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", &
             "contact is enforced exactly, without penalty")
       case default
@@ -104,7 +106,7 @@ contains
             line(n) = line_origin(reader, data%i_line)
             pair(n)%origin = reader%card(i)%origin
             pair(n)%formulation = formulation
-            call read_surfaces_of_pair(reader, data, scene, pair(n))
+            call get_surfaces(reader, data, scene, pair(n)%slave, pair(n)%master)
             call check_nodal(reader, data, scene, pair(n))
             call check_repeated(reader, data, scene, pair(:n), line)
          end do
@@ -134,33 +136,6 @@ contains
          call refuse_option(reader, card, "TYPE", known // ", SURFACE TO SURFACE", "")
       end select
    end subroutine read_formulation
-
-   !> Data line: slave, master. A surface that is in doubt stays 0.
-   subroutine read_surfaces_of_pair(reader, data, scene, pair)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(inout) :: pair
-      integer :: side, i_surface(2)
-      character(len=:), allocatable :: name
-      character(len=6), parameter :: role(2) = ["slave ", "master"]
-
-      call check_count(reader, data, 2, 2, "slave surface, master surface")
-      if (.not. data%ok) return
-      i_surface = 0
-      do side = 1, 2
-         data%ok = .true.
-         call get_name(reader, data, side, trim(role(side)) // " surface", name)
-         if (.not. data%ok) cycle
-         i_surface(side) = find_surface(scene%surface, name)
-         if (i_surface(side) == 0 .and. .not. reader%doubt_names) then
-            call data_error(reader, data, "unknown " // trim(role(side)) // " surface " &
-               // quoted(name) // suggestion(name, surface_names(scene%surface)))
-         end if
-      end do
-      pair%slave = i_surface(1)
-      pair%master = i_surface(2)
-   end subroutine read_surfaces_of_pair
 
    !> A surface of nodes has no edges: it may only be the slave of another one, node to surface.
    !> A master that is refused becomes 0.

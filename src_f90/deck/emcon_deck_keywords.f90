@@ -22,13 +22,13 @@ module emcon_deck_keywords
    type :: keyword_t
       character(len=22) :: name = ""
       integer :: place = in_both
-      character(len=72) :: parameters = ""
+      character(len=160) :: parameters = ""
       character(len=64) :: reason = ""
       logical :: is_output = .false.         !! --lenient reads on if it is not supported
    end type keyword_t
 
    character(len=*), parameter :: no_rods = "only plane strain solids are read", &
-      no_thermal = "there is no temperature", no_couple = "couplings are not in this version"
+      no_thermal = "there is no temperature", no_couple = "linear couplings go by *EQUATION"
    character(len=*), parameter :: no_export = "results go by *NODE FILE, *EL FILE and *... PRINT"
    character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL"
    character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT,!POSITION,!USER"
@@ -55,6 +55,9 @@ module emcon_deck_keywords
       keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,!NOSEPARATION,!PENALTY"), &
       keyword_t("FRICTION", in_model, "~SLIPTOLERANCE,!ROUGH,!LAGRANGE"), &
       keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,ADJUST=,!SMALLSLIDING,!TIED"), &
+      keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
+         // "~NOROTATION,~NOTHICKNESS,!CYCLICSYMMETRY,!MULTISTAGE,!TIEDNSET,!CONSTRAINTRATIO"), &
+      keyword_t("EQUATION", in_both, "!REMOVE,!REMOVEALL,!INPUT"), &
       keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,!TIMEDELAY,!USER,!SUBMODEL"), &
       keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,!PERTURBATION"), &
       keyword_t("STATIC", in_step, "DIRECT,~SOLVER,!STABILIZE,!RIKS,!EXPLICIT"), &
@@ -76,8 +79,6 @@ module emcon_deck_keywords
       keyword_t("ENERGY PRINT", in_step, "~ELSET,FREQUENCY=,TIMEPOINTS="), &
       keyword_t("RESTART", in_step, "WRITE,FREQUENCY=,~OVERLAY,!READ"), &
       keyword_t("END STEP", in_step), &
-      keyword_t("TIE", in_model, "", "ties are not in this version"), &
-      keyword_t("EQUATION", in_both, "", no_couple), &
       keyword_t("MPC", in_model, "", no_couple), &
       keyword_t("COUPLING", in_model, "", no_couple), &
       keyword_t("KINEMATIC", in_model, "", no_couple), &
@@ -220,6 +221,14 @@ contains
          reason = " (time integration is implicit)"
       case ("SMALLSLIDING")
          reason = " (contact follows the deformed surfaces)"
+      case ("TIED")
+         reason = " (use *TIE)"
+      case ("CYCLICSYMMETRY", "MULTISTAGE")
+         reason = " (sectors of a model are not repeated; couple their edges by *EQUATION)"
+      case ("TIEDNSET")
+         reason = " (whole surfaces are tied)"
+      case ("REMOVE", "REMOVEALL")
+         reason = " (equations hold in all steps)"
       case ("TIMEDELAY")
          reason = " (shift the times of the amplitude)"
       case ("OGDEN", "MOONEY-RIVLIN", "YEOH", "POLYNOMIAL")

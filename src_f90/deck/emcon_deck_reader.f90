@@ -47,6 +47,7 @@ module emcon_deck_reader
       logical :: doubt_nodes = .false., doubt_elements = .false., doubt_names = .false.
       logical :: doubt_positions = .false.               !! some node is not where it should be
       logical :: doubt_shapes = .false.                  !! some element is not what it should be
+      logical :: doubt_equations = .false.               !! some equation is missing after an error
       type(label_map_t) :: node_map, element_map
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
@@ -172,17 +173,17 @@ contains
       end if
    end subroutine option_count
 
-   !> Value of a parameter that is a positive number; unchanged if it is absent.
+   !> Value of a parameter that is a positive number; unchanged if it is absent or wrong.
    subroutine option_real(reader, card, name, value)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: name         !! blanks are for the message
       real(wp), intent(inout) :: value
       real(wp) :: number
       integer :: i
       logical :: ok
 
-      i = find_option(card, name)
+      i = find_option(card, squeezed(name))
       if (i == 0) return
       call read_real(card%option(i)%value, number, ok)
       if (ok) ok = number > 0.0_wp

@@ -253,7 +253,7 @@ contains
       case default
          call refuse_option(reader, card, "TYPE", "PERSISTENT, ADMISSIBLE, VELOCITY UPDATE", "")
       end select
-      call option_real(reader, card, "GAPTOLERANCE", step%gap_tolerance)
+      call option_real(reader, card, "GAP TOLERANCE", step%gap_tolerance)
    end subroutine read_initiation
 
    subroutine read_newton(reader, card, step)

@@ -5,13 +5,13 @@ module emcon_deck_surfaces
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
    use emcon_deck_sets, only : get_elements, get_nodes
-   use emcon_diagnostics, only : label_list, quoted
+   use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_scene, only : scene_t, surface_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_surfaces, find_surface, surface_names
+   public :: read_surfaces, get_surfaces
    public :: adjacency_t, adjacency_init, n_neighbours
 
    !> The elements at each node: element(first(i):first(i + 1) - 1).
@@ -309,6 +309,36 @@ contains
          if (surface(i)%name == name) find_surface = i
       end do
    end function find_surface
+
+   !> Data line: slave surface, master surface. One that is unknown becomes 0.
+   subroutine get_surfaces(reader, data, scene, slave, master)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      integer, intent(out) :: slave, master        !! indices
+      integer :: side, i_surface(2)
+      character(len=:), allocatable :: name
+      character(len=6), parameter :: role(2) = ["slave ", "master"]
+
+      slave = 0
+      master = 0
+      call check_count(reader, data, 2, 2, "slave surface, master surface")
+      if (.not. data%ok) return
+      i_surface = 0
+      do side = 1, 2
+         data%ok = .true.
+         call get_name(reader, data, side, trim(role(side)) // " surface", name)
+         if (.not. data%ok) cycle
+         i_surface(side) = find_surface(scene%surface, name)
+         if (i_surface(side) == 0 .and. .not. reader%doubt_names) then
+            call data_error(reader, data, "unknown " // trim(role(side)) // " surface " &
+               // quoted(name) // suggestion(name, surface_names(scene%surface)))
+         end if
+      end do
+      slave = i_surface(1)
+      master = i_surface(2)
+      data%ok = slave > 0 .and. master > 0
+   end subroutine get_surfaces
 
    pure function surface_names(surface) result(list)
       type(surface_t), intent(in) :: surface(:)

@@ -14,8 +14,8 @@ module emcon_march
    use emcon_numbering, only : spread_dependent
    use emcon_pair_record, only : pair_record_init
    use emcon_rigid_motion, only : free_motion_text
-   use emcon_scene, only : initiation_persistent, procedure_dynamic, procedure_static, scene_t, &
-      step_t
+   use emcon_scene, only : initiation_persistent, method_saddle_point, procedure_dynamic, &
+      procedure_static, scene_t, step_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
    use emcon_system, only : pose_t, system_begin_step, system_init, system_respond
@@ -159,7 +159,8 @@ contains
          end if
          call newton_init(self%newton, self%system%numbering%n_unknown, &
             self%system%solid%n_node, step%newton_tolerance, step%newton_maximum)
-         call correction_reset(self%correction, step%constraint_method)
+         call correction_reset(self%correction, merge(step%constraint_method, &
+            method_saddle_point, self%system%is_reduced))
          call velocity_update_reset(self%velocity_update)
          self%active%holds_gap = step%initiation == initiation_persistent &
             .and. self%scheme%has_inertia

@@ -129,9 +129,7 @@ contains
       self%offset = 0.0_wp
       self%du = 0.0_wp
       if (self%scheme%has_inertia .and. .not. is_at_rest) self%du = h*self%state%v
-      do k = 1, size(self%du, 2)
-         if (.not. self%system%is_alive(k)) self%du(:, k) = 0.0_wp
-      end do
+      where (.not. self%system%is_alive) self%du = 0.0_wp
       self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%i_step))
          do k = 1, size(step%prescribed)

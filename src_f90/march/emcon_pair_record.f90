@@ -21,7 +21,8 @@ module emcon_pair_record
 
    type :: pair_record_t
       type(pair_total_t), allocatable :: total(:)   !! (n_pair)
-      real(wp), allocatable :: force(:, :)       !! (2, n_constraint) by its pair on the slave node
+      !> (2, n_constraint) by its pair on the slave node, and on the other one at its place
+      real(wp), allocatable :: force(:, :)
       real(wp), allocatable :: area(:)           !! (n_constraint) of each multiplier [L^2]
    end type pair_record_t
 
@@ -93,9 +94,11 @@ contains
       integer :: k, i, first
 
       first = system%first_constraint(pair)
-      associate (force => system%f_work, node => system%contact(pair)%contact%node)
+      associate (force => system%f_work, node => system%contact(pair)%contact%node, &
+            twin => system%contact(pair)%contact%twin)
          do i = 1, size(node)
             force(:, node(i)) = 0.0_wp
+            if (twin(i) > 0) force(:, twin(i)) = 0.0_wp
          end do
          do k = 1, size(item)
             do i = 1, item(k)%n_slave
@@ -104,6 +107,7 @@ contains
          end do
          do i = 1, size(node)
             self%force(:, first + i) = force(:, node(i))
+            if (twin(i) > 0) self%force(:, first + i) = self%force(:, first + i) + force(:, twin(i))
          end do
       end associate
    end subroutine measure_nodes

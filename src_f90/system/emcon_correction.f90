@@ -2,6 +2,7 @@
 !>
 !> Patterns and orderings are kept as long as the active constraints stand on the same unknowns.
 module emcon_correction
+   use emcon_cholmod, only : cholmod_t
    use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
       constraints_merge_pattern
    use emcon_csr, only : csr_t
@@ -32,6 +33,8 @@ module emcon_correction
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
       type(umfpack_t) :: solver                  !! no active constraint
+      type(cholmod_t) :: definite_solver         !! the same, symmetric and positive definite
+      logical, private :: is_definite = .false.  !! last factorisation: by that one
       type(csr_t) :: merged                      !! N with constraints
       integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
       integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
@@ -58,6 +61,7 @@ contains
       type(correction_t), intent(inout) :: self
 
       call self%solver%free()
+      call self%definite_solver%free()
       call self%null_space%solver%free()
       call self%saddle_point%solver%free()
    end subroutine correction_free
@@ -73,7 +77,6 @@ contains
       self%n_redundant = 0
       if (set%n == 0) then
          self%fell_back = .false.
-         if (system%numbering%n_unknown > 0) call self%solver%analyse(system%matrix, error)
          return
       end if
       call stopwatch_start(self%clock)
@@ -134,8 +137,7 @@ contains
 
       self%n_factorisation = self%n_factorisation + 1
       if (set%n == 0) then
-         call self%solver%factorise(system%matrix%value, error)
-         is_singular = self%solver%is_singular
+         call factorise_free(self, system, is_singular, error)
          return
       end if
       is_singular = .true.
@@ -164,6 +166,28 @@ contains
       end if
       call saddle_point_factorise(self%saddle_point, set, self%merged, is_singular, error)
    end subroutine correction_factorise
+
+   !> Factorise the matrix as it is; a symmetric one that is not definite like any other.
+   subroutine factorise_free(self, system, is_singular, error)
+      type(correction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      logical, intent(out) :: is_singular
+      type(error_t), allocatable, intent(out) :: error
+
+      is_singular = .true.
+      self%is_definite = .false.
+      if (system%is_symmetric) then
+         call self%definite_solver%analyse(system%matrix, error)
+         if (.not. allocated(error)) call self%definite_solver%factorise(system%matrix%value, error)
+         if (allocated(error)) return
+         self%is_definite = .not. self%definite_solver%is_singular
+      end if
+      is_singular = .not. self%is_definite
+      if (self%is_definite) return
+      call self%solver%analyse(system%matrix, error)
+      if (.not. allocated(error)) call self%solver%factorise(system%matrix%value, error)
+      is_singular = self%solver%is_singular
+   end subroutine factorise_free
 
    !> The multipliers that belong to `residual` (without contact forces), by null space only: the
    !> saddle point has them as unknowns.
@@ -210,7 +234,11 @@ contains
 
       dlam = 0.0_wp
       if (set%n == 0) then
-         call self%solver%solve(residual, dq, error)
+         if (self%is_definite) then
+            call self%definite_solver%solve(residual, dq, error)
+         else
+            call self%solver%solve(residual, dq, error)
+         end if
          dq = -dq
       else if (self%is_reduced) then
          call null_space_solve(self%null_space, set, self%merged, residual, dq, error)

@@ -177,7 +177,8 @@ contains
    end function noise
 
    !> Put the slave nodes within ADJUST= of the surface, and those behind it, onto it, free of
-   !> stress: along the normal, in the reference configuration.
+   !> stress: along the normal, in the reference configuration. Of two nodes at one place of a
+   !> surface of tied pieces the other one goes along.
    subroutine adjust_pair(scene, pair, contact, notes)
       type(scene_t), intent(inout) :: scene
       type(contact_pair_t), intent(in) :: pair
@@ -185,7 +186,7 @@ contains
       type(notes_t), intent(inout) :: notes
       type(gap_state_t) :: state
       type(constraint_t) :: constraint(1)
-      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2)), largest
+      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2)), way(2), largest
       logical :: is_meant
       integer :: i, k, n_moved
 
@@ -205,9 +206,11 @@ contains
          n_moved = n_moved + 1
          do k = 1, most_moves
             call contact%evaluate([i], scene%x, scene%u0, zero, [0.0_wp], constraint)
-            associate (normal => constraint(1)%c(:, 1))
-               scene%x(:, contact%node(i)) = scene%x(:, contact%node(i)) &
-                  - constraint(1)%gap1*normal/dot_product(normal, normal)
+            associate (normal => constraint(1)%c(:, 1), node => contact%node(i), &
+                  twin => contact%twin(i))
+               way = constraint(1)%gap1*normal/dot_product(normal, normal)
+               scene%x(:, node) = scene%x(:, node) - way
+               if (twin > 0) scene%x(:, twin) = scene%x(:, twin) - way
             end associate
             if (abs(constraint(1)%gap1) <= epsilon(1.0_wp)*constraint(1)%size) exit
          end do

@@ -23,6 +23,7 @@ module emcon_loads
       type(load_t), allocatable :: load(:)
       integer, allocatable :: edge(:, :)         !! (2, n) nodes of a loaded edge, else 0
       integer, allocatable :: slot(:, :)         !! (16, n) entries of the pressure stiffness
+      logical :: has_pressure = .false.
       logical :: is_ramped = .false.             !! static: without amplitude, linear over the step
       logical :: nlgeom = .false.
       real(wp) :: duration = 1.0_wp
@@ -43,6 +44,7 @@ contains
 
       self%load = step%load
       self%n = size(step%load)
+      self%has_pressure = any(step%load%kind == load_pressure)
       self%is_ramped = step%procedure == procedure_static
       self%nlgeom = step%nlgeom
       self%duration = step%duration

@@ -38,25 +38,21 @@ module emcon_numbering
 
 contains
 
-   !> Number all degrees of freedom that `prescribed` does not name, of nodes that are alive: one
-   !> that has neither an element nor an equation stays where it is. With `linear`, one freedom for
+   !> Number all degrees of freedom that are alive and that `prescribed` does not name: what has
+   !> neither an element nor an equation stays where it is. With `linear`, one freedom for
    !> each of its used rows becomes dependent; rows that follow from earlier ones go to `unresolved`.
-   subroutine numbering_init(self, n_dim, is_alive, prescribed, linear, unresolved)
+   subroutine numbering_init(self, is_alive, prescribed, linear, unresolved)
       type(numbering_t), intent(out) :: self
-      integer, intent(in) :: n_dim
-      logical, intent(in) :: is_alive(:)         !! (n_node)
+      logical, intent(in) :: is_alive(:, :)      !! (n_dim, n_node)
       type(prescribed_t), intent(in) :: prescribed(:)
       type(linear_rows_t), intent(in), optional :: linear
       type(unresolved_t), allocatable, intent(out), optional :: unresolved(:)
       integer, allocatable :: start(:), term(:)
       real(hp), allocatable :: weight(:)
       type(unresolved_t), allocatable :: rest(:)
-      integer :: i, k
+      integer :: k
 
-      allocate(self%unknown(n_dim, size(is_alive)), source=1)
-      do i = 1, size(is_alive)
-         if (.not. is_alive(i)) self%unknown(:, i) = 0
-      end do
+      allocate(self%unknown, source=merge(1, 0, is_alive))
       do k = 1, size(prescribed)
          self%unknown(prescribed(k)%dof, prescribed(k)%node) = 0
       end do

@@ -15,7 +15,7 @@ module emcon_system
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
    use emcon_unresolved_rows, only : report_unresolved
-   use emcon_scene, only : method_null_space, scene_t
+   use emcon_scene, only : law_linear, method_null_space, scene_t
    use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t, &
       solid_tangent_times
    use emcon_text, only : note_add, notes_t
@@ -45,14 +45,16 @@ module emcon_system
       integer :: n_constraint = 0
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: no element
-      logical, allocatable :: is_alive(:)        !! (n_node) in an element or in an equation
+      logical, allocatable :: is_alive(:, :)     !! (2, n_node) in an element or in an equation
       integer :: i_step = 0                      !! step of the deck the rest belongs to
       logical :: nlgeom = .false.
+      logical :: has_linear_laws = .false.
       type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
       logical :: is_reduced = .true.             !! `numbering` is that one, else without them
       type(numbering_t) :: numbering
       type(loads_t) :: loads
       type(csr_t) :: matrix                      !! tangent over the unknowns
+      logical :: is_symmetric = .false.          !! `matrix` is, up to round-off
       integer, allocatable :: slot(:)            !! element entries, as `reduction_slot` gives them
       type(reduction_t) :: reduction             !! brings dependent freedoms into `matrix`
       type(notes_t) :: notes                     !! on the linear constraints of the step
@@ -73,21 +75,26 @@ contains
       type(system_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, n
+      integer :: i, k, n
 
       call solid_init(self%solid, scene, error)
       if (allocated(error)) return
       call init_mass(self, error)
       if (allocated(error)) return
+      self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear)
       call linear_rows_init(self%linear, scene)
       call init_contact(self, scene, error)
       if (allocated(error)) return
       n = self%solid%n_node
       call bodies_find(self%solid%node, n, self%body, self%n_body)
-      allocate(self%is_alive(n))
-      self%is_alive = self%body > 0
+      allocate(self%is_alive(2, n))
+      self%is_alive = spread(self%body > 0, 1, 2)
       do i = 1, size(scene%equation)
-         self%is_alive(scene%equation(i)%node) = .true.
+         associate (equation => scene%equation(i))
+            do k = 1, size(equation%node)
+               self%is_alive(equation%dof(k), equation%node(k)) = .true.
+            end do
+         end associate
       end do
       allocate(self%response%force(2, n), self%response%magnitude(2, n), source=0.0_wp)
       allocate(self%response%rounding(2, n), source=0.0_wp)
@@ -200,7 +207,7 @@ contains
       self%notes = notes_t()
       call linear_rows_begin_step(self%linear, scene, scene%step(self%i_step)%prescribed)
       if (self%linear%n == 0) return
-      call numbering_init(self%linked, 2, self%is_alive, scene%step(self%i_step)%prescribed, &
+      call numbering_init(self%linked, self%is_alive, scene%step(self%i_step)%prescribed, &
          self%linear, unresolved)
       do k = 1, size(unresolved)
          self%linear%is_used(unresolved(k)%row) = .false.
@@ -220,11 +227,11 @@ contains
       if (self%is_reduced .and. self%linear%n > 0) then
          self%numbering = self%linked
       else
-         call numbering_init(self%numbering, 2, self%is_alive, &
+         call numbering_init(self%numbering, self%is_alive, &
             scene%step(self%i_step)%prescribed)
       end if
       call element_lists(self%solid, 2, start, list)
-      call append_bare_nodes(self, start, list)
+      call append_bare_freedoms(self, start, list)
       allocate(number, source=freedom_numbers(self%numbering))
       list = number(list)
       call csr_from_elements(full, self%numbering%n_unknown + self%numbering%n_dependent, start, &
@@ -234,19 +241,22 @@ contains
          is_too_full)
    end subroutine number_and_lay_out
 
-   !> Nodes without element that stand in equations, as lists of one freedom each.
-   pure subroutine append_bare_nodes(self, start, list)
+   !> Freedoms without element that stand in equations, as lists of one each.
+   pure subroutine append_bare_freedoms(self, start, list)
       type(system_t), intent(in) :: self
       integer, allocatable, intent(inout) :: start(:), list(:)
       integer, allocatable :: bare(:)
-      integer :: i, n
+      integer :: a, i, n
 
-      bare = pack([(i, i = 1, size(self%body))], self%is_alive .and. self%body == 0)
-      if (size(bare) == 0) return
+      allocate(bare(0))
+      do i = 1, size(self%body)
+         if (self%body(i) > 0) cycle
+         bare = [bare, pack([(2*(i - 1) + a, a = 1, 2)], self%is_alive(:, i))]
+      end do
       n = size(list)
-      list = [list, [(2*bare(i) - 1, 2*bare(i), i = 1, size(bare))]]
-      start = [start, [(n + 1 + i, i = 1, 2*size(bare))]]
-   end subroutine append_bare_nodes
+      list = [list, bare]
+      start = [start, [(n + 1 + i, i = 1, size(bare))]]
+   end subroutine append_bare_freedoms
 
    !> Put the mass into the pattern of the matrix.
    subroutine place_mass(self)
@@ -285,6 +295,7 @@ contains
       logical, intent(in) :: with_tangent
 
       self%external = 0.0_wp
+      if (with_tangent) self%is_symmetric = has_symmetric_tangent(self, pose)
       if (with_tangent) self%matrix%value = real(pose%mass_scale*pose%rate, dp)*self%mass_value
       if (pose%is_end) then
          self%u_work = u0 + du
@@ -329,6 +340,16 @@ contains
       end subroutine respond_at
 
    end subroutine system_respond
+
+   !> Second derivatives of a potential are symmetric: those of discrete gradients of quadratic
+   !> energies and of gradients at the end, unless a pressure follows the surface.
+   pure logical function has_symmetric_tangent(self, pose)
+      type(system_t), intent(in) :: self
+      type(pose_t), intent(in) :: pose
+
+      has_symmetric_tangent = pose%is_end .or. (self%has_linear_laws .and. .not. self%nlgeom)
+      if (self%nlgeom .and. self%loads%has_pressure) has_symmetric_tangent = .false.
+   end function has_symmetric_tangent
 
    !> The tangent of internal forces and inertia at u0 + du times `direction`, on all nodes: what
    !> prescribed motion does to first order. In gradients at the end (`is_end`) as in steps.

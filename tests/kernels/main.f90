@@ -24,6 +24,7 @@ program main
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
    use test_initial_contact, only : collect_initial_contact
+   use test_joints, only : collect_joints
    use test_lapack, only : collect_lapack
    use test_law, only : collect_law
    use test_loads, only : collect_loads
@@ -36,6 +37,7 @@ program main
    use test_null_space, only : collect_null_space
    use test_numbering, only : collect_numbering
    use test_deck_parameters, only : collect_deck_parameters
+   use test_deck_ties, only : collect_deck_ties
    use test_results, only : collect_results
    use test_rigid_motion, only : collect_rigid_motion
    use test_saddle_point, only : collect_saddle_point
@@ -44,6 +46,9 @@ program main
    use test_shape, only : collect_shape
    use test_solid, only : collect_solid
    use test_system, only : collect_system
+   use test_tied_contact, only : collect_tied_contact
+   use test_tie, only : collect_tie
+   use test_tie_partner, only : collect_tie_partner
    use test_triple_product, only : collect_triple_product
    use test_umfpack, only : collect_umfpack
    use test_velocity_update, only : collect_velocity_update
@@ -86,9 +91,12 @@ program main
    call run("search", collect_search)
    call run("nts_gap", collect_nts_gap)
    call run("nts", collect_nts)
+   call run("joints", collect_joints)
    call run("hermite_gap", collect_hermite_gap)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar", collect_mortar)
+   call run("tie", collect_tie)
+   call run("tie_partner", collect_tie_partner)
    call run("numbering", collect_numbering)
    call run("bodies", collect_bodies)
    call run("loads", collect_loads)
@@ -104,7 +112,9 @@ program main
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("march", collect_march)
+   call run("tied_contact", collect_tied_contact)
    call run("deck_parameters", collect_deck_parameters)
+   call run("deck_ties", collect_deck_ties)
    call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then

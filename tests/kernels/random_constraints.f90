@@ -38,7 +38,7 @@ contains
          held(k)%node = 2 + 3*(k - 1)
          held(k)%dof = 1 + mod(k, 2)
       end do
-      call numbering_init(problem%numbering, 2, [(.true., k = 1, n_node)], held)
+      call numbering_init(problem%numbering, spread([(.true., k = 1, n_node)], 1, 2), held)
       call make_base(problem%numbering%n_unknown, 4, problem%base)
       call constraints_select(problem%set, [(k, k = 1, n_constraint)])
       do k = 1, n_constraint
@@ -71,7 +71,7 @@ contains
       real(wp) :: angle, factor, w(3)
 
       n = size(at)
-      call numbering_init(problem%numbering, 2, [(.true., k = 1, 3*n + 1)], nothing)
+      call numbering_init(problem%numbering, spread([(.true., k = 1, 3*n + 1)], 1, 2), nothing)
       call make_base(problem%numbering%n_unknown, n_each, problem%base)
       call constraints_select(problem%set, [(k, k = 1, n)])
       do k = 1, n

@@ -30,7 +30,7 @@ contains
       call prescribe(step, 2, 2, 0.5_wp)
       call prescribe(step, 4, 1, 0.5_wp)
       call clamp(step, [3, 3])
-      call numbering_init(numbering, 2, [.true., .true., .true., .true., .false.], step%prescribed)
+      call numbering_init(numbering, spread([.true., .true., .true., .true., .false.], 1, 2), step%prescribed)
    end subroutine make
 
    subroutine test_numbers(error)
@@ -66,10 +66,10 @@ contains
       real(wp) :: field(2, 3), vector(0)
 
       allocate(step%prescribed(0))
-      call numbering_init(numbering, 2, [.true., .true., .true.], step%prescribed)
+      call numbering_init(numbering, spread([.true., .true., .true.], 1, 2), step%prescribed)
       call check_equal(error, numbering%dof, [1, 2, 3, 4, 5, 6], "all free")
       call clamp(step, [1, 2, 3])
-      call numbering_init(numbering, 2, [.true., .true., .true.], step%prescribed)
+      call numbering_init(numbering, spread([.true., .true., .true.], 1, 2), step%prescribed)
       call check_equal(error, numbering%n_unknown, 0, "none free")
       field = 1.0_wp
       call pick_unknowns(numbering, field, vector)

@@ -1,0 +1,310 @@
+!> *EQUATION: sums of coefficient times displacement that are zero in all steps.
+module emcon_deck_equations
+   use emcon_deck_fields, only : data_error, data_open, data_t, get_integer, get_name, get_real, &
+      is_blank, is_label, next_line
+   use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, option_name, reader_t
+   use emcon_deck_sets, only : get_nodes
+   use emcon_diagnostics, only : add_error, quoted
+   use emcon_kinds, only : wp
+   use emcon_scene, only : equation_t, origin_t, scene_t
+   use emcon_sort, only : sort_order
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: read_equations
+
+   !> One term as it is written: a node, or the nodes of a set in the order of their labels.
+   type :: term_t
+      character(len=:), allocatable :: set         !! name of the set; empty: a node
+      integer, allocatable :: item(:)
+      integer :: dof = 0
+      real(wp) :: coefficient = 0.0_wp
+   end type term_t
+
+   !> The equation that is being read.
+   type :: draft_t
+      type(origin_t) :: origin                     !! of the line with the number of its terms
+      integer :: n_wanted = 0                      !! terms it is to have; 0: none is open
+      integer :: n = 0                             !! terms read
+      logical :: is_refused = .false.
+      logical :: is_lost = .false.                 !! after an error: wait for the next count
+      type(term_t), allocatable :: term(:)
+   end type draft_t
+
+   !> The equations while they grow.
+   type :: list_t
+      integer :: n = 0
+      type(equation_t), allocatable :: item(:)
+   end type list_t
+
+contains
+
+   !> All *EQUATION cards before the first step.
+   subroutine read_equations(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(list_t) :: list
+      integer :: i, n_before
+
+      n_before = reader%log%n_errors
+      allocate(list%item(16))
+      do i = 1, size(reader%card)
+         associate (card => reader%card(i))
+            if (card%name /= "EQUATION") cycle
+            if (card%step == 0) then
+               call read_card(reader, card, scene, list)
+            else if (.not. (has_option(card, "REMOVE") .or. has_option(card, "REMOVEALL"))) then
+               call card_error(reader, card, "known but not supported inside a step: equations " &
+                  // "hold in all steps; put it before the first *STEP")
+            end if
+         end associate
+      end do
+      scene%equation = list%item(:list%n)
+      reader%doubt_equations = reader%doubt_equations .or. reader%log%n_errors > n_before
+   end subroutine read_equations
+
+   !> The equations of one card: each a line with the number of terms, then lines of terms.
+   subroutine read_card(reader, card, scene, list)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(list_t), intent(inout) :: list
+      type(data_t) :: data
+      type(draft_t) :: draft
+      logical :: is_empty
+
+      is_empty = .true.
+      allocate(draft%term(4))
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         is_empty = .false.
+         if (data%n == 1 .or. draft%n_wanted == 0) then
+            if (draft%n_wanted > 0) call tell_missing(reader, draft)
+            if (draft%is_lost .and. data%n /= 1) cycle
+            call read_count(reader, data, draft)
+            reader%doubt_equations = reader%doubt_equations .or. draft%is_lost
+         else
+            call read_terms(reader, data, scene, draft)
+            reader%doubt_equations = reader%doubt_equations .or. draft%is_refused
+            if (draft%n < draft%n_wanted) cycle
+            if (.not. draft%is_refused) call store_equation(reader, scene, draft, list)
+            draft%n_wanted = 0
+         end if
+      end do
+      if (draft%n_wanted > 0) call tell_missing(reader, draft)
+      if (is_empty) call card_error(reader, card, "no equation is given")
+   end subroutine read_card
+
+   subroutine tell_missing(reader, draft)
+      type(reader_t), intent(inout) :: reader
+      type(draft_t), intent(in) :: draft
+
+      call add_error(reader%log, draft%origin, "*EQUATION: the equation is to have " &
+         // to_text(draft%n_wanted) // " terms, but only " // to_text(draft%n) // " follow")
+   end subroutine tell_missing
+
+   !> The line that begins an equation: the number of its terms.
+   subroutine read_count(reader, data, draft)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(draft_t), intent(inout) :: draft
+      integer :: n_wanted
+
+      n_wanted = 0
+      if (data%n > 1) then
+         call data_error(reader, data, "expected the number of terms of an equation, alone on " &
+            // "its line, found " // quoted(data%text(data%from(1):data%to(data%n))))
+      else
+         call get_integer(reader, data, 1, "number of terms", n_wanted)
+      end if
+      draft%is_lost = .not. data%ok
+      draft%n_wanted = merge(n_wanted, 0, data%ok)
+      draft%n = 0
+      draft%is_refused = .false.
+      draft%origin = line_origin(reader, data%i_line)
+   end subroutine read_count
+
+   !> A line of terms: node or node set, degree of freedom, coefficient, again and again.
+   subroutine read_terms(reader, data, scene, draft)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(draft_t), intent(inout) :: draft
+      integer :: i
+
+      if (mod(data%n, 3) /= 0 .or. data%n == 0) then
+         call data_error(reader, data, "expected terms of node or node set, degree of freedom, " &
+            // "coefficient; found " // to_text(data%n) // " values")
+      else if (draft%n + data%n/3 > draft%n_wanted) then
+         call data_error(reader, data, "the equation of line " // to_text(draft%origin%line) &
+            // " is to have " // to_text(draft%n_wanted) // " terms; here is term " &
+            // to_text(draft%n_wanted + 1))
+      end if
+      draft%is_lost = .not. data%ok
+      if (draft%is_lost) then
+         draft%n_wanted = 0
+         draft%is_refused = .true.
+         return
+      end if
+      do i = 1, data%n, 3
+         data%ok = .true.
+         draft%n = draft%n + 1
+         if (draft%n > size(draft%term)) call grow_terms(draft%term)
+         call read_term(reader, data, i, scene, draft%term(draft%n))
+         draft%is_refused = draft%is_refused .or. .not. data%ok
+      end do
+   end subroutine read_terms
+
+   pure subroutine grow_terms(term)
+      type(term_t), allocatable, intent(inout) :: term(:)
+      type(term_t), allocatable :: grown(:)
+
+      allocate(grown(2*size(term)))
+      grown(:size(term)) = term
+      call move_alloc(grown, term)
+   end subroutine grow_terms
+
+   !> The term in the fields from `k` on.
+   subroutine read_term(reader, data, k, scene, term)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: k
+      type(scene_t), intent(in) :: scene
+      type(term_t), intent(out) :: term
+
+      call get_nodes(reader, data, k, scene, term%item)
+      term%set = ""
+      if (data%ok .and. .not. is_label(data, k)) then
+         call get_name(reader, data, k, "node set", term%set)
+         term%item = term%item(sort_order(scene%node_label(term%item)))
+         if (size(term%item) == 0) call data_error(reader, data, "node set " // quoted(term%set) &
+            // " is empty")
+      end if
+      call get_integer(reader, data, k + 1, "degree of freedom", term%dof)
+      if (term%dof == 3) then
+         call data_error(reader, data, "the model is plane: degree of freedom 3 does not exist")
+      else if (term%dof > scene%n_dim) then
+         call data_error(reader, data, "degree of freedom " // to_text(term%dof) &
+            // " does not exist; known: 1, 2")
+      end if
+      if (is_blank(data, k + 2)) call data_error(reader, data, "the coefficient is missing")
+      call get_real(reader, data, k + 2, "coefficient", term%coefficient)
+   end subroutine read_term
+
+   !> Check the equation that was read, and add it to `list`: once for each node of its sets.
+   subroutine store_equation(reader, scene, draft, list)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(draft_t), intent(in) :: draft
+      type(list_t), intent(inout) :: list
+      type(equation_t) :: new
+      character(len=:), allocatable :: fault
+      logical :: is_kept(draft%n)
+      integer :: i, k
+
+      fault = set_fault(reader, draft%term(:draft%n))
+      is_kept = abs(draft%term(:draft%n)%coefficient) > 0.0_wp
+      if (fault == "" .and. .not. any(is_kept)) then
+         fault = "all coefficients are 0"
+      else if (fault == "" .and. .not. is_kept(1)) then
+         fault = "the first coefficient is 0; the first term is the one to eliminate: put " &
+            // "another one first"
+      end if
+      new%origin = draft%origin
+      new%dof = draft%term(:draft%n)%dof
+      new%coefficient = draft%term(:draft%n)%coefficient
+      allocate(new%node(draft%n))
+      do i = 1, size(draft%term(1)%item)
+         if (fault /= "") exit
+         do k = 1, draft%n
+            new%node(k) = draft%term(k)%item(min(i, size(draft%term(k)%item)))
+         end do
+         fault = repeated_fault(scene, new)
+         if (fault == "") call append(list, new, is_kept)
+      end do
+      if (fault /= "") call add_error(reader%log, draft%origin, "*EQUATION: " // fault)
+   end subroutine store_equation
+
+   !> What is wrong with the numbers of nodes of the terms: empty if nothing is.
+   !>
+   !> The nodes of sets are paired; a single node stands in each of the equations.
+   function set_fault(reader, term) result(fault)
+      type(reader_t), intent(in) :: reader
+      type(term_t), intent(in) :: term(:)
+      character(len=:), allocatable :: fault
+      integer :: k, n, n_paired
+
+      fault = ""
+      n = size(term(1)%item)
+      n_paired = 0
+      do k = 1, size(term)
+         if (size(term(k)%item) > 1) n_paired = n_paired + 1
+         if (size(term(k)%item) == n .or. size(term(k)%item) == 1) cycle
+         fault = "node set " // quoted(term(k)%set) // " has " // to_text(size(term(k)%item)) &
+            // " nodes, the first term has " // to_text(n) // "; they are paired one by one"
+         return
+      end do
+      if (n_paired < 2) return
+      do k = 1, size(term)
+         if (.not. is_unsorted(reader, term(k)%set)) cycle
+         fault = "node set " // quoted(term(k)%set) // " is UNSORTED, but nodes are paired in " &
+            // "the order of their labels; name them one by one"
+         return
+      end do
+   end function set_fault
+
+   !> Whether a card of the node set `name` says that the order of its nodes matters.
+   pure logical function is_unsorted(reader, name)
+      type(reader_t), intent(in) :: reader
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      is_unsorted = .false.
+      if (name == "") return
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "NSET") cycle
+         if (.not. has_option(reader%card(i), "UNSORTED")) cycle
+         if (option_name(reader%card(i), "NSET") == name) is_unsorted = .true.
+      end do
+   end function is_unsorted
+
+   !> Names a degree of freedom that stands twice in an equation; empty if none does.
+   pure function repeated_fault(scene, equation) result(fault)
+      type(scene_t), intent(in) :: scene
+      type(equation_t), intent(in) :: equation
+      character(len=:), allocatable :: fault
+      integer :: freedom(size(equation%node)), order(size(equation%node)), i
+
+      fault = ""
+      freedom = scene%n_dim*(equation%node - 1) + equation%dof
+      order = sort_order(freedom)
+      do i = 2, size(order)
+         if (freedom(order(i)) /= freedom(order(i - 1))) cycle
+         fault = "degree of freedom " // to_text(equation%dof(order(i))) // " of node " &
+            // to_text(scene%node_label(equation%node(order(i)))) // " stands in it twice"
+         return
+      end do
+   end function repeated_fault
+
+   !> Add the terms of `new` that are kept.
+   pure subroutine append(list, new, is_kept)
+      type(list_t), intent(inout) :: list
+      type(equation_t), intent(in) :: new
+      logical, intent(in) :: is_kept(:)
+      type(equation_t), allocatable :: grown(:)
+
+      if (list%n == size(list%item)) then
+         allocate(grown(2*list%n))
+         grown(:list%n) = list%item
+         call move_alloc(grown, list%item)
+      end if
+      list%n = list%n + 1
+      associate (equation => list%item(list%n))
+         equation%origin = new%origin
+         equation%node = pack(new%node, is_kept)
+         equation%dof = pack(new%dof, is_kept)
+         equation%coefficient = pack(new%coefficient, is_kept)
+      end associate
+   end subroutine append
+
+end module emcon_deck_equations

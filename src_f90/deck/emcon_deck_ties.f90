@@ -1,0 +1,166 @@
+!> *TIE: surfaces that stay together.
+module emcon_deck_ties
+   use emcon_deck_fields, only : data_error, data_open, data_t, next_line
+   use emcon_deck_reader, only : card_error, card_t, line_origin, need_name, option_name, &
+      option_real, reader_t, refuse_option
+   use emcon_deck_surfaces, only : get_surfaces
+   use emcon_diagnostics, only : quoted
+   use emcon_scene, only : multiplier_dual, multiplier_standard, scene_t, tie_t, where_text
+   implicit none
+   private
+   public :: read_ties
+
+contains
+
+   !> All *TIE cards: one tie for each data line.
+   subroutine read_ties(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(tie_t), allocatable :: tie(:)
+      type(tie_t) :: common
+      integer :: i, n, most
+
+      most = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == "TIE") then
+            most = most + reader%card(i)%last - reader%card(i)%first + 1
+         end if
+      end do
+      allocate(tie(most))
+      n = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "TIE") cycle
+         call read_tie_options(reader, reader%card(i), common)
+         call check_name(reader, i, scene)
+         call read_tie_lines(reader, reader%card(i), scene, common, tie, n)
+      end do
+      scene%tie = tie(:n)
+   end subroutine read_ties
+
+   !> What a card says of all its ties.
+   subroutine read_tie_options(reader, card, tie)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(tie_t), intent(out) :: tie
+
+      call need_name(reader, card, "NAME", tie%name)
+      call option_real(reader, card, "POSITION TOLERANCE", tie%tolerance)
+      select case (option_name(card, "MULTIPLIER"))
+      case ("", "DUAL")
+         tie%multiplier = multiplier_dual
+      case ("STANDARD")
+         tie%multiplier = multiplier_standard
+      case default
+         call refuse_option(reader, card, "MULTIPLIER", "DUAL, STANDARD", "")
+      end select
+      select case (option_name(card, "ADJUST"))
+      case ("", "YES")
+         continue
+      case ("NO")
+         call refuse_option(reader, card, "ADJUST", "YES", "slave nodes are always put onto the " &
+            // "master surface: across a gap angular momentum would be lost")
+      case default
+         call refuse_option(reader, card, "ADJUST", "YES", "")
+      end select
+      select case (option_name(card, "TYPE"))
+      case ("", "SURFACETOSURFACE")
+         continue
+      case ("NODETOSURFACE")
+         call refuse_option(reader, card, "TYPE", "SURFACE TO SURFACE", &
+            "ties are integrated over edges, so that a uniform stress passes through")
+      case default
+         call refuse_option(reader, card, "TYPE", "SURFACE TO SURFACE", "")
+      end select
+   end subroutine read_tie_options
+
+   !> The card `i` must not have the name of an earlier one.
+   subroutine check_name(reader, i, scene)
+      type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: i
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable :: name
+      integer :: k
+
+      name = option_name(reader%card(i), "NAME")
+      if (name == "") return
+      do k = 1, i - 1
+         if (reader%card(k)%name /= "TIE") cycle
+         if (option_name(reader%card(k), "NAME") /= name) cycle
+         call card_error(reader, reader%card(i), "tie " // name // " is defined twice; first at " &
+            // where_text(scene, reader%card(k)%origin))
+         return
+      end do
+   end subroutine check_name
+
+   !> Data lines: slave surface, master surface. Ties that are refused have no surfaces.
+   subroutine read_tie_lines(reader, card, scene, common, tie, n)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: common
+      type(tie_t), intent(inout) :: tie(:)
+      integer, intent(inout) :: n
+      type(data_t) :: data
+      integer :: n_before
+
+      n_before = n
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         n = n + 1
+         tie(n) = common
+         tie(n)%origin = line_origin(reader, data%i_line)
+         call get_surfaces(reader, data, scene, tie(n)%slave, tie(n)%master)
+         if (tie(n)%slave > 0 .and. tie(n)%master > 0) then
+            call check_sides(reader, data, scene, tie(n))
+            if (data%ok) call check_repeated(reader, data, scene, tie(:n))
+         end if
+         if (data%ok) cycle
+         tie(n)%slave = 0
+         tie(n)%master = 0
+      end do
+      if (n == n_before) call card_error(reader, card, "no surfaces are given; expected slave " &
+         // "surface, master surface")
+   end subroutine read_tie_lines
+
+   !> The sides of a tie are two surfaces of element faces.
+   subroutine check_sides(reader, data, scene, tie)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: tie
+      integer :: side, i
+      character(len=6), parameter :: role(2) = ["slave ", "master"]
+
+      if (tie%slave == tie%master) then
+         call data_error(reader, data, "surface " // quoted(scene%surface(tie%slave)%name) &
+            // " is tied to itself; a tie joins two surfaces")
+         return
+      end if
+      do side = 1, 2
+         i = merge(tie%slave, tie%master, side == 1)
+         if (scene%surface(i)%is_nodal) call data_error(reader, data, "the " // trim(role(side)) &
+            // " surface " // quoted(scene%surface(i)%name) // " has TYPE=NODE, but ties are " &
+            // "integrated over edges; define it by element faces (*SURFACE, TYPE=ELEMENT)")
+      end do
+   end subroutine check_sides
+
+   !> The last of `tie` must not be there already, in either order.
+   subroutine check_repeated(reader, data, scene, tie)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: tie(:)
+      integer :: i, n
+
+      n = size(tie)
+      do i = 1, n - 1
+         if (.not. ((tie(i)%slave == tie(n)%slave .and. tie(i)%master == tie(n)%master) .or. &
+            (tie(i)%slave == tie(n)%master .and. tie(i)%master == tie(n)%slave))) cycle
+         call data_error(reader, data, "surfaces " // quoted(scene%surface(tie(n)%slave)%name) &
+            // " and " // quoted(scene%surface(tie(n)%master)%name) // " are tied twice; first " &
+            // "at " // where_text(scene, tie(i)%origin))
+         return
+      end do
+   end subroutine check_repeated
+
+end module emcon_deck_ties

@@ -1,0 +1,282 @@
+!> Ties before the first step: frozen integrals, multipliers at crosspoints, slave nodes moved onto
+!> the master surface.
+!>
+!> Source: docs/theory.md, section 11.
+module emcon_ties
+   use emcon_element_kinds, only : element_kinds
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_linear_rows, only : linear_rows_begin_step, linear_rows_init, linear_rows_t
+   use emcon_numbering, only : numbering_init, numbering_t
+   use emcon_scene, only : prescribed_t, scene_t, tie_rows_t, where_text
+   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_tie, only : tie_measure
+   implicit none
+   private
+   public :: ties_prepare, ties_move_nodes
+
+   !> A node that would move by less than this part of the largest coordinate stays where it is.
+   real(wp), parameter :: rounding = 64.0_wp*epsilon(1.0_wp)
+   !> An element is spoilt if a corner keeps less than this part of its area.
+   real(wp), parameter :: least_area = 0.1_wp
+
+contains
+
+   !> Find the constraint rows of all ties and move their slave nodes so that D x_s = M x_m; the
+   !> notes tell how far.
+   subroutine ties_prepare(scene, notes, error)
+      type(scene_t), intent(inout) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: n_tie(:)
+      integer :: t
+
+      if (size(scene%tie) == 0) return
+      do t = 1, size(scene%tie)
+         call tie_measure(scene, scene%tie(t), scene%tie(t)%rows, error)
+         if (allocated(error)) return
+      end do
+      call check_repeated(scene, error)
+      if (allocated(error)) return
+      call count_ties(scene, n_tie)
+      do t = 1, size(scene%tie)
+         call merge_ends(scene%tie(t)%rows, n_tie)
+      end do
+      call ties_move_nodes(scene, notes, error)
+   end subroutine ties_prepare
+
+   !> A slave node in the middle of one tie cannot be a slave node of another.
+   subroutine check_repeated(scene, error)
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: owner(:)
+      logical, allocatable :: is_inner(:)
+      integer :: t, k
+
+      allocate(owner(size(scene%x, 2)), source=0)
+      allocate(is_inner(size(scene%x, 2)), source=.false.)
+      do t = 1, size(scene%tie)
+         associate (rows => scene%tie(t)%rows)
+            do k = 1, size(rows%slave)
+               associate (node => rows%slave(k), is_inner_here => all(rows%neighbour(:, k) > 0))
+                  if (owner(node) > 0 .and. (is_inner(node) .or. is_inner_here)) then
+                     call raise(error, err_input, where_text(scene, scene%tie(t)%origin) // &
+                        ": *TIE " // scene%tie(t)%name // " over-constrains the model: slave node " &
+                        // to_text(scene%node_label(node)) // " is a slave node of *TIE " // &
+                        scene%tie(owner(node))%name // " already; let the surface be the master " &
+                        // "of one of them")
+                     return
+                  end if
+                  owner(node) = t
+                  is_inner(node) = is_inner(node) .or. is_inner_here
+               end associate
+            end do
+         end associate
+      end do
+   end subroutine check_repeated
+
+   !> Number of ties that each node takes part in.
+   pure subroutine count_ties(scene, n_tie)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: n_tie(:)      !! (n_node)
+      integer, allocatable :: seen(:)
+      integer :: t, i, k, side
+
+      allocate(n_tie(size(scene%x, 2)), seen(size(scene%x, 2)), source=0)
+      do t = 1, size(scene%tie)
+         do side = 1, 2
+            associate (surface => &
+                  scene%surface(merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)))
+               do i = 1, size(surface%element)
+                  associate (e => surface%element(i))
+                     associate (nodes => scene%element_node(element_kinds(scene%element_kind(e)) &
+                           %face_node(:, surface%face(i)), e))
+                        do k = 1, size(nodes)
+                           if (seen(nodes(k)) == t) cycle
+                           seen(nodes(k)) = t
+                           n_tie(nodes(k)) = n_tie(nodes(k)) + 1
+                        end do
+                     end associate
+                  end associate
+               end do
+            end associate
+         end do
+      end do
+   end subroutine count_ties
+
+   !> Where the end of a slave chain takes part in another tie too, its multiplier goes to the
+   !> neighbour: on the end edge there is a constant one then. A chain keeps one multiplier.
+   pure subroutine merge_ends(rows, n_tie)
+      type(tie_rows_t), intent(inout) :: rows
+      integer, intent(in) :: n_tie(:)                    !! (n_node)
+      logical :: is_merged(size(rows%slave))
+      integer :: k, other
+
+      is_merged = .false.
+      do k = 1, size(rows%slave)
+         if (all(rows%neighbour(:, k) > 0) .or. all(rows%neighbour(:, k) == 0)) cycle
+         other = maxval(rows%neighbour(:, k))
+         is_merged(k) = n_tie(rows%slave(k)) > 1 .and. .not. is_merged(other)
+      end do
+      if (any(is_merged)) call take_merged(rows, is_merged)
+   end subroutine merge_ends
+
+   !> Add the rows `is_merged` to their neighbours and leave them out.
+   pure subroutine take_merged(rows, is_merged)
+      type(tie_rows_t), intent(inout) :: rows
+      logical, intent(in) :: is_merged(:)                !! (rows) ends
+      type(tie_rows_t) :: old
+      integer, allocatable :: kept(:), number(:)
+      integer :: i, k, n, side
+
+      old = rows
+      kept = pack([(k, k = 1, size(is_merged))], .not. is_merged)
+      allocate(number(0:size(is_merged)), source=0)
+      number(kept) = [(k, k = 1, size(kept))]
+      rows%slave = old%slave(kept)
+      rows%size = old%size(kept)
+      deallocate(rows%neighbour, rows%start)
+      allocate(rows%neighbour(2, size(kept)), rows%start(size(kept) + 1), source=0)
+      n = 0
+      do i = 1, size(kept)
+         k = kept(i)
+         call add_entries(old, k, rows, i, n)
+         do side = 1, 2
+            associate (other => old%neighbour(side, k))
+               rows%neighbour(side, i) = number(other)
+               if (other == 0) cycle
+               if (.not. is_merged(other)) cycle
+               call add_entries(old, other, rows, i, n)
+               rows%size(i) = rows%size(i) + old%size(other)
+            end associate
+         end do
+         rows%start(i + 1) = n
+      end do
+      rows%node = rows%node(:n)
+      rows%weight = rows%weight(:n)
+   end subroutine take_merged
+
+   !> Add the entries of row `k` of `old` to row `i` of `rows`, the last one, which ends at `n`.
+   pure subroutine add_entries(old, k, rows, i, n)
+      type(tie_rows_t), intent(in) :: old
+      integer, intent(in) :: k, i
+      type(tie_rows_t), intent(inout) :: rows
+      integer, intent(inout) :: n
+      integer :: s, place
+
+      do s = old%start(k) + 1, old%start(k + 1)
+         place = rows%start(i) + findloc(rows%node(rows%start(i) + 1:n), old%node(s), 1)
+         if (place == rows%start(i)) then
+            n = n + 1
+            place = n
+            rows%node(n) = old%node(s)
+            rows%weight(n) = 0.0_wp
+         end if
+         rows%weight(place) = rows%weight(place) + old%weight(s)
+      end do
+   end subroutine add_entries
+
+   !> Move the slave nodes onto the places that their ties give them; the notes tell how far.
+   subroutine ties_move_nodes(scene, notes, error)
+      type(scene_t), intent(inout) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      type(prescribed_t) :: nothing(0)
+      type(linear_rows_t) :: linear
+      type(numbering_t) :: numbering
+      real(wp), allocatable :: move(:, :)
+      logical, allocatable :: is_alive(:, :)
+
+      if (size(scene%tie) == 0) return
+      call linear_rows_init(linear, scene)
+      call linear_rows_begin_step(linear, scene, nothing)
+      linear%is_used = linear%tie > 0
+      allocate(is_alive(2, size(scene%x, 2)), source=.true.)
+      call numbering_init(numbering, is_alive, nothing, linear)
+      allocate(move, source=0.0_wp*scene%x)
+      call find_moves(numbering, scene%x, move)
+      where (abs(move) <= rounding*maxval(abs(scene%x))) move = 0.0_wp
+      call note_moves(scene, move, notes)
+      call check_elements(scene, move, error)
+      if (.not. allocated(error)) scene%x = scene%x + move
+   end subroutine ties_move_nodes
+
+   !> x_d - (T x)_d of the dependent freedoms, from differences of places.
+   pure subroutine find_moves(numbering, x, move)
+      type(numbering_t), intent(in) :: numbering
+      real(wp), intent(in) :: x(size(numbering%start) - 1)
+      real(wp), intent(inout) :: move(size(numbering%start) - 1)
+      integer :: k, t
+
+      do k = 1, numbering%n_dependent
+         associate (d => numbering%dependent(k))
+            do t = numbering%start(d) + 1, numbering%start(d + 1)
+               move(d) = move(d) + numbering%weight(t)*(x(numbering%term(t)) - x(d))
+            end do
+         end associate
+      end do
+   end subroutine find_moves
+
+   !> Tell the largest move of each tie.
+   subroutine note_moves(scene, move, notes)
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: move(:, :)                 !! (2, n_node)
+      type(notes_t), intent(inout) :: notes
+      real(wp), allocatable :: distance(:)
+      integer :: t, k
+
+      do t = 1, size(scene%tie)
+         associate (slave => scene%tie(t)%rows%slave)
+            allocate(distance(size(slave)))
+            do k = 1, size(slave)
+               distance(k) = norm2(move(:, slave(k)))
+            end do
+            k = maxloc(distance, 1)
+            if (distance(k) > 0.0_wp) call note_add(notes, "*TIE " // scene%tie(t)%name // &
+               ": " // to_text(count(distance > 0.0_wp)) // " of " // to_text(size(slave)) // &
+               " slave nodes moved onto the master surface, at most by " // &
+               to_text(distance(k)) // " (node " // to_text(scene%node_label(slave(k))) // ")")
+            deallocate(distance)
+         end associate
+      end do
+   end subroutine note_moves
+
+   !> An error if a corner of an element would lose most of its area.
+   subroutine check_elements(scene, move, error)
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: move(:, :)                 !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: before, after
+      integer :: e, i, n, k
+
+      do e = 1, size(scene%element_kind)
+         n = element_kinds(scene%element_kind(e))%n_node
+         associate (node => scene%element_node(:n, e))
+            if (all(abs(move(:, node)) <= 0.0_wp)) cycle
+            do i = 1, n
+               before = corner_area(scene%x(:, node), i)
+               after = corner_area(scene%x(:, node) + move(:, node), i)
+               if (.not. before > 0.0_wp .or. after > least_area*before) cycle
+               k = maxloc(abs(move(1, node)) + abs(move(2, node)), 1)
+               call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
+                  " would be spoilt: a tie moves its node " // &
+                  to_text(scene%node_label(node(k))) // " by " // to_text(norm2(move(:, node(k)))) &
+                  // " onto the master surface; let the surfaces meet, or refine the coarser one")
+               return
+            end do
+         end associate
+      end do
+   end subroutine check_elements
+
+   !> Twice the area of the triangle at corner `i` of a polygon.
+   pure real(wp) function corner_area(x, i)
+      real(wp), intent(in) :: x(:, :)                    !! (2, corners) counter-clockwise
+      integer, intent(in) :: i
+      real(wp) :: a(2), b(2)
+
+      a = x(:, 1 + mod(i, size(x, 2))) - x(:, i)
+      b = x(:, 1 + mod(i + size(x, 2) - 2, size(x, 2))) - x(:, i)
+      corner_area = a(1)*b(2) - a(2)*b(1)
+   end function corner_area
+
+end module emcon_ties
