@@ -1,115 +1,197 @@
 !> Rigid motions that nothing prevents: what makes a static problem singular.
 module emcon_rigid_motion
-   use emcon_kinds, only : wp
+   use emcon_bodies, only : bodies_find
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_null_space
+   use emcon_rigid_bodies, only : find_assemblies, find_free_motions, motions_as_one, &
+      rigid_bodies_find, rigid_bodies_t, rigid_rows_find, rigid_rows_t
    use emcon_scene, only : prescribed_t, scene_t
    use emcon_system, only : system_t
-   use emcon_text, only : to_text
+   use emcon_text, only : joined, string_t, to_text
    implicit none
    private
    public :: free_motion_text
 
+   !> Bodies of an assembly that are named.
+   integer, parameter :: most_named = 10
+
 contains
 
-   !> Names the first body that can move as a rigid one, and how; empty if none can. Bodies in a
-   !> contact pair are looked at only `with_contact`: contact may hold them.
+   !> Names the first body that can move as a rigid one, and how, or the first assembly of bodies
+   !> tied to each other; empty if none can. Bodies in a contact pair are looked at only
+   !> `with_contact`: contact may hold them. `system%linear` holds the rows of the step.
    function free_motion_text(system, scene, prescribed, with_contact) result(text)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       type(prescribed_t), intent(in) :: prescribed(:)
       logical, intent(in), optional :: with_contact
-      character(len=:), allocatable :: text, motion
-      logical :: touches(system%n_body)
-      integer :: b, i, k
+      character(len=:), allocatable :: text
+      type(rigid_bodies_t) :: bodies
+      type(rigid_rows_t) :: rows
+      integer, allocatable :: assembly(:), order(:), member(:)
+      real(dp), allocatable :: z(:, :)
+      real(dp) :: noise
+      logical :: contact_holds
+      integer :: n_assembly, i, n, first, last
 
+      contact_holds = .true.
+      if (present(with_contact)) contact_holds = .not. with_contact
+      call rigid_rows_find(system, prescribed, rows)
+      call rigid_bodies_find(system, scene, rows, contact_holds, bodies)
+      call find_assemblies(bodies, rows, assembly, n_assembly, order)
       text = ""
-      touches = .false.
-      if (.not. present(with_contact)) then
-         do k = 1, size(system%contact)
-            call mark_contact_bodies(system, scene, k, touches)
+      last = 0
+      do i = 1, n_assembly
+         first = last + 1
+         do while (last < size(order))
+            if (assembly(rows%low(order(last + 1))) /= i) exit
+            last = last + 1
          end do
-      end if
-      do b = 1, system%n_body
-         if (touches(b)) cycle
-         motion = body_motion(system, scene, prescribed, b)
-         if (len(motion) == 0) cycle
-         i = 1
-         do while (system%body(system%solid%node(1, i)) /= b)
-            i = i + 1
-         end do
-         text = "the body of element " // &
-            to_text(scene%element_label(i)) // " is free to " // motion // &
-            "; add *BOUNDARY conditions"
+         member = pack([(n, n = 1, bodies%n)], assembly == i)
+         call find_free_motions(bodies, rows, order(first:last), member, z, noise)
+         if (size(z, 2) == 0) cycle
+         call keep_moving_together(member, z, sqrt(noise))
+         text = name_text(bodies, system, scene, member) // " free to " &
+            // motion_text(bodies, member, z, sqrt(noise)) // "; add *BOUNDARY conditions"
          return
       end do
    end function free_motion_text
 
-   subroutine mark_contact_bodies(system, scene, pair, touches)
-      type(system_t), intent(in) :: system
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: pair
-      logical, intent(inout) :: touches(:)
-      integer :: i, surface(2), k
+   !> Of an assembly keep the first body that moves and those that move with it: whose motions
+   !> are correlated over the null space.
+   subroutine keep_moving_together(member, z, tol)
+      integer, allocatable, intent(inout) :: member(:)
+      real(dp), allocatable, intent(inout) :: z(:, :)    !! (3*members, n) orthonormal columns
+      real(dp), intent(in) :: tol                        !! what counts as motion
+      real(dp) :: size_of(size(member)), block(3, 3)
+      integer, allocatable :: link(:, :), group(:)
+      integer :: i, j, n, n_group, pass
 
-      surface = [scene%pair(pair)%slave, scene%pair(pair)%master]
-      do i = 1, 2
-         associate (s => scene%surface(surface(i)))
-            if (s%is_nodal) then
-               do k = 1, size(s%node)
-                  if (system%body(s%node(k)) > 0) touches(system%body(s%node(k))) = .true.
-               end do
-            else
-               do k = 1, size(s%element)
-                  touches(system%body(scene%element_node(1, s%element(k)))) = .true.
-               end do
-            end if
-         end associate
+      do i = 1, size(member)
+         size_of(i) = norm2(z(3*i - 2:3*i, :))
       end do
-   end subroutine mark_contact_bodies
-
-   !> The motions of body `b` that its prescribed freedoms leave, from the rank of these freedoms
-   !> on the two translations and the rotation.
-   function body_motion(system, scene, prescribed, b) result(text)
-      type(system_t), intent(in) :: system
-      type(scene_t), intent(in) :: scene
-      type(prescribed_t), intent(in) :: prescribed(:)
-      integer, intent(in) :: b
-      character(len=:), allocatable :: text
-      real(wp) :: center(2), arm(2), gram(3, 3), row(3), size_of_body
-      logical :: has(2), is_full
-      integer :: i, k
-
-      center = 0.0_wp
-      do i = 1, size(scene%x, 2)
-         if (system%body(i) == b) center = center + scene%x(:, i)
-      end do
-      center = center/real(count(system%body == b), wp)
-      size_of_body = 0.0_wp
-      do i = 1, size(scene%x, 2)
-         if (system%body(i) /= b) cycle
-         size_of_body = max(size_of_body, maxval(abs(scene%x(:, i) - center)))
-      end do
-      gram = 0.0_wp
-      has = .false.
-      do k = 1, size(prescribed)
-         if (system%body(prescribed(k)%node) /= b) cycle
-         arm = (scene%x(:, prescribed(k)%node) - center)/size_of_body
-         has(prescribed(k)%dof) = .true.
-         row = 0.0_wp
-         row(prescribed(k)%dof) = 1.0_wp
-         row(3) = merge(-arm(2), arm(1), prescribed(k)%dof == 1)
-         do i = 1, 3
-            gram(:, i) = gram(:, i) + row*row(i)
+      if (maxval(size_of) <= tol) return         ! coordinates that are mostly round-off
+      do pass = 1, 2                             ! count, then list
+         n = 0
+         do i = 1, size(member)
+            if (size_of(i) <= tol) cycle
+            do j = i, size(member)
+               if (size_of(j) <= tol) cycle
+               block = matmul(z(3*i - 2:3*i, :), transpose(z(3*j - 2:3*j, :)))
+               if (maxval(abs(block)) <= tol*size_of(i)*size_of(j)) cycle
+               n = n + 1
+               if (pass == 2) link(:, n) = [i, j]
+            end do
          end do
+         if (pass == 1) allocate(link(2, n))
       end do
-      do i = 1, 2                                ! the rank of the rotation beside what is missing
-         if (.not. has(i)) gram(i, i) = 1.0_wp
+      call bodies_find(link, size(member), group, n_group)
+      z = z(pack([(i, i = 1, size(z, 1))], [((group(j) == 1, i = 1, 3), j = 1, size(group))]), :)
+      member = pack(member, group == 1)
+   end subroutine keep_moving_together
+
+   !> "the body of element 3 is", or all bodies and nodes of `member`.
+   function name_text(bodies, system, scene, member) result(text)
+      type(rigid_bodies_t), intent(in) :: bodies
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: member(:)
+      character(len=:), allocatable :: text
+      integer :: label(bodies%n), i, n
+
+      do i = size(scene%element_label), 1, -1
+         label(system%body(system%solid%node(1, i))) = scene%element_label(i)
       end do
-      is_full = determinant(gram) > 1.0e3_wp*epsilon(1.0_wp)*max(1.0_wp, trace(gram))**3
+      do i = 1, size(bodies%of_node)
+         if (bodies%of_node(i) > bodies%n_mesh) label(bodies%of_node(i)) = scene%node_label(i)
+      end do
+      n = count(member <= bodies%n_mesh)
+      text = list_text("the body of element ", "the bodies of elements ", label(member(:n)))
+      if (n > 0 .and. n < size(member)) text = text // " and "
+      text = text // list_text("node ", "nodes ", label(member(n + 1:)))
+      if (size(member) == 1) then
+         text = text // " is"
+      else
+         text = text // ", tied to each other, are"
+      end if
+   end function name_text
+
+   !> `one` or `more` and the labels; empty if there is none.
+   pure function list_text(one, more, label) result(text)
+      character(len=*), intent(in) :: one, more
+      integer, intent(in) :: label(:)
+      character(len=:), allocatable :: text
+      type(string_t) :: word(size(label))
+      integer :: i
+
+      do i = 1, size(label)
+         word(i)%text = to_text(label(i))
+      end do
       text = ""
-      if (.not. has(1)) text = "move in x"
-      if (.not. has(2)) text = join(text, "move in y")
-      if (.not. is_full) text = join(text, "rotate")
-   end function body_motion
+      if (size(label) == 1) text = one // word(1)%text
+      if (size(label) > 1) text = more // joined(word, ", ", most_named)
+   end function list_text
+
+   !> How bodies that move together can move: as one, which are combinations g of two translations
+   !> and a rotation, or against each other. Nodes follow.
+   function motion_text(bodies, member, z, tol) result(text)
+      type(rigid_bodies_t), intent(in) :: bodies
+      integer, intent(in) :: member(:)
+      real(dp), intent(in) :: z(:, :)                    !! (3*members, n) their motions
+      real(dp), intent(in) :: tol
+      character(len=:), allocatable :: text
+      type(error_t), allocatable :: error
+      real(dp), allocatable :: a(:, :), both(:, :), held(:, :), g(:, :), shift(:, :)
+      integer :: n
+      logical :: along(2)
+
+      n = count(member <= bodies%n_mesh)
+      if (n == 0) n = size(member)
+      allocate(a(3*n, 3 + size(z, 2)))
+      a(:, :3) = motions_as_one(bodies, member(:n))/sqrt(real(n, dp))
+      a(:, 4:) = -z(:3*n, :)
+      text = "move"
+      call find_null_space(a, tol, both, error)
+      if (allocated(error)) return
+      call find_null_space(transpose(both(:3, :)), tol, held, error)     ! g^T held = 0
+      if (allocated(error)) return
+      call find_null_space(transpose(held), tol, g, error)
+      if (allocated(error)) return
+      call find_null_space(g(3:3, :), tol, shift, error)
+      if (allocated(error)) return
+      text = ""
+      along = [norm2(held(1, :)) <= tol, norm2(held(2, :)) <= tol]
+      if (along(1)) text = "move in x"
+      if (along(2)) text = join(text, "move in y")
+      if (size(shift, 2) == 1 .and. .not. any(along)) then
+         text = direction_text(matmul(g(:2, :), shift(:, 1)))
+      end if
+      if (size(shift, 2) < size(g, 2)) text = join(text, "rotate")
+      if (size(both, 2) < size(z, 2)) text = join(text, "move against each other")
+   end function motion_text
+
+   !> Columns z with a z = 0 up to singular values of `tol`, for a matrix of order one or of noise.
+   subroutine find_null_space(a, tol, z, error)
+      real(dp), intent(in) :: a(:, :)
+      real(dp), intent(in) :: tol
+      real(dp), allocatable, intent(out) :: z(:, :)      !! (columns of a, n) orthonormal
+      type(error_t), allocatable, intent(out) :: error
+
+      call dense_null_space(a, tol/max(norm2(a), tol), z, error)
+   end subroutine find_null_space
+
+   !> "move along (1, -0.5)": one of the entries is 1.
+   pure function direction_text(shift) result(text)
+      real(dp), intent(in) :: shift(2)
+      character(len=:), allocatable :: text
+      real(wp) :: along(2)
+      integer :: i
+
+      i = merge(1, 2, abs(shift(1)) > 0.5_dp*abs(shift(2)))
+      along = real(shift/shift(i), wp)
+      text = "move along (" // to_text(along(1), 3) // ", " // to_text(along(2), 3) // ")"
+   end function direction_text
 
    pure function join(a, b) result(text)
       character(len=*), intent(in) :: a, b
@@ -118,19 +200,5 @@ contains
       text = b
       if (len(a) > 0) text = a // ", " // b
    end function join
-
-   pure real(wp) function trace(a)
-      real(wp), intent(in) :: a(3, 3)
-
-      trace = a(1, 1) + a(2, 2) + a(3, 3)
-   end function trace
-
-   pure real(wp) function determinant(a)
-      real(wp), intent(in) :: a(3, 3)
-
-      determinant = a(1, 1)*(a(2, 2)*a(3, 3) - a(2, 3)*a(3, 2)) &
-         - a(1, 2)*(a(2, 1)*a(3, 3) - a(2, 3)*a(3, 1)) &
-         + a(1, 3)*(a(2, 1)*a(3, 2) - a(2, 2)*a(3, 1))
-   end function determinant
 
 end module emcon_rigid_motion

@@ -63,6 +63,7 @@ contains
          weight = 0.0_wp
          do i = 1, n + m - 1
             width = break(i + 1) - break(i)
+            if (.not. width > 0.0_wp) cycle
             do q = 1, 3
                at = break(i) + width*(0.5_wp*(q - 1))
                associate (psi => dual(y, k, at, break(i) + 0.5_wp*width))
@@ -84,9 +85,7 @@ contains
       real(wp), intent(in) :: y(:), at
       integer, intent(in) :: k
 
-      hat = 1.0_wp
-      if (at < y(k)) hat = 0.0_wp
-      if (at > y(k)) hat = 0.0_wp
+      hat = merge(1.0_wp, 0.0_wp, abs(at - y(k)) <= 0.0_wp)
       if (k > 1) then
          if (at < y(k)) hat = max(0.0_wp, (at - y(k - 1))/(y(k) - y(k - 1)))
       end if
