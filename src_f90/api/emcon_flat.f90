@@ -136,7 +136,8 @@ contains
       n = 0
       if (.not. is_open(handle, ierr)) return
       associate (system => slot(handle)%stepper%march%system)
-         n = [system%solid%n_node, system%solid%n_element, system%n_constraint, system%n_body, &
+         n = [system%solid%n_node, system%solid%n_element, &
+            system%n_constraint - system%linear%n, system%n_body, &
             system%numbering%n_unknown, size(slot(handle)%stepper%scene%step), &
             size(system%contact)]
       end associate
@@ -224,7 +225,7 @@ contains
       integer(c_int), intent(out) :: active(n_constraint)
       integer(c_int), intent(out) :: label(n_constraint)
       integer(c_int), intent(out) :: ierr
-      integer :: i, first, last
+      integer :: i, first, last, before
 
       lam = 0.0_c_double
       active = 0
@@ -232,15 +233,16 @@ contains
       if (.not. is_open(handle, ierr)) return
       associate (system => slot(handle)%stepper%march%system, &
             state => slot(handle)%stepper%march%state, scene => slot(handle)%stepper%scene)
-         if (n_constraint /= system%n_constraint) then
+         before = system%linear%n
+         if (n_constraint /= system%n_constraint - before) then
             call fail("the arrays do not have the size of the model", err_input, ierr)
             return
          end if
-         lam = real(state%lam, c_double)
-         active = merge(1, 0, state%is_active)
+         lam = real(state%lam(before + 1:), c_double)
+         active = merge(1, 0, state%is_active(before + 1:))
          do i = 1, size(system%contact)
-            first = system%first_constraint(i) + 1
-            last = system%first_constraint(i + 1)
+            first = system%first_constraint(i) - before + 1
+            last = system%first_constraint(i + 1) - before
             label(first:last) = scene%node_label(system%contact(i)%contact%node)
          end do
       end associate

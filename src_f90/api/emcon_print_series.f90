@@ -177,7 +177,7 @@ contains
             label = scene%element_label(item)
          case (of_constraints)
             set = "CONTACT"
-            item = [(i, i = 1, system%n_constraint)]
+            item = [(i, i = system%first_constraint(1) + 1, system%n_constraint)]
             allocate(label(0))
             do i = 1, size(system%contact)
                label = [label, scene%node_label(system%contact(i)%contact%node)]

@@ -65,7 +65,9 @@ contains
       end if
       allocate(self%length(self%n_edge))
       do i = 1, self%n_edge
-         self%length(i) = norm2(scene%x(:, self%edge(2, i)) - scene%x(:, self%edge(1, i)))
+         associate (a => scene%x(:, self%edge(2, i)) - scene%x(:, self%edge(1, i)))
+            self%length(i) = sqrt(dot_product(a, a))   ! not norm2: its bits depend on the units
+         end associate
       end do
       call link_edges(self, scene, surface, error)
       if (allocated(error)) return

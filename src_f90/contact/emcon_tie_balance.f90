@@ -19,7 +19,7 @@ module emcon_tie_balance
    use emcon_tie_balance_step, only : balance_step_do, balance_step_init, balance_step_t
    implicit none
    private
-   public :: tie_balance_report_t, tie_balance
+   public :: tie_balance_report_t, tie_balance, tie_is_balanced
 
    !> What became of the rows. Residuals: out of balance, per largest nodal force of the master
    !> side, under any constant stress.
@@ -62,6 +62,32 @@ contains
       call tie_balance_free(tie)
    end subroutine tie_balance
 
+   !> Are `rows` in balance as they are, up to round-off?
+   subroutine tie_is_balanced(rows, x, slave_edge, master_edge, is_balanced, error)
+      type(tie_rows_t), intent(in) :: rows
+      real(wp), intent(in) :: x(:, :)            !! (2, n_node) positions [L]
+      integer, intent(in) :: slave_edge(:, :), master_edge(:, :)   !! (2, n)
+      logical, intent(out) :: is_balanced
+      type(error_t), allocatable, intent(out) :: error
+      type(tie_balance_t) :: tie
+      real(wp) :: cover(2, size(master_edge, 2)), residual
+
+      call find_cover(rows, x, slave_edge, master_edge, cover)
+      call tie_balance_init(tie, rows, x, slave_edge, master_edge, cover, error)
+      if (.not. allocated(error)) call tie_balance_residual(tie, residual, error)
+      is_balanced = .false.
+      if (.not. allocated(error)) is_balanced = residual <= tolerance_of(tie)
+      call tie_balance_free(tie)
+   end subroutine tie_is_balanced
+
+   !> Residuals below this are round-off.
+   pure real(wp) function tolerance_of(tie)
+      type(tie_balance_t), intent(in) :: tie
+
+      tolerance_of = round_off*max(maxval(abs(tie%x_other)), maxval(abs(tie%x))) &
+         /min(minval(tie%size), tie%force)
+   end function tolerance_of
+
    !> Newton steps until the residual is round-off and falls no more.
    subroutine improve(tie, report, error)
       type(tie_balance_t), intent(inout) :: tie
@@ -71,8 +97,7 @@ contains
       real(wp) :: best(size(tie%m_value)), tolerance, last, now, change
       integer :: i, n_stall
 
-      tolerance = round_off*max(maxval(abs(tie%x_other)), maxval(abs(tie%x))) &
-         /min(minval(tie%size), tie%force)
+      tolerance = tolerance_of(tie)
       report%after = report%before
       report%is_balanced = report%before <= tolerance
       if (report%is_balanced) return

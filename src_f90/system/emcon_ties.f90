@@ -3,14 +3,17 @@
 !>
 !> Source: docs/theory.md, section 11.
 module emcon_ties
+   use emcon_chain, only : chain_init, chain_t
    use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_begin_step, linear_rows_init, linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t
-   use emcon_scene, only : prescribed_t, scene_t, tie_rows_t, where_text
+   use emcon_scene, only : prescribed_t, scene_t, tie_rows_t, tie_t, where_text
+   use emcon_sort, only : find_sorted
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_tie, only : tie_measure
+   use emcon_tie_balance, only : tie_balance, tie_balance_report_t, tie_is_balanced
    implicit none
    private
    public :: ties_prepare, ties_move_nodes
@@ -19,6 +22,7 @@ module emcon_ties
    real(wp), parameter :: rounding = 64.0_wp*epsilon(1.0_wp)
    !> An element is spoilt if a corner keeps less than this part of its area.
    real(wp), parameter :: least_area = 0.1_wp
+   integer, parameter :: most_sweeps = 4
 
 contains
 
@@ -42,7 +46,9 @@ contains
       do t = 1, size(scene%tie)
          call merge_ends(scene%tie(t)%rows, n_tie)
       end do
-      call ties_move_nodes(scene, notes, error)
+      call balance(scene, error)
+      if (.not. allocated(error)) call ties_move_nodes(scene, notes, error)
+      if (.not. allocated(error)) call note_unbalanced(scene, notes, error)
    end subroutine ties_prepare
 
    !> A slave node in the middle of one tie cannot be a slave node of another.
@@ -120,6 +126,93 @@ contains
       end do
       if (any(is_merged)) call take_merged(rows, is_merged)
    end subroutine merge_ends
+
+   !> Let curved ties keep the equilibrium of a constant stress. A tie may be master of another one
+   !> whose slave nodes it moves: a few sweeps settle that.
+   subroutine balance(scene, error)
+      type(scene_t), intent(inout) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: moved
+      type(notes_t) :: unused
+      logical :: is_balanced, has_changed
+      integer :: t, sweep
+
+      moved = scene
+      do sweep = 1, most_sweeps
+         has_changed = .false.
+         do t = 1, size(scene%tie)
+            call balance_tie(moved, moved%tie(t), is_balanced, error)
+            if (allocated(error)) return
+            has_changed = has_changed .or. .not. is_balanced
+         end do
+         if (.not. has_changed) exit
+         call ties_move_nodes(moved, unused, error)
+         if (allocated(error)) return
+      end do
+      do t = 1, size(scene%tie)
+         scene%tie(t)%rows = moved%tie(t)%rows
+      end do
+   end subroutine balance
+
+   !> Balance one tie. On a curved interface the ends of the slave chain need no multiplier and may
+   !> have none; a chain that would keep less than two stays as it is.
+   subroutine balance_tie(scene, tie, was_balanced, error)
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(inout) :: tie
+      logical, intent(out) :: was_balanced
+      type(error_t), allocatable, intent(out) :: error
+      type(chain_t) :: slave, master
+      type(tie_balance_report_t) :: report
+      type(tie_rows_t) :: rows
+      logical :: is_end(size(tie%rows%slave))
+
+      call chain_init(slave, scene, scene%surface(tie%slave), error)
+      if (.not. allocated(error)) call chain_init(master, scene, scene%surface(tie%master), error)
+      if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%edge, master%edge, &
+         was_balanced, error)
+      if (allocated(error) .or. was_balanced) return
+      rows = tie%rows
+      is_end = any(rows%neighbour == 0, dim=1) .and. is_chain_end(slave, rows%slave)
+      if (count(.not. is_end) < 2) return
+      if (any(is_end)) call take_merged(rows, is_end)
+      call tie_balance(rows, scene%x, slave%edge, master%edge, report, error)
+      if (.not. allocated(error) .and. report%is_balanced) tie%rows = rows
+   end subroutine balance_tie
+
+   !> Is a node an end of the chain?
+   pure function is_chain_end(chain, node) result(is_end)
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: node(:)
+      logical :: is_end(size(node))
+      integer :: i
+
+      do i = 1, size(node)
+         is_end(i) = any(chain%node_edge(:, find_sorted(chain%node, node(i))) == 0)
+      end do
+   end function is_chain_end
+
+   !> Tell which ties do not keep the equilibrium of a constant stress.
+   subroutine note_unbalanced(scene, notes, error)
+      type(scene_t), intent(in) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      type(chain_t) :: slave, master
+      logical :: is_balanced
+      integer :: t
+
+      do t = 1, size(scene%tie)
+         associate (tie => scene%tie(t))
+            call chain_init(slave, scene, scene%surface(tie%slave), error)
+            if (.not. allocated(error)) call chain_init(master, scene, &
+               scene%surface(tie%master), error)
+            if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%edge, &
+               master%edge, is_balanced, error)
+            if (allocated(error)) return
+            if (.not. is_balanced) call note_add(notes, "*TIE " // tie%name // ": its curved " // &
+               "meshes do not fit so well that a constant stress is kept exactly")
+         end associate
+      end do
+   end subroutine note_unbalanced
 
    !> Add the rows `is_merged` to their neighbours and leave them out.
    pure subroutine take_merged(rows, is_merged)

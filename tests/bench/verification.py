@@ -14,7 +14,8 @@ import pathlib
 import re
 import tempfile
 
-from book import (bar, contact_patch, free_bodies, hertz, ironing, numerics, ring, spin, statics)
+from book import (bar, contact_patch, free_bodies, hertz, ironing, numerics, ring, spin, statics,
+                  ties)
 from book.common import Runs
 
 BOOK = pathlib.Path(__file__).resolve().parents[2] / "docs" / "verification.md"
@@ -22,7 +23,8 @@ BOOK = pathlib.Path(__file__).resolve().parents[2] / "docs" / "verification.md"
 #: In the order of the book.
 CHAPTERS = [
     chapter
-    for module in (ring, spin, bar, free_bodies, statics, contact_patch, hertz, ironing, numerics)
+    for module in (ring, spin, bar, free_bodies, statics, ties, contact_patch, hertz, ironing,
+                   numerics)
     for chapter in module.CHAPTERS
 ]
 

@@ -40,6 +40,7 @@ program main
    use test_deck_ties, only : collect_deck_ties
    use test_results, only : collect_results
    use test_rigid_motion, only : collect_rigid_motion
+   use test_rigid_bodies, only : collect_rigid_bodies
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
@@ -49,6 +50,7 @@ program main
    use test_tied_contact, only : collect_tied_contact
    use test_tie, only : collect_tie
    use test_tie_partner, only : collect_tie_partner
+   use test_tie_balance, only : collect_tie_balance
    use test_triple_product, only : collect_triple_product
    use test_umfpack, only : collect_umfpack
    use test_velocity_update, only : collect_velocity_update
@@ -97,10 +99,12 @@ program main
    call run("mortar", collect_mortar)
    call run("tie", collect_tie)
    call run("tie_partner", collect_tie_partner)
+   call run("tie_balance", collect_tie_balance)
    call run("numbering", collect_numbering)
    call run("bodies", collect_bodies)
    call run("loads", collect_loads)
    call run("rigid_motion", collect_rigid_motion)
+   call run("rigid_bodies", collect_rigid_bodies)
    call run("constraints", collect_constraints)
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)

@@ -1,6 +1,6 @@
 """Every deck of input_decks/ runs and gives the figures of its heading.
 
-The ring has test_ring.py, the spinning ring also test_flight.py.
+The ring has test_ring.py, the spinning ring also test_flight.py, tied bodies have test_ties.py.
 """
 
 import numpy as np
@@ -15,6 +15,8 @@ SHORT = {
     "two_bodies": {"h": 0.02, "t_end": 0.4},
     "three_bodies": {"h": 0.02, "t_end": 0.4},
     "self_contact": {"h": 0.02, "t_end": 0.4},
+    "tied_ring": {"h": 0.05, "t_end": 0.5},
+    "tied_spin": {"t_end": 1},
 }
 
 
