@@ -11,11 +11,13 @@ METHODS = ["NULL SPACE", "SADDLE POINT"]
 
 # ---- patch tests --------------------------------------------------------------------------------
 
-FLAT = {
+INTERFACES = {
     "straight": ["--interface", "STRAIGHT"],
     "straight, swapped": ["--interface", "STRAIGHT", "--swap"],
     "inclined": ["--interface", "INCLINED"],
     "inclined, swapped": ["--interface", "INCLINED", "--swap"],
+    "curved": ["--interface", "CURVED"],
+    "curved, swapped": ["--interface", "CURVED", "--swap"],
     "three": ["--interface", "THREE"],
     "four": ["--interface", "FOUR"],
     "four, swapped": ["--interface", "FOUR", "--swap"],
@@ -45,19 +47,19 @@ def assert_uniform(deck, run):
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("linear", [False, True], ids=["nlgeom", "linear"])
 @pytest.mark.parametrize("load", LOADS)
-@pytest.mark.parametrize("interface", FLAT)
+@pytest.mark.parametrize("interface", INTERFACES)
 def test_patch_in_statics(tmp_path, interface, load, linear, multiplier):
-    options = [*FLAT[interface], "--load", load, *(["--linear"] if linear else [])]
+    options = [*INTERFACES[interface], "--load", load, *(["--linear"] if linear else [])]
     deck = made("patch", tmp_path, *options)
     assert_uniform(deck, run_deck(deck, tmp_path, multiplier=multiplier))
 
 
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("load", LOADS)
-@pytest.mark.parametrize("interface", FLAT)
+@pytest.mark.parametrize("interface", INTERFACES)
 def test_patch_in_dynamics(tmp_path, interface, load, multiplier):
     """A uniform rate of strain, which needs no force inside; an equilibrium that stays."""
-    deck = made("patch", tmp_path, *FLAT[interface], "--load", load, "--dynamic")
+    deck = made("patch", tmp_path, *INTERFACES[interface], "--load", load, "--dynamic")
     run = run_deck(deck, tmp_path, multiplier=multiplier)
     assert len(run.history) == 11
     assert_uniform(deck, run)
