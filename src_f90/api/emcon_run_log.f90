@@ -2,12 +2,13 @@
 module emcon_run_log
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
+   use emcon_link_lines, only : add_link_lines
    use emcon_log, only : log_line, log_t
    use emcon_march, only : increment_t
    use emcon_scene, only : contact_options_t, formulation_mortar, formulation_segment, &
       integration_elements, multiplier_dual, normal_nodal, scene_t, smoothing_hermite
    use emcon_stepper, only : stepper_t
-   use emcon_text, only : string_t, to_text
+   use emcon_text, only : notes_t, string_t, to_text
    use emcon_version, only : version
    implicit none
    private
@@ -60,6 +61,7 @@ contains
    function model_lines(stepper) result(line)
       type(stepper_t), intent(in) :: stepper
       type(string_t), allocatable :: line(:)
+      type(notes_t) :: links
       integer :: i, k
 
       allocate(line(0))
@@ -71,6 +73,10 @@ contains
          do k = 1, size(element_kinds)
             if (any(scene%element_kind == k)) call add(to_text(count(scene%element_kind == k)) // &
                " elements " // trim(element_kinds(k)%name))
+         end do
+         call add_link_lines(scene, system, links)
+         do k = 1, links%n
+            call add(links%item(k)%text)
          end do
          do k = 1, size(scene%pair)
             call add("contact: " // scene%surface(scene%pair(k)%slave)%name // " (slave, " // &

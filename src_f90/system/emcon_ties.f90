@@ -16,7 +16,7 @@ module emcon_ties
    use emcon_tie_balance, only : tie_balance, tie_balance_report_t, tie_is_balanced
    implicit none
    private
-   public :: ties_prepare, ties_move_nodes
+   public :: ties_prepare, ties_move_nodes, find_crosspoints
 
    !> A node that would move by less than this part of the largest coordinate stays where it is.
    real(wp), parameter :: rounding = 64.0_wp*epsilon(1.0_wp)
@@ -109,6 +109,46 @@ contains
          end do
       end do
    end subroutine count_ties
+
+   !> Nodes at places where ends of several ties meet, and which of these places each is at.
+   subroutine find_crosspoints(scene, node, place, n_place)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: node(:)
+      integer, allocatable, intent(out) :: place(:)      !! (size of `node`) 1..n_place
+      integer, intent(out) :: n_place
+      type(chain_t) :: chain
+      type(error_t), allocatable :: error
+      integer, allocatable :: n_tie(:)
+      real(wp) :: reach(size(scene%x, 2))        !! half of the shortest edge at a chain end; else 0
+      integer :: t, side, k, i, j, surface
+
+      call count_ties(scene, n_tie)
+      reach = 0.0_wp
+      do t = 1, size(scene%tie)
+         do side = 1, 2
+            surface = merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)
+            call chain_init(chain, scene, scene%surface(surface), error)
+            if (allocated(error)) cycle
+            do k = 1, size(chain%node)
+               if (all(chain%node_edge(:, k) > 0) .or. n_tie(chain%node(k)) == 1) cycle
+               reach(chain%node(k)) = 0.5_wp*minval(chain%length(pack(chain%node_edge(:, k), &
+                  chain%node_edge(:, k) > 0)))
+            end do
+         end do
+      end do
+      node = pack([(i, i = 1, size(reach))], reach > 0.0_wp)
+      allocate(place(size(node)), source=0)
+      n_place = 0
+      do i = 1, size(node)
+         do j = 1, i - 1
+            if (norm2(scene%x(:, node(i)) - scene%x(:, node(j))) &
+               < min(reach(node(i)), reach(node(j)))) place(i) = place(j)
+         end do
+         if (place(i) > 0) cycle
+         n_place = n_place + 1
+         place(i) = n_place
+      end do
+   end subroutine find_crosspoints
 
    !> Where the end of a slave chain takes part in another tie too, its multiplier goes to the
    !> neighbour: on the end edge there is a constant one then. A chain keeps one multiplier.

@@ -1,0 +1,107 @@
+!> What the log and `emcon check` tell of ties and equations: subdomains, interfaces, crosspoints,
+!> and what elimination leaves.
+module emcon_link_lines
+   use emcon_scene, only : multiplier_dual, scene_t, tie_t
+   use emcon_system, only : system_t
+   use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   use emcon_ties, only : find_crosspoints
+   implicit none
+   private
+   public :: add_link_lines
+
+   !> Subdomains, and nodes of a crosspoint, that are named.
+   integer, parameter :: most_subdomains = 100, most_nodes = 10
+
+contains
+
+   !> Add the lines to `notes`; none if the scene has neither ties nor equations.
+   subroutine add_link_lines(scene, system, notes)
+      type(scene_t), intent(in) :: scene
+      type(system_t), intent(in) :: system
+      type(notes_t), intent(inout) :: notes
+      integer, allocatable :: node(:), place(:)
+      integer :: k, n_place
+
+      if (system%linear%n == 0) return
+      call find_crosspoints(scene, node, place, n_place)
+      call note_add(notes, to_text(system%n_body) // " subdomains, " // &
+         to_text(size(scene%tie)) // " ties, " // to_text(n_place) // " crosspoints, " // &
+         to_text(size(scene%equation)) // " equations; " // elimination_text(system))
+      if (size(scene%tie) > 0) call add_subdomains(scene, system, notes)
+      do k = 1, size(scene%tie)
+         call note_add(notes, "tie " // tie_text(scene, scene%tie(k)))
+      end do
+      do k = 1, n_place
+         call note_add(notes, "crosspoint " // to_text(k) // ": nodes " // &
+            labels_text(scene, pack(node, place == k)))
+      end do
+   end subroutine add_link_lines
+
+   !> Unknowns without linear constraints, and with them.
+   function elimination_text(system) result(text)
+      type(system_t), intent(in) :: system
+      character(len=:), allocatable :: text
+
+      associate (numbering => system%numbering)
+         if (system%is_reduced) then
+            text = to_text(numbering%n_unknown + numbering%n_dependent) // &
+               " unknowns before, " // to_text(numbering%n_unknown) // " after elimination"
+         else
+            text = to_text(numbering%n_unknown) // " unknowns and " // &
+               to_text(count(system%linear%is_used)) // " multipliers"
+         end if
+      end associate
+   end function elimination_text
+
+   !> One line for each connected mesh.
+   subroutine add_subdomains(scene, system, notes)
+      type(scene_t), intent(in) :: scene
+      type(system_t), intent(in) :: system
+      type(notes_t), intent(inout) :: notes
+      integer :: n_node(system%n_body), n_element(system%n_body), first(system%n_body)
+      integer :: i, b
+
+      n_node = 0
+      n_element = 0
+      do i = 1, size(system%body)
+         if (system%body(i) > 0) n_node(system%body(i)) = n_node(system%body(i)) + 1
+      end do
+      do i = size(scene%element_kind), 1, -1
+         b = system%body(scene%element_node(1, i))
+         n_element(b) = n_element(b) + 1
+         first(b) = scene%element_label(i)
+      end do
+      do b = 1, min(system%n_body, most_subdomains)
+         call note_add(notes, "subdomain " // to_text(b) // ": " // to_text(n_element(b)) // &
+            " elements from " // to_text(first(b)) // " on, " // to_text(n_node(b)) // " nodes")
+      end do
+   end subroutine add_subdomains
+
+   !> Name, surfaces and multipliers of a tie.
+   function tie_text(scene, tie) result(text)
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: tie
+      character(len=:), allocatable :: text
+
+      text = tie%name // ": " // scene%surface(tie%slave)%name // " (slave, " // &
+         to_text(size(scene%surface(tie%slave)%element)) // " edges) to " // &
+         scene%surface(tie%master)%name // " (" // &
+         to_text(size(scene%surface(tie%master)%element)) // " edges), " // &
+         to_text(size(tie%rows%slave)) // " " // &
+         trim(merge("dual    ", "standard", tie%multiplier == multiplier_dual)) // " multipliers"
+   end function tie_text
+
+   function labels_text(scene, node) result(text)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: node(:)
+      character(len=:), allocatable :: text
+      type(string_t) :: label(size(node))
+      integer :: i
+
+      do i = 1, size(node)
+         label(i)%text = to_text(scene%node_label(node(i)))
+      end do
+      text = joined(label, ", ", most_nodes)
+   end function labels_text
+
+end module emcon_link_lines
