@@ -95,9 +95,9 @@ module emcon_scene
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
    end type contact_pair_t
 
-   !> The constraints of a tie: for row k, in either direction, the sum of weight times position over
-   !> its entries is zero. Row k belongs to the multiplier psi_k of slave node k: the entries are
-   !> D_kB = int psi_k N_B for slave nodes and -M_kC = -int psi_k N_C for master nodes.
+   !> The constraints of a tie: for row k, in either direction, the sum of weight times position
+   !> over its entries is zero. Row k belongs to the multiplier psi_k of slave node k: the entries
+   !> are D_kB = int psi_k N_B for slave nodes and -M_kC = -int psi_k N_C for master nodes.
    type :: tie_rows_t
       integer, allocatable :: slave(:)               !! (n) slave nodes, along the chains
       integer, allocatable :: neighbour(:, :)        !! (2, n) row before and after; 0: an end

@@ -99,8 +99,8 @@ contains
       call find_amplitude_value(scene%amplitude(i), time, value, rate)
    end subroutine amplitude_at
 
-   !> Add the loads at `instant`, acting on the positions x + u, to `force`; with `value` and `side`,
-   !> also subtract `factor` times their derivative by u from the matrix.
+   !> Add the loads at `instant`, acting on the positions x + u, to `force`; with `value` and
+   !> `side`, also subtract `factor` times their derivative by u from the matrix.
    pure subroutine loads_add(self, scene, solid, instant, u, force, factor, value, side)
       type(loads_t), intent(in) :: self
       type(scene_t), intent(in) :: scene

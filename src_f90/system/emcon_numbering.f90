@@ -39,8 +39,8 @@ module emcon_numbering
 contains
 
    !> Number all degrees of freedom that are alive and that `prescribed` does not name: what has
-   !> neither an element nor an equation stays where it is. With `linear`, one freedom for
-   !> each of its used rows becomes dependent; rows that follow from earlier ones go to `unresolved`.
+   !> neither an element nor an equation stays where it is. With `linear`, one freedom for each of
+   !> its used rows becomes dependent; rows that follow from earlier ones go to `unresolved`.
    subroutine numbering_init(self, is_alive, prescribed, linear, unresolved)
       type(numbering_t), intent(out) :: self
       logical, intent(in) :: is_alive(:, :)      !! (n_dim, n_node)

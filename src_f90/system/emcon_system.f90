@@ -39,7 +39,7 @@ module emcon_system
    type :: system_t
       type(solid_t) :: solid
       type(csr_t) :: mass                        !! node by node, the same in all directions
-      type(linear_rows_t) :: linear              !! constraints of ties and equations, the first ones
+      type(linear_rows_t) :: linear              !! rows of ties and equations
       type(contact_box_t), allocatable :: contact(:)
       integer, allocatable :: first_constraint(:)   !! (n_pair + 1) constraints before each pair
       integer :: n_constraint = 0
@@ -168,8 +168,8 @@ contains
       end do
    end subroutine init_contact
 
-   !> Number the unknowns of step `i_step` of the deck and lay out its matrix. Linear constraints are
-   !> eliminated, unless the deck asks for multipliers or their rows are too long.
+   !> Number the unknowns of step `i_step` of the deck and lay out its matrix. Linear constraints
+   !> are eliminated, unless the deck asks for multipliers or their rows are too long.
    subroutine system_begin_step(self, scene, i_step, error)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene

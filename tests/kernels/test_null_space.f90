@@ -319,14 +319,16 @@ contains
       call null_space_solve(null_space, problem%set, problem%matrix, problem%residual, dq(:, 2), &
          error)
       if (allocated(error)) return
-      call null_space_multipliers(null_space, problem%set, problem%numbering, problem%residual, lam(:, 1))
+      call null_space_multipliers(null_space, problem%set, problem%numbering, problem%residual, &
+         lam(:, 1))
       call null_space_init(new, problem%set, problem%matrix, problem%numbering, error)
       if (allocated(error)) return
       call null_space_factorise(new, problem%set, problem%matrix, is_singular, error)
       if (allocated(error)) return
       call null_space_solve(new, problem%set, problem%matrix, problem%residual, dq(:, 3), error)
       if (allocated(error)) return
-      call null_space_multipliers(new, problem%set, problem%numbering, problem%residual, lam(:, 2))
+      call null_space_multipliers(new, problem%set, problem%numbering, problem%residual, &
+         lam(:, 2))
       call check_near(error, dq(:, 2), dq(:, 3), 0.0_wp, 1.0_wp, "dq, to the last bit")
       call check_near(error, lam(:, 1), lam(:, 2), 0.0_wp, 1.0_wp, "lam, to the last bit")
       call null_space%solver%free()

@@ -30,7 +30,8 @@ contains
       call prescribe(step, 2, 2, 0.5_wp)
       call prescribe(step, 4, 1, 0.5_wp)
       call clamp(step, [3, 3])
-      call numbering_init(numbering, spread([.true., .true., .true., .true., .false.], 1, 2), step%prescribed)
+      call numbering_init(numbering, spread([.true., .true., .true., .true., .false.], 1, 2), &
+         step%prescribed)
    end subroutine make
 
    subroutine test_numbers(error)
