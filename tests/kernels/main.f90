@@ -27,6 +27,8 @@ program main
    use test_joints, only : collect_joints
    use test_lapack, only : collect_lapack
    use test_law, only : collect_law
+   use test_linear_rows, only : collect_linear_rows
+   use test_links, only : collect_links
    use test_loads, only : collect_loads
    use test_march, only : collect_march
    use test_mortar, only : collect_mortar
@@ -38,9 +40,11 @@ program main
    use test_numbering, only : collect_numbering
    use test_deck_parameters, only : collect_deck_parameters
    use test_deck_ties, only : collect_deck_ties
+   use test_reduction, only : collect_reduction
    use test_results, only : collect_results
    use test_rigid_motion, only : collect_rigid_motion
    use test_rigid_bodies, only : collect_rigid_bodies
+   use test_row_elimination, only : collect_row_elimination
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
@@ -51,6 +55,7 @@ program main
    use test_tie, only : collect_tie
    use test_tie_partner, only : collect_tie_partner
    use test_tie_balance, only : collect_tie_balance
+   use test_ties, only : collect_ties
    use test_triple_product, only : collect_triple_product
    use test_umfpack, only : collect_umfpack
    use test_velocity_update, only : collect_velocity_update
@@ -76,6 +81,7 @@ program main
    call run("blas", collect_blas)
    call run("csr", collect_csr)
    call run("triple_product", collect_triple_product)
+   call run("row_elimination", collect_row_elimination)
    call run("umfpack", collect_umfpack)
    call run("cholmod", collect_cholmod)
    call run("initial_contact", collect_initial_contact)
@@ -102,6 +108,7 @@ program main
    call run("tie_balance", collect_tie_balance)
    call run("numbering", collect_numbering)
    call run("bodies", collect_bodies)
+   call run("linear_rows", collect_linear_rows)
    call run("loads", collect_loads)
    call run("rigid_motion", collect_rigid_motion)
    call run("rigid_bodies", collect_rigid_bodies)
@@ -110,12 +117,15 @@ program main
    call run("null_space", collect_null_space)
    call run("saddle_point", collect_saddle_point)
    call run("correction", collect_correction)
+   call run("reduction", collect_reduction)
    call run("system", collect_system)
    call run("newton", collect_newton)
    call run("velocity_update", collect_velocity_update)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("march", collect_march)
+   call run("ties", collect_ties)
+   call run("links", collect_links)
    call run("tied_contact", collect_tied_contact)
    call run("deck_parameters", collect_deck_parameters)
    call run("deck_ties", collect_deck_ties)

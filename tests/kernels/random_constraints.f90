@@ -5,6 +5,7 @@ module random_constraints
    use emcon_contact, only : constraint_resize
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_kinds, only : dp, wp
+   use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_scene, only : prescribed_t
    use small_scenes, only : shake
@@ -28,8 +29,10 @@ module random_constraints
 contains
 
    !> Slave nodes 1..n, masters among the nodes above 10; a sixth of the freedoms is prescribed.
-   subroutine make_problem(problem)
+   !> With `linear` some of the freedoms depend on others.
+   subroutine make_problem(problem, linear)
       type(problem_t), intent(out) :: problem
+      type(linear_rows_t), intent(in), optional :: linear
       type(prescribed_t) :: held(10)
       integer :: k, i
       real(wp) :: u(4)
@@ -38,7 +41,7 @@ contains
          held(k)%node = 2 + 3*(k - 1)
          held(k)%dof = 1 + mod(k, 2)
       end do
-      call numbering_init(problem%numbering, spread([(.true., k = 1, n_node)], 1, 2), held)
+      call numbering_init(problem%numbering, spread([(.true., k = 1, n_node)], 1, 2), held, linear)
       call make_base(problem%numbering%n_unknown, 4, problem%base)
       call constraints_select(problem%set, [(k, k = 1, n_constraint)])
       do k = 1, n_constraint

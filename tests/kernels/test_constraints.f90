@@ -2,10 +2,14 @@
 module test_constraints
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraints, only : constraint_place, constraints_force, constraints_select
+   use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_linear_rows, only : linear_rows_t
+   use emcon_numbering, only : pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_system, only : system_init, system_t
+   use linear_scenes, only : dense_terms, make_random_rows
    use random_constraints, only : make_problem, problem_t, tol_dp
    use small_scenes, only : block_t, make_two_blocks
    use sparse_samples, only : dense_of
@@ -23,6 +27,7 @@ contains
          test_case_t("merged pattern holds N and all pairs", test_merge), &
          test_case_t("curvature", test_curvature), &
          test_case_t("contact forces", test_force), &
+         test_case_t("rows, curvature and forces over dependent freedoms", test_dependent), &
          test_case_t("a smaller set after a larger one", test_select), &
          test_case_t("numbers over several pairs", test_place)]
    end subroutine collect_constraints
@@ -185,5 +190,63 @@ contains
          call check_equal(error, [pair, i], merge([1, id], [2, id - 3], id <= 3), "place")
       end do
    end subroutine test_place
+
+   !> All are those over all freedoms, times T.
+   subroutine test_dependent(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(linear_rows_t) :: linear
+      type(problem_t) :: problem
+      real(wp), allocatable :: t(:, :), matrix(:, :), sum_of(:)
+      real(wp) :: g(60), c(60), h(60, 60), force(2, 30)
+      integer :: i, k
+
+      call make_random_rows(linear)
+      call make_problem(problem, linear)
+      allocate(t, source=dense_terms(problem%numbering))
+      h = 0.0_wp
+      associate (set => problem%set)
+         do k = 1, set%n
+            g = 0.0_wp
+            c = 0.0_wp
+            associate (item => set%item(k), n => set%item(k)%n_node)
+               associate (dof => [(2*item%node((i + 1)/2) - mod(i, 2), i = 1, 2*n)])
+                  g(dof) = reshape(item%g(:, :n), [2*n])
+                  c(dof) = reshape(item%c(:, :n), [2*n])
+                  h(dof, dof) = h(dof, dof) + set%lam(k)*item%h(:2*n, :2*n)
+               end associate
+            end associate
+            call check_near(error, real(row_of(set%force_rows), wp), matmul(g, t), tol_dp, 1.0_wp, &
+               "force rows")
+            call check_near(error, real(row_of(set%gap_rows), wp), matmul(c, t), tol_dp, 1.0_wp, &
+               "gap rows")
+         end do
+         allocate(matrix, source=real(dense_of(problem%base), wp))
+         matrix = matrix - matmul(transpose(t), matmul(h, t))
+         call check_near(error, real(dense_of(problem%matrix), wp), matrix, tol_dp, 1.0_wp, &
+            "curvature")
+         call constraints_force(set, 1, force)
+         allocate(sum_of(problem%numbering%n_unknown))
+         call pick_unknowns(problem%numbering, force, sum_of)
+         call check_near(error, sum_of, matmul(set%lam, real(dense_of(set%force_rows), wp)), &
+            tol_dp, 1.0_wp, "forces on the unknowns")
+      end associate
+
+   contains
+
+      !> Row `k`, whose columns ascend and come once each.
+      function row_of(rows) result(row)
+         type(csr_t), intent(in) :: rows
+         real(dp) :: row(rows%n_col)
+         integer :: s
+
+         row = 0.0_dp
+         do s = rows%row_start(k) + 1, rows%row_start(k + 1)
+            row(rows%column(s) + 1) = rows%value(s)
+            if (s == rows%row_start(k) + 1) cycle
+            call check_true(error, rows%column(s) > rows%column(s - 1), "columns ascend")
+         end do
+      end function row_of
+
+   end subroutine test_dependent
 
 end module test_constraints

@@ -4,9 +4,12 @@ module test_correction
    use emcon_correction, only : correction_factorise, correction_free, correction_lay_out, &
       correction_multipliers, correction_reason, correction_reset, correction_solve, correction_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
+   use emcon_linear_rows, only : linear_rows_t
    use emcon_scene, only : method_null_space, method_saddle_point
    use emcon_system, only : system_t
+   use emcon_csr, only : csr_multiply, csr_multiply_transposed
+   use linear_scenes, only : make_random_rows
    use random_constraints, only : make_chain, make_problem, make_rows, problem_t, tol_dp
    implicit none
    private
@@ -20,6 +23,8 @@ contains
       tests = [ &
          test_case_t("no common pivot: saddle point, as long as it lasts", test_pivot), &
          test_case_t("too many coupled: saddle point", test_fill), &
+         test_case_t("contact of dependent freedoms", test_dependent), &
+         test_case_t("symmetric matrices, definite and not", test_symmetric), &
          test_case_t("redundant constraints are named, by either method", test_redundant)]
    end subroutine collect_correction
 
@@ -108,6 +113,81 @@ contains
       call compare(correction, problem, .true., error)
       call correction_free(correction)
    end subroutine test_fill
+
+   !> Slave and master nodes that follow others: null space against saddle point, and the
+   !> multipliers of forces that constraints make.
+   subroutine test_dependent(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(linear_rows_t) :: linear
+      type(problem_t) :: problem
+      type(correction_t) :: correction
+      real(wp), allocatable :: dq(:), expected(:)
+      logical :: is_singular
+
+      call make_random_rows(linear)
+      ! With all of them so many constraints are coupled that a saddle point is cheaper.
+      linear%is_used([2, 3, 6, 7]) = .false.
+      call make_problem(problem, linear)
+      call check_equal(error, problem%numbering%n_dependent, 4, "dependent freedoms")
+      if (allocated(error)) return
+      call correction_reset(correction, method_null_space)
+      call compare(correction, problem, .false., error)
+      if (allocated(error)) return
+      call check_true(error, correction%uses_null_space, "by null space")
+      expected = problem%set%lam
+      call csr_multiply_transposed(problem%set%force_rows, expected, problem%residual)
+      problem%set%lam = 0.0_wp
+      call correct(correction, problem, dq, is_singular, error)
+      if (allocated(error)) return
+      call check_near(error, problem%set%lam, expected, tol_dp, 1.0_wp, "multipliers")
+      call correction_free(correction)
+   end subroutine test_dependent
+
+   !> Without constraints: N dq = -r, also where a symmetric matrix is not definite.
+   subroutine test_symmetric(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(correction_t) :: correction
+      type(system_t) :: system
+      type(problem_t) :: problem
+      real(wp), allocatable :: dq(:), image(:)
+      real(wp) :: dlam(0)
+      logical :: is_singular
+      integer :: k, i, s
+
+      call make_chain([1, 2, 3, 4], [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp, 4, 0, problem)
+      call make_rows(problem)
+      problem%set%n = 0
+      system%numbering = problem%numbering
+      system%matrix = problem%matrix
+      system%is_symmetric = .true.
+      allocate(dq, image, source=problem%residual)
+      do k = 1, 4
+         ! Diagonal entries of 64 outweigh the rest of a row; 2: one of them is negative, 3: all are
+         ! positive again, 4: a row and its column vanish.
+         do i = 1, system%matrix%n_row
+            do s = system%matrix%row_start(i) + 1, system%matrix%row_start(i + 1)
+               system%matrix%value(s) = merge(64.0_dp, 1.0_dp, system%matrix%column(s) == i - 1)
+               if (k == 2 .and. all([i, system%matrix%column(s) + 1] == 5)) then
+                  system%matrix%value(s) = -system%matrix%value(s)
+               end if
+               if (k == 4 .and. any([i, system%matrix%column(s) + 1] == 5)) then
+                  system%matrix%value(s) = 0.0_dp
+               end if
+            end do
+         end do
+         call correction_lay_out(correction, system, problem%set, error)
+         if (allocated(error)) return
+         call correction_factorise(correction, system, problem%set, is_singular, error)
+         if (allocated(error)) return
+         call check_true(error, is_singular .eqv. k == 4, "singular")
+         if (k == 4) exit
+         call correction_solve(correction, problem%set, problem%residual, dq, dlam, error)
+         if (allocated(error)) return
+         call csr_multiply(system%matrix, dq, image)
+         call check_near(error, image, -problem%residual, tol_dp, 1.0_wp, "N dq")
+      end do
+      call correction_free(correction)
+   end subroutine test_symmetric
 
    !> Three times the same constraint.
    subroutine test_redundant(error)
