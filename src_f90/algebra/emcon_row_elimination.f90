@@ -6,7 +6,7 @@
 !> come twice. A row of which nothing but round-off is left depends on rows before it. Columns past
 !> `n_free` never give a pivot. Source: docs/theory.md, section 5.
 module emcon_row_elimination
-   use emcon_kinds, only : dp, hp
+   use emcon_kinds, only : dp, hp, wp
    implicit none
    private
    public :: row_elimination_t, elimination_begin, elimination_add, elimination_left
@@ -17,7 +17,8 @@ module emcon_row_elimination
    integer, parameter :: row_kept = 1, row_redundant = 2, row_poor = 3
 
    !> What is left of a row is round-off below this multiple of the largest term that entered it.
-   real(hp), parameter :: redundancy_tol = 512.0_hp*epsilon(1.0_dp)
+   real(hp), parameter :: redundancy_tol = 512.0_hp &
+      *max(real(epsilon(1.0_dp), hp), real(epsilon(1.0_wp), hp))
    !> Unknowns that are not a row's own count by this factor.
    real(hp), parameter :: other = 0.1_hp
    !> A later entry is taken only if it is larger by this factor: entries that are equal by the
@@ -104,17 +105,15 @@ contains
       if (fate == row_kept) call keep(self, k)
    end subroutine elimination_add
 
-   !> What the last row holds past the columns `n_free`, of the second kind, and the largest term
-   !> that entered it.
-   pure subroutine elimination_left(self, column, value, largest_term)
+   !> What the last row, a redundant one, holds past the columns `n_free` but for round-off.
+   pure subroutine elimination_left(self, column, value)
       type(row_elimination_t), intent(in) :: self
       integer, allocatable, intent(out) :: column(:)
       real(hp), allocatable, intent(out) :: value(:)
-      real(hp), intent(out) :: largest_term
 
       column = pack(self%list(:self%n_list), self%list(:self%n_list) > self%n_free)
+      column = pack(column, abs(self%work(2, column)) > redundancy_tol*self%largest_term(2))
       value = self%work(2, column)
-      largest_term = self%largest_term(2)
    end subroutine elimination_left
 
    !> Take the present row off the work space.
@@ -212,7 +211,9 @@ contains
          self%pivot(k) = j
       end do
       fate = row_kept
-      if (best <= poor_pivot) fate = row_poor
+      if (best > poor_pivot) return
+      fate = row_poor
+      self%pivot(k) = 0
    end subroutine choose
 
    !> Store the present row, less its pivot and less round-off, for later rows.

@@ -252,8 +252,10 @@ contains
       real(wp) :: part
 
       associate (state => stepper%march%state)
+         default_frame = 0
+         if (time <= state%start_time) return
          part = (time - state%start_time)/stepper%scene%step(state%i_step)%duration
-         default_frame = floor(real(default_frames, wp)*max(0.0_wp, part) + sqrt(epsilon(1.0_wp)))
+         default_frame = floor(real(default_frames, wp)*part + sqrt(epsilon(1.0_wp)))
       end associate
    end function default_frame
 

@@ -20,6 +20,7 @@ module emcon_march
    use emcon_scheme_static, only : scheme_static_t
    use emcon_system, only : pose_t, system_begin_step, system_init, system_respond
    use emcon_text, only : note_add, to_text
+   use emcon_unresolved_rows, only : report_unresolved
    use emcon_velocity_update, only : velocity_update_free, velocity_update_reset
    implicit none
    private
@@ -86,11 +87,13 @@ contains
       self%state%n_easy = 0
       self%state%n_before = self%state%increment
       self%state%start_time = self%state%time
-      self%state%u_start = self%state%u
       if (scene%step(i_step)%procedure == procedure_static) self%state%v = 0.0_wp
       call system_begin_step(self%system, scene, i_step, error)
+      if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
+         self%system%notes, error)
       if (allocated(error)) return
       call follow_links(self, scene)
+      self%state%u_start = self%state%u
       if (scene%step(i_step)%procedure == procedure_static) then
          text = free_motion_text(self%system, scene, scene%step(i_step)%prescribed)
          if (len(text) > 0) then

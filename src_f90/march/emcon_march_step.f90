@@ -107,8 +107,9 @@ contains
       n = 0
       do id = 1, size(is_meant)
          if (.not. is_meant(id)) cycle
-         n = n + 1
          call constraint_place(self%system, id, pair, i)
+         if (pair == 0) cycle
+         n = n + 1
          found(n)%text = to_text(scene%node_label(self%system%contact(pair)%contact%node(i)))
       end do
       text = joined(found(:n), ", ", most_named)
@@ -146,10 +147,19 @@ contains
             end associate
          end do
       end associate
-      call spread_dependent(self%system%numbering, self%du)
-      call spread_dependent(self%system%numbering, self%offset)
-      call spread_dependent(self%system%numbering, self%newton%driven)
+      call follow_links(self%system, self%du)
+      call follow_links(self%system, self%offset)
+      call follow_links(self%system, self%newton%driven)
    end subroutine guess
+
+   !> Let dependent entries of a motion follow the others, also where `numbering` does not know
+   !> them: with multipliers they have to move in the same way.
+   subroutine follow_links(system, field)
+      type(system_t), intent(in) :: system
+      real(wp), intent(inout), contiguous :: field(:, :)     !! (2, n_node)
+
+      if (system%linear%n > 0) call spread_dependent(system%linked, field)
+   end subroutine follow_links
 
    !> Take over the solved step: works, velocities, contact and reaction forces.
    subroutine commit(self, scene, h, increment, error)
@@ -174,10 +184,9 @@ contains
                end if
             end do
          end do
-         call spread_dependent(system%numbering, self%v1)
+         call follow_links(system, self%v1)
          state%reaction = system%residual
-         if (any(set%id <= system%linear%n)) call constraints_force(set, &
-            1 + count(set%id <= system%linear%n), self%newton%contact)
+         if (set%n_linear > 0) call constraints_force(set, set%n_linear + 1, self%newton%contact)
          call book_work(self)
          restored = 0.0_wp
          if (step%initiation == initiation_velocity_update .and. self%scheme%has_inertia) then

@@ -48,7 +48,7 @@ contains
       real(wp), intent(in) :: lag
       integer :: pair, first, last
 
-      last = count(set%id <= system%linear%n)
+      last = set%n_linear
       do pair = 1, size(self%total)
          first = last + 1
          last = count(set%id <= system%first_constraint(pair + 1))

@@ -6,10 +6,12 @@
 module emcon_velocity_update
    use emcon_cholmod, only : cholmod_t
    use emcon_constraints, only : constraint_set_t
+   use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_numbering, only : add_to_dofs, numbering_matrix, pick_unknowns
    use emcon_system, only : mass_times, system_t
+   use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    implicit none
    private
    public :: velocity_update_t, velocity_update_reset, velocity_update_apply, &
@@ -57,7 +59,7 @@ contains
       has_root = .true.
       lost = 0.0_wp
       noise = 0.0_wp
-      do k = 1, set%n
+      do k = set%n_linear + 1, set%n
          lost = lost - set%lam(k)*set%item(k)%dgap
          noise = noise + gap_noise*abs(set%lam(k))*set%item(k)%size
       end do
@@ -67,12 +69,12 @@ contains
       if (allocated(error)) return
       has_root = .not. self%mass%is_singular
       if (.not. has_root) return
-      call pick_unknowns(system%numbering, system%f_work, self%push)
+      call pick(system%f_work)
       call self%mass%solve(self%push, self%jump, error)
       if (allocated(error)) return
       a = dot_product(self%push, self%jump)
       call mass_times(system, v, system%f_work)
-      call pick_unknowns(system%numbering, system%f_work, self%push)
+      call pick(system%f_work)
       b = dot_product(self%push, self%jump)
       has_root = a > 0.0_wp
       if (.not. has_root) return
@@ -82,9 +84,34 @@ contains
       else
          root = (root - b)/a
       end if
-      call add_to_dofs(system%numbering, self%jump, root, v)
+      if (keeps_links(system)) then
+         call add_to_dofs(system%linked, self%jump, root, v)
+      else
+         call add_to_dofs(system%numbering, self%jump, root, v)
+      end if
       restored = lost
+
+   contains
+
+      !> The unknown entries of `field` to `push`.
+      subroutine pick(field)
+         real(wp), intent(in), contiguous :: field(:, :)     !! (2, n_node)
+
+         if (keeps_links(system)) then
+            call pick_unknowns(system%linked, field, self%push)
+         else
+            call pick_unknowns(system%numbering, field, self%push)
+         end if
+      end subroutine pick
+
    end subroutine velocity_update_apply
+
+   !> Are linear constraints not eliminated in the numbering? A jump has to keep them all the same.
+   pure logical function keeps_links(system)
+      type(system_t), intent(in) :: system
+
+      keeps_links = system%linear%n > 0 .and. .not. system%is_reduced
+   end function keeps_links
 
    !> Sum of w_k grad gap_k at the end of the step.
    pure subroutine push_forces(set, force)
@@ -94,7 +121,7 @@ contains
       integer :: k, i, node
 
       force = 0.0_wp
-      do k = 1, set%n
+      do k = set%n_linear + 1, set%n
          weight = max(0.0_wp, set%lam(k))*max(0.0_wp, set%item(k)%gap0)
          do i = 1, set%item(k)%n_node
             node = set%item(k)%node(i)
@@ -103,16 +130,32 @@ contains
       end do
    end subroutine push_forces
 
+   !> Factorise the mass over the unknowns, T^T M T over those that linear constraints leave.
    subroutine factorise_mass(self, system, error)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(error_t), allocatable, intent(out) :: error
+      type(triple_product_t) :: product
+      type(csr_t) :: mass, links, reduced
+      integer :: n
 
+      n = system%numbering%n_unknown
+      if (keeps_links(system)) then
+         n = system%linked%n_unknown
+         mass = system%matrix
+         mass%value = system%mass_value
+         call numbering_matrix(system%linked, system%numbering%dof, links)
+         call triple_product_init(product, links, mass, links, reduced, error)
+         if (allocated(error)) return
+         call triple_product_update(product, links, mass, links, reduced)
+         call self%mass%analyse(reduced, error)
+         if (.not. allocated(error)) call self%mass%factorise(reduced%value, error)
+      else
+         call self%mass%analyse(system%matrix, error)
+         if (.not. allocated(error)) call self%mass%factorise(system%mass_value, error)
+      end if
       if (allocated(self%push)) deallocate(self%push, self%jump)
-      allocate(self%push(system%numbering%n_unknown), self%jump(system%numbering%n_unknown))
-      call self%mass%analyse(system%matrix, error)
-      if (allocated(error)) return
-      call self%mass%factorise(system%mass_value, error)
+      allocate(self%push(n), self%jump(n))
       self%is_ready = .not. allocated(error)
    end subroutine factorise_mass
 

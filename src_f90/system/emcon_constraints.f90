@@ -21,6 +21,7 @@ module emcon_constraints
    !> Which constraints act, and the linearised set on the unknowns.
    type :: constraint_set_t
       integer :: n = 0
+      integer :: n_linear = 0                    !! the first ones: linear, without curvature
       integer, allocatable :: id(:)              !! (n) numbers over all pairs
       type(constraint_t), allocatable :: item(:) !! (n) values and derivatives
       real(wp), allocatable :: target(:)         !! (n) mean gap to hold [L]
@@ -39,6 +40,7 @@ contains
       integer, intent(in) :: id(:)
 
       self%n = size(id)
+      self%n_linear = 0
       self%id = id
       if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, self%lam, &
          self%defect)
@@ -73,7 +75,8 @@ contains
          call constraint_place(system, self%id(k), pair, i)
          number(k) = i
       end do
-      last = count(self%id <= system%linear%n)
+      self%n_linear = count(self%id <= system%linear%n)
+      last = self%n_linear
       do k = 1, last
          call evaluate_linear(system%linear, self%id(k), u0, du, self%item(k))
       end do
@@ -106,12 +109,12 @@ contains
       integer :: s, a, i, node
 
       associate (from => linear%start(id) + 1, to => linear%start(id + 1))
-         call constraint_resize(item, 1 + to - from)
+         if (.not. allocated(item%node)) allocate(item%node(1 + to - from), &
+            item%g(2, 1 + to - from), item%c(2, 1 + to - from), item%h(0, 0))
          item%n_node = 1
          item%n_slave = 1
          item%node(1) = (linear%own(id) + 1)/2
          item%g = 0.0_wp
-         item%h = 0.0_wp
          item%gap0 = 0.0_wp
          item%dgap = 0.0_wp
          do s = from, to
@@ -188,6 +191,8 @@ contains
          real(wp), intent(in) :: dg, dc
          integer :: t, place
 
+         ! A linear constraint stands on single freedoms.
+         if (k <= self%n_linear .and. abs(dg) <= 0.0_wp) return
          do t = numbering%start(dof) + 1, numbering%start(dof + 1)
             if (numbering%column(t) == 0) cycle
             place = 0
@@ -241,8 +246,8 @@ contains
       end do
    end function insertion_order
 
-   !> The pattern of `base` widened by all pairs of unknowns that meet in a constraint, and where
-   !> the entries of `base` went.
+   !> The pattern of `base` widened by all pairs of unknowns that meet in a constraint with
+   !> curvature, and where the entries of `base` went.
    subroutine constraints_merge_pattern(self, base, merged, slot)
       type(constraint_set_t), intent(in) :: self
       type(csr_t), intent(in) :: base
@@ -252,7 +257,7 @@ contains
       integer :: i, j, k, l, n, pass
       integer, allocatable :: seen(:)
 
-      call list_rows(self%force_rows, user_start, user)
+      call list_rows(self%force_rows, self%n_linear + 1, user_start, user)
       allocate(seen(base%n_row), slot(size(base%column)))
       merged%n_row = base%n_row
       merged%n_col = base%n_col
@@ -304,15 +309,16 @@ contains
 
    end subroutine constraints_merge_pattern
 
-   !> For each unknown the rows that it occurs in.
-   pure subroutine list_rows(rows, user_start, user)
+   !> For each unknown the rows that it occurs in, from the `first` one on.
+   pure subroutine list_rows(rows, first, user_start, user)
       type(csr_t), intent(in) :: rows
+      integer, intent(in) :: first
       integer, allocatable, intent(out) :: user_start(:), user(:)
       integer :: i, k, place(rows%n_col)
 
       allocate(user_start(rows%n_col + 1), source=0)
       allocate(user(rows%row_start(rows%n_row + 1)))
-      do k = 1, size(user)
+      do k = rows%row_start(first) + 1, size(user)
          user_start(rows%column(k) + 2) = user_start(rows%column(k) + 2) + 1
       end do
       user_start(1) = 1
@@ -320,7 +326,7 @@ contains
          user_start(i + 1) = user_start(i + 1) + user_start(i)
          place(i) = user_start(i)
       end do
-      do i = 1, rows%n_row
+      do i = first, rows%n_row
          do k = rows%row_start(i) + 1, rows%row_start(i + 1)
             user(place(rows%column(k) + 1)) = i
             place(rows%column(k) + 1) = place(rows%column(k) + 1) + 1
@@ -355,7 +361,7 @@ contains
       type(csr_t), intent(inout) :: merged
       integer :: k, i, j
 
-      do k = 1, self%n
+      do k = self%n_linear + 1, self%n
          associate (item => self%item(k))
             if (all(abs(item%h(:2*item%n_node, :2*item%n_node)) <= 0.0_wp)) cycle
             do j = 1, 2*item%n_node

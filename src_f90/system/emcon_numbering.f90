@@ -4,7 +4,8 @@
 !> of weight 1, itself, or for a dependent freedom the terms that linear constraints give it.
 !> Source: docs/theory.md, section 11.
 module emcon_numbering
-   use emcon_kinds, only : hp, wp
+   use emcon_csr, only : csr_t
+   use emcon_kinds, only : dp, hp, wp
    use emcon_linear_rows, only : linear_rows_t
    use emcon_row_elimination, only : elimination_add, elimination_begin, elimination_left, &
       elimination_resolve, row_elimination_t, row_redundant
@@ -13,7 +14,7 @@ module emcon_numbering
    implicit none
    private
    public :: numbering_t, numbering_init, pick_unknowns, pick_magnitudes, add_to_dofs
-   public :: spread_dependent, gather_dependent, unresolved_t
+   public :: spread_dependent, gather_dependent, numbering_matrix, unresolved_t
 
    type :: numbering_t
       integer :: n_unknown = 0
@@ -120,14 +121,10 @@ contains
          type(unresolved_t), intent(inout) :: item
          integer, allocatable :: column(:)
          real(hp), allocatable :: value(:)
-         real(hp) :: largest
-         logical, allocatable :: is_there(:)
 
-         call elimination_left(elimination, column, value, largest)
-         allocate(is_there(size(column)))
-         is_there = abs(value) > 512.0_hp*epsilon(1.0_wp)*largest
-         item%dof = present_dof(pack(column, is_there))
-         item%weight = real(pack(value, is_there), wp)
+         call elimination_left(elimination, column, value)
+         item%dof = present_dof(column)
+         item%weight = real(value, wp)
       end subroutine note_left
 
       !> Rows in the order of the dependent freedoms, which become known as such.
@@ -273,6 +270,32 @@ contains
       end do
       call spread_dependent(self, field)
    end subroutine add_to_dofs
+
+   !> T as a matrix: a row for each of the degrees of freedom `dof`, a column for each unknown.
+   pure subroutine numbering_matrix(self, dof, matrix)
+      type(numbering_t), intent(in) :: self
+      integer, intent(in) :: dof(:)                          !! places in an (n_dim, n_node) array
+      type(csr_t), intent(out) :: matrix                     !! (size of dof x n_unknown)
+      integer :: i, t, n
+
+      matrix%n_row = size(dof)
+      matrix%n_col = self%n_unknown
+      allocate(matrix%row_start(size(dof) + 1), source=0)
+      n = sum(self%start(dof + 1) - self%start(dof))
+      allocate(matrix%column(n), matrix%value(n))
+      n = 0
+      do i = 1, size(dof)
+         do t = self%start(dof(i)) + 1, self%start(dof(i) + 1)
+            if (self%column(t) == 0) cycle
+            n = n + 1
+            matrix%column(n) = self%column(t) - 1
+            matrix%value(n) = real(self%weight(t), dp)
+         end do
+         matrix%row_start(i + 1) = n
+      end do
+      matrix%column = matrix%column(:n)
+      matrix%value = matrix%value(:n)
+   end subroutine numbering_matrix
 
    !> Dependent entries of a displacement or velocity from those that they follow.
    pure subroutine spread_dependent(self, field)

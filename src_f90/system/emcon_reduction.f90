@@ -7,7 +7,7 @@
 module emcon_reduction
    use emcon_csr, only : csr_find, csr_sort_columns, csr_t, csr_transpose
    use emcon_kinds, only : dp, int64
-   use emcon_numbering, only : numbering_t
+   use emcon_numbering, only : numbering_matrix, numbering_t
    implicit none
    private
    public :: reduction_t, reduction_init, reduction_slot, reduction_add, freedom_numbers
@@ -26,6 +26,8 @@ module emcon_reduction
    !> Terms of the product per entry of the unreduced matrix, at most: eliminating long rows costs
    !> more than multipliers do.
    integer(int64), parameter :: most_terms = 64
+   !> And entries of the reduced matrix per entry of the unreduced one.
+   integer, parameter :: most_fill = 4
 
 contains
 
@@ -50,7 +52,7 @@ contains
       type(csr_t), intent(out) :: matrix
       integer, intent(inout) :: slot(:)                  !! 0 stays 0
       logical, intent(out) :: is_too_full
-      integer, allocatable :: place(:)
+      integer, allocatable :: place(:), from(:)
       integer :: i, k
 
       self%n_unknown = numbering%n_unknown
@@ -61,12 +63,15 @@ contains
          allocate(self%side%value(0), self%touched(0))
          return
       end if
-      call take_terms(self, numbering)
+      call numbering_matrix(numbering, numbering%dependent, self%terms)
+      call csr_transpose(self%terms, self%user, from)
       call lay_out_image(self, full)
       is_too_full = would_be_too_full(self, full)
       if (is_too_full) return
       call lay_out_side(self, full)
       call lay_out_matrix(self, full, matrix)
+      is_too_full = size(matrix%column) > most_fill*size(full%column)
+      if (is_too_full) return
       allocate(place(size(full%column)))
       do i = 1, full%n_row
          do k = full%row_start(i) + 1, full%row_start(i + 1)
@@ -104,40 +109,6 @@ contains
       call move_alloc(from%column, to%column)
       call move_alloc(from%value, to%value)
    end subroutine take
-
-   !> T over the unknowns and its transpose.
-   pure subroutine take_terms(self, numbering)
-      type(reduction_t), intent(inout) :: self
-      type(numbering_t), intent(in) :: numbering
-      integer, allocatable :: from(:)
-      integer :: k, t, n
-
-      associate (terms => self%terms)
-         terms%n_row = self%n_dependent
-         terms%n_col = self%n_unknown
-         allocate(terms%row_start(self%n_dependent + 1), source=0)
-         n = 0
-         do k = 1, self%n_dependent
-            associate (d => numbering%dependent(k))
-               n = n + count(numbering%column(numbering%start(d) + 1:numbering%start(d + 1)) > 0)
-            end associate
-            terms%row_start(k + 1) = n
-         end do
-         allocate(terms%column(n), terms%value(n))
-         n = 0
-         do k = 1, self%n_dependent
-            associate (d => numbering%dependent(k))
-               do t = numbering%start(d) + 1, numbering%start(d + 1)
-                  if (numbering%column(t) == 0) cycle
-                  n = n + 1
-                  terms%column(n) = numbering%column(t) - 1
-                  terms%value(n) = real(numbering%weight(t), dp)
-               end do
-            end associate
-         end do
-      end associate
-      call csr_transpose(self%terms, self%user, from)
-   end subroutine take_terms
 
    !> Pattern of the rows of N T that belong to dependent freedoms.
    pure subroutine lay_out_image(self, full)

@@ -10,11 +10,10 @@ module emcon_system
    use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_linear_rows, only : linear_rows_begin_step, linear_rows_init, linear_rows_t
+   use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
-   use emcon_unresolved_rows, only : report_unresolved
    use emcon_scene, only : law_linear, method_null_space, scene_t
    use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t, &
       solid_tangent_times
@@ -50,6 +49,7 @@ module emcon_system
       logical :: nlgeom = .false.
       logical :: has_linear_laws = .false.
       type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
+      type(unresolved_t), allocatable :: unresolved(:)   !! those of them that follow from others
       logical :: is_reduced = .true.             !! `numbering` is that one, else without them
       type(numbering_t) :: numbering
       type(loads_t) :: loads
@@ -81,6 +81,7 @@ contains
       if (allocated(error)) return
       call init_mass(self, error)
       if (allocated(error)) return
+      allocate(self%unresolved(0))
       self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear)
       call linear_rows_init(self%linear, scene)
       call init_contact(self, scene, error)
@@ -179,8 +180,7 @@ contains
 
       self%i_step = i_step
       self%nlgeom = scene%step(i_step)%nlgeom
-      call begin_linear(self, scene, error)
-      if (allocated(error)) return
+      call begin_linear(self, scene)
       self%is_reduced = scene%step(i_step)%constraint_method == method_null_space
       call number_and_lay_out(self, scene, is_too_full, error)
       if (allocated(error)) return
@@ -197,22 +197,16 @@ contains
    end subroutine system_begin_step
 
    !> The linear constraints of the step, less those that follow from others.
-   subroutine begin_linear(self, scene, error)
+   subroutine begin_linear(self, scene)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      type(error_t), allocatable, intent(out) :: error
-      type(unresolved_t), allocatable :: unresolved(:)
-      integer :: k
 
       self%notes = notes_t()
-      call linear_rows_begin_step(self%linear, scene, scene%step(self%i_step)%prescribed)
+      self%linear%is_used = .true.
       if (self%linear%n == 0) return
       call numbering_init(self%linked, self%is_alive, scene%step(self%i_step)%prescribed, &
-         self%linear, unresolved)
-      do k = 1, size(unresolved)
-         self%linear%is_used(unresolved(k)%row) = .false.
-      end do
-      call report_unresolved(scene, self%i_step, self%linear, unresolved, self%notes, error)
+         self%linear, self%unresolved)
+      self%linear%is_used(self%unresolved%row) = .false.
    end subroutine begin_linear
 
    !> Unknowns, and the pattern of the matrix with the places of element entries in it.

@@ -7,7 +7,7 @@ module emcon_ties
    use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_linear_rows, only : linear_rows_begin_step, linear_rows_init, linear_rows_t
+   use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_scene, only : prescribed_t, scene_t, tie_rows_t, tie_t, where_text
    use emcon_sort, only : find_sorted
@@ -33,18 +33,22 @@ contains
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: n_tie(:)
+      logical, allocatable :: is_held(:, :)
+      type(tie_rows_t) :: rows
       integer :: t
 
       if (size(scene%tie) == 0) return
       do t = 1, size(scene%tie)
-         call tie_measure(scene, scene%tie(t), scene%tie(t)%rows, error)
+         call tie_measure(scene, scene%tie(t), rows, error)
          if (allocated(error)) return
+         scene%tie(t)%rows = rows
       end do
       call check_repeated(scene, error)
       if (allocated(error)) return
       call count_ties(scene, n_tie)
+      call find_held(scene, is_held)
       do t = 1, size(scene%tie)
-         call merge_ends(scene%tie(t)%rows, n_tie)
+         call merge_ends(scene%tie(t)%rows, n_tie, is_held)
       end do
       call balance(scene, error)
       if (.not. allocated(error)) call ties_move_nodes(scene, notes, error)
@@ -150,11 +154,30 @@ contains
       end do
    end subroutine find_crosspoints
 
-   !> Where the end of a slave chain takes part in another tie too, its multiplier goes to the
-   !> neighbour: on the end edge there is a constant one then. A chain keeps one multiplier.
-   pure subroutine merge_ends(rows, n_tie)
+   !> Freedoms that are prescribed in some step.
+   pure subroutine find_held(scene, is_held)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: is_held(:, :)     !! (2, n_node)
+      integer :: i, k
+
+      allocate(is_held(2, size(scene%x, 2)), source=.false.)
+      do i = 1, size(scene%step)
+         associate (prescribed => scene%step(i)%prescribed)
+            do k = 1, size(prescribed)
+               is_held(prescribed(k)%dof, prescribed(k)%node) = .true.
+            end do
+         end associate
+      end do
+   end subroutine find_held
+
+   !> Where the end of a slave chain takes part in another tie too, or is held and its neighbour is
+   !> not, its multiplier goes to the neighbour: on the end edge there is a constant one then. The
+   !> rows are the same in all steps, as those that come back would not fit the displacements by
+   !> then, and in both directions, as rotations would not fulfil them else. A chain keeps one.
+   pure subroutine merge_ends(rows, n_tie, is_held)
       type(tie_rows_t), intent(inout) :: rows
       integer, intent(in) :: n_tie(:)                    !! (n_node)
+      logical, intent(in) :: is_held(:, :)               !! (2, n_node)
       logical :: is_merged(size(rows%slave))
       integer :: k, other
 
@@ -162,7 +185,10 @@ contains
       do k = 1, size(rows%slave)
          if (all(rows%neighbour(:, k) > 0) .or. all(rows%neighbour(:, k) == 0)) cycle
          other = maxval(rows%neighbour(:, k))
-         is_merged(k) = n_tie(rows%slave(k)) > 1 .and. .not. is_merged(other)
+         associate (node => rows%slave(k), next => rows%slave(other))
+            is_merged(k) = .not. is_merged(other) .and. (n_tie(node) > 1 &
+               .or. any(is_held(:, node) .and. .not. is_held(:, next)))
+         end associate
       end do
       if (any(is_merged)) call take_merged(rows, is_merged)
    end subroutine merge_ends
@@ -322,7 +348,6 @@ contains
 
       if (size(scene%tie) == 0) return
       call linear_rows_init(linear, scene)
-      call linear_rows_begin_step(linear, scene, nothing)
       linear%is_used = linear%tie > 0
       allocate(is_alive(2, size(scene%x, 2)), source=.true.)
       call numbering_init(numbering, is_alive, nothing, linear)

@@ -6,6 +6,7 @@ module emcon_unresolved_rows
    use emcon_numbering, only : unresolved_t
    use emcon_scene, only : prescribed_t, scene_t, where_text
    use emcon_sort, only : unique_sorted
+   use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none
    private
@@ -18,34 +19,38 @@ module emcon_unresolved_rows
 
 contains
 
-   !> Note the redundant rows; an error if prescribed values of step `i_step` contradict one.
-   subroutine report_unresolved(scene, i_step, linear, unresolved, notes, error)
+   !> Note the redundant rows of the step that `system` is in, which starts from the displacements
+   !> `u`; an error if prescribed values contradict one.
+   subroutine report_unresolved(scene, system, u, notes, error)
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: i_step
-      type(linear_rows_t), intent(in) :: linear
-      type(unresolved_t), intent(in) :: unresolved(:)
+      type(system_t), intent(in) :: system
+      real(wp), intent(in), contiguous :: u(:, :)            !! (2, n_node)
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
       integer :: k, t
 
-      do k = 1, size(unresolved)
-         if (is_met(scene, i_step, unresolved(k))) cycle
-         call raise(error, err_input, contradiction_text(scene, linear, unresolved(k)))
-         return
-      end do
-      do t = 0, size(scene%tie)
-         if (any(linear%tie(unresolved%row) == t)) call note_redundant(scene, linear, &
-            pack(unresolved%row, linear%tie(unresolved%row) == t), notes)
-      end do
+      associate (unresolved => system%unresolved, linear => system%linear)
+         do k = 1, size(unresolved)
+            if (is_met(scene, system%i_step, u, unresolved(k))) cycle
+            call raise(error, err_input, contradiction_text(scene, linear, unresolved(k)))
+            return
+         end do
+         do t = 0, size(scene%tie)
+            if (any(linear%tie(unresolved%row) == t)) call note_redundant(scene, linear, &
+               pack(unresolved%row, linear%tie(unresolved%row) == t), notes)
+         end do
+      end associate
    end subroutine report_unresolved
 
-   !> Do the values that step `i_step` prescribes fulfil the row, at all times? Freedoms that share
-   !> an amplitude, or that stay where they are, have to do so together.
-   pure logical function is_met(scene, i_step, item)
+   !> Do the motions that step `i_step` prescribes fulfil the row, at all times? Freedoms that share
+   !> an amplitude have to do so together; those without are to move from `u` together.
+   pure logical function is_met(scene, i_step, u, item)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_step
+      real(wp), intent(in), contiguous :: u(:, :)
       type(unresolved_t), intent(in) :: item
-      real(wp) :: total(0:size(scene%amplitude)), largest(0:size(scene%amplitude)), part
+      real(wp) :: total(0:size(scene%amplitude)), largest(0:size(scene%amplitude)), part, &
+         motion
       integer :: i, k
 
       total = 0.0_wp
@@ -53,9 +58,12 @@ contains
       associate (prescribed => scene%step(i_step)%prescribed)
          do k = 1, size(prescribed)
             if (prescribed(k)%is_frozen) cycle
+            motion = prescribed(k)%value
+            if (prescribed(k)%amplitude == 0) motion = motion - u(prescribed(k)%dof, &
+               prescribed(k)%node)
             do i = 1, size(item%dof)
                if (item%dof(i) /= 2*(prescribed(k)%node - 1) + prescribed(k)%dof) cycle
-               part = item%weight(i)*prescribed(k)%value
+               part = item%weight(i)*motion
                associate (a => prescribed(k)%amplitude)
                   total(a) = total(a) + part
                   largest(a) = max(largest(a), abs(part))

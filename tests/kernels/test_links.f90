@@ -405,9 +405,14 @@ contains
    subroutine test_velocity_update(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
-      call make_impact(scene, 1)
-      scene%step(1)%initiation = initiation_velocity_update
-      call run_update()
+      integer :: m
+
+      do m = 1, 2
+         call make_impact(scene, m)
+         scene%step(1)%initiation = initiation_velocity_update
+         call run_update()
+         if (allocated(error)) return
+      end do
 
    contains
 

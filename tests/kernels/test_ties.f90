@@ -3,13 +3,13 @@ module test_ties
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
-   use emcon_linear_rows, only : linear_rows_begin_step, linear_rows_init, linear_rows_t
+   use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_scene, only : prescribed_t, scene_t, tie_t
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
-   use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, right, &
-      scene_begin, top
+   use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, prescribe, &
+      right, scene_begin, top
    use tie_scenes, only : even, make_straight, multipliers, row_sum
    implicit none
    private
@@ -27,6 +27,7 @@ contains
          test_case_t("surfaces that meet stay where they are", test_still), &
          test_case_t("slave nodes are moved", test_moved), &
          test_case_t("crosspoints", test_crosspoint), &
+         test_case_t("held ends", test_held), &
          test_case_t("two ties of one slave surface", test_repeated), &
          test_case_t("a spoilt element", test_spoilt)]
    end subroutine collect_ties
@@ -158,7 +159,6 @@ contains
             end associate
          end do
          call linear_rows_init(linear, scene)
-         call linear_rows_begin_step(linear, scene, nothing)
          if (allocated(is_alive)) deallocate(is_alive)
          allocate(is_alive(2, size(scene%x, 2)), source=.true.)
          call numbering_init(numbering, is_alive, nothing, linear, unresolved)
@@ -166,6 +166,54 @@ contains
          call check_equal(error, numbering%n_dependent, 14, "dependent freedoms")
       end do
    end subroutine test_crosspoint
+
+   !> An end that is held in some step, in x or y, has no multiplier, unless its neighbour is held in
+   !> the same direction; a chain keeps one.
+   subroutine test_held(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_rows(6, [1], [1], [2, 3, 4, 5, 6])
+      call check_rows(6, [6], [2], [1, 2, 3, 4, 5])
+      call check_rows(6, [1, 6], [2, 1], [2, 3, 4, 5])
+      call check_rows(6, [1, 2], [2, 2], [1, 2, 3, 4, 5, 6])
+      call check_rows(6, [1, 2], [1, 2], [2, 3, 4, 5, 6])
+      call check_rows(6, [3], [1], [1, 2, 3, 4, 5, 6])
+      call check_rows(3, [1, 3], [1, 1], [2])
+      call check_rows(2, [1, 2], [1, 2], [2])
+
+   contains
+
+      !> The slave nodes with a row, `n` nodes along the slave surface; the second of two steps holds
+      !> the `dof` of each of `node`.
+      subroutine check_rows(n, node, dof, expected)
+         integer, intent(in) :: n, node(:), dof(:), expected(:)
+         type(scene_t) :: scene
+         type(notes_t) :: notes
+         integer :: i, k, m
+         character(len=:), allocatable :: text
+
+         do m = 1, 2
+            if (allocated(error)) return
+            call make_straight(scene, even(n - 1, 0.0_wp, 3.0_wp), even(4, 3.0_wp, 0.0_wp))
+            call add_tie(scene, "SEAM", 1, 2, multipliers(m))
+            deallocate(scene%step)
+            allocate(scene%step(2))
+            do i = 1, 2
+               allocate(scene%step(i)%prescribed(0))
+            end do
+            do k = 1, size(node)
+               call prescribe(scene%step(2), node(k), dof(k), 0.0_wp)
+            end do
+            call ties_prepare(scene, notes, error)
+            if (allocated(error)) return
+            text = to_text(n) // " nodes, multiplier " // to_text(m)
+            call check_equal(error, scene%tie(1)%rows%slave, expected, text)
+            call check_near(error, sum(scene%tie(1)%rows%size), 3.0_wp, tol, 1.0_wp, text)
+            call check_places(error, scene)
+         end do
+      end subroutine check_rows
+
+   end subroutine test_held
 
    subroutine test_repeated(error)
       type(error_t), allocatable, intent(out) :: error
