@@ -167,8 +167,8 @@ contains
       end do
    end subroutine test_crosspoint
 
-   !> An end that is held in some step, in x or y, has no multiplier, unless its neighbour is held in
-   !> the same direction; a chain keeps one.
+   !> An end that is held in some step, in x or y, has no multiplier, unless its neighbour is held
+   !> in the same direction; a chain keeps one.
    subroutine test_held(error)
       type(error_t), allocatable, intent(out) :: error
 
@@ -183,8 +183,8 @@ contains
 
    contains
 
-      !> The slave nodes with a row, `n` nodes along the slave surface; the second of two steps holds
-      !> the `dof` of each of `node`.
+      !> The slave nodes with a row, `n` nodes along the slave surface; the second of two steps
+      !> holds the `dof` of each of `node`.
       subroutine check_rows(n, node, dof, expected)
          integer, intent(in) :: n, node(:), dof(:), expected(:)
          type(scene_t) :: scene
