@@ -75,13 +75,14 @@ LIB_OBJ := $(call objects,$(LIB_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(LIB_C)))
 
 # From version 13 on, gfortran finalises structure constructors under -std=f2008, as that standard
 # had it before its corrigendum; -std=f2018 does not.
+# -frecursive: local arrays on the stack, so that models can run in threads of their own.
 # -ffp-contract=off: no fused products, so that every machine gives the same bits.
 # -Wno-maybe-uninitialized: gfortran 12 warns falsely at automatic allocation.
 # -Wno-compare-reals: exact comparisons here are meant.
 # -Wno-unused-dummy-argument: an implementation of an abstract interface need not use all of it.
 STD = $(if $(filter 12.%,$(COMPILER)),f2008,f2018)
 FFLAGS_ALL = -std=$(STD) -fimplicit-none -pedantic -Wall -Wextra -Wno-maybe-uninitialized \
-	-Wno-compare-reals -Wno-unused-dummy-argument -fPIC -g -ffp-contract=off -DEMCON_WP=$(WP)
+	-Wno-compare-reals -Wno-unused-dummy-argument -fPIC -frecursive -g -ffp-contract=off -DEMCON_WP=$(WP)
 FFLAGS_release := -O2
 FFLAGS_debug := -O0 -fcheck=all,no-array-temps -fbacktrace -ffpe-trap=invalid,zero,overflow \
 	-finit-real=snan -finit-integer=-99999 -Wconversion

@@ -25,12 +25,6 @@ class AnalysisError(ArithmeticError):
 _KINDS = {2: InputError, 3: AnalysisError, 4: OSError}
 
 
-def _check(ierr: int) -> None:
-    if ierr:
-        text = _flat.last_error().decode("utf-8", "replace").rstrip()
-        raise _KINDS.get(ierr, RuntimeError)(text)
-
-
 @dataclass(frozen=True)
 class Increment:
     """What one increment took: h and time in the deck's units, and counts."""
@@ -60,18 +54,29 @@ class Stepper:
     """A model read from a deck, at some point of its analysis.
 
     Parameters of the deck are given as keywords: ``Stepper("ring.inp", h=0.005)``. Arrays are
-    copies, of shape (n_node, 2) where they belong to nodes. Raises `InputError` for a bad deck.
+    copies, of shape (n_node, 2) where they belong to nodes. Any number of steppers live side by
+    side; each may run in a thread of its own, but not in two at once. Raises `InputError` for a
+    bad deck.
     """
 
     def __init__(self, deck: str | os.PathLike[str], *, lenient: bool = False,
                  **parameters: object) -> None:
         overrides = "\n".join(f"{name}={value}" for name, value in parameters.items())
         self._handle, ierr = _flat.open_deck(os.fsencode(deck), overrides, int(lenient))
-        _check(ierr)
+        try:
+            self._check(ierr)
+        except Exception:
+            self.close()
+            raise
         sizes, ierr = _flat.model_size(self._handle)
-        _check(ierr)
+        self._check(ierr)
         (self.n_node, self.n_element, self.n_constraint, self.n_body, self.n_unknown,
          self.n_step, self.n_pair) = (int(size) for size in sizes)
+
+    def _check(self, ierr: int) -> None:
+        if ierr:
+            text = _flat.last_error(self._handle).decode("utf-8", "replace").rstrip()
+            raise _KINDS.get(ierr, RuntimeError)(text)
 
     def close(self) -> None:
         """Free the model. Harmless when closed; any other call then raises `InputError`."""
@@ -93,28 +98,28 @@ class Stepper:
     def step(self) -> Increment:
         """Advance by one increment. Raises `AnalysisError` if it fails."""
         counts, times, ierr = _flat.advance(self._handle)
-        _check(ierr)
+        self._check(ierr)
         return Increment(float(times[0]), float(times[1]), *(int(count) for count in counts))
 
     @property
     def is_done(self) -> bool:
         """True after the last increment of the last step."""
         done, ierr = _flat.is_done(self._handle)
-        _check(ierr)
+        self._check(ierr)
         return bool(done)
 
     @property
     def positions(self) -> NDArray[np.float64]:
         """Reference positions X, (n_node, 2) [L]."""
         x, _, ierr = _flat.get_positions(self._handle, self.n_node)
-        _check(ierr)
+        self._check(ierr)
         return x.T
 
     @property
     def labels(self) -> NDArray[np.int32]:
         """Node numbers of the deck, (n_node,)."""
         _, label, ierr = _flat.get_positions(self._handle, self.n_node)
-        _check(ierr)
+        self._check(ierr)
         return label
 
     @property
@@ -134,7 +139,7 @@ class Stepper:
 
     def _state(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         u, v, ierr = _flat.get_state(self._handle, self.n_node)
-        _check(ierr)
+        self._check(ierr)
         return u.T, v.T
 
     def contact(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int32]]:
@@ -143,13 +148,13 @@ class Stepper:
         All of shape (n_constraint,).
         """
         lam, active, label, ierr = _flat.get_contact(self._handle, self.n_constraint)
-        _check(ierr)
+        self._check(ierr)
         return lam, active.astype(bool), label
 
     def pairs(self) -> list[PairTotal]:
         """Totals of the last increment, one for each contact pair in the order of the deck."""
         total, active, ierr = _flat.get_pairs(self._handle, self.n_pair)
-        _check(ierr)
+        self._check(ierr)
         return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n))
                 for row, n in zip(total.T, active)]
 
@@ -164,5 +169,5 @@ class Stepper:
 
     def _ledger(self) -> NDArray[np.float64]:
         values, ierr = _flat.get_ledger(self._handle)
-        _check(ierr)
+        self._check(ierr)
         return values

@@ -6,6 +6,7 @@ import csv
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,24 @@ from emcon.stepper import AnalysisError, InputError, Stepper  # noqa: E402
 RING = ROOT/"input_decks"/"ring.inp"
 EMCON = os.environ.get("EMCON", str(ROOT/"build"/"release"/"emcon"))
 EPS = np.finfo(float).eps
+ONE_ELEMENT = """*NODE
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+*ELEMENT, TYPE=CPE4, ELSET=ALL
+1, 1, 2, 3, 4
+*MATERIAL, NAME=M
+*ELASTIC
+100., 0.3
+*DENSITY
+1.
+*SOLID SECTION, ELSET=ALL, MATERIAL=M
+*STEP, NLGEOM
+*DYNAMIC, DIRECT
+0.1, 0.1
+*END STEP
+"""
 
 
 def test_stepper_gives_the_bits_of_the_batch_run(tmp_path: Path) -> None:
@@ -47,6 +66,41 @@ def test_two_models_side_by_side_do_not_meet() -> None:
             c.step()
         assert np.array_equal(a.u, c.u) and np.array_equal(a.v, c.v)
         assert not np.array_equal(a.u, b.u)
+
+
+def test_models_in_threads_give_the_bits_of_one_alone() -> None:
+    def run(formulation: str) -> tuple[list[float], np.ndarray]:
+        with Stepper(RING, h=0.05, t_end=2, formulation=formulation) as ring:
+            totals = []
+            while not ring.is_done:
+                ring.step()
+                totals.append(ring.energies()["total"])
+            return totals, ring.u
+
+    formulations = ["NODE TO SURFACE", "MORTAR", "SEGMENT", "NODE TO SURFACE", "MORTAR"]
+    alone = [run(formulation) for formulation in formulations]
+    with ThreadPoolExecutor(len(formulations)) as pool:
+        together = list(pool.map(run, formulations))
+    for (totals, u), (other_totals, other_u) in zip(alone, together):
+        assert totals == other_totals
+        assert np.array_equal(u, other_u)
+
+
+def test_closed_models_leave_no_memory(tmp_path: Path) -> None:
+    """A model of one element, opened and closed over and over, and once with an error each."""
+    deck = tmp_path/"one.inp"
+    deck.write_text(ONE_ELEMENT)
+
+    def cycles(n: int) -> int:
+        for k in range(n):
+            with Stepper(deck) as one:
+                one.step()
+            with pytest.raises(InputError):
+                Stepper(deck, none=k)
+        return int(Path("/proc/self/statm").read_text().split()[1])
+
+    first = cycles(200)
+    assert cycles(1000) - first < 256       # pages: one more allocation of 1 kB a cycle is as much
 
 
 def test_state_arrays_have_the_documented_shapes() -> None:
