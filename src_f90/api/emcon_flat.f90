@@ -7,15 +7,15 @@ module emcon_flat
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_handle, only : handle_fail, handle_find, handle_free, handle_new, handle_pass, model_t
+   use emcon_handle, only : handle_fail, handle_find, handle_free, handle_new, handle_open, &
+      handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_registry, only : law_create
    use emcon_march, only : increment_t
    use emcon_nts_gap, only : nts_gap
    use emcon_scene, only : material_t
-   use emcon_stepper, only : stepper_advance, stepper_is_done, stepper_open
-   use emcon_text, only : string_t
+   use emcon_stepper, only : stepper_advance, stepper_is_done
    implicit none
    private
    public :: open_deck, close_model, last_error, model_size, advance, is_done
@@ -42,41 +42,11 @@ contains
       integer(c_int), intent(in) :: is_lenient
       integer(c_int64_t), intent(out) :: handle
       integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-      type(error_t), allocatable :: error
-      integer :: i
       !f2py threadsafe
 
       handle = handle_new()
-      call handle_find(handle, model)
-      call stepper_open(model%stepper, trim(path), lines_of(overrides), is_lenient /= 0, error)
-      call handle_pass(model, error, ierr)
-      if (.not. (allocated(error) .and. allocated(model%stepper%diagnostic))) return
-      associate (text => model%stepper%diagnostic)
-         do i = 1, size(text)
-            if (text(i)%text /= error%message) model%message = model%message // new_line("a") // &
-               text(i)%text
-         end do
-      end associate
+      call handle_open(handle, path, overrides, is_lenient /= 0, ierr)
    end subroutine open_deck
-
-   !> The lines of a text.
-   function lines_of(text) result(line)
-      character(len=*), intent(in) :: text
-      type(string_t), allocatable :: line(:)
-      type(string_t) :: new(1)
-      integer :: first, last
-
-      allocate(line(0))
-      first = 1
-      do while (first <= len_trim(text))
-         last = index(text(first:), new_line("a"))
-         if (last == 0) last = len_trim(text) - first + 2
-         new(1)%text = text(first:first + last - 2)
-         line = [line, new]
-         first = first + last
-      end do
-   end function lines_of
 
    !> Free a model; harmless for 0.
    subroutine close_model(handle)

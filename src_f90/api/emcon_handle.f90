@@ -4,16 +4,20 @@
 !> number of models live side by side, each in a thread of its own. 0 is no model. A handle that
 !> was closed must not be used again: its owner forgets it.
 module emcon_handle
-   use, intrinsic :: iso_c_binding, only : c_f_pointer, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only : c_char, c_f_pointer, c_int, c_int64_t, c_loc, &
+      c_null_ptr, c_ptr
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_stepper, only : stepper_close, stepper_t
+   use emcon_stepper, only : stepper_close, stepper_open, stepper_t
+   use emcon_text, only : string_t
    implicit none
    private
    public :: model_t, handle_new, handle_free, handle_find, handle_fail, handle_pass
+   public :: handle_open
 
    type :: model_t
       type(stepper_t) :: stepper
       character(len=:), allocatable :: message   !! of the last failure
+      character(kind=c_char), allocatable :: c_text(:)   !! the same as C was given it
    end type model_t
 
 contains
@@ -26,6 +30,47 @@ contains
       model%message = ""
       handle_new = transfer(c_loc(model), handle_new)
    end function handle_new
+
+   !> Read a deck into a new model. `parameters`: NAME=VALUE, one per line. After a failure the
+   !> message holds all that is wrong with the deck, one per line.
+   subroutine handle_open(handle, path, parameters, is_lenient, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      character(len=*), intent(in) :: path, parameters
+      logical, intent(in) :: is_lenient
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+      integer :: i
+
+      call handle_find(handle, model)
+      call stepper_open(model%stepper, trim(path), lines_of(parameters), is_lenient, error)
+      call handle_pass(model, error, ierr)
+      if (.not. (allocated(error) .and. allocated(model%stepper%diagnostic))) return
+      associate (text => model%stepper%diagnostic)
+         do i = 1, size(text)
+            if (text(i)%text /= error%message) model%message = model%message // new_line("a") // &
+               text(i)%text
+         end do
+      end associate
+   end subroutine handle_open
+
+   !> The lines of a text.
+   function lines_of(text) result(line)
+      character(len=*), intent(in) :: text
+      type(string_t), allocatable :: line(:)
+      type(string_t) :: new(1)
+      integer :: first, last
+
+      allocate(line(0))
+      first = 1
+      do while (first <= len_trim(text))
+         last = index(text(first:), new_line("a"))
+         if (last == 0) last = len_trim(text) - first + 2
+         new(1)%text = text(first:first + last - 2)
+         line = [line, new]
+         first = first + last
+      end do
+   end function lines_of
 
    !> Free a model; harmless for 0.
    subroutine handle_free(handle)

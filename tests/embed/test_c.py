@@ -1,0 +1,109 @@
+"""The C interface: programs in C and C++ against the installed library, by pkg-config only."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+sys.path.insert(0, str(ROOT/"pywrap"))
+
+from emcon.stepper import Stepper  # noqa: E402
+
+RING = ROOT/"input_decks"/"ring.inp"
+HEADER = (ROOT/"src_f90"/"api"/"emcon.h").read_text(encoding="utf-8")
+FUNCTIONS = set(re.findall(r"^[a-z][\w *]*?(emcon_\w+)\(", HEADER, re.MULTILINE))
+
+
+def run(*command: object, **more: object) -> str:
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **more)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment of programs that use the installed library."""
+    prefix = tmp_path_factory.mktemp("installed")
+    run("make", "install", f"PREFIX={prefix}", cwd=ROOT)
+    return os.environ | {"PKG_CONFIG_PATH": str(prefix/"lib"/"pkgconfig"),
+                         "LD_LIBRARY_PATH": str(prefix/"lib"), "PREFIX": str(prefix)}
+
+
+def build(compiler: str, source: str, program: Path, env: dict[str, str], *options: str) -> None:
+    if not shutil.which(compiler):
+        pytest.skip(f"there is no {compiler} here")
+    flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
+    run(compiler, "-pedantic", "-Wall", "-Wextra", "-Werror", *options, HERE/source, "-o", program,
+        *flags, env=env)
+
+
+@pytest.fixture(scope="module")
+def impact(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    program = tmp_path_factory.mktemp("impact")/"impact"
+    build("cc", "impact.c", program, installed, "-std=c99")
+    return program
+
+
+def test_c_gives_the_bits_of_python(impact: Path, installed: dict[str, str]) -> None:
+    n, *values = run(impact, RING, "h=0.05\nt_end=1.5", env=installed).split()
+    with Stepper(RING, h=0.05, t_end=1.5) as ring:
+        count = 0
+        while not ring.is_done:
+            ring.step()
+            count += 1
+        expected = [ring.energies()["total"], ring.momenta()["py"], ring.u[0, 1], ring.v[0, 1]]
+    assert int(n) == count
+    assert [float(value) for value in values] == expected
+
+
+def test_c_tells_what_is_wrong_with_a_deck(
+    impact: Path, installed: dict[str, str], tmp_path: Path
+) -> None:
+    deck = tmp_path/"bad.inp"
+    deck.write_text("*NODE\n1, 0., 0.\n*ELEMNT, TYPE=CPE4\n")
+    done = subprocess.run([impact, deck], env=installed, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert re.search(r"error 2: .*bad\.inp:3: .*ELEMENT", done.stderr)
+
+
+def test_threads_in_cpp(installed: dict[str, str], tmp_path: Path) -> None:
+    program = tmp_path/"two_models"
+    build("c++", "two_models.cpp", program, installed, "-std=c++11", "-pthread")
+    assert "no such file" in run(program, RING, env=installed)
+
+
+def test_c_loses_no_memory(impact: Path, installed: dict[str, str]) -> None:
+    if not shutil.which("valgrind"):
+        pytest.skip("there is no valgrind here")
+    done = subprocess.run(
+        ["valgrind", "--leak-check=full", "--errors-for-leak-kinds=definite", "--error-exitcode=9",
+         "--quiet", impact, ROOT/"input_decks"/"patch_pressure.inp"],
+        env=installed, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_library_exports_what_the_header_declares(installed: dict[str, str]) -> None:
+    """A function that is declared is there; a change of the interface shows in the version."""
+    library = ctypes.CDLL(str(Path(installed["PREFIX"])/"lib"/"libemcon.so.0"))
+    assert len(FUNCTIONS) > 10
+    for name in FUNCTIONS:
+        assert hasattr(library, name), name
+    version = [ctypes.c_int() for _ in range(3)]
+    library.emcon_version(*(ctypes.byref(number) for number in version))
+    header = [int(re.search(rf"EMCON_VERSION_{part} (\d+)", HEADER).group(1))
+              for part in ("MAJOR", "MINOR", "PATCH")]
+    assert [number.value for number in version] == header
+    text = subprocess.run(["nm", "-D", "--defined-only", library._name], capture_output=True,
+                          text=True).stdout
+    exported = set(re.findall(r" T (emcon_[a-z0-9_]+)$", text, re.MULTILINE))
+    shims = {name for name in exported if re.match(r"emcon_(blas|cholmod|posix|hdf5)_", name)}
+    assert exported - shims == FUNCTIONS
