@@ -41,10 +41,9 @@ module emcon_c
       end function progress_interface
 
       subroutine log_interface(user, line) bind(c)
-         import :: c_char, c_ptr
+         import :: c_ptr
          implicit none
-         type(c_ptr), value :: user
-         character(kind=c_char), intent(in) :: line(*)
+         type(c_ptr), value :: user, line
       end subroutine log_interface
    end interface
 
@@ -74,21 +73,14 @@ contains
    end subroutine find
 
    integer(c_int) function emcon_open(deck, parameters, is_lenient, handle) bind(c)
-      character(kind=c_char), intent(in) :: deck(*)
-      type(c_ptr), value :: parameters
+      type(c_ptr), value :: deck, parameters
       integer(c_int), value :: is_lenient
       type(c_ptr), intent(out) :: handle
-      character(kind=c_char), pointer :: text(:)
       integer(c_int64_t) :: address
 
       address = handle_new()
       handle = transfer(address, c_null_ptr)
-      if (c_associated(parameters)) then
-         call c_f_pointer(parameters, text, [huge(1)])
-         call handle_open(address, f_text(deck), f_text(text), is_lenient /= 0, emcon_open)
-      else
-         call handle_open(address, f_text(deck), "", is_lenient /= 0, emcon_open)
-      end if
+      call handle_open(address, f_text(deck), f_text(parameters), is_lenient /= 0, emcon_open)
    end function emcon_open
 
    subroutine emcon_close(handle) bind(c)
@@ -100,17 +92,11 @@ contains
    type(c_ptr) function emcon_message(handle) bind(c)
       type(c_ptr), value :: handle
       type(model_t), pointer :: model
-      integer :: i
 
       emcon_message = c_null_ptr
       call find(handle, model)
       if (.not. associated(model)) return
-      if (allocated(model%c_text)) deallocate(model%c_text)
-      allocate(model%c_text(len(model%message) + 1))
-      do i = 1, len(model%message)
-         model%c_text(i) = model%message(i:i)
-      end do
-      model%c_text(size(model%c_text)) = c_null_char
+      model%c_text = c_string(model%message)
       emcon_message = c_loc(model%c_text)
    end function emcon_message
 
@@ -193,6 +179,7 @@ contains
       procedure(progress_interface), pointer :: tell
       type(model_t), pointer :: model
       type(increment_t) :: made
+      integer(c_int) :: stop
 
       emcon_run = err_input
       call find(handle, model)
@@ -210,8 +197,8 @@ contains
          if (allocated(made%notes%item)) call log_lines(made%notes%item, made%notes%n)
          if (emcon_run /= err_none) return
          if (.not. associated(tell)) cycle
-         if (tell(user, as_c(model, made), real(stepper_fraction(model%stepper), c_double)) == 0) &
-            cycle
+         stop = tell(user, as_c(model, made), real(stepper_fraction(model%stepper), c_double))
+         if (stop == 0) cycle
          call handle_fail(model, "stopped by the callback", err_interrupt, emcon_run)
          return
       end do
@@ -232,12 +219,14 @@ contains
          type(string_t), intent(in) :: line(:)
          integer, intent(in) :: n                !! the first ones; 0: all
          procedure(log_interface), pointer :: write_line
+         character(kind=c_char), allocatable, target :: text(:)
          integer :: i
 
          if (.not. c_associated(log)) return
          call c_f_procpointer(log, write_line)
          do i = 1, merge(n, size(line), n > 0)
-            call write_line(user, line(i)%text // c_null_char)
+            text = c_string(line(i)%text)
+            call write_line(user, c_loc(text))
          end do
       end subroutine log_lines
 
@@ -280,14 +269,14 @@ contains
    integer(c_int) function emcon_get_labels(handle, n_node, label) bind(c)
       type(c_ptr), value :: handle
       integer(c_int), value :: n_node
-      integer(c_int), intent(out) :: label(*)
+      type(c_ptr), value :: label
       type(model_t), pointer :: model
 
       emcon_get_labels = err_input
       call find(handle, model)
       if (.not. associated(model)) return
       if (.not. fits(model, n_node, size(model%stepper%scene%x, 2), emcon_get_labels)) return
-      label(:n_node) = model%stepper%scene%node_label
+      call put_integers(model%stepper%scene%node_label, label)
    end function emcon_get_labels
 
    !> Is `n` what the model has? If not, `ierr` and its message say so.
@@ -378,20 +367,37 @@ contains
       array = list
    end subroutine put_integers
 
-   !> The text of C up to its end.
-   pure function f_text(text) result(copy)
-      character(kind=c_char), intent(in) :: text(*)
+   !> The text of C up to its end; "" for NULL.
+   function f_text(text) result(copy)
+      type(c_ptr), intent(in) :: text
       character(len=:), allocatable :: copy
+      character(kind=c_char), pointer :: from(:)
       integer :: i, n
 
+      copy = ""
+      if (.not. c_associated(text)) return
+      call c_f_pointer(text, from, [huge(1)])
       n = 0
-      do while (text(n + 1) /= c_null_char)
+      do while (from(n + 1) /= c_null_char)
          n = n + 1
       end do
+      deallocate(copy)
       allocate(character(len=n) :: copy)
       do i = 1, n
-         copy(i:i) = text(i)
+         copy(i:i) = from(i)
       end do
    end function f_text
+
+   !> The same the other way round.
+   pure function c_string(text) result(copy)
+      character(len=*), intent(in) :: text
+      character(kind=c_char) :: copy(len(text) + 1)
+      integer :: i
+
+      do i = 1, len(text)
+         copy(i) = text(i:i)
+      end do
+      copy(size(copy)) = c_null_char
+   end function c_string
 
 end module emcon_c
