@@ -143,7 +143,7 @@ $(BUILD)/kernels: $(call objects,$(KERNEL_SRC)) $(BUILD)/libemcon.a
 
 lib: $(BUILD)/libemcon.a $(BUILD)/libemcon.so.0  ## the library, build/release/libemcon.{a,so}
 app: $(BUILD)/emcon  ## the program, build/release/emcon
-# One program per file, timed, not tested.
+# One program per file, timed, not tested; those without `bench_` are called by scripts.
 BENCHES := $(patsubst tests/bench/%.f90,$(BUILD)/%,$(wildcard tests/bench/*.f90))
 $(BENCHES): $(BUILD)/%: tests/bench/%.f90 $(BUILD)/libemcon.a
 	@echo "  FC    $<"
@@ -203,7 +203,7 @@ lint: .venv/lint.stamp  ## check the Fortran sources against the written rules
 
 bench:  ## print the timed scenes of tests/bench
 	$(BUILDING) app lib pywrap $(BENCHES)
-	@set -e; for program in $(BENCHES); do $$program; done
+	@set -e; for program in $(filter %/bench_%,$(BENCHES)); do $$program; done
 	@set -e; for script in tests/bench/*.py; do $(PY) $$script; done
 
 docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html

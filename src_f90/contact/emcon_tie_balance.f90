@@ -39,6 +39,8 @@ module emcon_tie_balance
    !> Largest sum of the changes of M in a row, per int psi_k, that a step may make. The rows of a
    !> chain end change by about 1; where balance cannot be had, changes are far larger.
    real(wp), parameter :: max_change = 8.0_wp
+   !> Places on a master edge that are nearer, per its length, are one.
+   real(wp), parameter :: apart = sqrt(epsilon(1.0_wp))
 
 contains
 
@@ -127,32 +129,48 @@ contains
       tie%m_value = best
    end subroutine improve
 
-   !> The part of each master edge that the slave chain covers: both nodes are in the rows, and the
-   !> ends of the slave chain, which runs the other way, bound it.
+   !> The integrals of both shape functions over the part of each master edge that the slave chains
+   !> cover, per length of the edge: both nodes are in the rows, and the ends of the slave chains,
+   !> which run the other way, bound it. An edge may lie under the ends of two chains.
    pure subroutine find_cover(rows, x, slave_edge, master_edge, cover)
       type(tie_rows_t), intent(in) :: rows
       real(wp), intent(in) :: x(:, :)
       integer, intent(in) :: slave_edge(:, :), master_edge(:, :)
       real(wp), intent(out) :: cover(:, :)
       logical :: is_met(size(x, 2))
+      real(wp) :: outmost(2, size(master_edge, 2))   !! last place where covering begins, ends
       integer :: e, i, side, node
       real(wp) :: place
 
       is_met = .false.
       is_met(rows%node) = .true.
-      cover(1, :) = 0.0_wp
-      do i = 1, size(master_edge, 2)
-         cover(2, i) = merge(1.0_wp, 0.0_wp, all(is_met(master_edge(:, i))))
-      end do
+      cover = 0.0_wp
+      outmost = -1.0_wp
       do i = 1, size(slave_edge, 2)
          do side = 1, 2
             node = slave_edge(side, i)
             if (any(slave_edge(3 - side, :) == node)) cycle
             call project(x, master_edge, is_met, x(:, node), e, place)
-            if (e > 0) cover(3 - side, e) = place
+            if (e == 0) cycle
+            cover(:, e) = cover(:, e) + merge(1.0_wp, -1.0_wp, side == 1)*up_to(place)
+            outmost(3 - side, e) = max(outmost(3 - side, e), place)
          end do
       end do
+      do i = 1, size(master_edge, 2)
+         if (.not. all(is_met(master_edge(:, i)))) cycle
+         if (outmost(2, i) > max(0.0_wp, outmost(1, i)) + apart) cycle
+         cover(:, i) = cover(:, i) + up_to(1.0_wp)
+      end do
+      where (spread(sum(cover, 1) <= apart, 1, 2)) cover = 0.0_wp
    end subroutine find_cover
+
+   !> The integrals of 1 - eta and eta from 0 to `place`.
+   pure function up_to(place)
+      real(wp), intent(in) :: place              !! 0..1
+      real(wp) :: up_to(2)
+
+      up_to = place*[1.0_wp - 0.5_wp*place, 0.5_wp*place]
+   end function up_to
 
    !> The covered master edge next to `point`, the first of equals, and the place on it, 0..1.
    pure subroutine project(x, master_edge, is_met, point, nearest, place)

@@ -48,7 +48,7 @@ contains
       real(wp), intent(in) :: x(:, :)            !! (2, n_node) positions [L]
       integer, intent(in) :: slave_edge(:, :)    !! (2, n) first and last node
       integer, intent(in) :: master_edge(:, :)   !! (2, n) first and last node
-      real(wp), intent(in) :: cover(:, :)        !! (2, n) part of each master edge, in 0..1
+      real(wp), intent(in) :: cover(:, :)        !! (2, n) int N_C over what is covered, per length
       type(error_t), allocatable, intent(out) :: error
       integer :: row_of(size(x, 2)), slave(2*size(slave_edge, 2))
       integer :: i, k
@@ -59,7 +59,7 @@ contains
       row_of(rows%slave) = [(k, k = 1, self%n_row)]
       self%other = unique_sorted([pack(rows%node, row_of(rows%node) == 0), &
          pack(slave, row_of(slave) == 0), &
-         pack(master_edge, spread(cover(2, :) > cover(1, :), 1, 2))])
+         pack(master_edge, spread(sum(cover, 1) > 0.0_wp, 1, 2))])
       self%n_other = size(self%other)
       self%x_other = x(:, self%other)
       self%size = rows%size
@@ -142,18 +142,16 @@ contains
       type(tie_balance_t), intent(inout) :: self
       real(wp), intent(in) :: x(:, :), cover(:, :)
       integer, intent(in) :: master_edge(:, :)
-      real(wp) :: a(2), share(2)
+      real(wp) :: a(2)
       integer :: i, k, j
 
       allocate(self%s_master(2, self%n_other), source=0.0_wp)
       do i = 1, size(master_edge, 2)
-         if (cover(2, i) <= cover(1, i)) cycle
+         if (.not. sum(cover(:, i)) > 0.0_wp) cycle
          a = x(:, master_edge(2, i)) - x(:, master_edge(1, i))
-         share(2) = 0.5_wp*(cover(2, i) - cover(1, i))*(cover(2, i) + cover(1, i))
-         share(1) = (cover(2, i) - cover(1, i)) - share(2)
          do k = 1, 2
             j = find_sorted(self%other, master_edge(k, i))
-            self%s_master(:, j) = self%s_master(:, j) - share(k)*a
+            self%s_master(:, j) = self%s_master(:, j) - cover(k, i)*a
          end do
       end do
    end subroutine add_master

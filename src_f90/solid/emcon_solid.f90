@@ -154,8 +154,9 @@ contains
    end subroutine reference_gradient
 
    !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
-   !> to the matrix entries `value` (slot > 0) and `side` (slot < 0).
-   pure subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side)
+   !> to the matrix entries `value` (slot > 0) and `side` (slot < 0). Where `u0` was computed as a
+   !> change of `before`, it is rounded with that too.
+   pure subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side, before)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
@@ -163,6 +164,7 @@ contains
       real(wp), intent(in), optional :: factor
       integer, intent(in), contiguous, optional :: slot(:)       !! element matrices by columns
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
+      real(wp), intent(in), contiguous, optional :: before(:, :)         !! (2, n_node) [L]
       type(element_response_t) :: part
       real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
       logical :: with_tangent
@@ -179,6 +181,7 @@ contains
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
+         if (present(before)) largest = max(largest, maxval(abs(before(:, self%node(:n, e)))))
          call element_respond(self%geometry(e), self%law(self%law_of(e))%law, local0, dlocal, &
             nlgeom, with_tangent, part)
          if (part%is_inverted) then

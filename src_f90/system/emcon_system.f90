@@ -322,12 +322,12 @@ contains
 
          if (with_tangent) then
             call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
-               solid_factor, self%slot, self%matrix%value, self%reduction%side%value)
+               solid_factor, self%slot, self%matrix%value, self%reduction%side%value, before=u0)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external, load_factor, self%matrix%value, self%reduction%side%value)
             call reduction_add(self%reduction, self%matrix)
          else
-            call solid_respond(self%solid, start, step, self%nlgeom, self%response)
+            call solid_respond(self%solid, start, step, self%nlgeom, self%response, before=u0)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external)
          end if

@@ -173,25 +173,43 @@ contains
    !> Where the end of a slave chain takes part in another tie too, or is held and its neighbour is
    !> not, its multiplier goes to the neighbour: on the end edge there is a constant one then. The
    !> rows are the same in all steps, as those that come back would not fit the displacements by
-   !> then, and in both directions, as rotations would not fulfil them else. A chain keeps one.
+   !> then, and in both directions, as rotations would not fulfil them else. A chain that would
+   !> keep less than two multipliers stays as it is: one alone would be a hinge.
    pure subroutine merge_ends(rows, n_tie, is_held)
       type(tie_rows_t), intent(inout) :: rows
       integer, intent(in) :: n_tie(:)                    !! (n_node)
       logical, intent(in) :: is_held(:, :)               !! (2, n_node)
       logical :: is_merged(size(rows%slave))
-      integer :: k, other
+      integer :: k
 
       is_merged = .false.
       do k = 1, size(rows%slave)
          if (all(rows%neighbour(:, k) > 0) .or. all(rows%neighbour(:, k) == 0)) cycle
-         other = maxval(rows%neighbour(:, k))
-         associate (node => rows%slave(k), next => rows%slave(other))
-            is_merged(k) = .not. is_merged(other) .and. (n_tie(node) > 1 &
-               .or. any(is_held(:, node) .and. .not. is_held(:, next)))
+         associate (node => rows%slave(k), next => rows%slave(maxval(rows%neighbour(:, k))))
+            is_merged(k) = n_tie(node) > 1 .or. any(is_held(:, node) .and. .not. is_held(:, next))
          end associate
       end do
+      call keep_two(rows%neighbour, is_merged)
       if (any(is_merged)) call take_merged(rows, is_merged)
    end subroutine merge_ends
+
+   !> Take back what is to be merged in chains of rows that would keep less than two.
+   pure subroutine keep_two(neighbour, is_merged)
+      integer, intent(in) :: neighbour(:, :)             !! (2, rows) before and after; 0: none
+      logical, intent(inout) :: is_merged(:)             !! (rows) ends of chains
+      integer :: k, last, n
+
+      do k = 1, size(is_merged)
+         if (neighbour(1, k) > 0) cycle
+         n = 1
+         last = k
+         do while (neighbour(2, last) > 0)
+            last = neighbour(2, last)
+            n = n + 1
+         end do
+         if (n - count(is_merged([k, last])) < 2) is_merged([k, last]) = .false.
+      end do
+   end subroutine keep_two
 
    !> Let curved ties keep the equilibrium of a constant stress. A tie may be master of another one
    !> whose slave nodes it moves: a few sweeps settle that.
@@ -274,8 +292,8 @@ contains
             if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%edge, &
                master%edge, is_balanced, error)
             if (allocated(error)) return
-            if (.not. is_balanced) call note_add(notes, "*TIE " // tie%name // ": its curved " // &
-               "meshes do not fit so well that a constant stress is kept exactly")
+            if (.not. is_balanced) call note_add(notes, "*TIE " // tie%name // ": its meshes " // &
+               "do not fit so well that a constant stress passes exactly")
          end associate
       end do
    end subroutine note_unbalanced
@@ -416,8 +434,8 @@ contains
                after = corner_area(scene%x(:, node) + move(:, node), i)
                if (.not. before > 0.0_wp .or. after > least_area*before) cycle
                k = maxloc(abs(move(1, node)) + abs(move(2, node)), 1)
-               call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
-                  " would be spoilt: a tie moves its node " // &
+               call raise(error, err_input, tie_text(scene, node(k)) // "element " // &
+                  to_text(scene%element_label(e)) // " would be spoilt: the tie moves its node " // &
                   to_text(scene%node_label(node(k))) // " by " // to_text(norm2(move(:, node(k)))) &
                   // " onto the master surface; let the surfaces meet, or refine the coarser one")
                return
@@ -425,6 +443,20 @@ contains
          end associate
       end do
    end subroutine check_elements
+
+   !> Which tie moves slave node `node`.
+   function tie_text(scene, node) result(text)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: node
+      character(len=:), allocatable :: text
+      integer :: t
+
+      text = ""
+      do t = 1, size(scene%tie)
+         if (any(scene%tie(t)%rows%slave == node)) text = where_text(scene, scene%tie(t)%origin) &
+            // ": error: tie " // scene%tie(t)%name // ": "
+      end do
+   end function tie_text
 
    !> Twice the area of the triangle at corner `i` of a polygon.
    pure real(wp) function corner_area(x, i)

@@ -5,7 +5,8 @@
 
 Runs the decks of input_decks/ and a few made here, in a temporary folder, two at a time; the
 chapters are the modules of tests/bench/book/. Needs the program (`make app`), and for one table
-the program in quadruple precision (`make app WP=real128`), which is left out where that is missing.
+the program in quadruple precision (`make app WP=real128`), for another the program of condition
+numbers (`make build/release/ties_condition`); a table is left out where its program is missing.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import re
 import tempfile
 
 from book import (bar, contact_patch, free_bodies, hertz, ironing, numerics, ring, spin, statics,
-                  ties)
+                  ties, ties_condition)
 from book.common import Runs
 
 BOOK = pathlib.Path(__file__).resolve().parents[2] / "docs" / "verification.md"
@@ -23,8 +24,8 @@ BOOK = pathlib.Path(__file__).resolve().parents[2] / "docs" / "verification.md"
 #: In the order of the book.
 CHAPTERS = [
     chapter
-    for module in (ring, spin, bar, free_bodies, statics, ties, contact_patch, hertz, ironing,
-                   numerics)
+    for module in (ring, spin, bar, free_bodies, statics, ties, ties_condition, contact_patch,
+                   hertz, ironing, numerics)
     for chapter in module.CHAPTERS
 ]
 

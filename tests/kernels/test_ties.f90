@@ -168,7 +168,7 @@ contains
    end subroutine test_crosspoint
 
    !> An end that is held in some step, in x or y, has no multiplier, unless its neighbour is held
-   !> in the same direction; a chain keeps one.
+   !> in the same direction; a chain that would keep less than two keeps all.
    subroutine test_held(error)
       type(error_t), allocatable, intent(out) :: error
 
@@ -178,8 +178,11 @@ contains
       call check_rows(6, [1, 2], [2, 2], [1, 2, 3, 4, 5, 6])
       call check_rows(6, [1, 2], [1, 2], [2, 3, 4, 5, 6])
       call check_rows(6, [3], [1], [1, 2, 3, 4, 5, 6])
-      call check_rows(3, [1, 3], [1, 1], [2])
-      call check_rows(2, [1, 2], [1, 2], [2])
+      call check_rows(4, [1, 4], [1, 1], [2, 3])
+      call check_rows(3, [3], [1], [1, 2])
+      call check_rows(3, [1, 3], [1, 1], [1, 2, 3])
+      call check_rows(2, [1], [1], [1, 2])
+      call check_rows(2, [1, 2], [1, 2], [1, 2])
 
    contains
 
