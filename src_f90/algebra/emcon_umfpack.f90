@@ -15,17 +15,18 @@ module emcon_umfpack
       sparse_solver_t
    implicit none
    private
-   public :: umfpack_t, ordering_amd, ordering_metis
+   public :: umfpack_t, ordering_amd, ordering_metis, ordering_less_fill
 
-   !> Values of `umfpack_t%ordering`, those of UMFPACK. METIS pays for 3-D meshes only.
-   integer, parameter :: ordering_amd = 1, ordering_metis = 3
+   !> Values of `umfpack_t%ordering`, those of UMFPACK; and the one of the two that fills less, for
+   !> matrices that are factorised often enough to pay for two analyses.
+   integer, parameter :: ordering_amd = 1, ordering_metis = 3, ordering_less_fill = -1
 
    integer(c_int), parameter :: umfpack_ok = 0, umfpack_singular = 1, umfpack_out_of_memory = -1
    integer(c_int), parameter :: umfpack_aat = 2
 
    !> Places in UMFPACK's arrays of controls and figures, from 1.
    integer, parameter :: control_irstep = 8, control_ordering = 11, control_scale = 17
-   integer, parameter :: info_lnz = 44, info_unz = 45, info_rcond = 68
+   integer, parameter :: info_symmetric_fill = 37, info_lnz = 44, info_unz = 45, info_rcond = 68
 
    type, extends(sparse_solver_t) :: umfpack_t
       integer :: ordering = ordering_amd         !! set before `analyse`
@@ -108,6 +109,7 @@ contains
       type(csr_t), intent(in) :: matrix
       type(error_t), allocatable, intent(out) :: error
       integer(c_int) :: status
+      real(c_double) :: fill
       integer :: n
 
       if (c_associated(self%symbolic)) then
@@ -121,19 +123,37 @@ contains
       allocate(self%rhs(n), self%x(n), self%work(5*n), self%index_work(n))
       call self%scaling%init(n, n)
       call umfpack_di_defaults(self%control)
-      self%control(control_ordering) = real(self%ordering, c_double)
       self%control(control_scale) = 0.0_c_double
       ! Ones, not a null pointer: without values UMFPACK counts no diagonal entry and takes the
       ! strategy for unsymmetric patterns, which here costs twice the time and many digits.
       self%scaled%value = 1.0_dp
-      associate (a => self%scaled)
-         status = umfpack_di_symbolic(int(n, c_int), int(n, c_int), a%row_start, a%column, &
-            a%value, self%symbolic, self%control, self%info)
-      end associate
+      if (self%ordering == ordering_less_fill) then
+         call order(self, ordering_amd, status)
+         fill = self%info(info_symmetric_fill)
+         if (status == umfpack_ok) call order(self, ordering_metis, status)
+         if (status == umfpack_ok .and. self%info(info_symmetric_fill) > fill) &
+            call order(self, ordering_amd, status)
+      else
+         call order(self, self%ordering, status)
+      end if
       self%n_analysis = self%n_analysis + 1
       if (status /= umfpack_ok) call solver_raise(error, "UMFPACK", "ordering", int(status), &
          status == umfpack_out_of_memory, self%scaled)
    end subroutine umfpack_analyse
+
+   !> Analyse the pattern with one ordering of UMFPACK.
+   subroutine order(self, ordering, status)
+      type(umfpack_t), intent(inout) :: self
+      integer, intent(in) :: ordering
+      integer(c_int), intent(out) :: status
+
+      call umfpack_di_free_symbolic(self%symbolic)
+      self%control(control_ordering) = real(ordering, c_double)
+      associate (a => self%scaled)
+         status = umfpack_di_symbolic(int(a%n_row, c_int), int(a%n_row, c_int), a%row_start, &
+            a%column, a%value, self%symbolic, self%control, self%info)
+      end associate
+   end subroutine order
 
    subroutine umfpack_factorise(self, value, error)
       class(umfpack_t), intent(inout) :: self

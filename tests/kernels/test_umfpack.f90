@@ -6,7 +6,7 @@ module test_umfpack
    use emcon_errors, only : err_internal, error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
-   use emcon_umfpack, only : ordering_metis, umfpack_t
+   use emcon_umfpack, only : ordering_amd, ordering_less_fill, ordering_metis, umfpack_t
    use sparse_samples, only : dense_of, quad_mesh_matrix, random_sparse
    implicit none
    private
@@ -25,6 +25,7 @@ contains
          test_case_t("random against LAPACK", test_random), &
          test_case_t("saddle point", test_saddle_point), &
          test_case_t("metis and refinement", test_metis), &
+         test_case_t("the ordering that fills less", test_less_fill), &
          test_case_t("pattern is analysed once", test_reuse), &
          test_case_t("same bits again", test_same_bits), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
@@ -105,6 +106,32 @@ contains
       call csr_multiply(a, x, y)
       call check_near(error, y, b, tol, 1.0_wp, "A x")
    end subroutine test_metis
+
+   !> Of meshes of two shapes, so that neither ordering is the better one throughout.
+   subroutine test_less_fill(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: cells(2, 2) = reshape([4, 300, 40, 40], [2, 2])
+      integer, parameter :: ordering(3) = [ordering_amd, ordering_metis, ordering_less_fill]
+      type(csr_t) :: a
+      type(umfpack_t) :: solver
+      integer :: fill(3), i, k
+
+      do i = 1, 2
+         call quad_mesh_matrix(cells(1, i), cells(2, i), 0.0_dp, a, error)
+         if (allocated(error)) return
+         do k = 1, 3
+            call solver%free()
+            solver%ordering = ordering(k)
+            call solver%analyse(a, error)
+            if (.not. allocated(error)) call solver%factorise(a%value, error)
+            if (allocated(error)) return
+            fill(k) = int(solver%n_factor)
+         end do
+         call check_true(error, fill(1) /= fill(2), "the orderings differ")
+         call check_equal(error, fill(3), minval(fill(:2)), "the lesser fill")
+      end do
+      call solver%free()
+   end subroutine test_less_fill
 
    subroutine test_reuse(error)
       type(error_t), allocatable, intent(out) :: error
