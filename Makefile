@@ -27,7 +27,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels lint bench docs install status clean help
+.PHONY: run test lib app pywrap kernels benches lint bench docs install status clean help
 
 # ---- set-up -------------------------------------------------------------------------------------
 
@@ -149,6 +149,7 @@ $(BENCHES): $(BUILD)/%: tests/bench/%.f90 $(BUILD)/libemcon.a
 	@echo "  FC    $<"
 	$(Q)$(FCOMPILE) -I$(BUILD)/mod -o $@ $^ $(LIBS)
 
+benches: $(BENCHES)  ## the programs of tests/bench
 kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/kernels [SUITE [TEST]]
 
 # ---- Python extension ---------------------------------------------------------------------------

@@ -1,13 +1,17 @@
 """EMCON: conserving dynamics of deformable bodies in contact.
 
-Results of a run, read from Python:
+Results of a run, read when asked for:
 
-    from emcon import FieldFile, locate, read_history
+    from emcon import Results, animate, compare
 
-    paths = locate("ring")
-    history = read_history(paths)            # one row per increment; history["total"], ...
-    with FieldFile(paths.field) as field:
-        u = field.point("displacement", -1)  # (n_node, 3) [L], last frame
+    with Results("ring") as ring:
+        ring.history["total"]                # (n_row), one row per increment
+        u = ring.fields["displacement"]      # (n_frame, n_node, 3) [L]
+        u[-1], u.at(2.5), u[:, 12]           # last frame, a time, a node over time
+    animate("ring")                          # ring.gif
+    print(compare("ring", "other/ring"))     # largest differences
+
+A mesh, and a deck made of it: `emcon.mesh`.
 
 A run, step by step:
 
@@ -18,22 +22,39 @@ A run, step by step:
             ring.step()
         print(ring.energies(), ring.momenta())
 
-Single kernels, for tests: `emcon.kernels`. From the shell: `python -m emcon plot ring`, `python -m emcon summary ring`.
+Single kernels, for tests: `emcon.kernels`. From the shell: `python -m emcon plot ring`,
+`summary ring`, `animate ring`, `compare ring other/ring`.
 
 Units are those of the deck, any consistent set: length [L], mass [M], time [T].
 """
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from .results import (Bodies, FieldFile, Pairs, ResultError, ResultPaths, energy_drift, locate,
-                      read_bodies, read_history, read_pairs)
+from .comparison import Comparison, Difference, compare
+from .results import (Bodies, FieldFile, FieldSeries, HistoryFile, Pairs, ResultError, ResultPaths,
+                      Results, Series, energy_drift, locate, read_bodies, read_history, read_pairs)
 
-__all__ = ["Bodies", "FieldFile", "Pairs", "ResultError", "ResultPaths", "__version__",
+if TYPE_CHECKING:
+    from .animation import animate
+
+__all__ = ["Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries", "HistoryFile", "Pairs",
+           "ResultError", "ResultPaths", "Results", "Series", "__version__", "animate", "compare",
            "energy_drift", "locate", "read_bodies", "read_history", "read_pairs"]
+
+#: Names that are imported when first used: matplotlib takes half a second to load.
+_LATE = {"animate": ".animation"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_LATE[name], __name__), name)
 
 
 def _version() -> str:

@@ -1,6 +1,7 @@
-"""`python -m emcon`: a picture or a short table of the result of a run.
+"""`python -m emcon`: a picture, an animation or a short table of a run; two runs compared.
 
-Exit codes as in docs/deck.md: 0 done, 2 wrong or missing input, 4 cannot write.
+Exit codes as in docs/deck.md: 0 done, 2 wrong or missing input, 4 cannot write; `compare` with a
+tolerance: 1 if a difference is above it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import sys
 from pathlib import Path
 
 from . import __version__
+from .comparison import compare
 from .results import ResultError, locate
 from .summary import summary
 
@@ -27,6 +29,20 @@ def _time(text: str) -> float:
     return time
 
 
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
+
+
+def _tolerance(text: str) -> float:
+    return 0.0 if text.strip() == "0" else _positive(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m emcon", description="Look at EMCON results.")
     parser.add_argument("--version", action="version", version=f"emcon {__version__}")
@@ -37,6 +53,21 @@ def _parser() -> argparse.ArgumentParser:
                       help="picture to write, by suffix png, pdf, svg, ... (default NAME.png)")
     plot.add_argument("--times", metavar="T", type=_time, nargs="+",
                       help="times of the upper row (default: six, evenly spaced)")
+    movie = commands.add_parser("animate", help="write an animation of a run")
+    movie.add_argument("result", metavar="RESULT", help=_RESULT)
+    movie.add_argument("--output", metavar="FILE", type=Path,
+                       help="animation to write, gif or mp4 by its suffix (default NAME.gif)")
+    movie.add_argument("--fps", metavar="N", type=_positive, default=20.0,
+                       help="frames per second (default 20)")
+    movie.add_argument("--field", metavar="NAME", default="von_mises",
+                       help="point or cell field that gives the colours (default von_mises)")
+    two = commands.add_parser("compare", help="print the largest differences of two runs")
+    two.add_argument("one", metavar="A", help=_RESULT)
+    two.add_argument("other", metavar="B", help="another result of the same model")
+    two.add_argument("--tolerance", metavar="TOL", type=_tolerance,
+                     help="exit with 1 if a relative difference is above TOL")
+    two.add_argument("--only", metavar="NAME", nargs="+", default=[],
+                     help="compare these fields, columns and series only")
     table = commands.add_parser("summary", help="print a short table of a run")
     table.add_argument("result", metavar="RESULT", help=_RESULT)
     return parser
@@ -52,12 +83,33 @@ def _plot(options: argparse.Namespace) -> None:
     print(f"picture: {picture}")
 
 
+def _animate(options: argparse.Namespace) -> None:
+    from .animation import write_animation
+
+    movie, notes = write_animation(locate(options.result), options.output, fps=options.fps,
+                                   field=options.field)
+    for note in notes:
+        print(f"note: {note}", file=sys.stderr)
+    print(f"animation: {movie}")
+
+
+def _compare(options: argparse.Namespace) -> int:
+    """The exit code: 1 if the tolerance is given and exceeded."""
+    found = compare(options.one, options.other, only=options.only)
+    print(found.table(options.tolerance))
+    return int(options.tolerance is not None and bool(found.exceeding(options.tolerance)))
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     options = _parser().parse_args(arguments)
     try:
         if options.command == "plot":
             _plot(options)
+        elif options.command == "animate":
+            _animate(options)
+        elif options.command == "compare":
+            return _compare(options)
         else:
             print(summary(locate(options.result)))
     except ResultError as problem:

@@ -1,5 +1,11 @@
 """Results of a run: the history `NAME.csv` or `NAME.h5`, and the fields over time `NAME.vtkhdf`.
 
+    with Results("ring") as ring:
+        u = ring.fields["displacement"]          # (n_frame, n_node, 3) [L], nothing read yet
+        u[-1], u[:, 12], u.at(2.5)               # a frame, a node over time, the frame at a time
+        ring.history["total"]                    # (n_row)
+        ring.series("TIP", "U").values           # (n_time, n_node, 2), of *NODE PRINT
+
 Files are described in docs/deck.md. A run that was killed leaves files that open: a history row
 or a frame that was not finished is left out.
 """
@@ -16,7 +22,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .fields import FieldFile, FieldSeries
+from .hdf5 import Array, ResultError, opened, read
+from .series import HistoryFile, Series
+
+__all__ = ["Array", "Bodies", "FieldFile", "FieldSeries", "HistoryFile", "Pairs", "ResultError",
+           "ResultPaths", "Results", "Series", "cpu_seconds", "energy_drift", "locate",
+           "read_bodies", "read_contact_force", "read_history", "read_pairs", "read_wall_seconds"]
 
 #: Columns of the history that count; all others are real numbers.
 COUNTS = ("increment", "active", "newton", "cuts")
@@ -26,10 +38,6 @@ NEEDED = ("increment", "time", "kinetic", "strain", "external_work", "total")
 ZERO_ENERGY = 64.0*float(np.finfo(np.float64).eps)
 
 _SUFFIXES = (".vtkhdf", ".h5", ".csv", ".log", ".png")
-
-
-class ResultError(Exception):
-    """A result that is missing, foreign or broken; the text is for the user."""
 
 
 @dataclass(frozen=True)
@@ -144,11 +152,11 @@ def _read_table(path: Path) -> NDArray[np.void]:
 
 def _read_history_group(path: Path) -> NDArray[np.void]:
     """Group `history` of NAME.h5: one data set (n_row) per column."""
-    with _open(path) as file:
+    with opened(path) as file:
         group = file.get("history")
         if not isinstance(group, h5py.Group):
             raise ResultError(f"{path} is not an EMCON history: it has no group /history")
-        return _history_array({name: _read(group, name) for name in group
+        return _history_array({name: read(group, name) for name in group
                                if isinstance(group[name], h5py.Dataset)
                                and group[name].ndim == 1})
 
@@ -200,12 +208,12 @@ def read_bodies(paths: ResultPaths) -> Bodies | None:
     """Masses and momenta of the bodies, /sets/BODIES in NAME.h5; None if they are not there."""
     if not paths.history.is_file():
         return None
-    with _open(paths.history) as file:
+    with opened(paths.history) as file:
         group = file.get("sets/BODIES")
         if not isinstance(group, h5py.Group):
             return None
         try:
-            mass, momentum = _read(group, "MASS"), _read(group, "MOMENTUM")
+            mass, momentum = read(group, "MASS"), read(group, "MOMENTUM")
         except ResultError:
             return None
     mass = mass.ravel()
@@ -222,14 +230,14 @@ def read_contact_force(paths: ResultPaths) -> tuple[Array, Array] | None:
     """
     if not paths.history.is_file():
         return None
-    with _open(paths.history) as file:
+    with opened(paths.history) as file:
         group = file.get("sets/CONTACT")
         if not isinstance(group, h5py.Group):
             return None
         name = next((name for name in ("TOTAL_CF", "CF") if name in group), None)
         if name is None or f"{name}_time" not in group:
             return None
-        times, force = _read(group, f"{name}_time"), _read(group, name)
+        times, force = read(group, f"{name}_time"), read(group, name)
     rows = min(len(times), len(force))
     if force.ndim != 3 or rows == 0:
         return None
@@ -262,20 +270,20 @@ def read_pairs(paths: ResultPaths) -> Pairs | None:
     """
     if not paths.history.is_file():
         return None
-    with _open(paths.history) as file:
+    with opened(paths.history) as file:
         group = file.get("sets/PAIRS")
         if not isinstance(group, h5py.Group) or "CF" not in group:
             return None
         time, on_slave, on_master, length, active = (
-            _read(group, name) for name in ("CF_time", "CF", "CF_MASTER", "CONTACT_LENGTH", "CNUM"))
-        names = [tuple(str(name) for name in np.char.decode(group[side][()], "utf-8"))
-                 for side in ("SLAVE", "MASTER")]
+            read(group, name) for name in ("CF_time", "CF", "CF_MASTER", "CONTACT_LENGTH", "CNUM"))
+        slave, master = (tuple(str(name) for name in np.char.decode(group[side][()], "utf-8"))
+                         for side in ("SLAVE", "MASTER"))
     rows = min(map(len, (time, on_slave, on_master, length, active)))
-    n_pair = len(names[0])
+    n_pair = len(slave)
     if (on_slave.shape[1:] != (n_pair, 3) or on_master.shape[1:] != (n_pair, 3)
             or length.shape[1:] != (n_pair,) or active.shape[1:] != (n_pair,)):
         raise ResultError(f"{paths.history}: the data sets of /sets/PAIRS do not fit each other")
-    return Pairs(*names, time[:rows], on_slave[:rows, :, :2], on_slave[:rows, :, 2],
+    return Pairs(slave, master, time[:rows], on_slave[:rows, :, :2], on_slave[:rows, :, 2],
                  on_master[:rows, :, :2], on_master[:rows, :, 2], length[:rows],
                  active[:rows].astype(np.int64))
 
@@ -284,114 +292,12 @@ def read_wall_seconds(paths: ResultPaths) -> float | None:
     """Wall time of the run [s], /sets/RUN/WALL_SECONDS in NAME.h5; None if it is not there."""
     if not paths.history.is_file():
         return None
-    with _open(paths.history) as file:
+    with opened(paths.history) as file:
         group = file.get("sets/RUN")
         if not isinstance(group, h5py.Group) or "WALL_SECONDS" not in group:
             return None
-        return float(_read(group, "WALL_SECONDS").ravel()[-1])
+        return float(read(group, "WALL_SECONDS").ravel()[-1])
 
-
-# --- fields ------------------------------------------------------------------------------------
-
-class FieldFile:
-    """Fields over time of one run (NAME.vtkhdf), read when asked for.
-
-    Attributes: `times` (n_frame) [T], `points` (n_node, 3) reference positions [L], `cells` list
-    of node numbers (0-based) per element, `point_fields` and `cell_fields` names. Frames are
-    counted from 0; -1 is the last.
-    """
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = Path(path)
-        self._file = _open(self.path)
-        try:
-            self._read_mesh()
-        except BaseException:
-            self._file.close()
-            raise
-
-    def _read_mesh(self) -> None:
-        root = self._file.get("VTKHDF")
-        kind = root.attrs.get("Type", b"") if isinstance(root, h5py.Group) else b""
-        kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
-        if kind.strip() != "UnstructuredGrid" or "Steps" not in root:
-            raise ResultError(f"{self.path} is not an EMCON field file: no unstructured grid "
-                              "over time in it")
-        self._root = root
-        steps = root["Steps"]
-        n_frame = int(steps.attrs.get("NSteps", 0))
-        self.times: Array = _read(steps, "Values")[:n_frame]
-        self.points: Array = _read(root, "Points")
-        connectivity = _read(root, "Connectivity").astype(np.int64)
-        offsets = _read(root, "Offsets").astype(np.int64)
-        n_node = len(self.points)
-        if (self.points.ndim != 2 or len(offsets) < 2 or offsets[-1] != len(connectivity)
-                or (np.diff(offsets) <= 0).any() or not len(connectivity)
-                or connectivity.min() < 0 or connectivity.max() >= n_node):
-            raise ResultError(f"{self.path}: the mesh in it is broken")
-        self.cells: list[NDArray[np.int64]] = np.split(connectivity, offsets[1:-1])
-        self.point_fields = self._names("PointData")
-        self.cell_fields = self._names("CellData")
-        if not len(self.times):
-            raise ResultError(f"{self.path} has no frame; the run ended before its first")
-
-    def _names(self, group: str) -> tuple[str, ...]:
-        return tuple(self._root[group]) if group in self._root else ()
-
-    def point(self, name: str, frame: int) -> Array:
-        """Point field `name` at `frame`: (n_node) or (n_node, n_comp)."""
-        return self._frame("PointData", name, frame, len(self.points))
-
-    def cell(self, name: str, frame: int) -> Array:
-        """Cell field `name` at `frame`: (n_element) or (n_element, n_comp)."""
-        return self._frame("CellData", name, frame, len(self.cells))
-
-    def _frame(self, group: str, name: str, frame: int, n: int) -> Array:
-        if name not in self._names(group):
-            raise ResultError(f"{self.path} has no field {name}; it has "
-                              f"{', '.join(self._names(group)) or 'none'}")
-        frame = range(len(self.times))[frame]
-        offsets = self._root["Steps"].get(f"{group}Offsets/{name}")
-        start = int(offsets[frame]) if offsets is not None else frame*n
-        data = self._root[group][name]
-        if start < 0 or start + n > len(data):
-            raise ResultError(f"{self.path}: field {name} ends before frame {frame}")
-        return np.asarray(data[start:start + n], dtype=np.float64)
-
-    def nearest_frame(self, time: float) -> int:
-        """The frame whose time is nearest to `time` [T]."""
-        return int(np.argmin(np.abs(self.times - time)))
-
-    def bodies(self) -> NDArray[np.int64]:
-        """Body number per node (n_node): nodes that elements connect have the same; -1: none."""
-        body = np.full(len(self.points), -1, dtype=np.int64)
-        used = np.concatenate(self.cells)
-        body[used] = used
-        sizes = {len(c) for c in self.cells}
-        groups = [np.array([c for c in self.cells if len(c) == size]) for size in sizes]
-        while True:
-            before = body.copy()
-            for group in groups:
-                lowest = np.repeat(body[group].min(axis=1)[:, None], group.shape[1], axis=1)
-                np.minimum.at(body, group, lowest)
-            body[used] = body[body[used]]
-            if np.array_equal(body, before):
-                break
-        numbers = {root: k for k, root in enumerate(np.unique(body[used]))}
-        return np.array([numbers.get(root, -1) for root in body], dtype=np.int64)
-
-    def close(self) -> None:
-        self._file.close()
-
-    def __enter__(self) -> FieldFile:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        self.close()
-
-
-# --- HDF5 --------------------------------------------------------------------------------------
 
 def _reason(problem: Exception) -> str:
     if isinstance(problem, UnicodeDecodeError):
@@ -399,22 +305,69 @@ def _reason(problem: Exception) -> str:
     return (problem.strerror if isinstance(problem, OSError) else None) or str(problem)
 
 
-def _open(path: Path) -> h5py.File:
-    """Open for reading, without a lock: a run may still be writing."""
-    if not path.is_file():
-        raise ResultError(f"no file {path}")
-    try:
-        return h5py.File(path, "r", locking=False)
-    except OSError as problem:
-        reason = problem.strerror or "it is not an HDF5 file, or it is damaged"
-        raise ResultError(f"cannot read {path}: {reason}") from None
+# --- all of a run ------------------------------------------------------------------------------
 
+class Results:
+    """The files of one run, each opened when it is first asked for.
 
-def _read(group: h5py.Group, name: str) -> Array:
-    data = group.get(name)
-    if not isinstance(data, h5py.Dataset):
-        raise ResultError(f"{group.file.filename} has no data set {group.name}/{name}")
-    try:
-        return np.atleast_1d(np.asarray(data[()], dtype=np.float64))
-    except (OSError, TypeError, ValueError):
-        raise ResultError(f"{group.file.filename}: cannot read {group.name}/{name}") from None
+    result   base name of the run (`build/run/ring`) or any one of its files
+
+    A context manager. Raises `ResultError` where the run, or what is asked for, is not there, and
+    after `close`. What was read before stays valid.
+    """
+
+    def __init__(self, result: str | os.PathLike[str]) -> None:
+        self.paths = locate(result)
+        self._fields: FieldFile | None = None
+        self._series: HistoryFile | None = None
+        self._history: NDArray[np.void] | None = None
+        self._is_closed = False
+
+    def _check(self) -> None:
+        if self._is_closed:
+            raise ResultError(f"the results of {self.paths.base} are closed")
+
+    @property
+    def fields(self) -> FieldFile:
+        """The fields over time: `fields["displacement"]`."""
+        self._check()
+        if self._fields is None:
+            self._fields = FieldFile(self.paths.field)
+        return self._fields
+
+    @property
+    def history(self) -> NDArray[np.void]:
+        """The history, (n_row) with a column per name: `history["total"]`; see `read_history`."""
+        self._check()
+        if self._history is None:
+            self._history = read_history(self.paths)
+        return self._history
+
+    def series(self, name: str, variable: str) -> Series:
+        """A printed quantity over time; see `HistoryFile.series`."""
+        return self._history_file().series(name, variable)
+
+    @property
+    def sets(self) -> dict[str, tuple[str, ...]]:
+        """Names of the printed quantities, per set."""
+        return self._history_file().sets
+
+    def _history_file(self) -> HistoryFile:
+        self._check()
+        if self._series is None:
+            self._series = HistoryFile(self.paths.history)
+        return self._series
+
+    def close(self) -> None:
+        """Close all files; harmless if they are closed."""
+        self._is_closed = True
+        for file in (self._fields, self._series):
+            if file is not None:
+                file.close()
+
+    def __enter__(self) -> Results:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()

@@ -110,6 +110,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer(c_int) :: status
       real(c_double) :: fill
+      logical :: is_worse
       integer :: n
 
       if (c_associated(self%symbolic)) then
@@ -131,8 +132,8 @@ contains
          call order(self, ordering_amd, status)
          fill = self%info(info_symmetric_fill)
          if (status == umfpack_ok) call order(self, ordering_metis, status)
-         if (status == umfpack_ok .and. self%info(info_symmetric_fill) > fill) &
-            call order(self, ordering_amd, status)
+         is_worse = self%info(info_symmetric_fill) > fill
+         if (status == umfpack_ok .and. is_worse) call order(self, ordering_amd, status)
       else
          call order(self, self%ordering, status)
       end if

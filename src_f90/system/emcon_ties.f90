@@ -435,8 +435,8 @@ contains
                if (.not. before > 0.0_wp .or. after > least_area*before) cycle
                k = maxloc(abs(move(1, node)) + abs(move(2, node)), 1)
                call raise(error, err_input, tie_text(scene, node(k)) // "element " // &
-                  to_text(scene%element_label(e)) // " would be spoilt: the tie moves its node " // &
-                  to_text(scene%node_label(node(k))) // " by " // to_text(norm2(move(:, node(k)))) &
+                  to_text(scene%element_label(e)) // " would be spoilt: the tie moves its " // &
+                  "node " // to_text(scene%node_label(node(k))) // " by " // to_text(norm2(move(:, node(k)))) &
                   // " onto the master surface; let the surfaces meet, or refine the coarser one")
                return
             end do

@@ -77,7 +77,7 @@ def label(kind, value):
 
 def report(started, folder):
     if not started:
-        return ["*(left out: no `ties_condition`; make build/release/ties_condition)*"]
+        return ["*(left out: no `ties_condition`; make benches)*"]
     done = {key: future.result() for key, future in started.items()}
     keys = [key[:2] for key in done if key[2] == METHODS[0]]
     rows = []

@@ -1,0 +1,233 @@
+"""Fields over time, `NAME.vtkhdf`: read frame by frame, when asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from .hdf5 import Array, ResultError, guarded, open_file, read
+
+
+class FieldFile:
+    """Fields over time of one run (NAME.vtkhdf), read when asked for.
+
+    Attributes: `times` (n_frame) [T], `points` (n_node, 3) reference positions [L], `cells` list
+    of node numbers (0-based) per element, `point_fields` and `cell_fields` names. Frames are
+    counted from 0; -1 is the last. `file[name]` is a field at all frames, a `FieldSeries`.
+
+    Raises `ResultError` for a file that is missing, foreign or damaged, for a field that it does
+    not have, and for fields asked for after `close`.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self._file = open_file(self.path)
+        try:
+            with guarded(self.path, "the mesh"):
+                self._read_mesh()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _read_mesh(self) -> None:
+        root = self._file.get("VTKHDF")
+        kind = root.attrs.get("Type", b"") if isinstance(root, h5py.Group) else b""
+        kind = kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
+        if kind.strip() != "UnstructuredGrid" or "Steps" not in root:
+            raise ResultError(f"{self.path} is not an EMCON field file: no unstructured grid "
+                              "over time in it")
+        self._group = root
+        steps = root["Steps"]
+        n_frame = int(steps.attrs.get("NSteps", 0))
+        self.times: Array = read(steps, "Values")[:n_frame]
+        self.points: Array = read(root, "Points")
+        connectivity = read(root, "Connectivity").astype(np.int64)
+        offsets = read(root, "Offsets").astype(np.int64)
+        n_node = len(self.points)
+        if (self.points.ndim != 2 or len(offsets) < 2 or offsets[-1] != len(connectivity)
+                or (np.diff(offsets) <= 0).any() or not len(connectivity)
+                or connectivity.min() < 0 or connectivity.max() >= n_node):
+            raise ResultError(f"{self.path}: the mesh in it is broken")
+        self.cells: list[NDArray[np.int64]] = np.split(connectivity, offsets[1:-1])
+        self.point_fields = self._names("PointData")
+        self.cell_fields = self._names("CellData")
+        if not len(self.times):
+            raise ResultError(f"{self.path} has no frame; the run ended before its first")
+
+    def _names(self, group: str) -> tuple[str, ...]:
+        return tuple(self._group[group]) if group in self._group else ()
+
+    def _root(self) -> h5py.Group:
+        if not self._file:
+            raise ResultError(f"{self.path} is closed")
+        return self._group
+
+    def point(self, name: str, frame: int) -> Array:
+        """Point field `name` at `frame`: (n_node) or (n_node, n_comp)."""
+        return self._series("PointData", name)[frame]
+
+    def cell(self, name: str, frame: int) -> Array:
+        """Cell field `name` at `frame`: (n_element) or (n_element, n_comp)."""
+        return self._series("CellData", name)[frame]
+
+    def __getitem__(self, name: str) -> FieldSeries:
+        """A point or cell field at all frames; nothing is read yet."""
+        if name in self.cell_fields and name not in self.point_fields:
+            return self._series("CellData", name)
+        if name not in self.point_fields:
+            raise ResultError(f"{self.path} has no field {name}; it has "
+                              f"{', '.join((*self.point_fields, *self.cell_fields)) or 'none'}")
+        return self._series("PointData", name)
+
+    def _series(self, group: str, name: str) -> FieldSeries:
+        names = self.point_fields if group == "PointData" else self.cell_fields
+        if name not in names:
+            raise ResultError(f"{self.path} has no field {name}; it has "
+                              f"{', '.join(names) or 'none'}")
+        return FieldSeries(self, group, name)
+
+    def at(self, name: str, time: float) -> Array:
+        """The field `name` at the frame nearest to `time` [T]; see `FieldSeries.at`."""
+        return self[name].at(time)
+
+    def nearest_frame(self, time: float) -> int:
+        """The frame whose time is nearest to `time` [T]."""
+        return int(np.argmin(np.abs(self.times - time)))
+
+    def frame_at(self, time: float) -> int:
+        """The frame nearest to `time` [T]; raises `ResultError` outside the run.
+
+        The ends may be missed by half of the longest time between frames.
+        """
+        slack = 0.5*float(np.max(np.diff(self.times), initial=0.0))
+        if not self.times[0] - slack <= time <= self.times[-1] + slack:
+            raise ResultError(f"no frame near time {time:g}; {self.path} runs from "
+                              f"{self.times[0]:g} to {self.times[-1]:g}")
+        return self.nearest_frame(time)
+
+    def bodies(self) -> NDArray[np.int64]:
+        """Body number per node (n_node): nodes that elements connect have the same; -1: none."""
+        body = np.full(len(self.points), -1, dtype=np.int64)
+        used = np.concatenate(self.cells)
+        body[used] = used
+        sizes = {len(c) for c in self.cells}
+        groups = [np.array([c for c in self.cells if len(c) == size]) for size in sizes]
+        while True:
+            before = body.copy()
+            for group in groups:
+                lowest = np.repeat(body[group].min(axis=1)[:, None], group.shape[1], axis=1)
+                np.minimum.at(body, group, lowest)
+            body[used] = body[body[used]]
+            if np.array_equal(body, before):
+                break
+        numbers = {root: k for k, root in enumerate(np.unique(body[used]))}
+        return np.array([numbers.get(root, -1) for root in body], dtype=np.int64)
+
+    def refresh(self) -> int:
+        """Look again at a file that a run is writing; returns the number of frames."""
+        self._root()
+        fresh = open_file(self.path)
+        self._file.close()
+        self._file = fresh
+        with guarded(self.path, "the mesh"):
+            self._read_mesh()
+        return len(self.times)
+
+    def close(self) -> None:
+        """Close the file; harmless if it is closed. What was read stays valid."""
+        self._file.close()
+
+    def __enter__(self) -> FieldFile:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+
+class FieldSeries:
+    """One field at all frames, like an array (n_frame, n[, n_comp]) of which parts are read.
+
+    The first index is the frame, a number or a slice; the others are those of an array: `f[-1]`,
+    `f[::10]`, `f[:, 12]`, `f[5, :, 0]`. `numpy.asarray(f)` reads all. Raises `IndexError` for a
+    frame that is not there.
+    """
+
+    def __init__(self, file: FieldFile, group: str, name: str) -> None:
+        self._field_file = file
+        self._place = (group, name)
+        root = file._root()
+        with guarded(file.path, f"field {name}"):
+            components = tuple(root[group][name].shape[1:])
+        self.name = name
+        self.times = file.times                                  #: (n_frame) [T]
+        n = len(file.points) if group == "PointData" else len(file.cells)
+        self.shape: tuple[int, ...] = (len(self.times), n, *components)
+        self.dtype = np.dtype(np.float64)
+
+    @property
+    def ndim(self) -> int:
+        return len(self.shape)
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __iter__(self) -> Iterator[Array]:
+        return (self[k] for k in range(len(self)))
+
+    def __getitem__(self, key: Any) -> Array:
+        first, *rest = key if isinstance(key, tuple) else (key,)
+        if isinstance(first, slice):
+            frames = range(*first.indices(len(self)))
+            values = [self._frame(k, rest) for k in frames]
+            return np.stack(values) if values else np.empty((0, *self.shape[1:]))[:, *rest]
+        if not isinstance(first, (int, np.integer)):
+            raise TypeError(f"{self.name}: a frame is a number or a slice, not {first!r}")
+        frame = int(first)
+        if not -len(self) <= frame < len(self):
+            raise IndexError(f"{self.name} has {len(self)} frames; there is no frame {frame}")
+        return self._frame(frame % len(self), rest)
+
+    def at(self, time: float) -> Array:
+        """The field at the frame nearest to `time` [T]: (n) or (n, n_comp).
+
+        Raises `ResultError` for a time outside the run.
+        """
+        return self[self._field_file.frame_at(time)]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        if copy is False:
+            raise ValueError(f"{self.name} is in a file: an array of it is a copy")
+        return self[:].astype(dtype or self.dtype, copy=False)
+
+    def __repr__(self) -> str:
+        return f"FieldSeries({self.name!r}, shape={self.shape})"
+
+    def _frame(self, frame: int, rest: list[Any]) -> Array:
+        """Part `rest` of one frame; of a single node only its row is read."""
+        group, name = self._place
+        root = self._field_file._root()
+        n = self.shape[1]
+        path = self._field_file.path
+        row = rest[0] if rest and isinstance(rest[0], (int, np.integer)) else None
+        if row is not None and not -n <= row < n:
+            raise IndexError(f"{name} has {n} rows in a frame; there is no row {row}")
+        with guarded(path, f"field {name} at frame {frame}"):
+            offsets = root["Steps"].get(f"{group}Offsets/{name}")
+            data = root[group][name]
+            # offsets may be missing: then each frame is written anew
+            start = frame*n if offsets is None else -1
+            if offsets is not None and frame < len(offsets):
+                start = int(offsets[frame])
+            if start < 0 or start + n > len(data):
+                raise ResultError(f"{path}: field {name} ends before frame {frame}")
+            chosen = slice(start, start + n) if row is None else start + int(row) % n
+            values: Array = np.asarray(data[chosen], dtype=np.float64)
+        return np.asarray(values[tuple(rest if row is None else rest[1:])])

@@ -1,0 +1,26 @@
+"""Meshes of CPE3 and CPE4 elements with sets and surfaces, and the decks made of them.
+
+    from emcon.mesh import Deck, block, ring
+
+    mesh = (ring((0.0, 10.1), (8.0, 10.0), (64, 4))
+            + block((-25.0, -5.0), (60.0, 5.0), (60, 5)))
+    deck = Deck(mesh, "A ring falls on a block", parameters={"h": 0.01})
+    deck.add(cards)                           # materials, contact, steps: text of docs/deck.md
+    deck.write("ring.inp")
+
+The sides of what the builders make have names: BLOCK_TOP, RING_OUTER, ... Each is a surface and
+the set of its nodes; the body itself is a set of nodes and of elements. `read` takes meshes from
+files of Gmsh and Abaqus.
+
+Lengths are in the deck's unit [L], angles in radians, counter-clockwise. Nodes and elements are
+named by their labels, whole numbers from 1 on, as in a deck.
+"""
+
+from .checks import MeshError, MeshWarning
+from .deck import Deck
+from .mesh import Mesh
+from .reading import read
+from .shapes import block, disc, grid, ring, strip
+
+__all__ = ["Deck", "Mesh", "MeshError", "MeshWarning", "block", "disc", "grid", "read", "ring",
+           "strip"]

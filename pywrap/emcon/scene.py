@@ -1,0 +1,254 @@
+"""The deformed bodies at some frames, coloured by a field: read, and drawn into axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from .results import Array, FieldFile, ResultError
+
+#: A body that moves less than this fraction of the largest displacement counts as support.
+SUPPORT_FRACTION = 0.1
+#: Room around the moving bodies, as a fraction of their extent; room for the supports below.
+MARGIN, SUPPORT_ROOM = 0.06, 0.30
+#: The view follows the bodies where their whole path is this much longer than they are.
+FOLLOW_RATIO = 1.25
+#: The colour scale ends where all but this fraction of the elements that move are below.
+COLOUR_CUT = 0.01
+#: Distance of the y labels from the axes at the left [inch].
+LABEL_OFFSET = 0.36
+
+STYLE: dict[Any, Any] = {"font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 10,
+         "axes.linewidth": 0.6, "axes.spines.top": False, "axes.spines.right": False,
+         "axes.labelsize": 10, "xtick.labelsize": 9, "ytick.labelsize": 9,
+         "xtick.direction": "in", "ytick.direction": "in", "xtick.major.width": 0.6,
+         "ytick.major.width": 0.6, "legend.frameon": False, "legend.fontsize": 9,
+         "lines.linewidth": 1.1, "svg.hashsalt": "emcon", "pdf.fonttype": 42}
+BLACK, BLUE, ORANGE, GREY = "#1a1a1a", "#1f5fa8", "#d1660f", "#8a8a8a"
+
+#: (x_min, x_max, y_min, y_max) [L]
+View = tuple[float, float, float, float]
+
+
+@dataclass
+class Scene:
+    """Some frames: positions (n_node, 2) and colour values per element, and the views."""
+
+    times: list[float]
+    position: list[Array]
+    values: list[Array] | None      #: each (n_element), units of the field
+    label: str                      #: what they are
+    cells: list[NDArray[np.int64]]
+    is_support: NDArray[np.bool_]   #: per node
+    notes: list[str] = field(default_factory=list)
+
+    def views(self) -> list[View]:
+        """Views [L] per frame; all of one size and one y range."""
+        boxes = np.array([_extent(p[~self.is_support]) for p in self.position])
+        y_min, y_max = float(boxes[:, 2].min()), float(boxes[:, 3].max())
+        margin = MARGIN*(y_max - y_min)
+        if self.is_support.any():
+            room = SUPPORT_ROOM*float(np.max(boxes[:, 3] - boxes[:, 2]))
+            _, _, low, high = _extent(np.concatenate(self.position))
+            y_low, y_high = max(low, y_min - room), min(high, y_max + room)
+        else:
+            y_low, y_high = y_min, y_max
+        # no margin where a support is cut: it goes on beyond the frame
+        y_low = y_low if y_low < y_min else y_min - margin
+        y_high = y_high if y_high > y_max else y_max + margin
+        return [(x0, x1, y_low, y_high) for x0, x1 in _windows(boxes[:, 0], boxes[:, 1])]
+
+    def moves(self) -> NDArray[np.bool_]:
+        """Per element: part of a body that moves."""
+        return np.array([not self.is_support[cell[0]] for cell in self.cells])
+
+    def polygons(self, frame: int) -> list[Array]:
+        """Corners (3 or 4, 2) of each element [L]."""
+        return [self.position[frame][cell] for cell in self.cells]
+
+
+def _extent(points: Array) -> View:
+    low, high = points.min(axis=0), points.max(axis=0)
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def _windows(low: Array, high: Array) -> list[tuple[float, float]]:
+    """Intervals of one length that hold [low, high] of each frame, with margin.
+
+    They are one and the same unless the way is long: then they follow.
+    """
+    length = float(np.max(high - low))
+    centre = 0.5*(low + high)
+    path = float(high.max() - low.min())
+    if path <= FOLLOW_RATIO*length:
+        length = path
+        centre = np.full(len(low), 0.5*float(low.min() + high.max()))
+    half = 0.5*length*(1.0 + 2.0*MARGIN)
+    return [(float(c) - half, float(c) + half) for c in centre]
+
+
+# --- reading -----------------------------------------------------------------------------------
+
+def _von_mises(file: FieldFile, frame: int) -> Array | None:
+    """Von Mises stress per node (n_node) [M/(L T^2)], or None if the file has no stress."""
+    if "von_mises" in file.point_fields:
+        return file.point("von_mises", frame)
+    if "cauchy_stress" not in file.point_fields:
+        return None
+    xx, yy, zz, xy, yz, xz = file.point("cauchy_stress", frame).T
+    square: Array = (0.5*((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2)
+                     + 3.0*(xy**2 + yz**2 + xz**2))
+    return np.sqrt(square)
+
+
+def _colour_values(file: FieldFile, name: str, frame: int) -> Array | None:
+    """A field per element (n_element): mean over its nodes; of vectors the length."""
+    nodal = _von_mises(file, frame) if name == "von_mises" else None
+    if name == "von_mises" and nodal is None:
+        return None
+    if nodal is None:
+        values = file[name][frame]
+        if values.ndim > 1:
+            values = np.sqrt((values**2).sum(axis=1))
+        if name not in file.point_fields:
+            return values
+        nodal = values
+    return np.array([nodal[cell].mean() for cell in file.cells])
+
+
+def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") -> Scene:
+    """The bodies at some frames, coloured by the point or cell field `name`.
+
+    Raises `ResultError` for a result in three dimensions and for a field that is not there; a
+    missing stress or displacement is a note.
+    """
+    if np.ptp(file.points[:, 2]) > 0.0:
+        raise ResultError(f"{file.path} is three-dimensional; open it in ParaView")
+    notes = []
+    if "displacement" in file.point_fields:
+        shift = [file.point("displacement", k)[:, :2] for k in frames]
+    else:
+        notes.append("no displacement in the result (asked for by *NODE FILE, U): bodies shown "
+                     "undeformed")
+        frames = frames[:1]
+        shift = [np.zeros((len(file.points), 2))]
+    values = [v for v in (_colour_values(file, name, k) for k in frames) if v is not None]
+    if not values:
+        notes.append("no stress in the result (asked for by *EL FILE, S): bodies shown in grey")
+
+    body = file.bodies()
+    travel = np.max([np.hypot(u[:, 0], u[:, 1]) for u in shift], axis=0)
+    most = np.array([np.max(travel[body == b], initial=0.0) for b in range(body.max() + 1)])
+    support = most < SUPPORT_FRACTION*most.max()
+    label = "von Mises stress" if name == "von_mises" else name.replace("_", " ")
+    return Scene(times=[float(file.times[k]) for k in frames],
+                 position=[file.points[:, :2] + u for u in shift],
+                 values=values or None, label=label, cells=file.cells,
+                 is_support=(body < 0) | support[body], notes=notes)
+
+
+# --- drawing -----------------------------------------------------------------------------------
+
+@dataclass
+class ColourScale:
+    """Colours of the values of a scene; `extend` says at which ends some are beyond."""
+
+    norm: Normalize
+    colours: LinearSegmentedColormap
+    extend: str
+
+
+def _colours() -> LinearSegmentedColormap:
+    """Pale to dark, equal steps in lightness; pale enough that unloaded bodies recede."""
+    colours = matplotlib.colormaps["magma_r"](np.linspace(0.03, 0.86, 256))
+    colours[:48, :3] += (1.0 - np.linspace(0.0, 1.0, 48)[:, None])*(0.96 - colours[:48, :3])
+    return LinearSegmentedColormap.from_list("stress", colours)
+
+
+def colour_scale(scene: Scene) -> ColourScale:
+    """From zero, or the lowest, to the highest value in what moves, a few outliers aside."""
+    if scene.values is None:
+        return ColourScale(Normalize(0.0, 1.0), _colours(), "neither")
+    low, top = 0.0, 0.0
+    every = np.concatenate(scene.values)
+    moves = scene.moves()
+    chosen = np.concatenate([s[moves] for s in scene.values])
+    chosen = chosen[np.isfinite(chosen)]
+    if chosen.size:
+        top = float(np.quantile(chosen, 1.0 - COLOUR_CUT))
+        low = min(float(np.quantile(chosen, COLOUR_CUT)), 0.0)
+    highest, lowest = float(np.nanmax(every, initial=0.0)), float(np.nanmin(every, initial=0.0))
+    if not top > low:
+        top = low + 1.0
+        return ColourScale(Normalize(low, top), _colours(), "neither")
+    above = highest > top + 0.02*(top - low)
+    below = lowest < low - 0.02*(top - low)
+    extend = {(True, True): "both", (True, False): "max", (False, True): "min"}
+    return ColourScale(Normalize(low, top), _colours(), extend.get((above, below), "neither"))
+
+
+def draw_bodies(axes: Axes, scene: Scene, frame: int, view: View, width: float,
+                scale: ColourScale) -> PolyCollection:
+    """Draw the elements of one frame into axes of a width [inch]."""
+    elements = PolyCollection(scene.polygons(frame), edgecolors=(0.1, 0.1, 0.1, 0.55),
+                              linewidths=_edge_width(scene, view, width))
+    if scene.values is not None:
+        elements.set(array=scene.values[frame], norm=scale.norm, cmap=scale.colours)
+    else:
+        elements.set_facecolor("#dddddd")
+    axes.add_collection(elements)
+    return elements
+
+
+def draw_colour_bar(figure: Figure, box: tuple[float, float, float, float], scene: Scene,
+                    scale: ColourScale) -> None:
+    """Draw the colour bar into a box (left, bottom, width, height) of the figure, 0 to 1."""
+    bar = figure.add_axes(box)
+    mappable = matplotlib.cm.ScalarMappable(scale.norm, scale.colours)
+    colour_bar = figure.colorbar(mappable, cax=bar, extend=scale.extend, extendfrac=0.04)
+    colour_bar.set_label(scene.label)
+    colour_bar.outline.set_linewidth(0.5)
+    bar.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    bar.tick_params(direction="in", width=0.5)
+
+
+def _edge_width(scene: Scene, view: View, width: float) -> float:
+    """Line width [point]: thin against the smallest elements as printed."""
+    side = min(float(np.ptp(scene.position[0][cell], axis=0).max()) for cell in scene.cells)
+    return float(np.clip(0.04*side/(view[1] - view[0])*width*72.0, 0.05, 0.35))
+
+
+def set_view(axes: Axes, view: View, width: float, height: float) -> None:
+    """Limits, widened where the panel [inch] is larger than the view so that the scale is true."""
+    x_min, x_max, y_min, y_max = view
+    scale = max((x_max - x_min)/width, (y_max - y_min)/height)
+    x_pad, y_pad = 0.5*(scale*width - (x_max - x_min)), 0.5*(scale*height - (y_max - y_min))
+    axes.set_xlim(x_min - x_pad, x_max + x_pad)
+    axes.set_ylim(y_min - y_pad, y_max + y_pad)
+
+
+def frame_view(axes: Axes, view: View, width: float, height: float, is_first: bool) -> None:
+    """A frame with ticks around a view; the first of a row has labels at its left."""
+    set_view(axes, view, width, height)
+    axes.set_aspect("equal", adjustable="box")
+    for spine in axes.spines.values():
+        spine.set(visible=True, linewidth=0.4, color=GREY)
+    axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axes.tick_params(width=0.4, length=2.5)
+    axes.set_xlabel("$x$", labelpad=1)
+    if is_first:
+        axes.set_ylabel("$y$")
+        axes.yaxis.set_label_coords(-LABEL_OFFSET/width, 0.5)
+    else:
+        axes.tick_params(labelleft=False)
