@@ -13,7 +13,7 @@ module emcon_chain
    implicit none
    private
    public :: chain_t, chain_init, chain_number, chain_thickness, chain_tributary, &
-      chain_distance, chain_is_joint, chain_touches, chain_corners, chain_crossing
+      chain_distance, chain_is_joint, chain_touches, chain_corners, chain_crossing, surface_edges
 
    type :: chain_t
       integer :: n_edge = 0
@@ -46,21 +46,13 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, e, kind
+      integer :: i
 
-      allocate(self%edge(2, 0))
+      call surface_edges(scene, surface, self%edge)
+      self%n_edge = size(self%edge, 2)
       if (surface%is_nodal) then
          self%node = unique_sorted(surface%node)
       else
-         self%n_edge = size(surface%element)
-         deallocate(self%edge)
-         allocate(self%edge(2, self%n_edge))
-         do i = 1, self%n_edge
-            e = surface%element(i)
-            kind = scene%element_kind(e)
-            self%edge(:, i) = &
-               scene%element_node(element_kinds(kind)%face_node(:, surface%face(i)), e)
-         end do
          self%node = unique_sorted(reshape(self%edge, [2*self%n_edge]))
       end if
       allocate(self%length(self%n_edge))
@@ -73,6 +65,28 @@ contains
       if (allocated(error)) return
       call chain_number(self)
    end subroutine chain_init
+
+   !> The edges of `surface` by their first and last nodes; none for a nodal one.
+   pure subroutine surface_edges(scene, surface, edge)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, allocatable, intent(out) :: edge(:, :)      !! (2, n_edge)
+      integer :: i, n
+
+      if (allocated(surface%edge)) then
+         allocate(edge, source=surface%edge)
+         return
+      end if
+      n = 0
+      if (.not. surface%is_nodal) n = size(surface%element)
+      allocate(edge(2, n))
+      do i = 1, n
+         associate (e => surface%element(i))
+            edge(:, i) = scene%element_node( &
+               element_kinds(scene%element_kind(e))%face_node(:, surface%face(i)), e)
+         end associate
+      end do
+   end subroutine surface_edges
 
    !> Find the neighbours of each edge.
    subroutine link_edges(self, scene, surface, error)
@@ -183,8 +197,8 @@ contains
          .or. any(self%twin(self%end_node(:, e)) == node)
    end function chain_touches
 
-   !> Thickness of the section at each node of the chain of `surface`, 1 where there is none.
-   !> Between two sections that of the edge that begins at the node.
+   !> Thickness of the section at each node of the chain of `surface`, 1 where there is none or no
+   !> element. Between two sections that of the edge that begins at the node.
    pure subroutine chain_thickness(self, scene, surface, thickness)
       type(chain_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
@@ -193,6 +207,7 @@ contains
       integer :: i, side
 
       allocate(thickness(size(self%node)), source=1.0_wp)
+      if (allocated(surface%edge)) return
       do i = 1, size(self%node)
          do side = 1, 2
             associate (e => self%node_edge(side, i))

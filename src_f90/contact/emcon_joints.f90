@@ -6,8 +6,7 @@
 !> Edges keep their own nodes: what acts on an edge acts on its element.
 !> Source: docs/theory.md, section 4.
 module emcon_joints
-   use emcon_chain, only : chain_number, chain_t
-   use emcon_element_kinds, only : element_kinds
+   use emcon_chain, only : chain_number, chain_t, surface_edges
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, surface_t, tie_t
    implicit none
@@ -98,6 +97,7 @@ contains
       type(surface_t), intent(in) :: surface
       integer, intent(in) :: node(:)             !! of the scene
       logical :: is_on(size(node))
+      integer, allocatable :: edge(:, :)
       integer :: i, k
 
       is_on = .false.
@@ -107,15 +107,11 @@ contains
          end do
          return
       end if
-      do i = 1, size(surface%element)
-         associate (e => surface%element(i))
-            associate (face => scene%element_node(element_kinds(scene%element_kind(e)) &
-                  %face_node(:, surface%face(i)), e))
-               do k = 1, size(node)
-                  is_on(k) = is_on(k) .or. any(face == node(k))
-               end do
-            end associate
-         end associate
+      call surface_edges(scene, surface, edge)
+      do i = 1, size(edge, 2)
+         do k = 1, size(node)
+            is_on(k) = is_on(k) .or. any(edge(:, i) == node(k))
+         end do
       end do
    end function is_on
 

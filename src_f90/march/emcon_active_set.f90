@@ -19,6 +19,7 @@ module emcon_active_set
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_solve
+   public :: active_set_begin, active_set_select, active_set_advance, active_set_drop
    public :: step_done, step_inverted, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off
 
@@ -48,6 +49,8 @@ module emcon_active_set
       integer :: n_newton = 0                    !! iterations over all sets of the last step
       real(wp) :: deepest = 0.0_wp               !! smallest gap per edge at the end, 0 if all open
       logical :: is_stale = .false.              !! stencils were chosen for another motion
+      integer :: n_stale = 0                     !! so often in this step
+      logical :: only_adds = .false.             !! nothing is let go any more in this step
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
@@ -84,23 +87,14 @@ contains
       real(wp), intent(inout), contiguous :: du(:, :)    !! (2, n_node)
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: only_adds, has_changed
-      integer :: n_stale
+      logical :: is_done
 
-      n_stale = 0
       call stopwatch_start(system%contact_clock)
-      call begin_contact(self, system, scene, state, du)
+      call active_set_begin(self, system, scene, state, du)
       call stopwatch_stop(system%contact_clock)
-      self%lam = state%lam
-      self%n_newton = 0
-      self%n_tried = 0
-      only_adds = .false.
-      self%comes_and_goes = .false.
-      self%is_dropped = .false.
       do
-         call remember(self)
          call stopwatch_start(system%contact_clock)
-         call select_active(self, system, scene, state%u, du)
+         call active_set_select(self, system, scene, state%u, du)
          call stopwatch_stop(system%contact_clock)
          call newton_solve(newton, system, scene, correction, self%set, pose, state%u, state%v, &
             offset, du, status, error)
@@ -108,27 +102,62 @@ contains
          self%lam(self%set%id) = self%set%lam
          self%n_newton = self%n_newton + newton%n_iteration
          if (status == newton_redundant) then
-            call drop(self, correction%redundant(:correction%n_redundant))
+            call active_set_drop(self, correction%redundant(:correction%n_redundant))
             cycle
          end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
          if (status /= newton_converged .or. size(system%contact) == 0) return
          call stopwatch_start(system%contact_clock)
-         call update(self, system, scene, state, du, only_adds, has_changed, status)
+         call active_set_advance(self, system, scene, state, du, is_done, status)
          call stopwatch_stop(system%contact_clock)
-         if (self%is_stale .and. n_stale < most_stale) then
-            n_stale = n_stale + 1
-            self%n_tried = 0
-            cycle
-         end if
-         if (self%is_stale .and. status == step_done) status = step_too_far
-         if (status /= step_done .or. .not. has_changed) return
-         if (first_tried(self) > 0 .or. self%n_tried == most_sets) then
-            call end_cycle(self, only_adds, status)
-            if (status /= step_done) return
-         end if
+         if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> Begin a step from `state` with the expected motion `du`: stencils, and the first set.
+   subroutine active_set_begin(self, system, scene, state, du)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(state_t), intent(in) :: state
+      real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
+
+      call begin_contact(self, system, scene, state, du)
+      self%lam = state%lam
+      self%n_newton = 0
+      self%n_tried = 0
+      self%n_stale = 0
+      self%only_adds = .false.
+      self%comes_and_goes = .false.
+      self%is_dropped = .false.
+   end subroutine active_set_begin
+
+   !> The next set from the motion `du` and the multipliers that solve the step with the present
+   !> one; `is_done` if that one stands, or if `status` tells of a failure.
+   subroutine active_set_advance(self, system, scene, state, du, is_done, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(state_t), intent(in) :: state
+      real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
+      logical, intent(out) :: is_done
+      integer, intent(out) :: status                     !! one of the `step_` codes
+      logical :: has_changed
+
+      call update(self, system, scene, state, du, has_changed, status)
+      if (self%is_stale .and. self%n_stale < most_stale) then
+         self%n_stale = self%n_stale + 1
+         self%n_tried = 0
+         status = step_done
+         is_done = .false.
+         return
+      end if
+      if (self%is_stale .and. status == step_done) status = step_too_far
+      is_done = status /= step_done .or. .not. has_changed
+      if (is_done) return
+      if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)
+      is_done = status /= step_done
+   end subroutine active_set_advance
 
    !> Choose stencils; start from the constraints that acted before and still can, also where the
    !> step is expected to end.
@@ -158,13 +187,14 @@ contains
    end subroutine begin_contact
 
    !> Hand the present set to the constraints, with the gaps to hold; multipliers carry over.
-   subroutine select_active(self, system, scene, u0, du)
+   subroutine active_set_select(self, system, scene, u0, du)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       integer :: k, pair, i
 
+      call remember(self)
       if (self%set%n == 0 .and. .not. any(self%is_active)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
       do pair = 1, size(system%contact)
@@ -182,16 +212,15 @@ contains
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate
       end do
-   end subroutine select_active
+   end subroutine active_set_select
 
    !> The next set, from the gaps and multipliers of the converged one.
-   subroutine update(self, system, scene, state, du, only_adds, has_changed, status)
+   subroutine update(self, system, scene, state, du, has_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(state_t), intent(in) :: state
       real(wp), intent(in), contiguous :: du(:, :)
-      logical, intent(in) :: only_adds
       logical, intent(out) :: has_changed
       integer, intent(out) :: status
       type(gap_state_t) :: gap
@@ -220,7 +249,8 @@ contains
                   end if
                   self%is_stale = self%is_stale .or. has_drifted(k, gap)
                   noise = force_noise*sum(system%magnitude(:, contact%node(i)))
-                  if (.not. gap%is_leaving .and. (only_adds .or. self%set%lam(k) >= -noise)) cycle
+                  if (.not. gap%is_leaving .and. &
+                     (self%only_adds .or. self%set%lam(k) >= -noise)) cycle
                   self%is_active(id) = .false.
                else
                   if (.not. (gap%is_near .and. gap%is_over)) cycle
@@ -275,14 +305,14 @@ contains
 
    !> Constraints that follow from earlier ones do not act in this step. They stand at the places
    !> `redundant` of the set; of constraints that depend on each other the last ones go.
-   pure subroutine drop(self, redundant)
+   pure subroutine active_set_drop(self, redundant)
       type(active_set_t), intent(inout) :: self
       integer, intent(in) :: redundant(:)
 
       self%is_dropped(self%set%id(redundant)) = .true.
       self%is_active = self%is_active .and. .not. self%is_dropped
       self%n_tried = 0
-   end subroutine drop
+   end subroutine active_set_drop
 
    subroutine remember(self)
       type(active_set_t), intent(inout) :: self
@@ -303,9 +333,8 @@ contains
 
    !> The sets since the first coming of the present one are a cycle: end it by their union, from
    !> which nothing is let go any more, or by a cut.
-   pure subroutine end_cycle(self, only_adds, status)
+   pure subroutine end_cycle(self, status)
       type(active_set_t), intent(inout) :: self
-      logical, intent(inout) :: only_adds
       integer, intent(inout) :: status
       integer :: first
 
@@ -314,10 +343,10 @@ contains
          self%comes_and_goes = any(cycle, dim=2) .and. .not. all(cycle, dim=2)
          self%is_active = any(cycle, dim=2)
       end associate
-      if (only_adds .or. (self%may_cut .and. .not. self%holds_gap)) then
+      if (self%only_adds .or. (self%may_cut .and. .not. self%holds_gap)) then
          status = step_cycling
       else
-         only_adds = .true.
+         self%only_adds = .true.
          self%n_tried = 0
       end if
    end subroutine end_cycle

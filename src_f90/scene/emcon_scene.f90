@@ -52,7 +52,7 @@ module emcon_scene
       integer, allocatable :: item(:)                !! ascending, distinct indices
    end type named_set_t
 
-   !> A surface: element faces in the order of the deck, or nodes.
+   !> A surface: element faces in the order of the deck, or nodes; or, without elements, edges.
    type :: surface_t
       character(len=:), allocatable :: name
       type(origin_t) :: origin
@@ -60,6 +60,8 @@ module emcon_scene
       integer, allocatable :: element(:)             !! (n_face)
       integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind
       integer, allocatable :: node(:)                !! (n_node), only if `is_nodal`
+      !> (2, n_edge) first and last nodes, the body to the left; only if there are no elements
+      integer, allocatable :: edge(:, :)
    end type surface_t
 
    type :: material_t

@@ -23,7 +23,7 @@ module emcon_null_space
    implicit none
    private
    public :: null_space_t, null_space_init, null_space_update, null_space_factorise, &
-      null_space_solve, null_space_multipliers
+      null_space_solve, null_space_multipliers, null_space_matrices, null_space_particular
    public :: obstacle_none, obstacle_redundant, obstacle_pivot, obstacle_fill
 
    !> Why the constraints cannot be eliminated.
@@ -76,17 +76,40 @@ contains
       type(numbering_t), intent(in) :: numbering
       type(error_t), allocatable, intent(out) :: error
 
+      call begin(self, matrix%n_row, set%n)
       self%n_entry = size(matrix%column)
-      self%n_free = max(0, matrix%n_row - set%n)
+      call null_space_update(self, set, numbering)
+      if (self%obstacle == obstacle_none) call lay_out(self, set%force_rows, matrix, error)
+   end subroutine null_space_init
+
+   !> Only P and DF, for the present gradients. Where there are none, `obstacle` tells why.
+   subroutine null_space_matrices(self, set, numbering)
+      type(null_space_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      type(numbering_t), intent(in) :: numbering
+
+      call begin(self, numbering%n_unknown, set%n)
+      self%n_entry = huge(self%n_entry)                  ! no N to be compared with
+      call null_space_update(self, set, numbering)
+      if (self%obstacle /= obstacle_none) return
+      call lay_out_matrices(self, set%force_rows)
+      call fill_matrices(self, set)
+   end subroutine null_space_matrices
+
+   !> Make room for another pattern.
+   pure subroutine begin(self, n_unknown, n)
+      type(null_space_t), intent(inout) :: self
+      integer, intent(in) :: n_unknown
+      integer, intent(in) :: n                           !! constraints
+
+      self%n_free = max(0, n_unknown - n)
       if (allocated(self%present%dependent)) deallocate(self%present%dependent)
       if (allocated(self%elimination%dependent)) deallocate(self%elimination%dependent)
       if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%part, self%image, self%owner)
       allocate(self%rhs(self%n_free), self%x(self%n_free))
-      allocate(self%part(matrix%n_row), self%image(matrix%n_row))
-      allocate(self%owner(matrix%n_row), source=0)
-      call null_space_update(self, set, numbering)
-      if (self%obstacle == obstacle_none) call lay_out(self, set%force_rows, matrix, error)
-   end subroutine null_space_init
+      allocate(self%part(n_unknown), self%image(n_unknown))
+      allocate(self%owner(n_unknown), source=0)
+   end subroutine begin
 
    !> Choose the dependent unknowns for the present gradients and factorise Gb_d. `obstacle` tells
    !> why that is not possible.
@@ -148,15 +171,23 @@ contains
       type(csr_t), intent(in) :: rows, matrix
       type(error_t), allocatable, intent(out) :: error
 
+      call lay_out_matrices(self, rows)
+      call triple_product_init(self%product, self%p, matrix, self%d, self%reduced, error)
+      if (allocated(error)) return
+      call self%solver%analyse(self%reduced, error)
+   end subroutine lay_out
+
+   !> Lay out P and DF for the present choice.
+   subroutine lay_out_matrices(self, rows)
+      type(null_space_t), intent(inout) :: self
+      type(csr_t), intent(in) :: rows
+
       call lay_out_p(self%present, self%n_free, self%p)
       self%d = self%p
       self%force = self%present
       self%gap = self%present
       call lay_out_elimination(self%elimination, self%present, rows, self%p)
-      call triple_product_init(self%product, self%p, matrix, self%d, self%reduced, error)
-      if (allocated(error)) return
-      call self%solver%analyse(self%reduced, error)
-   end subroutine lay_out
+   end subroutine lay_out_matrices
 
    !> Pattern of P: the identity, and for each dependent unknown the independent ones of its
    !> component.
@@ -261,6 +292,17 @@ contains
       end do
    end subroutine fill
 
+   !> Fill in P and DF for the gradients of the last `null_space_update`.
+   subroutine fill_matrices(self, set)
+      type(null_space_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      logical :: is_poor(2)
+
+      call fill(self%elimination, self%force, set%force_rows, self%p, is_poor(1))
+      call fill(self%elimination, self%gap, set%gap_rows, self%d, is_poor(2))
+      if (any(is_poor)) self%obstacle = obstacle_pivot
+   end subroutine fill_matrices
+
    !> Factorise P^T N DF for the gradients of the last `null_space_update`. Where the choice turns
    !> out as poor, `obstacle` tells.
    subroutine null_space_factorise(self, set, matrix, is_singular, error)
@@ -269,7 +311,6 @@ contains
       type(csr_t), intent(in) :: matrix
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_poor(2)
 
       is_singular = .true.
       if (self%obstacle /= obstacle_none) return
@@ -278,12 +319,8 @@ contains
          if (allocated(error)) return
       end if
       call stopwatch_start(self%clock)
-      call fill(self%elimination, self%force, set%force_rows, self%p, is_poor(1))
-      call fill(self%elimination, self%gap, set%gap_rows, self%d, is_poor(2))
-      if (any(is_poor)) then
-         self%obstacle = obstacle_pivot
-         return
-      end if
+      call fill_matrices(self, set)
+      if (self%obstacle /= obstacle_none) return
       call triple_product_update(self%product, self%p, matrix, self%d, self%reduced)
       call stopwatch_stop(self%clock)
       call self%solver%factorise(self%reduced%value, error)
@@ -298,12 +335,8 @@ contains
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
       real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
       type(error_t), allocatable, intent(out) :: error
-      real(dp) :: defect(set%n)
 
-      defect = real(set%defect, dp)
-      call dependent_block_solve(self%gap, .false., defect)
-      self%part = 0.0_wp
-      self%part(self%elimination%dependent) = -real(defect, wp)
+      call null_space_particular(self%gap, set%defect, self%part)
       call csr_multiply(matrix, self%part, self%image)
       self%image = -(residual + self%image)
       call csr_multiply_transposed(self%p, self%image, self%rhs)
@@ -312,6 +345,19 @@ contains
       call csr_multiply(self%d, self%x, dq)
       dq = dq + self%part
    end subroutine null_space_solve
+
+   !> -[0; G1_d^-1 defect], which closes the defect to first order.
+   subroutine null_space_particular(gap, defect, part)
+      type(dependent_block_t), intent(in) :: gap           !! G1_d
+      real(wp), intent(in) :: defect(:)                    !! (n) [L]
+      real(wp), intent(out) :: part(:)                     !! (n_unknown) [L]
+      real(dp) :: x(size(defect))
+
+      x = real(defect, dp)
+      call dependent_block_solve(gap, .false., x)
+      part = 0.0_wp
+      part(gap%dependent) = -real(x, wp)
+   end subroutine null_space_particular
 
    !> The multipliers from the dependent rows: Gb_d^T lam = r_d, r without contact forces.
    !>

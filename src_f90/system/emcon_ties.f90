@@ -3,7 +3,7 @@
 !>
 !> Source: docs/theory.md, section 11.
 module emcon_ties
-   use emcon_chain, only : chain_init, chain_t
+   use emcon_chain, only : chain_init, chain_t, surface_edges
    use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
@@ -89,27 +89,23 @@ contains
    pure subroutine count_ties(scene, n_tie)
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: n_tie(:)      !! (n_node)
-      integer, allocatable :: seen(:)
+      integer, allocatable :: seen(:), edge(:, :)
       integer :: t, i, k, side
 
       allocate(n_tie(size(scene%x, 2)), seen(size(scene%x, 2)), source=0)
       do t = 1, size(scene%tie)
          do side = 1, 2
-            associate (surface => &
-                  scene%surface(merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)))
-               do i = 1, size(surface%element)
-                  associate (e => surface%element(i))
-                     associate (nodes => scene%element_node(element_kinds(scene%element_kind(e)) &
-                           %face_node(:, surface%face(i)), e))
-                        do k = 1, size(nodes)
-                           if (seen(nodes(k)) == t) cycle
-                           seen(nodes(k)) = t
-                           n_tie(nodes(k)) = n_tie(nodes(k)) + 1
-                        end do
-                     end associate
+            call surface_edges(scene, &
+               scene%surface(merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)), edge)
+            do i = 1, size(edge, 2)
+               do k = 1, 2
+                  associate (node => edge(k, i))
+                     if (seen(node) == t) cycle
+                     seen(node) = t
+                     n_tie(node) = n_tie(node) + 1
                   end associate
                end do
-            end associate
+            end do
          end do
       end do
    end subroutine count_ties
@@ -436,8 +432,9 @@ contains
                k = maxloc(abs(move(1, node)) + abs(move(2, node)), 1)
                call raise(error, err_input, tie_text(scene, node(k)) // "element " // &
                   to_text(scene%element_label(e)) // " would be spoilt: the tie moves its " // &
-                  "node " // to_text(scene%node_label(node(k))) // " by " // to_text(norm2(move(:, node(k)))) &
-                  // " onto the master surface; let the surfaces meet, or refine the coarser one")
+                  "node " // to_text(scene%node_label(node(k))) // " by " // &
+                  to_text(norm2(move(:, node(k)))) // " onto the master surface; let the " // &
+                  "surfaces meet, or refine the coarser one")
                return
             end do
          end associate

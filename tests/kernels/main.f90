@@ -24,6 +24,7 @@ program main
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
    use test_initial_contact, only : collect_initial_contact
+   use test_interface, only : collect_interface
    use test_joints, only : collect_joints
    use test_lapack, only : collect_lapack
    use test_law, only : collect_law
@@ -99,6 +100,7 @@ program main
    call run("search", collect_search)
    call run("nts_gap", collect_nts_gap)
    call run("nts", collect_nts)
+   call run("interface", collect_interface)
    call run("joints", collect_joints)
    call run("hermite_gap", collect_hermite_gap)
    call run("mortar_pair", collect_mortar_pair)
