@@ -30,7 +30,7 @@ module emcon_nts
 
    type, extends(contact_t) :: nts_t
       type(chain_t) :: slave
-      type(chain_t) :: master
+      type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
       integer :: smoothing = smoothing_none
       integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
@@ -63,6 +63,7 @@ contains
 
       call chain_init(self%slave, scene, scene%surface(pair%slave), error)
       if (allocated(error)) return
+      allocate(self%master)
       call chain_init(self%master, scene, scene%surface(pair%master), error)
       if (allocated(error)) return
       call chain_join(self%slave, scene)

@@ -24,7 +24,7 @@ module emcon_weighted
 
    type, abstract, extends(contact_t) :: weighted_t
       type(chain_t) :: slave
-      type(chain_t) :: master
+      type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
       logical :: is_dual = .true.                     !! multiplier basis
       integer, allocatable :: node_edge(:, :)         !! (2, n_constraint) edges before and after
@@ -73,6 +73,7 @@ contains
 
       call chain_init(self%slave, scene, scene%surface(pair%slave), error)
       if (allocated(error)) return
+      if (.not. allocated(self%master)) allocate(self%master)
       call chain_init(self%master, scene, scene%surface(pair%master), error)
       if (allocated(error)) return
       call chain_join(self%slave, scene)

@@ -2,14 +2,13 @@
 !>
 !> Times are counted in integers: grid increments of h, and dyadic fractions of one when it is cut.
 module emcon_march
-   use emcon_active_set, only : active_set_init, step_cycling, step_diverged, step_done, &
-      step_inverted, step_singular, step_stands_off, step_too_far
+   use emcon_active_set, only : active_set_init
    use emcon_correction, only : correction_free, correction_reset
-   use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_ledger, only : ledger_measure
-   use emcon_loads, only : instant_t
-   use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
+   use emcon_ledger, only : ledger_measure, ledger_t
+   use emcon_march_parts, only : march_in_parts
+   use emcon_march_step, only : increment_t, march_t
    use emcon_newton, only : newton_init
    use emcon_numbering, only : spread_dependent
    use emcon_pair_record, only : pair_record_init
@@ -18,6 +17,7 @@ module emcon_march
       procedure_static, scene_t, step_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
+   use emcon_state, only : state_t
    use emcon_system, only : pose_t, system_begin_step, system_init, system_respond
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
@@ -25,7 +25,7 @@ module emcon_march
    implicit none
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
-      march_resume, march_free
+      march_resume, march_renumber, march_free, march_free_increment, march_set_time
 
    !> An increment is halved so often at most, unless the deck gives h_min.
    integer, parameter :: default_levels = 12, most_levels = 24
@@ -79,10 +79,10 @@ contains
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_step
       type(error_t), allocatable, intent(out) :: error
-      character(len=:), allocatable :: text
 
       self%state%i_step = i_step
       self%state%n_grid = 0
+      self%state%is_off_grid = .false.
       self%state%grid_stride = 1
       self%state%n_easy = 0
       self%state%n_before = self%state%increment
@@ -94,15 +94,25 @@ contains
       if (allocated(error)) return
       call follow_links(self, scene)
       self%state%u_start = self%state%u
-      if (scene%step(i_step)%procedure == procedure_static) then
-         text = free_motion_text(self%system, scene, scene%step(i_step)%prescribed)
-         if (len(text) > 0) then
-            call raise(error, err_analysis, "the static problem is singular: " // text)
-            return
-         end if
-      end if
+      call check_held(self, scene, error)
+      if (allocated(error)) return
       call prepare(self, scene, error)
    end subroutine march_begin_step
+
+   !> In statics no body may be free to move.
+   subroutine check_held(self, scene, error)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: text
+
+      associate (step => scene%step(self%state%i_step))
+         if (step%procedure /= procedure_static) return
+         text = free_motion_text(self%system, scene, step%prescribed)
+         if (len(text) > 0) call raise(error, err_analysis, "the static problem is singular: " &
+            // text)
+      end associate
+   end subroutine check_held
 
    !> Let displacements and velocities of dependent freedoms follow those of the others.
    subroutine follow_links(self, scene)
@@ -144,6 +154,26 @@ contains
       if (.not. allocated(error)) call prepare(self, scene, error)
    end subroutine march_resume
 
+   !> Number the unknowns anew, as the boundary conditions of the step that the state is in have
+   !> changed. The state and the ledger stay.
+   subroutine march_renumber(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(state_t) :: before
+      type(ledger_t) :: ledger_before
+
+      before = self%state
+      ledger_before = self%ledger
+      call system_begin_step(self%system, scene, self%state%i_step, error)
+      if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
+         self%system%notes, error)
+      if (.not. allocated(error)) call check_held(self, scene, error)
+      if (.not. allocated(error)) call prepare(self, scene, error)
+      self%state = before
+      self%ledger = ledger_before
+   end subroutine march_renumber
+
    !> Scheme, solver and contact for the step that the system is in.
    subroutine prepare(self, scene, error)
       type(march_t), intent(inout) :: self
@@ -177,6 +207,7 @@ contains
             end associate
          end do
          call count_grid(self, step)
+         if (.not. state%is_off_grid) state%step_time = grid_time(self, step, state%n_grid)
          self%du = 0.0_wp
          rest%is_end = .true.
          call system_respond(self%system, scene, rest, state%u, state%v, self%du, self%du, .false.)
@@ -190,6 +221,7 @@ contains
          state%energy = self%system%response%energy
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
+      self%revision = self%revision + 1
    end subroutine prepare
 
    !> Grid increments in the step, and by how much they may grow and shrink.
@@ -249,12 +281,19 @@ contains
                " increments of *STEP, INC= are used up at time " // to_text(state%time))
             return
          end if
+         if (state%is_off_grid) then
+            call raise(error, err_input, "time " // to_text(state%time, 9) // " lies between " // &
+               "two increments of the deck; go on to time " // to_text(state%start_time + &
+               grid_time(self, step, state%n_grid + 1), 9) // " with a step of a size of its own")
+            return
+         end if
          stride = min(state%grid_stride, self%n_grid - state%n_grid)
          call cross_grid(self, scene, state%n_grid + stride, increment, error)
          if (allocated(error)) return
          state%n_grid = state%n_grid + stride
          state%increment = state%increment + 1
-         state%time = state%start_time + grid_time(self, step, state%n_grid)
+         state%step_time = grid_time(self, step, state%n_grid)
+         state%time = state%start_time + state%step_time
          increment%n_active = count(state%is_active(self%system%linear%n + 1:))
          if (increment%n_cut > 0) then
             state%n_easy = 0
@@ -277,85 +316,72 @@ contains
       integer, intent(in) :: n_end
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
-      type(instant_t) :: start
-      real(wp) :: t0, h
-      integer :: level, place, status
+      real(wp) :: t0
 
       associate (step => scene%step(self%state%i_step))
          t0 = grid_time(self, step, self%state%n_grid)
          increment%h = grid_time(self, step, n_end) - t0
          if (n_end < self%n_grid .or. abs(real(n_end, wp)*step%h - step%duration) &
             <= whole*step%duration) increment%h = real(n_end - self%state%n_grid, wp)*step%h
-         level = 0
-         place = 0
-         do while (place < 2**self%n_level)
-            h = scale(increment%h, -level)
-            start%step_time = t0 + scale(real(place, wp), -self%n_level)*increment%h
-            start%total_time = self%state%start_time + start%step_time
-            call march_step(self, scene, start, h, level < self%n_level, increment, status, error)
-            if (allocated(error)) return
-            if (status == step_done) then
-               place = place + 2**(self%n_level - level)
-               if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
-               cycle
-            end if
-            call note_add(increment%notes, "increment cut at time " // &
-               to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // &
-               reason_text(self, scene, status))
-            increment%n_cut = increment%n_cut + 1
-            level = level + 1
-            if (level > self%n_level) then
-               call raise(error, err_analysis, failure_text(self, scene, start, h, status))
-               return
-            end if
-         end do
       end associate
+      call march_in_parts(self, scene, t0, increment, error)
    end subroutine cross_grid
 
-   !> Why a step failed.
-   function reason_text(self, scene, status) result(text)
-      type(march_t), intent(in) :: self
+   !> One increment of any size `h` > 0 [T], off the grid of the deck, in parts where it fails. It
+   !> may go beyond the end of the step: loads, boundary conditions and options are those of the
+   !> step, and amplitudes and linear runs keep their last value. On an error nothing has changed.
+   subroutine march_free_increment(self, scene, h, increment, error)
+      type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: status
-      character(len=:), allocatable :: text
-
-      select case (status)
-      case (step_inverted)
-         text = "element " // to_text(scene%element_label(max(1, self%newton%inverted_element))) &
-            // " is inverted"
-      case (step_diverged)
-         text = "Newton's method does not converge (relative residual " // &
-            to_text(self%newton%history(max(1, self%newton%n_history))) // " after " // &
-            to_text(self%newton%n_iteration) // " iterations)"
-      case (step_singular)
-         text = "the system is singular"
-      case (step_cycling)
-         text = cycling_text(self, scene)
-      case (step_too_far)
-         text = "a contact slides farther than its stencil was chosen for"
-      case (step_stands_off)
-         text = "a contact would close over more than the gap tolerance"
-      case default
-         text = "reason " // to_text(status)
-      end select
-   end function reason_text
-
-   !> Text of the error that ends an analysis.
-   function failure_text(self, scene, start, h, status) result(text)
-      type(march_t), intent(in) :: self
-      type(scene_t), intent(in) :: scene
-      type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h
-      integer, intent(in) :: status
-      character(len=:), allocatable :: text, motion
+      type(increment_t), intent(out) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      type(state_t) :: before
+      type(ledger_t) :: ledger_before
 
-      text = "the analysis stops at time " // to_text(start%total_time, 9) // ": with h = " // &
-         to_text(h) // ", the smallest allowed, " // reason_text(self, scene, status)
-      if (.not. self%scheme%has_inertia) then
-         motion = free_motion_text(self%system, scene, &
-            scene%step(self%state%i_step)%prescribed, with_contact=.true.)
-         if (len(motion) > 0) text = text // "; without contact " // motion
+      before = self%state
+      ledger_before = self%ledger
+      increment%h = h
+      call march_in_parts(self, scene, self%state%step_time, increment, error)
+      if (allocated(error)) then
+         self%state = before
+         self%ledger = ledger_before
+         return
       end if
-   end function failure_text
+      self%state%increment = self%state%increment + 1
+      call march_set_time(self, scene, before%step_time + h)
+      increment%n_active = count(self%state%is_active(self%system%linear%n + 1:))
+      call ledger_measure(self%ledger, self%system, scene%x, self%state)
+   end subroutine march_free_increment
+
+   !> Let the state be that of `time` since the start of the step [T]. What differs by no more than
+   !> the rounding of sums from a point of the grid is that point.
+   subroutine march_set_time(self, scene, time)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: time
+      integer :: n
+
+      associate (state => self%state, step => scene%step(self%state%i_step))
+         n = self%n_grid
+         if (time < step%duration) n = min(n, nint(time/step%h))
+         if (n == self%n_grid - 1 .and. is_same(time, step%duration)) n = self%n_grid
+         state%is_off_grid = .not. is_same(time, grid_time(self, step, n))
+         state%step_time = time
+         if (.not. state%is_off_grid) state%step_time = grid_time(self, step, n)
+         if (state%step_time < grid_time(self, step, n)) n = n - 1
+         state%n_grid = n
+         state%time = state%start_time + state%step_time
+      end associate
+
+   contains
+
+      pure logical function is_same(a, b)
+         real(wp), intent(in) :: a, b
+
+         is_same = abs(a - b) <= whole*b
+      end function is_same
+
+   end subroutine march_set_time
 
 end module emcon_march

@@ -20,7 +20,7 @@ module emcon_march_step
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, march_step, cycling_text
+   public :: march_t, increment_t, march_step, march_guess, follow_links, cycling_text
 
    !> Nodes named in a message.
    integer, parameter :: most_named = 10
@@ -48,6 +48,7 @@ module emcon_march_step
       integer :: n_grid = 0                      !! grid increments in the step
       integer :: most_stride = 1                 !! largest increment, in grid increments
       integer :: n_level = 0                     !! halvings allowed
+      integer :: revision = 0                    !! changes with the numbering of the unknowns
       real(wp), allocatable :: du(:, :), v1(:, :), offset(:, :)   !! (2, n_node)
    end type march_t
 
@@ -69,7 +70,7 @@ contains
       self%active%gap_tolerance = 0.0_wp
       if (may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
       do attempt = 1, 2
-         call guess(self, scene, start, h, is_at_rest=attempt == 2)
+         call march_guess(self, scene, start, h, is_at_rest=attempt == 2)
          call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
             self%scheme%pose(start, h), self%state, self%offset, self%du, status, error)
          if (allocated(error)) return
@@ -116,7 +117,7 @@ contains
    end function nodes_text
 
    !> First guess of the motion, and the motion and velocity of prescribed freedoms.
-   subroutine guess(self, scene, start, h, is_at_rest)
+   subroutine march_guess(self, scene, start, h, is_at_rest)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(instant_t), intent(in) :: start
@@ -150,7 +151,7 @@ contains
       call follow_links(self%system, self%du)
       call follow_links(self%system, self%offset)
       call follow_links(self%system, self%newton%driven)
-   end subroutine guess
+   end subroutine march_guess
 
    !> Let dependent entries of a motion follow the others, also where `numbering` does not know
    !> them: with multipliers they have to move in the same way.

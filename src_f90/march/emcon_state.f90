@@ -15,6 +15,8 @@ module emcon_state
       integer :: n_before = 0                    !! of these, before this step
       real(wp) :: start_time = 0.0_wp            !! total time at the start of the step [T]
       real(wp) :: time = 0.0_wp                  !! total time [T]
+      real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
+      logical :: is_off_grid = .false.           !! after grid point `n_grid`, not at it
       real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement [L]
       real(wp), allocatable :: v(:, :)           !! (2, n_node) velocity [L/T]
       real(wp), allocatable :: u_start(:, :)     !! (2, n_node) displacement at the step's start

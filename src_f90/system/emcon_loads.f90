@@ -80,7 +80,7 @@ contains
             load_value = load%value*factor
          else if (self%is_ramped) then
             load_value = load%value_start &
-               + (load%value - load%value_start)*(instant%step_time/self%duration)
+               + (load%value - load%value_start)*min(1.0_wp, instant%step_time/self%duration)
          else
             load_value = load%value
          end if
@@ -194,7 +194,8 @@ contains
          u = prescribed%value*factor
          v = prescribed%value*rate
       else if (step%procedure == procedure_static) then
-         u = u_start + (prescribed%value - u_start)*(instant%step_time/step%duration)
+         u = u_start + (prescribed%value - u_start) &
+            *min(1.0_wp, instant%step_time/step%duration)
       else
          u = prescribed%value
       end if

@@ -81,12 +81,13 @@ def test_threads_in_cpp(installed: dict[str, str], tmp_path: Path) -> None:
     assert "no such file" in run(program, RING, env=installed)
 
 
-def test_c_loses_no_memory(impact: Path, installed: dict[str, str]) -> None:
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR", "SEGMENT"])
+def test_c_loses_no_memory(impact: Path, installed: dict[str, str], formulation: str) -> None:
     if not shutil.which("valgrind"):
         pytest.skip("there is no valgrind here")
     done = subprocess.run(
         ["valgrind", "--leak-check=full", "--errors-for-leak-kinds=definite", "--error-exitcode=9",
-         "--quiet", impact, ROOT/"input_decks"/"patch_pressure.inp"],
+         "--quiet", impact, RING, f"h=0.1\nt_end=0.2\nformulation={formulation}"],
         env=installed, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 

@@ -51,6 +51,8 @@ program main
    use test_search, only : collect_search
    use test_shape, only : collect_shape
    use test_solid, only : collect_solid
+   use test_stepper_free, only : collect_stepper_free
+   use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
    use test_tied_contact, only : collect_tied_contact
    use test_tie, only : collect_tie
@@ -131,6 +133,8 @@ program main
    call run("tied_contact", collect_tied_contact)
    call run("deck_parameters", collect_deck_parameters)
    call run("deck_ties", collect_deck_ties)
+   call run("stepper_free", collect_stepper_free)
+   call run("stepper_query", collect_stepper_query)
    call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then

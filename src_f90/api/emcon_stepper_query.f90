@@ -1,0 +1,346 @@
+!> What the engine computes for a step, asked for from outside: residual, tangent, mass, momenta.
+!>
+!> A query has work space of its own, with its own system and contact search: asking changes neither
+!> the model nor what later steps give, to the last bit. One query belongs to one model and follows
+!> its changes. Unknowns are those of the present step of the deck, `query_unknowns` numbers them.
+module emcon_stepper_query
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use emcon_active_set, only : active_set_select
+   use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
+      constraints_evaluate, constraints_force, constraints_merge_pattern, constraints_rows
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : body_momenta
+   use emcon_loads, only : instant_t
+   use emcon_march, only : march_free, march_init, march_resume, march_t
+   use emcon_march_step, only : follow_links, march_guess
+   use emcon_null_space, only : null_space_t
+   use emcon_numbering, only : pick_unknowns
+   use emcon_stepper, only : stepper_t
+   use emcon_stepper_free, only : stepper_check_open
+   use emcon_system, only : system_respond
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: query_t, query_free, query_sync, query_check_field
+   public :: query_guess, query_evaluate, query_residual, query_tangent, query_unknowns, &
+      query_mass, query_momenta
+
+   type :: query_t
+      type(march_t) :: march                     !! its own; the state is that of the model
+      logical :: is_evaluated = .false.          !! by `query_evaluate`, for the present model
+      real(wp), allocatable :: contact(:, :)     !! (2, n_node) sum of lam_k g_k
+      type(constraint_set_t) :: near             !! of the last `query_constraints`
+      type(null_space_t) :: null_space           !! of the last `query_null_space`
+      logical :: has_tangent = .false.           !! of the last evaluation
+      logical :: has_null_space = .false.
+      integer, private :: revision = -1          !! of the model that the numbering is that of
+   end type query_t
+
+contains
+
+   !> Free what libraries hold for the query, and all work space.
+   subroutine query_free(self)
+      type(query_t), intent(inout) :: self
+
+      call march_free(self%march)
+      call self%null_space%solver%free()
+      call clear(self)
+   end subroutine query_free
+
+   subroutine clear(self)
+      type(query_t), intent(out) :: self
+
+      self%is_evaluated = .false.
+   end subroutine clear
+
+   !> Take over the present model and state of the stepper.
+   subroutine query_sync(self, stepper, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_check_open(stepper, error)
+      if (allocated(error)) return
+      if (self%revision < 0) then
+         call march_init(self%march, stepper%scene, error)
+         if (allocated(error)) return
+         allocate(self%contact, source=self%march%system%zero)
+         self%revision = 0
+      end if
+      self%march%state = stepper%march%state
+      if (self%revision /= stepper%march%revision) then
+         self%is_evaluated = .false.
+         call march_resume(self%march, stepper%scene, error)
+         if (allocated(error)) return
+         self%march%state = stepper%march%state
+         self%revision = stepper%march%revision
+      end if
+      self%march%system%loads%load = stepper%march%system%loads%load
+   end subroutine query_sync
+
+   !> A nodal field called `name` has the right shape and is finite.
+   subroutine query_check_field(stepper, field, name, error)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: field(:, :)            !! (2, n_node)
+      character(len=*), intent(in) :: name
+      type(error_t), allocatable, intent(out) :: error
+      integer :: n
+
+      n = size(stepper%scene%x, 2)
+      if (size(field, 1) /= 2 .or. size(field, 2) /= n) then
+         call raise(error, err_input, name // " is to have 2 components at each of " // &
+            to_text(n) // " nodes, not " // to_text(size(field, 1)) // " at " // &
+            to_text(size(field, 2)))
+      else if (.not. all(ieee_is_finite(field))) then
+         call raise(error, err_input, name // " is not finite")
+      end if
+   end subroutine query_check_field
+
+   !> Where a step of size `h` from the present state would start its iteration: prescribed freedoms
+   !> at their places at the end, free ones moved on by their velocities.
+   subroutine query_guess(self, stepper, h, u1, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: h                      !! > 0 [T]
+      real(wp), intent(out) :: u1(:, :)              !! (2, n_node) [L]
+      type(error_t), allocatable, intent(out) :: error
+
+      u1 = 0.0_wp
+      call query_sync(self, stepper, error)
+      if (.not. allocated(error)) call query_check_field(stepper, u1, "u1", error)
+      if (.not. allocated(error)) call check_size(h, error)
+      if (allocated(error)) return
+      call march_guess(self%march, stepper%scene, now(self), h, is_at_rest=.false.)
+      u1 = self%march%state%u + self%march%du
+   end subroutine query_guess
+
+   subroutine check_size(h, error)
+      real(wp), intent(in) :: h
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. ieee_is_finite(h)) then
+         call raise(error, err_input, "a step needs a size h > 0 that is finite")
+      else if (.not. h > 0.0_wp) then
+         call raise(error, err_input, "a step needs a size h > 0, not " // to_text(h))
+      end if
+   end subroutine check_size
+
+   !> The instant of the present state.
+   pure type(instant_t) function now(self)
+      type(query_t), intent(in) :: self
+
+      now%step_time = self%march%state%step_time
+      now%total_time = self%march%state%start_time + self%march%state%step_time
+   end function now
+
+   !> Evaluate the step of size `h` from the present state to `u1`: what the functions below give
+   !> belongs to the last evaluation. Constraints that act are those of the state, or `is_active`,
+   !> less those that have no surface near; their multipliers those of the state, or `lam`.
+   !> Dependent nodes of ties and equations follow the others.
+   subroutine query_evaluate(self, stepper, h, u1, with_tangent, error, lam, is_active)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: h                      !! > 0 [T]
+      real(wp), intent(in) :: u1(:, :)               !! (2, n_node) [L]
+      logical, intent(in) :: with_tangent
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: lam(:)       !! (n_constraint) [M L/T^2]
+      logical, intent(in), optional :: is_active(:)  !! (n_constraint)
+
+      self%is_evaluated = .false.
+      self%has_null_space = .false.
+      call query_sync(self, stepper, error)
+      if (.not. allocated(error)) call query_check_field(stepper, u1, "u1", error)
+      if (.not. allocated(error)) call check_size(h, error)
+      if (.not. allocated(error)) call take_contact(self, error, lam, is_active)
+      if (allocated(error)) return
+      call take_motion(self, stepper, h, u1)
+      associate (march => self%march, system => self%march%system, state => self%march%state)
+         associate (pose => march%scheme%pose(now(self), h))
+            call system_respond(system, stepper%scene, pose, state%u, state%v, march%du, &
+               march%offset, with_tangent)
+            if (system%response%inverted_element > 0) then
+               call raise(error, err_analysis, "element " // to_text(stepper%scene%element_label( &
+                  system%response%inverted_element)) // " is inverted by the displacements u1")
+               return
+            end if
+            call begin_contact(self, stepper)
+            call active_set_select(march%active, system, stepper%scene, state%u, march%du)
+            call constraints_evaluate(march%active%set, system, stepper%scene, pose, state%u, &
+               march%du)
+         end associate
+         call constraints_rows(march%active%set, system%numbering)
+         call constraints_force(march%active%set, 1, self%contact)
+      end associate
+      self%is_evaluated = .true.
+      self%has_tangent = with_tangent
+   end subroutine query_evaluate
+
+   !> Take over the given contact in place of that of the state.
+   subroutine take_contact(self, error, lam, is_active)
+      type(query_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: lam(:)
+      logical, intent(in), optional :: is_active(:)
+      integer :: n
+
+      associate (state => self%march%state)
+         n = size(state%lam)
+         if (present(lam)) n = size(lam)
+         if (n == size(state%lam) .and. present(is_active)) n = size(is_active)
+         if (n /= size(state%lam)) then
+            call raise(error, err_input, "lam and the active set are to have " // &
+               to_text(size(state%lam)) // " entries, one for each possible constraint, not " // &
+               to_text(n))
+            return
+         end if
+         if (present(is_active)) state%is_active = is_active
+         if (.not. present(lam)) return
+         state%lam = lam
+         if (.not. all(ieee_is_finite(lam))) call raise(error, err_input, "lam is not finite")
+      end associate
+   end subroutine take_contact
+
+   !> Take over the motion to `u1`. In the inertia prescribed freedoms have the velocities of their
+   !> conditions, wherever `u1` puts them.
+   subroutine take_motion(self, stepper, h, u1)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: h
+      real(wp), intent(in) :: u1(:, :)
+      real(wp) :: du
+      integer :: k
+
+      associate (march => self%march)
+         call march_guess(march, stepper%scene, now(self), h, is_at_rest=.true.)
+         associate (list => stepper%scene%step(march%state%i_step)%prescribed)
+            do k = 1, size(list)
+               associate (a => list(k)%dof, i => list(k)%node)
+                  du = u1(a, i) - march%state%u(a, i)
+                  if (march%scheme%has_inertia) march%offset(a, i) = march%offset(a, i) &
+                     + (march%du(a, i) - du)
+               end associate
+            end do
+         end associate
+         march%du = u1 - march%state%u
+         call follow_links(march%system, march%du)
+         call follow_links(march%system, march%offset)
+      end associate
+   end subroutine take_motion
+
+   !> Choose stencils for the motion, by a search that does not depend on earlier ones, and take the
+   !> wanted constraints that have a surface near.
+   subroutine begin_contact(self, stepper)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      integer :: pair
+
+      associate (march => self%march, system => self%march%system, state => self%march%state, &
+            active => self%march%active)
+         active%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%is_reduced
+         do pair = 1, size(system%contact)
+            associate (contact => system%contact(pair)%contact, &
+                  first => system%first_constraint(pair) + 1, &
+                  last => system%first_constraint(pair + 1))
+               contact%reach = 0.0_wp
+               call contact%begin_step(stepper%scene%x, state%u, march%du)
+               call contact%measure(stepper%scene%x, state%u, march%du)
+               active%is_active(first:last) = state%is_active(first:last) .and. &
+                  contact%state%is_near
+            end associate
+         end do
+         active%lam = state%lam
+         active%n_tried = 0
+      end associate
+   end subroutine begin_contact
+
+   !> There is an evaluation to report on.
+   subroutine check_evaluated(self, error)
+      type(query_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. self%is_evaluated) call raise(error, err_input, &
+         "no step was evaluated since the model was made or its unknowns changed")
+   end subroutine check_evaluated
+
+   !> Residual of the step: inertia, internal forces less loads, and `with_contact` less contact
+   !> forces. On prescribed freedoms it is the reaction.
+   subroutine query_residual(self, with_contact, nodal, unknown, error)
+      type(query_t), intent(in) :: self
+      logical, intent(in) :: with_contact
+      real(wp), allocatable, intent(out) :: nodal(:, :)      !! (2, n_node) [M L/T^2]
+      real(wp), allocatable, intent(out) :: unknown(:)       !! (n_unknown) T^T of the nodal one
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_evaluated(self, error)
+      if (allocated(error)) return
+      allocate(nodal, source=self%march%system%residual)
+      if (with_contact) nodal = nodal - self%contact
+      allocate(unknown(self%march%system%numbering%n_unknown))
+      call pick_unknowns(self%march%system%numbering, nodal, unknown)
+   end subroutine query_residual
+
+   !> Derivative of the residual on the unknowns by the unknowns at the end of the step, for given
+   !> multipliers; `with_contact` with the second derivatives of the gaps. The evaluation has to be
+   !> one with tangent.
+   subroutine query_tangent(self, with_contact, matrix, error)
+      type(query_t), intent(in) :: self
+      logical, intent(in) :: with_contact
+      type(csr_t), intent(out) :: matrix             !! (n_unknown x n_unknown) [M/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: slot(:)
+      integer :: k
+
+      call check_evaluated(self, error)
+      if (.not. (allocated(error) .or. self%has_tangent)) call raise(error, err_input, &
+         "the last evaluation was one without tangent")
+      if (allocated(error)) return
+      associate (set => self%march%active%set, system => self%march%system)
+         if (.not. with_contact .or. set%n == 0) then
+            matrix = system%matrix
+            return
+         end if
+         call constraints_merge_pattern(set, system%matrix, matrix, slot)
+         do k = 1, size(slot)
+            matrix%value(slot(k)) = system%matrix%value(k)
+         end do
+         call constraints_add_curvature(set, system%numbering, matrix)
+      end associate
+   end subroutine query_tangent
+
+   !> Unknown of each degree of freedom, from 1; 0: prescribed, dependent, or of no element.
+   subroutine query_unknowns(stepper, unknown, error)
+      type(stepper_t), intent(in) :: stepper
+      integer, allocatable, intent(out) :: unknown(:, :)     !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_check_open(stepper, error)
+      if (.not. allocated(error)) unknown = stepper%march%system%numbering%unknown
+   end subroutine query_unknowns
+
+   !> The consistent mass between nodes, the same in both directions [M].
+   subroutine query_mass(stepper, matrix, error)
+      type(stepper_t), intent(in) :: stepper
+      type(csr_t), intent(out) :: matrix             !! (n_node x n_node)
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_check_open(stepper, error)
+      if (.not. allocated(error)) matrix = stepper%march%system%mass
+   end subroutine query_mass
+
+   !> Linear momenta and angular momentum about the origin of each body in the present state.
+   subroutine query_momenta(self, stepper, momenta, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), allocatable, intent(out) :: momenta(:, :)    !! (3, n_body) px, py [M L/T], lz
+      type(error_t), allocatable, intent(out) :: error
+
+      call query_sync(self, stepper, error)
+      if (allocated(error)) return
+      allocate(momenta(3, self%march%system%n_body))
+      call body_momenta(self%march%system, stepper%scene%x, self%march%state, momenta)
+   end subroutine query_momenta
+
+end module emcon_stepper_query

@@ -1,0 +1,102 @@
+!> One increment in one step, or in dyadic parts of it where a step fails.
+module emcon_march_parts
+   use emcon_active_set, only : step_cycling, step_diverged, step_done, step_inverted, &
+      step_singular, step_stands_off, step_too_far
+   use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_loads, only : instant_t
+   use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
+   use emcon_rigid_motion, only : free_motion_text
+   use emcon_scene, only : scene_t
+   use emcon_text, only : note_add, to_text
+   implicit none
+   private
+   public :: march_in_parts
+
+contains
+
+   !> Go on by `increment%h` from the time `t0` since the start of the step. A part that fails is
+   !> halved, `self%n_level` times at most; on an error the state is that of the last part that
+   !> succeeded.
+   subroutine march_in_parts(self, scene, t0, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: t0                     !! [T]
+      type(increment_t), intent(inout) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      type(instant_t) :: start
+      real(wp) :: h
+      integer :: level, place, status
+
+      level = 0
+      place = 0
+      do while (place < 2**self%n_level)
+         h = scale(increment%h, -level)
+         start%step_time = t0 + scale(real(place, wp), -self%n_level)*increment%h
+         start%total_time = self%state%start_time + start%step_time
+         call march_step(self, scene, start, h, level < self%n_level, increment, status, error)
+         if (allocated(error)) return
+         if (status == step_done) then
+            place = place + 2**(self%n_level - level)
+            if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
+            cycle
+         end if
+         call note_add(increment%notes, "increment cut at time " // &
+            to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // &
+            reason_text(self, scene, status))
+         increment%n_cut = increment%n_cut + 1
+         level = level + 1
+         if (level > self%n_level) then
+            call raise(error, err_analysis, failure_text(self, scene, start, h, status))
+            return
+         end if
+      end do
+   end subroutine march_in_parts
+
+   !> Why a step failed.
+   function reason_text(self, scene, status) result(text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: status
+      character(len=:), allocatable :: text
+
+      select case (status)
+      case (step_inverted)
+         text = "element " // to_text(scene%element_label(max(1, self%newton%inverted_element))) &
+            // " is inverted"
+      case (step_diverged)
+         text = "Newton's method does not converge (relative residual " // &
+            to_text(self%newton%history(max(1, self%newton%n_history))) // " after " // &
+            to_text(self%newton%n_iteration) // " iterations)"
+      case (step_singular)
+         text = "the system is singular"
+      case (step_cycling)
+         text = cycling_text(self, scene)
+      case (step_too_far)
+         text = "a contact slides farther than its stencil was chosen for"
+      case (step_stands_off)
+         text = "a contact would close over more than the gap tolerance"
+      case default
+         text = "reason " // to_text(status)
+      end select
+   end function reason_text
+
+   !> Text of the error that ends an analysis.
+   function failure_text(self, scene, start, h, status) result(text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      integer, intent(in) :: status
+      character(len=:), allocatable :: text, motion
+
+      text = "the analysis stops at time " // to_text(start%total_time, 9) // ": with h = " // &
+         to_text(h) // ", the smallest allowed, " // reason_text(self, scene, status)
+      if (.not. self%scheme%has_inertia) then
+         motion = free_motion_text(self%system, scene, &
+            scene%step(self%state%i_step)%prescribed, with_contact=.true.)
+         if (len(motion) > 0) text = text // "; without contact " // motion
+      end if
+   end function failure_text
+
+end module emcon_march_parts
