@@ -3,8 +3,8 @@ module emcon_c
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, &
       c_f_procpointer, c_funptr, c_int, c_int64_t, c_loc, c_null_char, c_null_ptr, c_ptr
    use emcon_errors, only : err_input, err_interrupt, err_none, error_t
-   use emcon_handle, only : handle_fail, handle_find, handle_free, handle_new, handle_open, &
-      handle_pass, model_t
+   use emcon_handle, only : handle_fail, handle_find, handle_fits, handle_free, handle_new, &
+      handle_open, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_run_log, only : model_lines
@@ -275,22 +275,9 @@ contains
       emcon_get_labels = err_input
       call find(handle, model)
       if (.not. associated(model)) return
-      if (.not. fits(model, n_node, size(model%stepper%scene%x, 2), emcon_get_labels)) return
+      if (.not. handle_fits(model, n_node, size(model%stepper%scene%x, 2), emcon_get_labels)) return
       call put_integers(model%stepper%scene%node_label, label)
    end function emcon_get_labels
-
-   !> Is `n` what the model has? If not, `ierr` and its message say so.
-   logical function fits(model, n, expected, ierr)
-      type(model_t), intent(inout) :: model
-      integer(c_int), intent(in) :: n
-      integer, intent(in) :: expected
-      integer(c_int), intent(out) :: ierr
-
-      ierr = err_none
-      fits = n == expected
-      if (.not. fits) call handle_fail(model, "the arrays do not have the size of the model", &
-         err_input, ierr)
-   end function fits
 
    integer(c_int) function emcon_get_positions(handle, n_node, x) bind(c)
       type(c_ptr), value :: handle, x
@@ -300,7 +287,8 @@ contains
       emcon_get_positions = err_input
       call find(handle, model)
       if (.not. associated(model)) return
-      if (.not. fits(model, n_node, size(model%stepper%scene%x, 2), emcon_get_positions)) return
+      if (.not. handle_fits(model, n_node, size(model%stepper%scene%x, 2), &
+         emcon_get_positions)) return
       call put(model%stepper%scene%x, x)
    end function emcon_get_positions
 
@@ -312,7 +300,7 @@ contains
       emcon_get_state = err_input
       call find(handle, model)
       if (.not. associated(model)) return
-      if (.not. fits(model, n_node, size(model%stepper%scene%x, 2), emcon_get_state)) return
+      if (.not. handle_fits(model, n_node, size(model%stepper%scene%x, 2), emcon_get_state)) return
       call put(model%stepper%march%state%u, u)
       call put(model%stepper%march%state%v, v)
    end function emcon_get_state
@@ -340,7 +328,8 @@ contains
       if (.not. associated(model)) return
       associate (system => model%stepper%march%system, state => model%stepper%march%state)
          before = system%linear%n
-         if (.not. fits(model, n_contact, system%n_constraint - before, emcon_get_contact)) return
+         if (.not. handle_fits(model, n_contact, system%n_constraint - before, &
+         emcon_get_contact)) return
          call put(reshape(state%lam(before + 1:), [1, int(n_contact)]), lam)
          call put_integers(merge(1, 0, state%is_active(before + 1:)), is_active)
          allocate(of_node(n_contact), of_pair(n_contact))

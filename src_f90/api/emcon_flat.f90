@@ -7,8 +7,8 @@ module emcon_flat
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_handle, only : handle_fail, handle_find, handle_free, handle_new, handle_open, &
-      handle_pass, model_t
+   use emcon_handle, only : handle_fail, handle_find, handle_fits, handle_free, handle_new, &
+      handle_open, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_registry, only : law_create
@@ -54,19 +54,6 @@ contains
 
       call handle_free(handle)
    end subroutine close_model
-
-   !> Is there a model, and has it `n` of what an array is for, of which it has `expected`?
-   logical function fits(model, n, expected, ierr)
-      type(model_t), intent(inout) :: model
-      integer(c_int), intent(in) :: n
-      integer, intent(in) :: expected
-      integer(c_int), intent(out) :: ierr
-
-      ierr = err_none
-      fits = n == expected
-      if (.not. fits) call handle_fail(model, "the arrays do not have the size of the model", &
-         err_input, ierr)
-   end function fits
 
    !> Nodes, elements, possible contact constraints, bodies, unknowns, steps, contact pairs.
    subroutine model_size(handle, n, ierr)
@@ -144,7 +131,7 @@ contains
       ierr = err_input
       call handle_find(handle, model)
       if (.not. associated(model)) return
-      if (.not. fits(model, n_node, model%stepper%march%system%solid%n_node, ierr)) return
+      if (.not. handle_fits(model, n_node, model%stepper%march%system%solid%n_node, ierr)) return
       x = real(model%stepper%scene%x, c_double)
       label = model%stepper%scene%node_label
    end subroutine get_positions
@@ -163,7 +150,7 @@ contains
       ierr = err_input
       call handle_find(handle, model)
       if (.not. associated(model)) return
-      if (.not. fits(model, n_node, model%stepper%march%system%solid%n_node, ierr)) return
+      if (.not. handle_fits(model, n_node, model%stepper%march%system%solid%n_node, ierr)) return
       u = real(model%stepper%march%state%u, c_double)
       v = real(model%stepper%march%state%v, c_double)
    end subroutine get_state
@@ -189,7 +176,7 @@ contains
       associate (system => model%stepper%march%system, &
             state => model%stepper%march%state, scene => model%stepper%scene)
          before = system%linear%n
-         if (.not. fits(model, n_constraint, system%n_constraint - before, ierr)) return
+         if (.not. handle_fits(model, n_constraint, system%n_constraint - before, ierr)) return
          lam = real(state%lam(before + 1:), c_double)
          active = merge(1, 0, state%is_active(before + 1:))
          do i = 1, size(system%contact)
@@ -218,7 +205,7 @@ contains
       if (.not. associated(model)) return
       ierr = err_none
       associate (pair => model%stepper%march%state%pairs%total)
-         if (.not. fits(model, n_pair, size(pair), ierr)) return
+         if (.not. handle_fits(model, n_pair, size(pair), ierr)) return
          do k = 1, n_pair
             total(1:3, k) = real(pair(k)%slave, c_double)
             total(4:6, k) = real(pair(k)%master, c_double)

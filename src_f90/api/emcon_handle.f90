@@ -12,7 +12,7 @@ module emcon_handle
    implicit none
    private
    public :: model_t, handle_new, handle_free, handle_find, handle_fail, handle_pass
-   public :: handle_open
+   public :: handle_open, handle_fits
 
    type :: model_t
       type(stepper_t) :: stepper
@@ -115,5 +115,18 @@ contains
       ierr = err_none
       if (allocated(error)) call handle_fail(model, error%message, error%code, ierr)
    end subroutine handle_pass
+
+   !> Is the size `n` of an array what the model has? If not, `ierr` and the message say so.
+   logical function handle_fits(model, n, expected, ierr)
+      type(model_t), intent(inout) :: model
+      integer(c_int), intent(in) :: n
+      integer, intent(in) :: expected
+      integer(c_int), intent(out) :: ierr
+
+      ierr = err_none
+      handle_fits = n == expected
+      if (.not. handle_fits) call handle_fail(model, &
+         "the arrays do not have the size of the model", err_input, ierr)
+   end function handle_fits
 
 end module emcon_handle
