@@ -157,10 +157,11 @@ kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/ker
 # f2py writes the wrapper, the rules below compile it: the same way for every version of Python.
 # One run writes both files. A kind that f2py does not know becomes C float without an error.
 P := $(BUILD)/py
+FLAT := $(wildcard src_f90/api/emcon_flat*.f90)
 $(P)/_coremodule.c $(P)/_core-f2pywrappers2.f90 $(P)/fortranobject.c $(P)/include.txt &: \
-		src_f90/api/emcon_flat.f90 .venv/run.stamp
-	@echo "  F2PY  $<"
-	$(Q)$(PY) -m numpy.f2py $< -m _core --build-dir $(P) > $(P)/f2py.log 2>&1 \
+		$(FLAT) $(BUILD)/sources.txt .venv/run.stamp
+	@echo "  F2PY  $(FLAT)"
+	$(Q)$(PY) -m numpy.f2py $(FLAT) -m _core --build-dir $(P) > $(P)/f2py.log 2>&1 \
 		|| { cat $(P)/f2py.log; exit 1; }
 	$(Q)if grep -n 'is mapped to C "float"' $(P)/f2py.log; then exit 1; fi
 	$(Q)cp $$($(PY) -c 'import numpy.f2py as f; print(f.get_include())')/fortranobject.[ch] $(P)
@@ -170,7 +171,7 @@ $(P)/%.o: $(P)/%.c $(P)/include.txt $(BUILD)/flags.txt
 	@echo "  CC    $<"
 	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) @$(P)/include.txt $(CFLAGS) -c $< -o $@
 
-$(P)/_core-f2pywrappers2.o: $(P)/_core-f2pywrappers2.f90 $(O)/emcon_flat.o
+$(P)/_core-f2pywrappers2.o: $(P)/_core-f2pywrappers2.f90 $(call objects,$(FLAT))
 	@echo "  FC    $<"
 	$(Q)$(FC) -O2 -g -fPIC -I$(BUILD)/mod -J$(P) $(FFLAGS) -c $< -o $@
 

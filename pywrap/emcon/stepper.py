@@ -10,19 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _core
+from .errors import AnalysisError, InputError, check
+from .model import Model
+
+__all__ = ["AnalysisError", "Increment", "InputError", "PairTotal", "Stepper"]
 
 _flat = _core.emcon_flat
-
-
-class InputError(ValueError):
-    """A deck or an argument is wrong; the text says what, where and what to do."""
-
-
-class AnalysisError(ArithmeticError):
-    """The analysis failed; the state is that of the last part that succeeded."""
-
-
-_KINDS = {2: InputError, 3: AnalysisError, 4: OSError}
 
 
 @dataclass(frozen=True)
@@ -51,7 +44,7 @@ class PairTotal:
 
 
 class Stepper:
-    """A model read from a deck, at some point of its analysis.
+    """A model at some point of its analysis; `model` is one, or the path of a deck.
 
     Parameters of the deck are given as keywords: ``Stepper("ring.inp", h=0.005)``. Arrays are
     copies, of shape (n_node, 2) where they belong to nodes. Any number of steppers live side by
@@ -59,13 +52,17 @@ class Stepper:
     bad deck.
     """
 
-    def __init__(self, deck: str | os.PathLike[str], *, lenient: bool = False,
+    def __init__(self, model: str | os.PathLike[str] | Model, *, lenient: bool = False,
                  **parameters: object) -> None:
-        overrides = "\n".join(f"{name}={value}" for name, value in parameters.items())
-        self._handle, ierr = _flat.open_deck(os.fsencode(deck), overrides, int(lenient))
+        if not isinstance(model, Model):
+            model = Model.from_deck(model, lenient=lenient, **parameters)
+        elif lenient or parameters:
+            raise InputError("parameters are given to Model.from_deck, not to the Stepper of a "
+                             "Model")
+        self._handle = int(_flat.new_model())
         try:
-            self._check(ierr)
-        except Exception:
+            model.build(self._handle)
+        except BaseException:
             self.close()
             raise
         sizes, ierr = _flat.model_size(self._handle)
@@ -74,9 +71,7 @@ class Stepper:
          self.n_step, self.n_pair) = (int(size) for size in sizes)
 
     def _check(self, ierr: int) -> None:
-        if ierr:
-            text = _flat.last_error(self._handle).decode("utf-8", "replace").rstrip()
-            raise _KINDS.get(ierr, RuntimeError)(text)
+        check(self._handle, ierr)
 
     def close(self) -> None:
         """Free the model. Harmless when closed; any other call then raises `InputError`."""

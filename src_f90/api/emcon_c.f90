@@ -3,8 +3,8 @@ module emcon_c
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, &
       c_f_procpointer, c_funptr, c_int, c_int64_t, c_loc, c_null_char, c_null_ptr, c_ptr
    use emcon_errors, only : err_input, err_interrupt, err_none, error_t
-   use emcon_handle, only : handle_fail, handle_find, handle_fits, handle_free, handle_new, &
-      handle_open, handle_pass, model_t
+   use emcon_handle, only : handle_build, handle_fail, handle_find, handle_fits, handle_free, &
+      handle_new, handle_pass, handle_read, model_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_run_log, only : model_lines
@@ -80,7 +80,8 @@ contains
 
       address = handle_new()
       handle = transfer(address, c_null_ptr)
-      call handle_open(address, f_text(deck), f_text(parameters), is_lenient /= 0, emcon_open)
+      call handle_read(address, f_text(deck), f_text(parameters), is_lenient /= 0, emcon_open)
+      if (emcon_open == err_none) call handle_build(address, emcon_open)
    end function emcon_open
 
    subroutine emcon_close(handle) bind(c)

@@ -7,8 +7,8 @@ module emcon_flat
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_handle, only : handle_fail, handle_find, handle_fits, handle_free, handle_new, &
-      handle_open, handle_pass, model_t
+   use emcon_handle, only : handle_build, handle_fail, handle_find, handle_fits, handle_free, &
+      handle_new, handle_pass, handle_read, model_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_registry, only : law_create
@@ -18,7 +18,7 @@ module emcon_flat
    use emcon_stepper, only : stepper_advance, stepper_is_done
    implicit none
    private
-   public :: open_deck, close_model, last_error, model_size, advance, is_done
+   public :: new_model, read_deck, build_model, close_model, last_error, model_size, advance, is_done
    public :: get_positions, get_state, get_contact, get_pairs, get_ledger, law_kernel, nts_kernel
 
 contains
@@ -34,19 +34,33 @@ contains
       if (associated(model)) text = model%message
    end subroutine last_error
 
-   !> Read a deck and build its model. `overrides`: NAME=VALUE, one per line. The handle is to be
-   !> closed also after a failure.
-   subroutine open_deck(path, overrides, is_lenient, handle, ierr)
+   !> A handle of a model without contents.
+   subroutine new_model(handle)
+      integer(c_int64_t), intent(out) :: handle
+
+      handle = handle_new()
+   end subroutine new_model
+
+   !> Read a deck into a new model. `overrides`: NAME=VALUE, one per line.
+   subroutine read_deck(handle, path, overrides, is_lenient, ierr)
+      integer(c_int64_t), intent(in) :: handle
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: overrides
       integer(c_int), intent(in) :: is_lenient
-      integer(c_int64_t), intent(out) :: handle
       integer(c_int), intent(out) :: ierr
       !f2py threadsafe
 
-      handle = handle_new()
-      call handle_open(handle, path, overrides, is_lenient /= 0, ierr)
-   end subroutine open_deck
+      call handle_read(handle, path, overrides, is_lenient /= 0, ierr)
+   end subroutine read_deck
+
+   !> Build the model of the deck that was read, and begin its first step.
+   subroutine build_model(handle, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      integer(c_int), intent(out) :: ierr
+      !f2py threadsafe
+
+      call handle_build(handle, ierr)
+   end subroutine build_model
 
    !> Free a model; harmless for 0.
    subroutine close_model(handle)

@@ -1,21 +1,29 @@
 !> Handles: models that other languages hold by their address.
 !>
-!> A handle owns a stepper and the text of its last failure; nothing else keeps it, so that any
-!> number of models live side by side, each in a thread of its own. 0 is no model. A handle that
-!> was closed must not be used again: its owner forgets it.
+!> A handle owns a stepper, the answers to what was asked last, and the text of the last failure;
+!> nothing else keeps it, so that any number of models live side by side, each in a thread of its
+!> own. 0 is no model. A handle that was closed must not be used again: its owner forgets it.
 module emcon_handle
    use, intrinsic :: iso_c_binding, only : c_char, c_f_pointer, c_int, c_int64_t, c_loc, &
       c_null_ptr, c_ptr
+   use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_stepper, only : stepper_close, stepper_open, stepper_t
+   use emcon_stepper, only : stepper_build, stepper_close, stepper_read, stepper_t
+   use emcon_stepper_constraints, only : contact_report_t
+   use emcon_stepper_free, only : snapshot_t
+   use emcon_stepper_query, only : query_free, query_t
    use emcon_text, only : string_t
    implicit none
    private
    public :: model_t, handle_new, handle_free, handle_find, handle_fail, handle_pass
-   public :: handle_open, handle_fits
+   public :: handle_read, handle_build, handle_fits
 
    type :: model_t
       type(stepper_t) :: stepper
+      type(query_t) :: query
+      type(csr_t) :: matrix, twin                !! asked for last; `twin` has the same pattern
+      type(contact_report_t) :: report           !! of the constraints asked for last
+      type(snapshot_t), allocatable :: snapshot(:)   !! states to come back to
       character(len=:), allocatable :: message   !! of the last failure
       character(kind=c_char), allocatable :: c_text(:)   !! the same as C was given it
    end type model_t
@@ -33,26 +41,50 @@ contains
 
    !> Read a deck into a new model. `parameters`: NAME=VALUE, one per line. After a failure the
    !> message holds all that is wrong with the deck, one per line.
-   subroutine handle_open(handle, path, parameters, is_lenient, ierr)
+   subroutine handle_read(handle, path, parameters, is_lenient, ierr)
       integer(c_int64_t), intent(in) :: handle
       character(len=*), intent(in) :: path, parameters
       logical, intent(in) :: is_lenient
       integer(c_int), intent(out) :: ierr
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
+
+      ierr = err_input
+      call handle_find(handle, model)
+      if (.not. associated(model)) return
+      call stepper_read(model%stepper, trim(path), lines_of(parameters), is_lenient, error)
+      call handle_pass(model, error, ierr)
+      if (allocated(error)) call add_diagnostics(model, error%message)
+   end subroutine handle_read
+
+   !> Append what else is wrong with the deck to the message.
+   subroutine add_diagnostics(model, first)
+      type(model_t), intent(inout) :: model
+      character(len=*), intent(in) :: first          !! is there already
       integer :: i
 
-      call handle_find(handle, model)
-      call stepper_open(model%stepper, trim(path), lines_of(parameters), is_lenient, error)
-      call handle_pass(model, error, ierr)
-      if (.not. (allocated(error) .and. allocated(model%stepper%diagnostic))) return
+      if (.not. allocated(model%stepper%diagnostic)) return
       associate (text => model%stepper%diagnostic)
          do i = 1, size(text)
-            if (text(i)%text /= error%message) model%message = model%message // new_line("a") // &
+            if (text(i)%text /= first) model%message = model%message // new_line("a") // &
                text(i)%text
          end do
       end associate
-   end subroutine handle_open
+   end subroutine add_diagnostics
+
+   !> Build the model of the deck that was read.
+   subroutine handle_build(handle, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+
+      ierr = err_input
+      call handle_find(handle, model)
+      if (.not. associated(model)) return
+      call stepper_build(model%stepper, error)
+      call handle_pass(model, error, ierr)
+   end subroutine handle_build
 
    !> The lines of a text.
    function lines_of(text) result(line)
@@ -79,6 +111,7 @@ contains
 
       call handle_find(handle, model)
       if (.not. associated(model)) return
+      call query_free(model%query)
       call stepper_close(model%stepper)
       deallocate(model)
    end subroutine handle_free

@@ -18,7 +18,8 @@ module emcon_stepper
    use emcon_ties, only : ties_move_nodes, ties_prepare
    implicit none
    private
-   public :: stepper_t, stepper_open, stepper_advance, stepper_is_done
+   public :: stepper_t, stepper_open, stepper_read, stepper_read_source, stepper_build, &
+      stepper_advance, stepper_is_done
    public :: stepper_close, stepper_fraction, stepper_save, stepper_load, contact_gaps, &
       stepper_contact_seconds
 
@@ -28,6 +29,7 @@ module emcon_stepper
       type(deck_source_t) :: source              !! the deck as read, for restart files
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.
+      logical :: is_read = .false.               !! `scene` is complete
       type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
       type(notes_t) :: notes                     !! what was done before the first step
    end type stepper_t
@@ -41,6 +43,18 @@ contains
       type(string_t), intent(in) :: override(:)  !! parameters, NAME=VALUE
       logical, intent(in) :: is_lenient          !! unknown keywords are warnings
       type(error_t), allocatable, intent(out) :: error
+
+      call stepper_read(self, path, override, is_lenient, error)
+      if (.not. allocated(error)) call stepper_build(self, error)
+   end subroutine stepper_open
+
+   !> Read the deck at `path`: the scene, not yet the model.
+   subroutine stepper_read(self, path, override, is_lenient, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: path
+      type(string_t), intent(in) :: override(:)
+      logical, intent(in) :: is_lenient
+      type(error_t), allocatable, intent(out) :: error
       type(diagnostics_t) :: diagnostics
 
       call deck_open(path, self%source, diagnostics)
@@ -51,21 +65,32 @@ contains
       end if
       self%override = override
       self%is_lenient = is_lenient
-      call stepper_open_source(self, diagnostics, error)
-   end subroutine stepper_open
+      call stepper_read_source(self, diagnostics, error)
+   end subroutine stepper_read
 
-   !> Build the model of the deck source that `self` holds.
-   subroutine stepper_open_source(self, diagnostics, error)
+   !> The scene of the deck source that `self` holds.
+   subroutine stepper_read_source(self, diagnostics, error)
       type(stepper_t), intent(inout) :: self
       type(diagnostics_t), intent(inout) :: diagnostics
       type(error_t), allocatable, intent(out) :: error
 
       call deck_read(self%source, self%override, self%is_lenient, self%scene, diagnostics)
       self%diagnostic = diagnostics_texts(diagnostics)
-      if (diagnostics%n_errors > 0) then
-         call raise(error, err_input, self%diagnostic(1)%text)
-         return
+      self%is_read = diagnostics%n_errors == 0
+      if (.not. self%is_read) call raise(error, err_input, self%diagnostic(1)%text)
+   end subroutine stepper_read_source
+
+   !> Build the model of the scene that was read, and begin its first step.
+   subroutine stepper_build(self, error)
+      type(stepper_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. self%is_read) then
+         call raise(error, err_input, "there is no scene: no deck was read, or reading it failed")
+      else if (allocated(self%march%scheme)) then
+         call raise(error, err_input, "the model is built already")
       end if
+      if (allocated(error)) return
       call ties_prepare(self%scene, self%notes, error)
       if (allocated(error)) return
       call initial_contact_prepare(self%scene, self%notes, error)
@@ -76,7 +101,7 @@ contains
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
       if (.not. allocated(error)) call notes_append(self%notes, self%march%system%notes)
-   end subroutine stepper_open_source
+   end subroutine stepper_build
 
    !> Free what libraries hold for `self`; call it before the object goes, also after an error.
    subroutine stepper_close(self)
@@ -211,7 +236,8 @@ contains
       if (allocated(error)) return
       self%is_lenient = flag(1) == 1
       diagnostics%file_name = self%source%file_name
-      call stepper_open_source(self, diagnostics, error)
+      call stepper_read_source(self, diagnostics, error)
+      if (.not. allocated(error)) call stepper_build(self, error)
       if (allocated(error)) return
       call restart_get(restart, "progress", progress, error)
       if (.not. allocated(error)) call restart_get(restart, "time", time, error)
