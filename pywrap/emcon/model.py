@@ -1,22 +1,75 @@
-"""The model: what is to be analysed, as a deck says it. A `Stepper` analyses it."""
+"""The model: what is to be analysed, as a deck says it. A `Stepper` analyses it.
+
+    nodes = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    model = Model.from_arrays(nodes, [[0, 1, 2, 3]], heading="A square, pulled at a corner")
+    model.material("RUBBER", coupled_neo_hooke=(100.0, 0.3)).section("RUBBER")
+    model.boundary(0, (1, 2)).boundary(1, 2)
+    step = model.step("STATIC", h=0.5, nlgeom=True)
+    step.load(2, 2, 1.0)
+    with model.stepper() as square:
+        square.step()
+    model.write("square.inp")                 # for `emcon run`
+
+Messages about the model name the lines of Python that made its cards.
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from .errors import check
+from .cards import (Block, Cards, Dof, Number, Numbering, Where, array_of, caller, card, real,
+                    text_lines, whole)
+from .deck_text import number, table, write_text
+from .errors import InputError, check
+from .steps import Step
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
+    from .stepper import Stepper
 
 _flat = _core.emcon_flat
+_source = _core.emcon_flat_source
+
+#: Nodes of an element, by kind.
+_CORNERS = {"CPE3": 3, "CPE4": 4}
+_LARGEST_TEXT = 2**31 - 1
 
 
-class Model:
-    """A scene: mesh, materials, contact, steps. Made by `Model.from_deck`."""
+class Model(Cards):
+    """A scene: mesh, sets, materials, contact, steps; made of a deck, a mesh, arrays or calls.
 
-    def __init__(self, deck: str | os.PathLike[str], overrides: str, lenient: bool) -> None:
-        self._deck = os.fsencode(deck)
-        self._overrides = overrides
-        self._lenient = lenient
+    Each method adds one card of docs/deck.md, which says what it means. Where an argument is a
+    number, `"<name>"` stands for a parameter of the deck. Errors of the reader name the line of
+    Python that made the card: ``study.py:42: error: ...``.
+
+    Nodes and elements are counted from 0 in the order in which `add_nodes` and `add_elements` (or
+    `from_arrays`) give them; row i has the label i + 1, in messages and results, unless labels are
+    given. In a model of a deck or of a `Mesh` they are named by their labels.
+
+    Lengths are in any unit [L], masses [M] and times [T] likewise.
+    """
+
+    def __init__(self, heading: str = "") -> None:
+        super().__init__(Numbering("node", rows=True), Numbering("element", rows=True))
+        self._place = caller()
+        self._steps: list[Step] = []
+        self._overrides: dict[str, str] = {}
+        self._lenient = False
+        # given from outside, for `_give`: by material; forces; the host's mass and forces
+        self._laws: dict[str, Any] = {}
+        self._potentials: list[Any] = []
+        self._host: Any = None
+        if heading:
+            self.heading(heading)
+
+    # --- making ----------------------------------------------------------------------------
 
     @classmethod
     def from_deck(cls, path: str | os.PathLike[str], *, lenient: bool = False,
@@ -24,11 +77,365 @@ class Model:
         """The model of the deck at `path`; parameters of the deck as keywords.
 
         The deck is read when a `Stepper` is made. With `lenient` unknown keywords are passed over.
+        Further steps may be added by calls. Raises `InputError` for a parameter that is no number
+        and no line of text.
         """
-        overrides = "\n".join(f"{name}={value}" for name, value in parameters.items())
-        return cls(path, overrides, lenient)
+        model = cls._labelled()
+        model._lenient = lenient
+        for name, value in parameters.items():
+            model._overrides[name] = _parameter(name, value)
+        return model.include(path)
+
+    @classmethod
+    def from_arrays(cls, nodes: ArrayLike,
+                    elements: ArrayLike | Mapping[str, ArrayLike] | None = None, *,
+                    node_labels: ArrayLike | None = None,
+                    element_labels: ArrayLike | Mapping[str, ArrayLike] | None = None,
+                    heading: str = "") -> Model:
+        """The model of one mesh, with the sets ALL of its nodes and of its elements.
+
+        nodes            (n, 2) positions [L]
+        elements         (m, 3) or (m, 4) rows of `nodes`, counter-clockwise; or by kind, CPE3 and
+                         CPE4; None where `given_forces` stand for elements
+        node_labels      (n,) whole numbers from 1 on, each once; default 1..n
+        element_labels   (m,), or by kind; default 1.. in the order of `elements`
+        """
+        model = cls(heading)
+        model.add_nodes(nodes, labels=node_labels)
+        if elements is None:
+            elements = {}
+        kinds = elements if isinstance(elements, Mapping) else {"": elements}
+        labels = (element_labels if isinstance(element_labels, Mapping)
+                  else {kind: element_labels for kind in kinds})
+        if element_labels is not None and (isinstance(element_labels, Mapping)
+                                           != isinstance(elements, Mapping)
+                                           or set(labels) != set(kinds)):
+            raise InputError("element_labels have the kinds of elements: "
+                             f"{', '.join(map(repr, kinds))}")
+        for kind, corners in kinds.items():
+            if kind and kind not in _CORNERS:
+                raise InputError(f"{kind!r} is no kind of element; known are CPE3, CPE4")
+            array = array_of(corners, "elements")
+            if kind and array.ndim == 2 and array.shape[1] != _CORNERS[kind]:
+                raise InputError(f"elements of {kind} have {_CORNERS[kind]} nodes, not "
+                                 f"{array.shape[1]}")
+            model.add_elements(array, labels=labels[kind])
+        return model
+
+    @classmethod
+    def from_mesh(cls, mesh: Mesh, heading: str = "", *,
+                  parameters: Mapping[str, float | str] | None = None) -> Model:
+        """The model of a mesh with its sets and surfaces, and a heading and `*PARAMETER` before it.
+
+        Nodes and elements are named by the labels of the mesh. `parameters`: see `parameter`.
+        """
+        model = cls._labelled(heading)
+        if parameters:
+            model.parameter(**parameters)
+        model._add(mesh.text())
+        return model
+
+    @classmethod
+    def _labelled(cls, heading: str = "") -> Model:
+        model = cls(heading)
+        model._nodes.rows = model._elements.rows = False
+        return model
+
+    # --- text and parameters ---------------------------------------------------------------
+
+    def heading(self, text: str) -> Model:
+        """`*HEADING`: text that goes to the log of a run."""
+        lines = text_lines(text)
+        if any(line.lstrip().startswith("*") for line in lines):
+            raise InputError("a line of a heading does not begin with a star")
+        self._add("\n".join(["*HEADING", *lines]) + "\n")
+        return self
+
+    def parameter(self, **values: float | str) -> Model:
+        """`*PARAMETER`: values of `"<name>"` in what follows, which `emcon run --set` may change.
+
+        Numbers, or text as it stands in a deck: `60./n`, `NULL SPACE`.
+        """
+        self._add("*PARAMETER\n" + "".join(f"{name} = {_parameter(name, value)}\n"
+                                           for name, value in values.items()))
+        return self
+
+    def include(self, path: str | os.PathLike[str]) -> Model:
+        """`*INCLUDE`: the cards of a file, relative to the working directory."""
+        name = os.fsdecode(path)
+        if not name.strip() or any(ord(c) < 32 or ord(c) == 127 for c in name):
+            raise InputError(f"{name!r} is not the name of a deck")
+        # quotes keep blanks and commas at the ends
+        self._blocks.append(Block(f'*INCLUDE, INPUT="{name}"\n', *caller(),
+                                  f'*INCLUDE, INPUT="{os.path.abspath(name)}"\n'))
+        return self
+
+    # --- mesh ------------------------------------------------------------------------------
+
+    def add_nodes(self, positions: ArrayLike, *, labels: ArrayLike | None = None,
+                  name: str = "ALL") -> NDArray[np.int64]:
+        """`*NODE`: nodes at positions (n, 2) [L], in the node set `name`; returns their rows (n,).
+
+        labels   (n,) whole numbers from 1 on; required in a model of a deck or a `Mesh`, which
+                 gets labels back
+        """
+        x = real(positions, "nodes")
+        if x.ndim != 2 or x.shape[1] != 2:
+            raise InputError(f"nodes are an (n, 2) array of positions, not {x.shape}")
+        head = card("NODE", {"NSET": name})
+        first = self._nodes.count
+        label = self._nodes.extend(len(x), labels)
+        self._add(head + (table(label, x[:, 0], x[:, 1]) if len(x) else ""))
+        return np.arange(first, first + len(x)) if self._nodes.rows else label
+
+    def add_elements(self, corners: ArrayLike, *, labels: ArrayLike | None = None,
+                     name: str = "ALL") -> NDArray[np.int64]:
+        """`*ELEMENT`: elements of three nodes (m, 3), CPE3, or of four (m, 4), CPE4.
+
+        corners   nodes, counter-clockwise
+        labels    (m,), as with `add_nodes`
+        name      of the element set that they are in
+
+        Returns the rows (m,) of the elements.
+        """
+        array = array_of(corners, "elements")
+        n = array.shape[-1] if array.ndim == 2 else 0
+        if n not in (3, 4):
+            raise InputError(f"elements are an (m, 3) or (m, 4) array of nodes, not {array.shape}")
+        nodes = self._nodes.labels(array, "elements", (None, n))
+        head = card("ELEMENT", {"TYPE": f"CPE{n}", "ELSET": name})
+        first = self._elements.count
+        label = self._elements.extend(len(nodes), labels)
+        self._add(head + (table(label, *nodes.T) if len(nodes) else ""))
+        return np.arange(first, first + len(nodes)) if self._elements.rows else label
+
+    def surface(self, name: str, *, faces: ArrayLike | Sequence[tuple[Any, int]] | None = None,
+                elements: Where | None = None, nodes: Where | None = None,
+                edges: ArrayLike | None = None) -> Model:
+        """`*SURFACE`: made of faces, of the free faces of elements, of nodes, or of edges.
+
+        faces      (k, 2): element (or element set) and face 1..4; face i of an element goes from
+                   corner i to the next
+        elements   element set, or (k,) elements
+        nodes      node set, or (k,) nodes; only for slave surfaces of NODE TO SURFACE
+        edges      (k, 2): first and last node of each edge
+        """
+        given = [kind for kind, value in (("faces", faces), ("elements", elements),
+                                          ("nodes", nodes), ("edges", edges)) if value is not None]
+        if len(given) != 1:
+            raise InputError(f"surface {name} is made of faces, elements, nodes or edges, one of "
+                             f"them, not {len(given)}")
+        what = f"surface {name}"
+        rows: Sequence[Sequence[object]] = ()
+        data = ""
+        if edges is not None:
+            ends = self._nodes.labels(edges, what, (None, 2))
+            data = table(*ends.T) if len(ends) else ""
+        elif faces is not None:
+            rows = [(item, f"S{face}") for item, face in self._faces(faces, what)]
+        elif elements is not None:
+            rows = [(item,) for item in self._names(elements, self._elements, what)]
+        elif nodes is not None:
+            rows = [(item,) for item in self._names(nodes, self._nodes, what)]
+        kind = {"edges": "EDGE", "nodes": "NODE"}.get(given[0], "ELEMENT")
+        return self._card("SURFACE", {"NAME": name, "TYPE": kind}, rows, data)
+
+    def _faces(self, faces: ArrayLike | Sequence[tuple[Any, int]],
+               what: str) -> list[tuple[str | int, int]]:
+        if isinstance(faces, np.ndarray):
+            array = whole(faces, what, (None, 2))
+            pairs: list[Any] = list(zip(self._elements.labels(array[:, 0], what).tolist(),
+                                        array[:, 1].tolist()))
+        else:
+            pairs = [tuple(pair) if isinstance(pair, (list, tuple, np.ndarray)) else ()
+                     for pair in cast("Sequence[Any]", faces)]
+            if any(len(pair) != 2 for pair in pairs):
+                raise InputError(f"{what}: faces are pairs of an element or an element set and a "
+                                 "face")
+            pairs = [(self._names(item, self._elements, what)[0], face) for item, face in pairs]
+        wrong = [face for _, face in pairs if face not in (1, 2, 3, 4)]
+        if wrong or not pairs:
+            raise InputError(f"{what}: a face is 1 to 4, not {wrong[0]!r}" if wrong
+                             else f"{what} has no faces")
+        return [(item, int(face)) for item, face in pairs]
+
+    # --- materials -------------------------------------------------------------------------
+
+    def material(self, name: str, *, density: Number | None = None,
+                 elastic: Sequence[Number] | None = None,
+                 neo_hooke: Sequence[Number] | None = None,
+                 coupled_neo_hooke: Sequence[Number] | None = None,
+                 user: Sequence[Number] | None = None) -> Model:
+        """`*MATERIAL` with one law; stresses in [M/(L T^2)].
+
+        density             [M/L^3]; required in dynamic steps and for gravity
+        elastic             (E, nu): St. Venant-Kirchhoff under NLGEOM, linear without
+        neo_hooke           (C10, D1): C10 (J^(-2/3) tr C - 3) + (J - 1)^2/D1
+        coupled_neo_hooke   (E, nu): mu/2 (tr C - 3) - mu ln J + lambda/2 ln^2 J
+        user                constants (k,) of a law that is given to the model
+        """
+        laws = {"ELASTIC": elastic, "HYPERELASTIC, NEO HOOKE": neo_hooke,
+                "HYPERELASTIC, COUPLED NEO HOOKE": coupled_neo_hooke, "USER MATERIAL": user}
+        chosen = [(law, values) for law, values in laws.items() if values is not None]
+        if len(chosen) != 1:
+            raise InputError(f"material {name} has one law, not {len(chosen)}")
+        law, values = chosen[0]
+        constants = list(values)
+        if law != "USER MATERIAL" and len(constants) != 2:
+            raise InputError(f"material {name}: {law} has 2 constants, not {len(constants)}")
+        options: dict[str, object] = {}
+        if law == "ELASTIC":
+            options = {"TYPE": "ISO"}
+        elif law == "USER MATERIAL":
+            options = {"CONSTANTS": len(constants)}
+        text = card("MATERIAL", {"NAME": name})
+        text += card(law, options, [constants[k:k + 8] for k in range(0, len(constants), 8)])
+        self._add(text if density is None else text + card("DENSITY", rows=[(density,)]))
+        return self
+
+    def section(self, material: str, elements: str = "ALL", *, thickness: Number = 1.0) -> Model:
+        """`*SOLID SECTION`: an element set is of a material, of `thickness` [L]."""
+        return self._card("SOLID SECTION", {"ELSET": elements, "MATERIAL": material},
+                          [(thickness,)])
+
+    def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
+                value: Number | ArrayLike) -> Model:
+        """`*INITIAL CONDITIONS`: velocities [L/T] or displacements [L] at the start.
+
+        dof     1, 2 or (1, 2)
+        value   one for all, (n_dof,), or (k, n_dof) for k nodes
+        """
+        self._valued("INITIAL CONDITIONS", where, dof, value, {"TYPE": type})
+        return self
+
+    # --- contact, ties, equations ----------------------------------------------------------
+
+    def interaction(self, name: str, *, friction: Number | None = None) -> Model:
+        """`*SURFACE INTERACTION` with hard contact; `friction` may only be 0."""
+        text = card("SURFACE INTERACTION", {"NAME": name})
+        text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})
+        self._add(text if friction is None else text + card("FRICTION", rows=[(friction,)]))
+        return self
+
+    def contact_pair(self, slave: str, master: str, *, interaction: str,
+                     type: str = "NODE TO SURFACE", adjust: Number | None = None) -> Model:
+        """`*CONTACT PAIR` of two surfaces, or of one with itself.
+
+        type     NODE TO SURFACE, SEGMENT or MORTAR
+        adjust   distance [L] up to which slave nodes are moved onto the master, or a node set
+        """
+        return self._card("CONTACT PAIR", {"INTERACTION": interaction, "TYPE": type,
+                                           "ADJUST": adjust}, [(slave, master)])
+
+    def tie(self, name: str, slave: str, master: str, *,
+            position_tolerance: Number | None = None, multiplier: str | None = None) -> Model:
+        """`*TIE` of two surfaces.
+
+        position_tolerance   how far apart they may be [L]; default a tenth of an edge
+        multiplier           DUAL (default) or STANDARD
+        """
+        return self._card("TIE", {"NAME": name, "POSITION TOLERANCE": position_tolerance,
+                                  "MULTIPLIER": multiplier, "ADJUST": "YES",
+                                  "TYPE": "SURFACE TO SURFACE"}, [(slave, master)])
+
+    def equation(self, terms: Sequence[tuple[str | int, int, Number]]) -> Model:
+        """`*EQUATION`: the sum of coefficient times displacement over the terms is 0.
+
+        terms   node or node set, 1 or 2, coefficient; the first one is eliminated
+        """
+        rows: list[Sequence[object]] = [(len(terms),)]
+        for term in terms:
+            if len(term) != 3:
+                raise InputError(f"a term is node, 1 or 2, coefficient, not {term!r}")
+            rows.append((*self._names(term[0], self._nodes, "*EQUATION"), *term[1:]))
+        return self._card("EQUATION", rows=rows)
+
+    def given_forces(self, nodes: str | None = None) -> Model:
+        """`*GIVEN FORCES`: nodes whose forces and mass another program gives.
+
+        nodes   node set; default the nodes that belong to no element
+        """
+        return self._card("GIVEN FORCES", {"NSET": nodes})
+
+    # --- steps -----------------------------------------------------------------------------
+
+    def step(self, procedure: Literal["STATIC", "DYNAMIC"], h: Number = 1.0,
+             duration: Number = 1.0, h_min: Number | None = None, h_max: Number | None = None, *,
+             direct: bool = False, nlgeom: bool | None = None, increments: int | str | None = None,
+             amplitude: Literal["RAMP", "STEP"] | None = None) -> Step:
+        """`*STEP`: a further step, to which conditions, settings and output are added.
+
+        h, duration    increment and length of the step [T]
+        h_min, h_max   bounds of the increment [T] where it is cut or grown
+        direct         keep to h
+        nlgeom         large displacements; stays on for later steps
+        increments     most increments of the step
+        amplitude      RAMP in static steps, STEP in dynamic ones: what holds anyway
+        """
+        options: dict[str, object] = {
+            "NLGEOM": "NO" if nlgeom is False else nlgeom, "INC": increments,
+            "AMPLITUDE": amplitude}
+        step = Step(self, options, procedure, {"DIRECT": direct}, (h, duration, h_min, h_max))
+        self._steps.append(step)
+        return step
+
+    # --- using -----------------------------------------------------------------------------
+
+    def deck(self) -> str:
+        """The model as the text of a deck, which `emcon run` reads.
+
+        Raises `InputError` for the model of a deck that is given other values of its parameters.
+        """
+        if self._overrides:
+            options = " ".join(f"--set {name}={value}" for name, value in self._overrides.items())
+            raise InputError("the deck of this model is given parameters; run it with "
+                             f"emcon run DECK {options}")
+        return "".join(block.written or block.text for block in self._all_blocks())
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write `deck()` to a file; returns its path. Raises `OSError` where that fails."""
+        return write_text(path, self.deck())
+
+    def stepper(self) -> Stepper:
+        """A new `Stepper` of this model. Raises `InputError`."""
+        from .stepper import Stepper
+        return Stepper(self)
 
     def build(self, handle: int) -> None:
         """Read the model into the new library model `handle`. Raises `InputError`."""
-        check(handle, _flat.read_deck(handle, self._deck, self._overrides, int(self._lenient)))
+        blocks = self._all_blocks()
+        text = "".join(block.text for block in blocks).encode(errors="surrogateescape")
+        if len(text) > _LARGEST_TEXT:
+            raise InputError("the text of the model is larger than 2 GB; use include")
+        files = {file: i for i, file in enumerate(
+            dict.fromkeys([self._place[0], *(block.file for block in blocks)]), 1)}
+        places = np.array([(block.text.count("\n"), files[block.file], block.line, 0)
+                           for block in blocks] or [(0, 1, self._place[1], 0)], dtype=np.int32)
+        names = "\n".join(file.replace("\n", "?") for file in files)
+        overrides = "\n".join(f"{name}={value}" for name, value in self._overrides.items())
+        check(handle, _source.read_text(handle, text, places.T, os.fsencode(names),
+                                        overrides.encode(), int(self._lenient)))
+        self._give(handle)
         check(handle, _flat.build_model(handle))
+
+    def _give(self, handle: int) -> None:
+        """Hand over what is given from outside, between reading and building."""
+
+    def _all_blocks(self) -> list[Block]:
+        blocks = list(self._blocks)
+        for step in self._steps:
+            first = step._blocks[0]
+            blocks += [*step._blocks, Block("*END STEP\n", first.file, first.line)]
+        return blocks
+
+
+def _parameter(name: str, value: object) -> str:
+    """The value of a parameter as text."""
+    text = (value.strip() if isinstance(value, str)
+            else str(int(value)) if isinstance(value, (int, np.integer)) else "")
+    if isinstance(value, (float, np.floating)):
+        text = number(float(value)) if np.isfinite(value) else ""
+    if not text or not text.isprintable() or not name.isidentifier() or not name.isascii():
+        raise InputError(f"parameter {name!r} = {value!r} cannot stand in a deck: a name is one "
+                         "word, a value a finite number or one line of text")
+    return text

@@ -63,6 +63,16 @@ typedef struct emcon_ledger {
    double lz;       /* angular momentum about the origin */
 } emcon_ledger;
 
+/* A sparse matrix by rows, numbers from 0: row i has the entries row_start[i] to row_start[i + 1] - 1
+ * of `column` and `value`, the columns of a row in ascending order. The arrays belong to the model. */
+typedef struct emcon_csr {
+   int n_row;
+   int n_column;
+   const int *row_start;   /* n_row + 1 */
+   const int *column;      /* row_start[n_row] */
+   const double *value;    /* row_start[n_row] */
+} emcon_csr;
+
 /* Called after each increment; anything but 0 stops the run. */
 typedef int (*emcon_progress)(void *user, const emcon_increment *increment, double fraction_done);
 

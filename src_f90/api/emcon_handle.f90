@@ -7,8 +7,10 @@ module emcon_handle
    use, intrinsic :: iso_c_binding, only : c_char, c_f_pointer, c_int, c_int64_t, c_loc, &
       c_null_ptr, c_ptr
    use emcon_csr, only : csr_t
+   use emcon_deck_source, only : passage_t
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_stepper, only : stepper_build, stepper_close, stepper_read, stepper_t
+   use emcon_stepper, only : stepper_build, stepper_close, stepper_read, stepper_read_text, &
+      stepper_t
    use emcon_stepper_constraints, only : contact_report_t
    use emcon_stepper_free, only : snapshot_t
    use emcon_stepper_query, only : query_free, query_t
@@ -16,7 +18,7 @@ module emcon_handle
    implicit none
    private
    public :: model_t, handle_new, handle_free, handle_find, handle_fail, handle_pass
-   public :: handle_read, handle_build, handle_fits
+   public :: handle_read, handle_read_text, handle_read_passages, handle_build, handle_fits
 
    type :: model_t
       type(stepper_t) :: stepper
@@ -56,6 +58,35 @@ contains
       call handle_pass(model, error, ierr)
       if (allocated(error)) call add_diagnostics(model, error%message)
    end subroutine handle_read
+
+   !> The same for the text of a deck; messages call it `name` and count its lines from 1.
+   subroutine handle_read_text(handle, text, name, parameters, is_lenient, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      character(len=*), intent(in) :: text, name, parameters
+      logical, intent(in) :: is_lenient
+      integer(c_int), intent(out) :: ierr
+
+      call handle_read_passages(handle, text, [passage_t()], name, parameters, is_lenient, ierr)
+   end subroutine handle_read_text
+
+   !> The same for a text whose lines stand in several files. `names`: one file per line.
+   subroutine handle_read_passages(handle, text, passage, names, parameters, is_lenient, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      character(len=*), intent(in) :: text, names, parameters
+      type(passage_t), intent(in) :: passage(:)
+      logical, intent(in) :: is_lenient
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+
+      ierr = err_input
+      call handle_find(handle, model)
+      if (.not. associated(model)) return
+      call stepper_read_text(model%stepper, text, passage, lines_of(names), &
+         lines_of(parameters), is_lenient, error)
+      call handle_pass(model, error, ierr)
+      if (allocated(error)) call add_diagnostics(model, error%message)
+   end subroutine handle_read_passages
 
    !> Append what else is wrong with the deck to the message.
    subroutine add_diagnostics(model, first)

@@ -4,7 +4,7 @@ module emcon_stepper
    use emcon_contact, only : gap_state_t
    use emcon_correction, only : correction_seconds
    use emcon_deck, only : deck_read
-   use emcon_deck_source, only : deck_open, deck_source_t
+   use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, error_t, raise
    use emcon_initial_contact, only : initial_contact_prepare
@@ -18,8 +18,8 @@ module emcon_stepper
    use emcon_ties, only : ties_move_nodes, ties_prepare
    implicit none
    private
-   public :: stepper_t, stepper_open, stepper_read, stepper_read_source, stepper_build, &
-      stepper_advance, stepper_is_done
+   public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &
+      stepper_build, stepper_advance, stepper_is_done
    public :: stepper_close, stepper_fraction, stepper_save, stepper_load, contact_gaps, &
       stepper_contact_seconds
 
@@ -58,6 +58,31 @@ contains
       type(diagnostics_t) :: diagnostics
 
       call deck_open(path, self%source, diagnostics)
+      call read_opened(self, override, is_lenient, diagnostics, error)
+   end subroutine stepper_read
+
+   !> Read a deck in memory, of which messages say that it stands in the files `file_name`.
+   subroutine stepper_read_text(self, text, passage, file_name, override, is_lenient, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: text
+      type(passage_t), intent(in) :: passage(:)
+      type(string_t), intent(in) :: file_name(:), override(:)
+      logical, intent(in) :: is_lenient
+      type(error_t), allocatable, intent(out) :: error
+      type(diagnostics_t) :: diagnostics
+
+      call deck_open_text(text, passage, file_name, self%source, diagnostics)
+      call read_opened(self, override, is_lenient, diagnostics, error)
+   end subroutine stepper_read_text
+
+   !> The scene of the deck source that was just opened; `diagnostics` are of its opening.
+   subroutine read_opened(self, override, is_lenient, diagnostics, error)
+      type(stepper_t), intent(inout) :: self
+      type(string_t), intent(in) :: override(:)
+      logical, intent(in) :: is_lenient
+      type(diagnostics_t), intent(inout) :: diagnostics
+      type(error_t), allocatable, intent(out) :: error
+
       if (diagnostics%n_errors > 0 .and. size(self%source%line) == 0) then
          self%diagnostic = diagnostics_texts(diagnostics)
          call raise(error, err_input, self%diagnostic(1)%text)
@@ -66,7 +91,7 @@ contains
       self%override = override
       self%is_lenient = is_lenient
       call stepper_read_source(self, diagnostics, error)
-   end subroutine stepper_read
+   end subroutine read_opened
 
    !> The scene of the deck source that `self` holds.
    subroutine stepper_read_source(self, diagnostics, error)

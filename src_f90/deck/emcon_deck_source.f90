@@ -1,4 +1,5 @@
-!> The text of a deck: the file and all it includes, as one list of lines that know their origin.
+!> The text of a deck, from a file or from memory, with all the files it includes: one list of lines
+!> that know their origin.
 module emcon_deck_source
    use, intrinsic :: iso_fortran_env, only : iostat_end
    use emcon_diagnostics, only : add_error, diagnostics_t, quoted
@@ -7,7 +8,7 @@ module emcon_deck_source
    use emcon_text, only : squeezed, string_t, to_text
    implicit none
    private
-   public :: deck_source_t, deck_open
+   public :: deck_source_t, passage_t, deck_open, deck_open_text
 
    integer, parameter :: max_depth = 20            !! of files that include files
    integer, parameter :: max_includes = 10000      !! in all: files can include each other in powers
@@ -22,6 +23,14 @@ module emcon_deck_source
       type(string_t), allocatable :: file_name(:)  !! as typed; included ones as resolved
       logical :: is_whole = .true.                 !! false: some included file could not be read
    end type deck_source_t
+
+   !> Lines of a text that follow each other, and where messages say that they stand.
+   type :: passage_t
+      integer :: n_line = huge(1)                  !! the last one takes what is left of the text
+      integer :: file = 1                          !! index into the file names
+      integer :: number = 1                        !! line number of the first one
+      logical :: is_counted = .true.               !! false: all lines have that number
+   end type passage_t
 
    !> A deck source while it grows.
    type :: builder_t
@@ -42,11 +51,57 @@ contains
       type(deck_source_t), intent(out) :: source
       type(diagnostics_t), intent(out) :: diagnostics
       type(builder_t) :: builder
-      integer :: n
+
+      call begin(builder)
+      call append_file(builder, path, origin_t())
+      call finish(builder, source, diagnostics)
+   end subroutine deck_open
+
+   !> Take the deck `text` and read the files that it includes, those relative to the working
+   !> directory. Line ends are LF, CR LF or CR. Failures are in `diagnostics`.
+   subroutine deck_open_text(text, passage, file_name, source, diagnostics)
+      character(len=*), intent(in) :: text
+      type(passage_t), intent(in) :: passage(:)        !! of the text, in its order; at least one
+      type(string_t), intent(in) :: file_name(:)       !! for messages; at least one
+      type(deck_source_t), intent(out) :: source
+      type(diagnostics_t), intent(out) :: diagnostics
+      type(builder_t) :: builder
+      character(len=:), allocatable :: fault
+      integer :: i
+
+      call begin(builder)
+      do i = 1, size(file_name)
+         call add_file_name(builder, file_name(i)%text)
+      end do
+      fault = binary_fault(text)
+      if (size(passage) == 0 .or. size(file_name) == 0) then
+         fault = "a deck in memory has passages and file names"
+      else if (any(passage%file < 1) .or. any(passage%file > size(file_name))) then
+         fault = "a passage belongs to a file from 1 to " // to_text(size(file_name))
+      end if
+      if (fault == "") then
+         call append_text(builder, text, passage)
+      else
+         call add_error(builder%log, origin_t(min(1, size(file_name)), 0), fault)
+         builder%source%is_whole = .false.
+      end if
+      call finish(builder, source, diagnostics)
+   end subroutine deck_open_text
+
+   subroutine begin(builder)
+      type(builder_t), intent(inout) :: builder
 
       allocate(builder%source%line(0), builder%source%file(0), builder%source%number(0))
       allocate(builder%source%file_name(4))
-      call append_file(builder, path, origin_t())
+   end subroutine begin
+
+   !> Hand over what was read.
+   subroutine finish(builder, source, diagnostics)
+      type(builder_t), intent(inout) :: builder
+      type(deck_source_t), intent(inout) :: source
+      type(diagnostics_t), intent(inout) :: diagnostics
+      integer :: n
+
       n = builder%n_line
       call resize(builder, n)
       builder%source%file_name = builder%source%file_name(:builder%n_file)
@@ -60,7 +115,7 @@ contains
       if (n == 0 .and. diagnostics%n_errors == 0) then
          call add_error(diagnostics, origin_t(1, 0), "the deck is empty")
       end if
-   end subroutine deck_open
+   end subroutine finish
 
    !> Append the lines of one file; `origin` is the line that includes it (file 0: none).
    recursive subroutine append_file(builder, path, origin)
@@ -85,7 +140,7 @@ contains
       end if
       builder%depth = builder%depth + 1
       builder%open_file(builder%depth) = builder%n_file
-      call append_text(builder, text, builder%n_file)
+      call append_text(builder, text, [passage_t(file=builder%n_file)])
       builder%depth = builder%depth - 1
    end subroutine append_file
 
@@ -174,44 +229,63 @@ contains
    end function binary_fault
 
    !> Append the lines of `text`; line ends are LF, CR LF or CR.
-   recursive subroutine append_text(builder, text, i_file)
+   recursive subroutine append_text(builder, text, passage)
       type(builder_t), intent(inout) :: builder
       character(len=*), intent(in) :: text
-      integer, intent(in) :: i_file
+      type(passage_t), intent(in) :: passage(:)
       character(len=:), allocatable :: include_card
-      integer :: first, last, i, number, n_needed
-      type(origin_t) :: origin
+      integer :: first, last, i, i_passage, i_line, n_needed
+      type(origin_t) :: origin, here
 
       n_needed = builder%n_line + count_lines(text)
       if (n_needed > size(builder%source%file)) then
          call resize(builder, max(n_needed, 2*size(builder%source%file)))
       end if
       include_card = ""
-      number = 0
+      i_passage = 1
+      i_line = 0
       first = 1
       if (index(text, utf8_mark) == 1) first = 4
       do while (first <= len(text) .and. .not. builder%is_full)
          do last = first, len(text)
             if (text(last:last) == achar(10) .or. text(last:last) == achar(13)) exit
          end do
-         number = number + 1
+         call next_place(passage, i_passage, i_line, here)
          i = first
          first = last + 1
          if (first <= len(text)) then
             if (text(first - 1:first) == achar(13) // achar(10)) first = first + 1
          end if
          if (last > len(text)) last = len(text) + 1
-         if (include_card == "") origin = origin_t(i_file, number)
+         if (include_card == "") origin = here
          if (include_card /= "" .or. is_include(text(i:last - 1))) then
             include_card = include_card // clean(text(i:last - 1))
             if (include_card(len(include_card):) == "," .and. first <= len(text)) cycle
             call append_included(builder, include_card, origin)
             include_card = ""
          else
-            call append_line(builder, text(i:last - 1), origin_t(i_file, number))
+            call append_line(builder, text(i:last - 1), here)
          end if
       end do
    end subroutine append_text
+
+   !> Go on to the next line of a text: line `i_line` of passage `i_passage`, which stands `here`.
+   pure subroutine next_place(passage, i_passage, i_line, here)
+      type(passage_t), intent(in) :: passage(:)
+      integer, intent(inout) :: i_passage, i_line
+      type(origin_t), intent(out) :: here
+
+      i_line = i_line + 1
+      do while (i_passage < size(passage))
+         if (i_line <= passage(i_passage)%n_line) exit
+         i_line = 1
+         i_passage = i_passage + 1
+      end do
+      associate (this => passage(i_passage))
+         here = origin_t(this%file, this%number)
+         if (this%is_counted) here%line = here%line + i_line - 1
+      end associate
+   end subroutine next_place
 
    pure integer function count_lines(text)
       character(len=*), intent(in) :: text
@@ -250,7 +324,8 @@ contains
       end if
    end function clean
 
-   !> Follow `*INCLUDE, INPUT=file`; the file is sought beside the file that names it.
+   !> Follow `*INCLUDE, INPUT=file`; the file is sought beside the file that names it, from a text
+   !> in memory in the working directory.
    recursive subroutine append_included(builder, card, origin)
       type(builder_t), intent(inout) :: builder
       character(len=*), intent(in) :: card
@@ -279,7 +354,7 @@ contains
       end if
       folder = builder%source%file_name(origin%file)%text
       folder = folder(:index(folder, "/", back=.true.))
-      if (name(1:1) == "/") folder = ""
+      if (name(1:1) == "/" .or. builder%depth == 0) folder = ""
       call append_file(builder, folder // name, origin)
    end subroutine append_included
 

@@ -12,8 +12,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT/"pywrap"))
 
-from emcon.mesh import (Deck, Mesh, MeshError, block, disc, grid, read, ring,  # noqa: E402
-                        strip)
+from emcon.mesh import Mesh, MeshError, block, disc, grid, read, ring, strip  # noqa: E402
+from emcon.model import Model  # noqa: E402
 from emcon.stepper import InputError, Stepper  # noqa: E402
 
 EPS = float(np.finfo(float).eps)
@@ -203,10 +203,10 @@ def test_sets_by_place() -> None:
 def test_deck_is_read_to_the_same_bits(tmp_path: Path) -> None:
     mesh = (ring((0.0, 10.1), (8.0, 10.0), (32, 2), kind="CPE3").rotate(0.1, (0.0, 10.1))
             + block((-25.0, -5.0), (60.0, 5.0), (30, 2)))
-    deck = Deck(mesh, "A ring falls\non a block", parameters={"h": 0.05, "n": "2**6"})
-    path = deck.add(RING_CARDS).write(tmp_path/"ring.inp")
+    model = Model.from_mesh(mesh, "A ring falls\non a block", parameters={"h": 0.05, "n": "2**6"})
+    path = model.cards(RING_CARDS).write(tmp_path/"ring.inp")
     text = path.read_text()
-    assert text.splitlines()[:6] == ["*HEADING", "A ring falls", "** on a block", "*PARAMETER",
+    assert text.splitlines()[:6] == ["*HEADING", "A ring falls", "on a block", "*PARAMETER",
                                      "h = 0.05", "n = 2**6"]
     with Stepper(path) as stepper:
         assert np.array_equal(stepper.labels, mesh.node_labels)
@@ -225,12 +225,12 @@ def test_deck_is_read_to_the_same_bits(tmp_path: Path) -> None:
         assert np.array_equal(again.node_sets[name], labels), name
 
 
-def test_every_shape_is_taken_by_the_engine(tmp_path: Path) -> None:
+def test_every_shape_is_taken_by_the_engine() -> None:
     """The engine judges elements, surfaces and contact chains by itself."""
     for kind in ("CPE3", "CPE4"):
-        for k, mesh in enumerate(shapes(kind)):
+        for mesh in shapes(kind):
             name = next(iter(mesh.element_sets))
-            deck = Deck(mesh).add(f"""
+            model = Model.from_mesh(mesh).cards(f"""
                 *MATERIAL, NAME=M
                 *ELASTIC
                 1., 0.3
@@ -243,7 +243,7 @@ def test_every_shape_is_taken_by_the_engine(tmp_path: Path) -> None:
                 0.1, 0.1
                 *END STEP
             """)
-            with Stepper(deck.write(tmp_path/f"{kind}_{k}.inp")) as stepper:
+            with model.stepper() as stepper:
                 assert stepper.n_body == 1 and stepper.n_node == len(mesh.nodes)
 
 
@@ -254,14 +254,6 @@ def test_mesh_file_is_for_include(tmp_path: Path) -> None:
     assert read(tmp_path/"deck.inp").node_sets["MORE"].tolist() == [1, 2, 3, 4, 5, 6]
     with pytest.raises(InputError):
         Stepper(tmp_path/"deck.inp")            # no material: the engine says so
-
-
-def test_deck_refuses_what_no_deck_can_hold() -> None:
-    with pytest.raises(ValueError, match="begin with a keyword line"):
-        Deck(block()).add("RING, 2, 0.1")
-    for parameters in ({"two words": 1.0}, {"h": ""}, {"h": "1\n2"}):
-        with pytest.raises(ValueError, match="cannot stand in a deck"):
-            Deck(block(), parameters=parameters)
 
 
 # --- bad input ---------------------------------------------------------------------------------

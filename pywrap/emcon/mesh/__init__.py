@@ -1,12 +1,14 @@
-"""Meshes of CPE3 and CPE4 elements with sets and surfaces, and the decks made of them.
+"""Meshes of CPE3 and CPE4 elements with sets and surfaces.
 
-    from emcon.mesh import Deck, block, ring
+    from emcon.mesh import block, ring
+    from emcon.model import Model
 
     mesh = (ring((0.0, 10.1), (8.0, 10.0), (64, 4))
             + block((-25.0, -5.0), (60.0, 5.0), (60, 5)))
-    deck = Deck(mesh, "A ring falls on a block", parameters={"h": 0.01})
-    deck.add(cards)                           # materials, contact, steps: text of docs/deck.md
-    deck.write("ring.inp")
+    model = Model.from_mesh(mesh, "A ring falls on a block")
+    model.cards(text)                         # materials, contact, steps: text of docs/deck.md,
+    model.section("SOFT", "RING")             # or calls
+    model.write("ring.inp")
 
 The sides of what the builders make have names: BLOCK_TOP, RING_OUTER, ... Each is a surface and
 the set of its nodes; the body itself is a set of nodes and of elements. `read` takes meshes from
@@ -17,10 +19,9 @@ named by their labels, whole numbers from 1 on, as in a deck.
 """
 
 from .checks import MeshError, MeshWarning
-from .deck import Deck
 from .mesh import Mesh
 from .reading import read
 from .shapes import block, disc, grid, ring, strip
 
-__all__ = ["Deck", "Mesh", "MeshError", "MeshWarning", "block", "disc", "grid", "read", "ring",
+__all__ = ["Mesh", "MeshError", "MeshWarning", "block", "disc", "grid", "read", "ring",
            "strip"]

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..deck_text import set_text, table, write_text
 from .checks import (KINDS, Array, Labels, MeshError, checked_name, corner_fault, label_array,
                      places, point_of, positions, refuse_twice)
-from .deck import number, set_lines, write_text
 
 
 class Mesh:
@@ -266,26 +266,21 @@ class Mesh:
 
     # --- writing ---------------------------------------------------------------------------
 
-    def lines(self) -> list[str]:
-        """The mesh as lines of a deck: nodes, elements, sets, surfaces."""
-        lines = ["*NODE"]
-        lines += [f"{label}, {number(x)}, {number(y)}" for label, (x, y)
-                  in zip(self.node_labels.tolist(), self.nodes.tolist())]
+    def text(self) -> str:
+        """The mesh as cards of a deck: nodes, elements, sets, surfaces."""
+        parts = ["*NODE\n", table(self.node_labels, self.nodes[:, 0], self.nodes[:, 1])]
         for kind, nodes in self.elements.items():
-            lines.append(f"*ELEMENT, TYPE={kind}")
-            table = np.column_stack([self.element_labels[kind], nodes]).tolist()
-            lines += [", ".join(map(str, row)) for row in table]
+            parts += [f"*ELEMENT, TYPE={kind}\n", table(self.element_labels[kind], *nodes.T)]
         for card, sets in (("NSET", self.node_sets), ("ELSET", self.element_sets)):
-            for name, labels in sets.items():
-                lines += set_lines(card, name, labels)
+            parts += [set_text(card, name, labels) for name, labels in sets.items()]
         for name, faces in self.surfaces.items():
-            lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
-            lines += [f"{element}, S{face}" for element, face in faces.tolist()]
-        return lines
+            parts.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT\n")
+            parts += [f"{element}, S{face}\n" for element, face in faces.tolist()]
+        return "".join(parts)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the mesh alone, for `*INCLUDE, INPUT=`; returns the path. May raise `OSError`."""
-        return write_text(path, "\n".join(self.lines()) + "\n")
+        return write_text(path, self.text())
 
 
 # --- joining -----------------------------------------------------------------------------------

@@ -1,0 +1,145 @@
+"""A step of a model: its procedure, conditions, settings and output."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from numpy.typing import ArrayLike
+
+from .cards import Cards, Dof, Number, Where, card, entry
+from .errors import InputError
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Op: TypeAlias = Literal["MOD", "NEW"]
+#: Requests, and the parameter that names their set.
+_REQUESTS = {"NODE FILE": "NSET", "EL FILE": "ELSET", "CONTACT FILE": None, "NODE PRINT": "NSET",
+             "EL PRINT": "ELSET", "CONTACT PRINT": None, "ENERGY PRINT": None}
+
+
+class Step(Cards):
+    """Cards between `*STEP` and `*END STEP`; made by `Model.step`.
+
+    Conditions, settings and output requests stay for later steps until they are given anew.
+    Methods return the step.
+    """
+
+    def __init__(self, model: Model, step: dict[str, object], procedure: str,
+                 options: dict[str, object], times: Sequence[Number | None]) -> None:
+        super().__init__(model._nodes, model._elements)
+        if procedure not in ("STATIC", "DYNAMIC"):
+            raise InputError(f"procedures are STATIC and DYNAMIC, not {procedure!r}")
+        entries = ", ".join("" if time is None else entry(time, f"*{procedure}") for time in times)
+        self._add(card("STEP", step) + card(procedure, options, data=entries.rstrip(", ") + "\n"))
+
+    # --- loads -----------------------------------------------------------------------------
+
+    def load(self, where: Where, dof: Dof, force: Number | ArrayLike, *,
+             amplitude: str | None = None, op: Op | None = None) -> Step:
+        """`*CLOAD`: forces on nodes [M L/T^2].
+
+        where   node set, node, or (k,) of them
+        dof     1, 2 or (1, 2)
+        force   one for all, (n_dof,), or (k, n_dof)
+        op      NEW: all forces of earlier steps go
+        """
+        self._valued("CLOAD", where, dof, force, {"OP": op, "AMPLITUDE": amplitude})
+        return self
+
+    def pressure(self, where: Where, face: int, value: Number, *, amplitude: str | None = None,
+                 op: Op | None = None) -> Step:
+        """`*DLOAD`: pressure [M/(L T^2)], positive inwards, on face 1..4 of elements.
+
+        where   element set, element, or (k,) of them
+        op      NEW: all pressures and gravity of earlier steps go
+        """
+        if face not in (1, 2, 3, 4):
+            raise InputError(f"a face is 1 to 4, not {face!r}")
+        return self._distributed(where, [f"P{int(face)}", value], op, amplitude)
+
+    def gravity(self, where: Where, g: Number, direction: Sequence[Number] = (0.0, -1.0), *,
+                amplitude: str | None = None, op: Op | None = None) -> Step:
+        """`*DLOAD`: acceleration `g` [L/T^2] of elements along `direction` (2,), of any length."""
+        if isinstance(direction, str) or len(direction) != 2:
+            raise InputError(f"the direction of gravity is a pair of numbers, not {direction!r}")
+        return self._distributed(where, ["GRAV", g, *direction], op, amplitude)
+
+    def _distributed(self, where: Where, load: Sequence[object], op: Op | None,
+                     amplitude: str | None) -> Step:
+        names = self._names(where, self._elements, "*DLOAD")
+        return self._card("DLOAD", {"OP": op, "AMPLITUDE": amplitude},
+                          [(name, *load) for name in names])
+
+    # --- settings --------------------------------------------------------------------------
+
+    def constraint_method(self, type: str) -> Step:
+        """`*CONSTRAINT METHOD`: NULL SPACE (default) or SADDLE POINT."""
+        return self._card("CONSTRAINT METHOD", {"TYPE": type})
+
+    def contact_initiation(self, type: str = "PERSISTENT", *,
+                           gap_tolerance: Number | None = None) -> Step:
+        """`*CONTACT INITIATION`: PERSISTENT (default), ADMISSIBLE or VELOCITY UPDATE.
+
+        gap_tolerance   largest new stand-off as a fraction of an edge, for PERSISTENT
+        """
+        return self._card("CONTACT INITIATION", {"TYPE": type, "GAP TOLERANCE": gap_tolerance})
+
+    def mortar(self, *, integration: str | None = None, points: int | str | None = None,
+               multiplier: str | None = None, normal: str | None = None,
+               feature_angle: Number | None = None) -> Step:
+        """`*MORTAR`, for pairs of type MORTAR and SEGMENT; what is not given stays.
+
+        integration     SEGMENTS (default) or ELEMENTS
+        points          Gauss points: 2 to 10 per segment, or 1 to 10 per slave edge
+        multiplier      DUAL (default) or STANDARD
+        normal          NODAL (default) or EDGE
+        feature_angle   degrees; a sharper turn is a corner
+        """
+        return self._card("MORTAR", {"INTEGRATION": integration, "POINTS": points,
+                                     "MULTIPLIER": multiplier, "NORMAL": normal,
+                                     "FEATURE ANGLE": feature_angle})
+
+    def smoothing(self, type: str, *, feature_angle: Number | None = None) -> Step:
+        """`*SURFACE SMOOTHING` of master surfaces: NONE (default) or HERMITE.
+
+        feature_angle   degrees; a sharper turn is a corner
+        """
+        return self._card("SURFACE SMOOTHING", {"TYPE": type, "FEATURE ANGLE": feature_angle})
+
+    def newton(self, *, tolerance: Number | None = None, maximum: int | str | None = None) -> Step:
+        """`*NEWTON`: relative residual, below 1 (default 1e-10); most iterations (20)."""
+        return self._card("NEWTON", {"TYPE": "FULL", "TOLERANCE": tolerance, "MAXIMUM": maximum})
+
+    def time_integration(self, scheme: str) -> Step:
+        """`*TIME INTEGRATION`: ENERGY MOMENTUM (default)."""
+        return self._card("TIME INTEGRATION", {"SCHEME": scheme})
+
+    # --- output ----------------------------------------------------------------------------
+
+    def output(self, request: str, variables: str | Sequence[str] = (), *,
+               set: str | None = None, frequency: int | str | None = None,
+               time_points: str | None = None, totals: str | None = None) -> Step:
+        """Ask for output of the batch program, `emcon run`.
+
+        request       NODE, EL or CONTACT with FILE (fields) or PRINT (history); ENERGY PRINT
+        variables     U, V, RF; S, E, ENER, ELSE, ELKE, EVOL; CDIS, CSTR, CF, CNUM
+        set           of nodes or elements, for NODE and EL
+        frequency     every so many increments; 0: never
+        time_points   name of times, instead
+        totals        YES or ONLY: the sums over the set, for PRINT
+        """
+        if request not in _REQUESTS:
+            raise InputError(f"output requests are {', '.join(_REQUESTS)}, not {request!r}")
+        key = _REQUESTS[request]
+        if set is not None and key is None:
+            raise InputError(f"{request} is for the whole model, not for a set")
+        chosen = [variables] if isinstance(variables, str) else list(variables)
+        return self._card(request, {**({key: set} if key else {}), "FREQUENCY": frequency,
+                                    "TIME POINTS": time_points, "TOTALS": totals},
+                          [chosen] if chosen else [])
+
+    def restart(self, frequency: int | str | None = None) -> Step:
+        """`*RESTART, WRITE`: the batch program writes one every so many increments; 0: none."""
+        return self._card("RESTART", {"WRITE": True, "FREQUENCY": frequency})

@@ -1,0 +1,41 @@
+"""What the tests of programs against the installed library share."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+API = ROOT/"src_f90"/"api"
+WARNINGS = ["-pedantic", "-Wall", "-Wextra", "-Werror"]
+
+
+def run(*command: object, **more: object) -> str:
+    """What the command prints; it has to succeed."""
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **more)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def need(program: str) -> None:
+    if not shutil.which(program):
+        pytest.skip(f"there is no {program} here")
+
+
+def build(compiler: str, source: Path, program: Path, env: dict[str, str], *options: str) -> None:
+    """Compile and link by what pkg-config says, with warnings as errors."""
+    need(compiler)
+    flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
+    run(compiler, *WARNINGS, *options, source, "-o", program, *flags, "-lm", env=env,
+        cwd=program.parent)
+
+
+def check_memory(env: dict[str, str], *command: object) -> None:
+    """No invalid access, and no bytes lost."""
+    need("valgrind")
+    run("valgrind", "--leak-check=full", "--errors-for-leak-kinds=definite", "--error-exitcode=9",
+        "--quiet", *command, env=env)
