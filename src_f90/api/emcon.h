@@ -3,10 +3,15 @@
  * A model is a deck that was read, at some point of its analysis. All state is in the model: any
  * number of them live side by side, each used from one thread at a time. No function stops the
  * program or prints; those that can fail return EMCON_OK or a code, and the text of the failure
- * stays with the model until the next one.
+ * stays with the model until the next one. A call that fails leaves the model as it was, unless
+ * the text here says otherwise. A model that was closed must not be used again: that cannot be
+ * checked.
  *
- * Arrays belong to the caller. Those of nodes hold x and y of node 0, x and y of node 1 and so on;
- * their order is that of the deck, as emcon_get_labels tells. Units are those of the deck.
+ * Arrays belong to the caller, who says how long they are. Those of nodes hold x and y of node 0,
+ * x and y of node 1 and so on, 2*n_node numbers; their order is that of the deck, as
+ * emcon_get_labels tells. An output that is NULL is left out. Inputs that may be NULL are named.
+ * Labels and degrees of freedom (1, 2) are those of the deck; all else is counted from 0, but in
+ * messages from 1. Units are those of the deck.
  */
 #ifndef EMCON_H
 #define EMCON_H
@@ -20,51 +25,64 @@ extern "C" {
 /* Numbers follow semantic versioning: a program runs with every library of its major version (of
  * its minor version as long as the major one is 0) that is not older than the header it saw. */
 #define EMCON_VERSION_MAJOR 0
-#define EMCON_VERSION_MINOR 1
+#define EMCON_VERSION_MINOR 2
 #define EMCON_VERSION_PATCH 0
 
 /* What functions return; the same numbers as the exit codes of the program. */
 enum {
    EMCON_OK = 0,
    EMCON_ERROR_INPUT = 2,      /* a deck or an argument is wrong */
-   EMCON_ERROR_ANALYSIS = 3,   /* the analysis failed; the state is that of the last part before */
+   EMCON_ERROR_ANALYSIS = 3,   /* the analysis failed */
    EMCON_ERROR_FILE = 4,
    EMCON_ERROR_INTERNAL = 5,   /* a bug of the library */
    EMCON_ERROR_INTERRUPT = 130 /* a callback asked to stop; the model stays usable */
 };
 
+/* Kinds of loads. */
+enum {
+   EMCON_LOAD_POINT = 1,       /* force on a degree of freedom of a node */
+   EMCON_LOAD_PRESSURE = 2,    /* on a face of an element */
+   EMCON_LOAD_GRAVITY = 3      /* acceleration of an element */
+};
+
 typedef struct emcon_model emcon_model;
+typedef struct emcon_snapshot emcon_snapshot;
 
 typedef struct emcon_sizes {
    int n_node;
    int n_element;
-   int n_contact;   /* contacts possible: slave nodes over all pairs */
-   int n_pair;      /* contact pairs */
-   int n_body;      /* connected meshes */
-   int n_unknown;   /* in the present step of the deck */
-   int n_step;      /* steps of the deck */
+   int n_contact;    /* contacts possible: slave nodes over all pairs */
+   int n_pair;       /* contact pairs */
+   int n_body;       /* connected meshes */
+   int n_unknown;    /* in the present step of the deck */
+   int n_step;       /* steps of the deck */
+   int n_constraint; /* all constraints: rows of ties and equations, then the n_contact contacts */
+   int n_load;       /* in the present step of the deck */
+   int i_step;       /* the present step of the deck; the first is 1, as in messages */
 } emcon_sizes;
 
 typedef struct emcon_increment {
    double h;
-   double time;     /* at the end of the increment */
-   int n_newton;    /* iterations, over all cuts and active sets */
+   double time;      /* at the end of the increment */
+   int n_newton;     /* iterations, over all cuts and active sets */
    int n_cut;
-   int n_active;    /* contacts */
+   int n_active;     /* contacts */
 } emcon_increment;
 
 typedef struct emcon_ledger {
    double kinetic;
    double strain;
+   double potential; /* of forces that are given from outside by their energy */
    double external_work;
    double contact_work;
-   double total;    /* kinetic + strain - external_work */
-   double px, py;   /* momentum */
-   double lz;       /* angular momentum about the origin */
+   double total;     /* kinetic + strain + potential - external_work */
+   double px, py;    /* momentum */
+   double lz;        /* angular momentum about the origin */
 } emcon_ledger;
 
-/* A sparse matrix by rows, numbers from 0: row i has the entries row_start[i] to row_start[i + 1] - 1
- * of `column` and `value`, the columns of a row in ascending order. The arrays belong to the model. */
+/* A sparse matrix by rows: row i has the entries row_start[i] to row_start[i + 1] - 1 of `column`
+ * and `value`, the columns of a row in ascending order. The arrays belong to the model; they are
+ * valid until the function that gave them is called again, or the model is closed. */
 typedef struct emcon_csr {
    int n_row;
    int n_column;
@@ -72,6 +90,21 @@ typedef struct emcon_csr {
    const int *column;      /* row_start[n_row] */
    const double *value;    /* row_start[n_row] */
 } emcon_csr;
+
+/* Contacts between two configurations, ascending by their numbers. The gaps of a contact differ by
+ * its discrete gradient times u1 - u0. The arrays belong to the model, as those of a matrix. */
+typedef struct emcon_constraint_report {
+   int n;
+   const int *id;                 /* number among the n_constraint constraints */
+   const int *pair;               /* number of the contact pair */
+   const int *node;               /* number of the slave node */
+   const double *gap0;            /* at u0, > 0 is open */
+   const double *gap1;            /* at u1 */
+   const double *dgap;            /* gap1 - gap0, to relative accuracy */
+   const double *size;            /* length of an edge */
+   emcon_csr discrete_gradient;   /* n x 2*n_node */
+   emcon_csr end_gradient;        /* n x 2*n_node, the gradient at u1 */
+} emcon_constraint_report;
 
 /* Called after each increment; anything but 0 stops the run. */
 typedef int (*emcon_progress)(void *user, const emcon_increment *increment, double fraction_done);
@@ -82,26 +115,81 @@ typedef void (*emcon_log)(void *user, const char *line);
 /* The version of the library, which may be newer than the header. */
 void emcon_version(int *major, int *minor, int *patch);
 
-/* Read a deck and build its model. `parameters`: NAME=VALUE lines with line ends between them, or
- * NULL. `*model` has to be closed also after a failure, when it holds the messages of the deck. */
+/* ---- reading and building -------------------------------------------------------------------- */
+
+/* Read a deck, without building its model. `parameters`: NAME=VALUE lines with line ends between
+ * them, or NULL. `is_lenient`: unknown keywords are no errors. `*model` has to be closed also after
+ * a failure, when it holds the messages of the deck; nothing else can be done with it then. */
+int emcon_read(const char *deck, const char *parameters, int is_lenient, emcon_model **model);
+
+/* The same for a deck in memory. `name` stands for the file in messages; what the deck includes is
+ * looked for beside it. */
+int emcon_read_text(const char *text, const char *name, const char *parameters, int is_lenient,
+                    emcon_model **model);
+
+/* Build the model of the deck that was read, and begin its first step. After a failure the model
+ * can only be closed. */
+int emcon_build(emcon_model *model);
+
+/* Read a deck and build its model. */
 int emcon_open(const char *deck, const char *parameters, int is_lenient, emcon_model **model);
 
-/* Free a model; harmless for NULL. */
+/* Free a model, and all that it has given; harmless for NULL. Snapshots stay. */
 void emcon_close(emcon_model *model);
 
-/* The text of the last failure, "" if there was none; valid until the next call with the model. */
+/* The text of the last failure, "" if there was none, NULL for NULL; valid until the next call
+ * with the model. */
 const char *emcon_message(emcon_model *model);
 
-int emcon_get_sizes(emcon_model *model, emcon_sizes *sizes);
+/* ---- the run of the deck --------------------------------------------------------------------- */
 
-/* One increment on the grid of the deck; `increment` may be NULL. An error after the last one. */
+/* One increment on the grid of the deck. An error after the last one. After a failed increment the
+ * state is that of the last part before. */
 int emcon_advance(emcon_model *model, emcon_increment *increment);
 
-/* 1 after the last increment of the last step, else 0; also for NULL. */
+/* 1 after the last increment of the last step, else 0; 1 also for NULL. */
 int emcon_is_done(emcon_model *model);
 
 /* Increments until `time` is reached, or the end of the deck. Callbacks may be NULL. */
 int emcon_run(emcon_model *model, double time, emcon_progress progress, emcon_log log, void *user);
+
+/* ---- steps of any size ----------------------------------------------------------------------- */
+
+/* One step of the size h > 0 under the conditions of the present step of the deck, cut into parts
+ * where it fails. It may end anywhere, also after the end of the deck's step: amplitudes and linear
+ * runs keep their last value there. emcon_advance goes on from points of the deck's grid only. */
+int emcon_step(emcon_model *model, double h, emcon_increment *increment);
+
+/* Begin the next step of the deck at the present time, wherever that is. */
+int emcon_next_step(emcon_model *model);
+
+/* Put the given parts of the state in place of the present ones; each may be NULL, and a count is
+ * looked at only where one of its arrays is given. Dependent nodes of ties and equations follow the
+ * others; energies and momenta are measured anew, the works stand. `lam` is 0 where a constraint
+ * does not act; `time` is not before the start of the present step of the deck. With `u` the forces
+ * of the last step are forgotten. */
+int emcon_set_state(emcon_model *model, int n_node, const double *u, const double *v,
+                    int n_constraint, const double *lam, const int *is_active, const double *time);
+
+/* Keep the present state; `*snapshot` is NULL after a failure. It outlives the model. */
+int emcon_take_snapshot(emcon_model *model, emcon_snapshot **snapshot);
+
+/* Go back, or forward, to a state that was taken from this model: what follows has the same bits.
+ * The step of the deck is that of the snapshot, with the loads and boundary values it has now. */
+int emcon_restore_snapshot(emcon_model *model, const emcon_snapshot *snapshot);
+
+/* Free a snapshot; harmless for NULL. */
+void emcon_free_snapshot(emcon_snapshot *snapshot);
+
+/* Write deck, state and conditions of the present step to a file; emcon_load makes a model of it
+ * that goes on with the same bits. `*model` has to be closed also after a failure. */
+int emcon_save(emcon_model *model, const char *path);
+int emcon_load(const char *path, emcon_model **model);
+
+/* ---- what a model holds ---------------------------------------------------------------------- */
+
+/* Before emcon_build only n_node, n_element and n_step are known; the others are 0. */
+int emcon_get_sizes(emcon_model *model, emcon_sizes *sizes);
 
 int emcon_get_time(emcon_model *model, double *time);
 int emcon_get_ledger(emcon_model *model, emcon_ledger *ledger);
@@ -109,14 +197,99 @@ int emcon_get_ledger(emcon_model *model, emcon_ledger *ledger);
 /* Labels of the nodes, n_node. */
 int emcon_get_labels(emcon_model *model, int n_node, int *label);
 
-/* Reference positions, displacements, velocities: 2*n_node each; NULL is left out. */
+/* Reference positions. emcon_build may move nodes, to close a tie or an initial contact. */
 int emcon_get_positions(emcon_model *model, int n_node, double *x);
+
+/* Displacements and velocities. */
 int emcon_get_state(emcon_model *model, int n_node, double *u, double *v);
 
-/* Of each possible contact: multiplier (force), whether it acts, label of its slave node, number of
- * its pair from 0; NULL is left out. */
+/* Of each constraint: multiplier (force), and whether it acts. */
+int emcon_get_multipliers(emcon_model *model, int n_constraint, double *lam, int *is_active);
+
+/* The same of each possible contact, the label of its slave node, and the number of its pair. */
 int emcon_get_contact(emcon_model *model, int n_contact, double *lam, int *is_active, int *label,
                       int *pair);
+
+/* Of each pair: 7 numbers, force and moment about the origin on the slave side (fx, fy, m), the
+ * same on the master side, length in contact; and the number of active contacts. */
+int emcon_get_pairs(emcon_model *model, int n_pair, double *total, int *n_active);
+
+/* Of each body: px, py, and the angular momentum about the origin; 3*n_body. */
+int emcon_get_momenta(emcon_model *model, int n_body, double *momenta);
+
+/* ---- loads and boundary values --------------------------------------------------------------- */
+
+/* Changes hold for the present step of the deck. With an amplitude a value is what the amplitude is
+ * multiplied by. Without one, the linear runs of a static step go on from where they are to the new
+ * value at the end of the step; in a dynamic step it holds from the next step on. */
+
+/* Number of the load of this kind on node or element `label`; `place` is the degree of freedom of a
+ * force, the face of a pressure, and not looked at for gravity. Of several the first. */
+int emcon_find_load(emcon_model *model, int kind, int label, int place, int *load);
+
+/* Give load 0 <= `load` < n_load of the present step a value. */
+int emcon_set_load(emcon_model *model, int load, double value);
+
+/* Give the boundary condition on degree of freedom `dof` of node `label` a value; prescribe a free
+ * one; set one free. The last two number the unknowns anew, and the state stays. */
+int emcon_set_prescribed(emcon_model *model, int label, int dof, double value);
+int emcon_add_prescribed(emcon_model *model, int label, int dof, double value);
+int emcon_remove_prescribed(emcon_model *model, int label, int dof);
+
+/* ---- what the engine computes for a step ----------------------------------------------------- */
+
+/* Queries change neither the state nor what later steps give, to the last bit. The displacements of
+ * all nodes are T times the unknowns, up to prescribed motion. */
+
+/* Number of the unknown of each degree of freedom, 2*n_node; -1: prescribed, dependent, or of no
+ * element. */
+int emcon_unknowns(emcon_model *model, int n_node, int *unknown);
+
+/* T, 2*n_node x n_unknown: row 2*node + direction. */
+int emcon_links(emcon_model *model, emcon_csr *matrix);
+
+/* The consistent mass, n_node x n_node, the same in both directions. */
+int emcon_mass(emcon_model *model, emcon_csr *matrix);
+
+/* Where a step of the size h from the present state would start its iteration. */
+int emcon_guess(emcon_model *model, double h, int n_node, double *u1);
+
+/* Evaluate the step of the size h from the present state to displacements `u1`: what the functions
+ * below give belongs to the last evaluation. Constraints that act are those of the state, or
+ * `is_active` unless it is NULL, less those that have no surface near; their multipliers those of
+ * the state, or `lam` unless it is NULL. */
+int emcon_evaluate(emcon_model *model, double h, int n_node, const double *u1, int with_tangent,
+                   int n_constraint, const double *lam, const int *is_active);
+
+/* Residual: inertia, internal forces less loads, and `with_contact` less those of the constraints.
+ * At the nodes, where it is the reaction on prescribed freedoms; and T^T times it. */
+int emcon_residual(emcon_model *model, int with_contact, int n_node, double *nodal, int n_unknown,
+                   double *unknown);
+
+/* Derivative of the residual by the unknowns at the end of the step, n_unknown x n_unknown, for
+ * fixed multipliers; `with_contact` with the second derivatives of the gaps. The evaluation has to
+ * be one with tangent. */
+int emcon_tangent(emcon_model *model, int with_contact, emcon_csr *matrix);
+
+/* Null-space matrix P, and DF of the reparametrisation, for the constraints that act in the last
+ * evaluation: P^T G^T = 0 and C DF = 0 for their discrete gradients G and gradients at the end C;
+ * 2*n_node x independent unknowns. */
+int emcon_null_space(emcon_model *model, emcon_csr *p, emcon_csr *df);
+
+/* The multipliers, n_constraint, that the residual without contact amounts to, by the dependent
+ * unknowns of the last null space; 0 where a constraint does not act. */
+int emcon_multipliers(emcon_model *model, int n_constraint, double *lam);
+
+/* All contacts near from displacements u0 to u1. With `keeps_gap` they are those that hold the mean
+ * gap of u0, as persistent contact does: all gaps are counted from there. The last evaluation is
+ * forgotten. */
+int emcon_constraints(emcon_model *model, int n_node, const double *u0, const double *u1,
+                      int keeps_gap, emcon_constraint_report *report);
+
+/* Sum over the n contacts of the last report of `factor` times the derivative of the discrete
+ * gradient by u1 times `direction`; both fields have 2*n_node numbers. */
+int emcon_curvature_times(emcon_model *model, int n, const double *factor, int n_node,
+                          const double *direction, double *product);
 
 #ifdef __cplusplus
 }

@@ -4,8 +4,8 @@
 !> nothing else keeps it, so that any number of models live side by side, each in a thread of its
 !> own. 0 is no model. A handle that was closed must not be used again: its owner forgets it.
 module emcon_handle
-   use, intrinsic :: iso_c_binding, only : c_char, c_f_pointer, c_int, c_int64_t, c_loc, &
-      c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only : c_char, c_double, c_f_pointer, c_int, c_int64_t, &
+      c_loc, c_null_ptr, c_ptr
    use emcon_csr, only : csr_t
    use emcon_deck_source, only : passage_t
    use emcon_errors, only : err_input, err_none, error_t
@@ -28,6 +28,9 @@ module emcon_handle
       type(snapshot_t), allocatable :: snapshot(:)   !! states to come back to
       character(len=:), allocatable :: message   !! of the last failure
       character(kind=c_char), allocatable :: c_text(:)   !! the same as C was given it
+      type(csr_t) :: c_matrix(5)                 !! that C was given, each kind in its place
+      integer(c_int), allocatable :: c_place(:, :)       !! the numbers in `report`, from 0
+      real(c_double), allocatable :: c_gap(:, :)         !! the gaps in it
    end type model_t
 
 contains

@@ -105,17 +105,29 @@ contains
       if (.not. self%is_read) call raise(error, err_input, self%diagnostic(1)%text)
    end subroutine stepper_read_source
 
-   !> Build the model of the scene that was read, and begin its first step.
+   !> Build the model of the scene that was read, and begin its first step. After an error there is
+   !> nothing left to build from.
    subroutine stepper_build(self, error)
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
       if (.not. self%is_read) then
-         call raise(error, err_input, "there is no scene: no deck was read, or reading it failed")
+         call raise(error, err_input, "there is no scene: no deck was read, or reading " // &
+            "or building it failed")
       else if (allocated(self%march%scheme)) then
          call raise(error, err_input, "the model is built already")
       end if
       if (allocated(error)) return
+      call build(self, error)
+      if (.not. allocated(error)) return
+      self%is_read = .false.                     ! ties and contact may have moved nodes
+      if (allocated(self%march%scheme)) deallocate(self%march%scheme)
+   end subroutine stepper_build
+
+   subroutine build(self, error)
+      type(stepper_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
       call ties_prepare(self%scene, self%notes, error)
       if (allocated(error)) return
       call initial_contact_prepare(self%scene, self%notes, error)
@@ -126,7 +138,7 @@ contains
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
       if (.not. allocated(error)) call notes_append(self%notes, self%march%system%notes)
-   end subroutine stepper_build
+   end subroutine build
 
    !> Free what libraries hold for `self`; call it before the object goes, also after an error.
    subroutine stepper_close(self)

@@ -1,0 +1,81 @@
+"""Loads and boundary values, changed between steps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _core
+from .arguments import labels, number, real_array
+from .errors import InputError
+from .handle import Handle
+
+_conditions = _core.emcon_flat_conditions
+
+
+class Conditions:
+    """What a stepper offers to change loads and boundary values of the present step of the deck.
+
+    With an amplitude a value is what the amplitude is multiplied by. Without one, the linear runs
+    of a static step go on from where they are to the new value at the end of the step; in a
+    dynamic step it holds from the next step on. Nodes and elements go by their numbers in the
+    deck; in a model of arrays without labels that is row + 1. Raises `InputError`; nothing has
+    changed then.
+    """
+
+    _handle: Handle
+
+    def set_point_load(self, node: ArrayLike, dof: ArrayLike, value: ArrayLike) -> None:
+        """Give the force on degree of freedom `dof` (1, 2) of `node` a new value [M L/T^2].
+
+        The arguments are numbers or lists, and the deck has such a load in the present step.
+        """
+        self._set_loads(1, node, dof, value)
+
+    def set_pressure(self, element: ArrayLike, face: ArrayLike, value: ArrayLike) -> None:
+        """Give the pressure on `face` (1 to 4) of `element`, > 0 inwards, a new value [M/(L T^2)].
+
+        The arguments are numbers or lists, and the deck has such a load in the present step.
+        """
+        self._set_loads(2, element, face, value)
+
+    def set_gravity(self, element: ArrayLike, value: ArrayLike) -> None:
+        """Give the gravity on `element` a new value [L/T^2]; its direction stays.
+
+        The arguments are numbers or lists, and the deck has such a load in the present step.
+        """
+        self._set_loads(3, element, 0, value)
+
+    def _set_loads(self, kind: int, label: ArrayLike, place: ArrayLike, value: ArrayLike) -> None:
+        label = labels(label, "the label")
+        place = labels(place, "the place")
+        shape = np.shape(value)
+        if len(shape) > 1:
+            raise InputError(f"the value is to be a number or a list of such, not {shape}")
+        value = real_array(value, "the value", shape)
+        try:
+            label, place, value = np.broadcast_arrays(label, place, value)
+        except ValueError as error:
+            raise InputError("labels, places and values are to be of the same number") from error
+        self._handle.change(_conditions.set_loads, kind, label, place, value)
+
+    def prescribe(self, node: int, dof: int, value: float) -> None:
+        """Prescribe displacement `dof` (1, 2) of `node` [L], whether it was free before or not.
+
+        What was free gets no equation any more: `n_unknown` and `unknowns` change.
+        """
+        self._handle.change(_conditions.prescribe, *_freedom(node, dof), number(value, "the value"))
+
+    def release(self, node: int, dof: int) -> None:
+        """Set displacement `dof` (1, 2) of `node` free, which was prescribed."""
+        self._handle.change(_conditions.release, *_freedom(node, dof))
+
+
+def _freedom(node: int, dof: int) -> tuple[int, int]:
+    found = []
+    for value, name in ((node, "the node"), (dof, "the degree of freedom")):
+        array = labels(value, name)
+        if np.ndim(value) > 0:
+            raise InputError(f"{name} is to be one whole number")
+        found.append(int(array[0]))
+    return found[0], found[1]

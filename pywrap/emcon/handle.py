@@ -1,0 +1,75 @@
+"""A library model held by Python: calls to it, one at a time, and their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+import numpy as np
+
+from . import _core
+from .errors import InputError, check
+
+_flat = _core.emcon_flat
+
+#: Reals of a block whose return teaches the C library to keep what is freed below this size. Else
+#: the work space of each factorisation goes back to the system, and its pages are cleared anew:
+#: a sixth of the time of a run.
+_LESSON = 2**21
+
+
+class Handle:
+    """A library model without contents, to be read or built into; freed by `close`.
+
+    The library lets other threads run while it works, so a call while another one is under way
+    raises `InputError` instead of meeting it in the same model.
+    """
+
+    def __init__(self) -> None:
+        np.empty(_LESSON)
+        self.address = int(_flat.new_model())
+        #: Counts what makes evaluations stale, and what replaces the report of constraints.
+        self.n_changes = 0
+        self.n_reports = 0
+        self._is_busy = False
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """`function(address, *arguments)` without its last result, the status.
+
+        One result comes as it is, several as a tuple. Raises what the status stands for.
+        """
+        # No lock: Ctrl-C between taking one and the `try` would leave it taken. CPython looks for
+        # signals and other threads at calls and loops only, and there is none in these lines.
+        if self._is_busy:
+            raise InputError("this stepper is in use by another thread, or by the call that a "
+                             "function of yours was called from")
+        try:
+            self._is_busy = True
+            found = function(self.address, *arguments)
+            values = found if isinstance(found, tuple) else (found,)
+            check(self.address, values[-1])
+        finally:
+            self._is_busy = False
+        return values[0] if len(values) == 2 else values[:-1]
+
+    def change(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """The same for calls after which evaluations no longer belong to the model."""
+        self.n_changes += 1
+        return self.call(function, *arguments)
+
+    def close(self) -> None:
+        """Free the model; harmless when closed."""
+        if self._is_busy:
+            raise InputError("this stepper is in use by another thread: it cannot be closed")
+        address, self.address = self.address, 0
+        self.n_changes += 1
+        if address:
+            _flat.close_model(address)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a stepper cannot be copied or sent to another process; use save, or "
+                        "write_restart and from_restart")
+
+    def __del__(self) -> None:
+        if getattr(self, "address", 0):
+            self.close()

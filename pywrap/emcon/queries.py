@@ -1,0 +1,244 @@
+"""What the engine computes for a step, asked for without making it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from .arguments import flag_array, positive, real_array
+from .csr import Csr
+from .errors import InputError
+from .handle import Handle
+
+_query = _core.emcon_flat_query
+_NO_REALS = np.empty(0)
+_NO_FLAGS = np.empty(0, dtype=np.int32)
+
+
+class Evaluation:
+    """A step of size h from the state of a stepper to displacements u1, evaluated, not made.
+
+    It is valid until the model changes or the next evaluation, also by one of the short forms of
+    the stepper, or report of constraints is made; after that it raises `InputError`.
+    """
+
+    def __init__(self, stepper: Queries, with_tangent: bool, *arguments: Any) -> None:
+        self._handle = stepper._handle
+        self._sizes = (stepper.n_node, stepper.n_unknown)
+        self._n_constraint = stepper.n_constraint
+        self._has_null_space = False
+        self._handle.change(_query.evaluate, *arguments, int(with_tangent))
+        self._n_changes = self._handle.n_changes
+
+    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        if self._handle.address and self._n_changes != self._handle.n_changes:
+            raise InputError("this evaluation is stale: since it was made the model was changed, "
+                             "or another evaluation or report of constraints was made")
+        return self._handle.call(function, *arguments)
+
+    def residual(self, *, contact: bool = True) -> NDArray[np.float64]:
+        """Inertia and internal forces less loads, (n_node, 2) [M L/T^2].
+
+        With `contact` also less contact forces. At prescribed freedoms it is the reaction.
+        """
+        nodal, _ = self._call(_query.get_residual, int(contact), *self._sizes)
+        return nodal.T
+
+    def unknown_residual(self, *, contact: bool = True) -> NDArray[np.float64]:
+        """The same on the unknowns, (n_unknown,): T^T r with the `links` T. 0 solves the step."""
+        return self._call(_query.get_residual, int(contact), *self._sizes)[1]
+
+    def tangent(self, *, contact: bool = True) -> Csr:
+        """Derivative of the residual on the unknowns by them at the end, for given multipliers.
+
+        (n_unknown, n_unknown) [M/T^2]. With `contact` the second derivatives of the gaps are in
+        it, times the multipliers. Needs an evaluation ``with_tangent``.
+        """
+        return self._call(_made, _query.make_tangent, int(contact))
+
+    def null_space(self) -> tuple[Csr, Csr]:
+        """P and DF, each (2 n_node, independent unknowns), for the constraints that act.
+
+        P^T G^T = 0 and C DF = 0 for their discrete gradients G and their gradients C at the end.
+        Ties, equations and prescribed freedoms are taken account of. Raises `AnalysisError` if
+        there is none: constraints that follow from others.
+        """
+        return self._call(_null_space)
+
+    def multipliers(self) -> NDArray[np.float64]:
+        """The contact forces that the residual without them amounts to, (n_constraint,) [M L/T^2].
+
+        They balance it on the unknowns that `null_space` makes dependent; 0 where a constraint
+        does not act.
+        """
+        if not self._has_null_space:
+            self._call(_null_space)
+            self._has_null_space = True
+        return self._call(_query.get_multipliers, self._n_constraint)
+
+
+@dataclass(frozen=True, eq=False)
+class ConstraintReport:
+    """Contact constraints between two configurations, near each other's surfaces; n of them.
+
+    Gaps are > 0 where open, and ``dgap = discrete_gradient @ (u1 - u0).ravel()`` to round-off.
+    """
+
+    id: NDArray[np.int32]            #: (n) index into `lam`, `active`, `contact()`
+    pair: NDArray[np.int32]          #: (n) from 0, in the order of the deck
+    node: NDArray[np.int32]          #: (n) row of the slave node in arrays of nodes
+    gap0: NDArray[np.float64]        #: (n) at the start [L]
+    gap1: NDArray[np.float64]        #: (n) at the end
+    dgap: NDArray[np.float64]        #: (n) the difference, to relative accuracy
+    size: NDArray[np.float64]        #: (n) length of an edge [L]
+    discrete_gradient: Csr           #: (n, 2 n_node) G
+    jacobian: Csr                    #: (n, 2 n_node) C: gradient of gap1 by the end
+    _handle: Handle = field(repr=False)
+    _n_reports: int = field(repr=False)
+    _n_node: int = field(repr=False)
+
+    def curvature_times(self, factor: ArrayLike, direction: ArrayLike) -> NDArray[np.float64]:
+        """Sum over the constraints of factor times (dG/du1) times direction, (n_node, 2).
+
+        `factor` (n,) for instance multipliers, `direction` (n_node, 2). Belongs to the last
+        report of a stepper; raises `InputError` for earlier ones.
+        """
+        factor = real_array(factor, "the factor", self.id.shape)
+        direction = real_array(direction, "the direction", (self._n_node, 2))
+        if self._handle.address and self._n_reports != self._handle.n_reports:
+            raise InputError("this report is stale: constraints were asked for again")
+        return self._handle.call(_query.curvature_times, factor, direction.T).T
+
+
+class Queries:
+    """What a stepper can be asked. It changes neither the state nor, in any bit, what follows."""
+
+    _handle: Handle
+    n_node: int
+    n_constraint: int
+    n_body: int
+    n_unknown: int
+    positions: NDArray[np.float64]
+
+    def guess(self, h: float) -> NDArray[np.float64]:
+        """Displacements from which a step of size h would start to iterate, (n_node, 2) [L]."""
+        return self._handle.call(_query.guess, positive(h, "h"), self.n_node).T
+
+    def evaluate(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
+                 active: ArrayLike | None = None, with_tangent: bool = True) -> Evaluation:
+        """Evaluate the step of size h [T] from the present state to `u1` (n_node, 2) [L].
+
+        `lam` [M L/T^2] and `active`, both (n_constraint,), are those of the state if not given.
+        Constraints that have no surface near do not act. Dependent nodes of ties and equations
+        follow the others. Raises `AnalysisError` where `u1` inverts an element.
+        """
+        u1 = real_array(u1, "u1", (self.n_node, 2))
+        h = positive(h, "h")
+        lam, active = contact_arguments(lam, active, self.n_constraint)
+        return Evaluation(self, with_tangent, h, u1.T, lam, active)
+
+    def residual(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
+                 active: ArrayLike | None = None, contact: bool = True) -> NDArray[np.float64]:
+        """Residual at the nodes, (n_node, 2): of `evaluate`, where the arguments are told."""
+        evaluation = self.evaluate(u1, h, lam=lam, active=active, with_tangent=False)
+        return evaluation.residual(contact=contact)
+
+    def tangent(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
+                active: ArrayLike | None = None, contact: bool = True) -> Csr:
+        """Tangent on the unknowns: of `evaluate`, where the arguments are told."""
+        return self.evaluate(u1, h, lam=lam, active=active).tangent(contact=contact)
+
+    def null_space(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
+                   active: ArrayLike | None = None) -> tuple[Csr, Csr]:
+        """P and DF: of `evaluate`, where the arguments are told."""
+        evaluation = self.evaluate(u1, h, lam=lam, active=active, with_tangent=False)
+        return evaluation.null_space()
+
+    @property
+    def mass(self) -> Csr:
+        """The consistent mass between nodes, the same in both directions, (n_node, n_node) [M]."""
+        return self._handle.call(_made, _query.make_mass)
+
+    @property
+    def links(self) -> Csr:
+        """T, (2 n_node, n_unknown): displacements are T times unknowns, up to prescribed motion.
+
+        Row 2 i + a is direction a of node i, both from 0. That of a prescribed freedom is empty,
+        that of a dependent one has the weights of those that it follows.
+        """
+        return self._handle.call(_made, _query.make_links)
+
+    @property
+    def unknowns(self) -> NDArray[np.int32]:
+        """Unknown of each freedom, (n_node, 2), from 0; -1: prescribed, dependent, no element."""
+        return self._handle.call(_query.get_unknowns, self.n_node).T - 1
+
+    def constraint(self, q0: ArrayLike | None = None, q1: ArrayLike | None = None, *,
+                   u0: ArrayLike | None = None, u1: ArrayLike | None = None,
+                   keeps_gap: bool = False) -> ConstraintReport:
+        """Contact between positions `q0` and `q1`, or displacements `u0` and `u1`, (n_node, 2) [L].
+
+        The library works with displacements. X + u and back costs a rounding of X, about 1e-16 of
+        it, which the gaps then have: give displacements where that counts. With `keeps_gap` the
+        constraints are those that hold the mean gap of the start, as persistent contact does:
+        integrated gaps have other gradients then, and all gaps are counted from there.
+        """
+        if (q0 is None) != (q1 is None) or (u0 is None) != (u1 is None) \
+                or (q0 is None) == (u0 is None):
+            raise InputError("give either q0 and q1 or u0 and u1")
+        shape = (self.n_node, 2)
+        if q0 is not None:
+            x = self.positions
+            u0, u1 = real_array(q0, "q0", shape) - x, real_array(q1, "q1", shape) - x
+        u0, u1 = real_array(u0, "u0", shape), real_array(u1, "u1", shape)
+        self._handle.n_reports += 1
+        place, values, *matrices = self._handle.change(_constraints, u0, u1, bool(keeps_gap))
+        return ConstraintReport(*place.T, *values.T, *matrices, self._handle,
+                                self._handle.n_reports, self.n_node)
+
+    def body_momenta(self) -> NDArray[np.float64]:
+        """px, py [M L/T] and lz about the origin [M L^2/T] of each body, (n_body, 3)."""
+        return self._handle.call(_query.get_momenta, self.n_body).T
+
+
+def contact_arguments(lam: ArrayLike | None, active: ArrayLike | None,
+                      n: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Multipliers and active flags for the library; without entries where not given."""
+    return (_NO_REALS if lam is None else real_array(lam, "lam", (n,)),
+            _NO_FLAGS if active is None else flag_array(active, "active", (n,)))
+
+
+def _csr(address: int, number: int, sizes: NDArray[np.int32]) -> tuple[Csr | None, int]:
+    """Copy out the matrix that the library calls `number`."""
+    n_row, n_col, n_entry = (int(n) for n in sizes)
+    start, column, value, ierr = _query.get_csr(address, number, n_row, n_entry)
+    return Csr((n_row, n_col), start, column, value), ierr
+
+
+def _made(address: int, make: Callable[..., Any], *arguments: Any) -> tuple[Csr | None, int]:
+    """The matrix that `make` makes."""
+    sizes, ierr = make(address, *arguments)
+    return _csr(address, 1, sizes) if ierr == 0 else (None, ierr)
+
+
+def _null_space(address: int) -> tuple[tuple[Csr, Csr] | None, int]:
+    sizes, ierr = _query.make_null_space(address)
+    if ierr:
+        return None, ierr
+    (p, _), (d, ierr) = (_csr(address, k + 1, sizes[:, k]) for k in range(2))
+    return (p, d), ierr
+
+
+def _constraints(address: int, u0: NDArray[np.float64], u1: NDArray[np.float64],
+                 keeps_gap: bool) -> tuple[Any, ...]:
+    sizes, ierr = _query.constraints(address, u0.T, u1.T, int(keeps_gap))
+    if ierr:
+        return None, ierr
+    place, values, _ = _query.get_constraints(address, int(sizes[0, 0]))
+    (g, _), (c, ierr) = (_csr(address, k + 3, sizes[:, k]) for k in range(2))
+    return place, values, g, c, ierr

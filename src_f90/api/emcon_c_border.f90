@@ -1,0 +1,252 @@
+!> What all functions of the C interface share: the model of a handle, and texts, arrays and
+!> matrices on their way over the border.
+!>
+!> One rule for all: an output that is NULL is left out; so is an input where the header says so,
+!> and the Fortran side then has an array that is not allocated.
+module emcon_c_border
+   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, c_int, &
+      c_int64_t, c_loc, c_null_char, c_ptr
+   use emcon_c_types, only : csr_c, increment_c
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : err_input, err_none, error_t, raise
+   use emcon_handle, only : handle_fail, handle_find, model_t
+   use emcon_kinds, only : wp
+   use emcon_march, only : increment_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: find_model, find_read, find_built, address_of, check_count, check_given
+   public :: take_field, take_values, take_flags, put_field, put_values, put_numbers, put_number
+   public :: put_increment, as_increment, show_matrix, f_text, c_string
+
+contains
+
+   !> The address that a C handle is.
+   pure integer(c_int64_t) function address_of(handle)
+      type(c_ptr), intent(in) :: handle
+
+      address_of = transfer(handle, 0_c_int64_t)
+   end function address_of
+
+   !> The model of a handle; null, and an error code, for NULL.
+   subroutine find_model(handle, model, ierr)
+      type(c_ptr), intent(in) :: handle
+      type(model_t), pointer, intent(out) :: model
+      integer(c_int), intent(out) :: ierr
+
+      call handle_find(address_of(handle), model)
+      ierr = merge(err_none, err_input, associated(model))
+   end subroutine find_model
+
+   !> The same for a model whose deck was read.
+   subroutine find_read(handle, model, ierr)
+      type(c_ptr), intent(in) :: handle
+      type(model_t), pointer, intent(out) :: model
+      integer(c_int), intent(out) :: ierr
+
+      call find_model(handle, model, ierr)
+      if (ierr /= err_none) return
+      if (.not. model%stepper%is_read) call handle_fail(model, &
+         "there is no scene: reading the deck or building its model failed", err_input, ierr)
+   end subroutine find_read
+
+   !> The same for a model that was built.
+   subroutine find_built(handle, model, ierr)
+      type(c_ptr), intent(in) :: handle
+      type(model_t), pointer, intent(out) :: model
+      integer(c_int), intent(out) :: ierr
+
+      call find_read(handle, model, ierr)
+      if (ierr /= err_none) return
+      if (.not. allocated(model%stepper%march%scheme)) call handle_fail(model, &
+         "the model is not built yet: call emcon_build", err_input, ierr)
+   end subroutine find_built
+
+   !> An error unless the count called `name` is what the model has.
+   subroutine check_count(name, n, expected, error)
+      character(len=*), intent(in) :: name
+      integer(c_int), intent(in) :: n
+      integer, intent(in) :: expected
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error) .or. n == expected) return
+      call raise(error, err_input, name // " is " // to_text(int(n)) // ", but the model has " // &
+         to_text(expected))
+   end subroutine check_count
+
+   !> An error for an argument that must not be NULL.
+   subroutine check_given(name, argument, error)
+      character(len=*), intent(in) :: name
+      type(c_ptr), intent(in) :: argument
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error) .or. c_associated(argument)) return
+      call raise(error, err_input, name // " is NULL")
+   end subroutine check_given
+
+   !> A nodal field (2, n) from C; not allocated for NULL.
+   subroutine take_field(from, n, expected, field, error)
+      type(c_ptr), intent(in) :: from
+      integer(c_int), intent(in) :: n
+      integer, intent(in) :: expected                !! number of nodes
+      real(wp), allocatable, intent(out) :: field(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      real(c_double), pointer :: array(:, :)
+
+      if (.not. c_associated(from)) return
+      call check_count("n_node", n, expected, error)
+      if (allocated(error)) return
+      call c_f_pointer(from, array, [2, expected])
+      allocate(field(2, expected))
+      field = real(array, wp)
+   end subroutine take_field
+
+   !> A list of reals from C; not allocated for NULL.
+   subroutine take_values(name, from, n, expected, list, error)
+      character(len=*), intent(in) :: name           !! of the count
+      type(c_ptr), intent(in) :: from
+      integer(c_int), intent(in) :: n
+      integer, intent(in) :: expected
+      real(wp), allocatable, intent(out) :: list(:)
+      type(error_t), allocatable, intent(inout) :: error
+      real(c_double), pointer :: array(:)
+
+      if (.not. c_associated(from)) return
+      call check_count(name, n, expected, error)
+      if (allocated(error)) return
+      call c_f_pointer(from, array, [expected])
+      allocate(list(expected))
+      list = real(array, wp)
+   end subroutine take_values
+
+   !> A list of truth values, 0 is false; not allocated for NULL.
+   subroutine take_flags(name, from, n, expected, list, error)
+      character(len=*), intent(in) :: name
+      type(c_ptr), intent(in) :: from
+      integer(c_int), intent(in) :: n
+      integer, intent(in) :: expected
+      logical, allocatable, intent(out) :: list(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int), pointer :: array(:)
+
+      if (.not. c_associated(from)) return
+      call check_count(name, n, expected, error)
+      if (allocated(error)) return
+      call c_f_pointer(from, array, [expected])
+      allocate(list(expected))
+      list = array /= 0
+   end subroutine take_flags
+
+   !> Copy a field to an array of C.
+   subroutine put_field(field, to)
+      real(wp), intent(in) :: field(:, :)
+      type(c_ptr), intent(in) :: to
+      real(c_double), pointer :: array(:, :)
+
+      if (.not. c_associated(to)) return
+      call c_f_pointer(to, array, shape(field))
+      array = real(field, c_double)
+   end subroutine put_field
+
+   !> Copy a list of reals.
+   subroutine put_values(list, to)
+      real(wp), intent(in) :: list(:)
+      type(c_ptr), intent(in) :: to
+      real(c_double), pointer :: array(:)
+
+      if (.not. c_associated(to)) return
+      call c_f_pointer(to, array, shape(list))
+      array = real(list, c_double)
+   end subroutine put_values
+
+   !> Copy a list of integers.
+   subroutine put_numbers(list, to)
+      integer, intent(in) :: list(:)
+      type(c_ptr), intent(in) :: to
+      integer(c_int), pointer :: array(:)
+
+      if (.not. c_associated(to)) return
+      call c_f_pointer(to, array, shape(list))
+      array = list
+   end subroutine put_numbers
+
+   !> Copy one integer.
+   subroutine put_number(number, to)
+      integer, intent(in) :: number
+      type(c_ptr), intent(in) :: to
+      integer(c_int), pointer :: place
+
+      if (.not. c_associated(to)) return
+      call c_f_pointer(to, place)
+      place = number
+   end subroutine put_number
+
+   !> Copy what was done.
+   subroutine put_increment(model, made, to)
+      type(model_t), intent(in) :: model
+      type(increment_t), intent(in) :: made
+      type(c_ptr), intent(in) :: to
+      type(increment_c), pointer :: place
+
+      if (.not. c_associated(to)) return
+      call c_f_pointer(to, place)
+      place = as_increment(model, made)
+   end subroutine put_increment
+
+   pure type(increment_c) function as_increment(model, made)
+      type(model_t), intent(in) :: model
+      type(increment_t), intent(in) :: made
+
+      as_increment%h = real(made%h, c_double)
+      as_increment%time = real(model%stepper%march%state%time, c_double)
+      as_increment%n_newton = made%n_newton
+      as_increment%n_cut = made%n_cut
+      as_increment%n_active = made%n_active
+   end function as_increment
+
+   !> Let C see a matrix in its place.
+   subroutine show_matrix(matrix, to)
+      type(csr_t), intent(in), target :: matrix      !! of a model, so that it stays there
+      type(csr_c), intent(out) :: to
+
+      to%n_row = matrix%n_row
+      to%n_column = matrix%n_col
+      if (allocated(matrix%row_start)) to%row_start = c_loc(matrix%row_start)
+      if (allocated(matrix%column)) to%column = c_loc(matrix%column)
+      if (allocated(matrix%value)) to%value = c_loc(matrix%value)
+   end subroutine show_matrix
+
+   !> The text of C up to its end; "" for NULL.
+   function f_text(text) result(copy)
+      type(c_ptr), intent(in) :: text
+      character(len=:), allocatable :: copy
+      character(kind=c_char), pointer :: from(:)
+      integer :: i, n
+
+      copy = ""
+      if (.not. c_associated(text)) return
+      call c_f_pointer(text, from, [huge(1)])
+      n = 0
+      do while (from(n + 1) /= c_null_char)
+         n = n + 1
+      end do
+      deallocate(copy)
+      allocate(character(len=n) :: copy)
+      do i = 1, n
+         copy(i:i) = from(i)
+      end do
+   end function f_text
+
+   !> The same the other way round.
+   pure function c_string(text) result(copy)
+      character(len=*), intent(in) :: text
+      character(kind=c_char) :: copy(len(text) + 1)
+      integer :: i
+
+      do i = 1, len(text)
+         copy(i) = text(i:i)
+      end do
+      copy(size(copy)) = c_null_char
+   end function c_string
+
+end module emcon_c_border

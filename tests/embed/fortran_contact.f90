@@ -1,0 +1,88 @@
+!> Contact alone, for a program that has its own solids: surfaces as lists of edges, one step, and
+!> what each formulation gives for it.
+!>
+!> usage: fortran_contact
+program fortran_contact
+   use emcon_api, only : constraint_values_t, contact_options_t, csr_multiply, csr_product, csr_t, &
+      dp, error_t, formulation_mortar, formulation_nts, formulation_segment, interface_add_pair, &
+      interface_add_surface, interface_begin_step, interface_evaluate, interface_init, &
+      interface_links, interface_null_space, interface_prepare, interface_select, interface_t, wp
+   implicit none
+   integer, parameter :: n_node = 6
+   !> The floor from right to left and the body from left to right: each has its body to the left.
+   integer, parameter :: floor(2, 1) = reshape([2, 1], [2, 1])
+   integer, parameter :: body(2, 3) = reshape([3, 4, 4, 5, 5, 6], [2, 3])
+   real(wp), parameter :: x(2, n_node) = reshape([0.0_wp, 0.0_wp, 4.0_wp, 0.1_wp, &
+      0.5_wp, 0.2_wp, 1.4_wp, 0.15_wp, 2.2_wp, 0.15_wp, 3.1_wp, 0.3_wp], [2, n_node])
+   integer, parameter :: formulation(3) = [formulation_nts, formulation_segment, formulation_mortar]
+   integer :: k
+
+   do k = 1, size(formulation)
+      call look_at(formulation(k))
+   end do
+
+contains
+
+   subroutine require(error)
+      type(error_t), allocatable, intent(in) :: error
+
+      if (.not. allocated(error)) return
+      print "(2a)", "error: ", error%message
+      stop 1
+   end subroutine require
+
+   !> The body turns and comes down; the floor is held.
+   subroutine look_at(formulation)
+      integer, intent(in) :: formulation
+      type(interface_t) :: face
+      type(constraint_values_t) :: values
+      type(error_t), allocatable :: error
+      real(wp) :: u0(2, n_node), du(2, n_node)
+      logical, allocatable :: active(:)
+      logical :: held(2, n_node)
+      integer :: slave, master, i
+
+      call interface_init(face, x, error)
+      if (.not. allocated(error)) call interface_add_surface(face, "BODY", body, slave, error)
+      if (.not. allocated(error)) call interface_add_surface(face, "FLOOR", floor, master, error)
+      if (.not. allocated(error)) call interface_add_pair(face, slave, master, formulation, &
+         contact_options_t(), error)
+      held = .false.
+      held(:, :2) = .true.
+      if (.not. allocated(error)) call interface_prepare(face, held, error)
+      call require(error)
+      u0 = 0.0_wp
+      du(:, :2) = 0.0_wp
+      do i = 3, n_node
+         du(:, i) = [0.1_wp - 0.2_wp*x(2, i), 0.2_wp*x(1, i) - 0.7_wp]
+      end do
+      allocate(active(face%n_constraint))
+      call interface_begin_step(face, u0, du, spread(.true., 1, size(active)), active, error)
+      if (.not. allocated(error)) call interface_select(face, u0, du, active, error)
+      if (.not. allocated(error)) call interface_evaluate(face, u0, du, values, error)
+      call require(error)
+      call report(face, values, du)
+   end subroutine look_at
+
+   !> Number of constraints; largest change of a gap; by how much g . du differs from that; largest
+   !> entry of P^T T^T G^T.
+   subroutine report(face, values, du)
+      type(interface_t), intent(inout) :: face
+      type(constraint_values_t), intent(in) :: values
+      real(wp), intent(in) :: du(:, :)
+      type(error_t), allocatable :: error
+      type(csr_t) :: p, df, links, product, crossed
+      real(wp) :: along(values%n)
+      integer, allocatable :: redundant(:)
+
+      call csr_multiply(values%g, reshape(du, [size(du)]), along)
+      call interface_links(face, links, error)
+      if (.not. allocated(error)) call interface_null_space(face, p, df, redundant, error)
+      call require(error)
+      call csr_product(links, p, product)
+      call csr_product(values%g, product, crossed)
+      print "(2(i0, 1x), 3es25.16)", values%n, size(redundant), maxval(abs(values%dgap)), &
+         maxval(abs(along - values%dgap)), maxval([0.0_dp, abs(crossed%value)])
+   end subroutine report
+
+end program fortran_contact

@@ -1,0 +1,126 @@
+"""The facade for Fortran: a program that uses nothing else, against the installed modules."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from embed_tools import API, HERE, ROOT, build, check_memory, run
+
+RING = ROOT/"input_decks"/"ring.inp"
+EPS = 2.0**-52
+# Modules that emcon_api stands for, by their files; other modules it takes single names from.
+STANDS_FOR = ["emcon_stepper*", "emcon_interface*", "emcon_quantities", "emcon_version"]
+# For the other rooms of the library, not for programs.
+INNER_MODULES = {"emcon_interface_check", "emcon_interface_stage", "emcon_interface_handle"}
+INNER_NAMES = {"stepper_read_source", "stepper_check_open", "query_sync", "query_check_field",
+               "field_names", "pair_variables"}
+
+
+def statements(path: Path) -> list[str]:
+    """The statements of a file, on one line each, without comments."""
+    text = re.sub(r"\s*!.*", "", path.read_text())
+    return [line.strip() for line in re.sub(r"\s*&\s*\n\s*", " ", text).splitlines()]
+
+
+def listed(lines: list[str], pattern: str) -> set[str]:
+    found = [re.fullmatch(pattern, line) for line in lines]
+    return {name.strip() for match in found if match for name in match[1].split(",")}
+
+
+def missing(api: Path) -> set[str]:
+    """Public names of the modules that the facade of the folder stands for, but does not have."""
+    offered = listed(statements(api/"emcon_api.f90"), r"use \w+, only : (.*)")
+    wanted = set()
+    for pattern in STANDS_FOR:
+        for path in api.glob(f"{pattern}.f90"):
+            if path.stem not in INNER_MODULES:
+                wanted |= listed(statements(path), r"public :: (.*)")
+    assert len(wanted) > 60
+    return wanted - offered - INNER_NAMES
+
+
+@pytest.fixture(scope="module")
+def host(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    program = tmp_path_factory.mktemp("fortran")/"fortran_host"
+    build("gfortran", HERE/"fortran_host.f90", program, installed, "-std=f2008")
+    return program
+
+
+def test_facade_has_all_public_names(tmp_path: Path) -> None:
+    assert missing(API) == set()
+    for path in API.glob("*.f90"):
+        text = path.read_text()
+        if path.stem == "emcon_api":
+            text = text.replace("stepper_snapshot, ", "")
+        (tmp_path/path.name).write_text(text)
+    assert missing(tmp_path) == {"stepper_snapshot"}
+
+
+def test_facade_tells_of_what_there_is() -> None:
+    """Names in the guide at its head are exported."""
+    text = (API/"emcon_api.f90").read_text()
+    head, body = text.split("\nmodule emcon_api\n")
+    told = set(re.findall(r"`((?:stepper|query|interface|conditions|restart)_\w+)`", head))
+    assert len(told) > 40
+    assert told <= set(re.findall(r"\w+", body))
+
+
+@pytest.fixture(scope="module")
+def lines(host: Path, installed: dict[str, str]) -> list[list[str]]:
+    """What the program prints, in words."""
+    return [line.split() for line in run(host, RING, env=installed).splitlines()]
+
+
+def test_version_is_that_of_the_package(lines: list[list[str]], installed: dict[str, str]) -> None:
+    version = run("pkg-config", "--modversion", "emcon", env=installed).strip()
+    assert lines[0] == ["version", version]
+
+
+def test_models_side_by_side(lines: list[list[str]]) -> None:
+    rows = [[float(number) for number in line[1:]] for line in lines if line[0] == "model"]
+    assert len(rows) == 40
+    first = rows[0][2]
+    for _, _, total, *_ in rows:
+        # Each step adds roundings of a sum over 1250 unknowns.
+        assert abs(total - first) <= 40*1250**0.5*EPS*first
+    assert rows[-1][1] == pytest.approx(1.0, rel=100*EPS)
+    assert rows[-1][4] > rows[0][4]            # the ring is on its way back
+    assert ["alone", "T"] in lines
+    assert ["same", "T", "T", "T"] in lines
+
+
+def test_residual_of_a_step_is_round_off(lines: list[list[str]]) -> None:
+    name, start, end, n_active = lines[-1]
+    assert name == "residual" and int(n_active) > 0
+    assert float(end) <= 100*EPS*float(start)  # some hundred terms in each row
+
+
+def test_contact_for_a_program_with_its_own_solids(
+    installed: dict[str, str], tmp_path: Path
+) -> None:
+    """Discrete gradients: g . du is the change of the gap; and P is orthogonal to them."""
+    program = tmp_path/"fortran_contact"
+    build("gfortran", HERE/"fortran_contact.f90", program, installed, "-std=f2008")
+    lines = run(program, env=installed).splitlines()
+    assert len(lines) == 3
+    for line in lines:
+        n, redundant, change, misfit, crossed = map(float, line.split())
+        assert n == 4 and redundant == 0
+        assert change > 0.1
+        # Sums of 12 products of numbers of size 1 at most, each off by some roundings.
+        assert max(misfit, crossed) <= 100*EPS
+    check_memory(installed, program)
+
+
+def test_errors_are_values(host: Path, installed: dict[str, str], tmp_path: Path) -> None:
+    done = subprocess.run([host, tmp_path/"none.inp"], env=installed, capture_output=True,
+                          text=True)
+    assert done.returncode == 1
+    assert re.match(r"error 2: .*none\.inp: .*no such file", done.stdout)
+
+
+def test_no_memory_is_lost(host: Path, installed: dict[str, str]) -> None:
+    check_memory(installed, host, ROOT/"input_decks"/"bouncing_bar.inp")
