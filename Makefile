@@ -95,7 +95,7 @@ LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(LAPACK_LIBS)
 
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
 ifdef COMPILER
-$(shell mkdir -p $(O) $(BUILD)/mod $(BUILD)/py)
+$(shell mkdir -p $(O) $(BUILD)/mod)
 FLAGS := $(strip $(COMPILER) $(FCOMPILE) $(CCOMPILE) $(LIBS))
 ifneq ($(file <$(BUILD)/flags.txt),$(FLAGS))
 $(file >$(BUILD)/flags.txt,$(FLAGS))
@@ -155,19 +155,28 @@ kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/ker
 # ---- Python extension ---------------------------------------------------------------------------
 
 # f2py writes the wrapper, the rules below compile it: the same way for every version of Python.
-# One run writes both files. A kind that f2py does not know becomes C float without an error.
+# For the interpreter that pip runs in, pywrap/setup.py sets PY, PY_READY (what must have been made
+# for it: nothing), PYTHON_INCLUDE and EXT_SUFFIX, and gives folders of its own as P and PACKAGE.
+PY_READY := .venv/run.stamp
 P := $(BUILD)/py
+PACKAGE := pywrap/emcon
 FLAT := $(wildcard src_f90/api/emcon_flat*.f90)
+
+# One run writes both files. A kind that f2py does not know becomes C float without an error.
 $(P)/_coremodule.c $(P)/_core-f2pywrappers2.f90 $(P)/fortranobject.c $(P)/include.txt &: \
-		$(FLAT) $(BUILD)/sources.txt .venv/run.stamp
+		$(FLAT) $(BUILD)/sources.txt $(PY_READY)
 	@echo "  F2PY  $(FLAT)"
+	$(Q)mkdir -p $(P)
 	$(Q)$(PY) -m numpy.f2py $(FLAT) -m _core --build-dir $(P) > $(P)/f2py.log 2>&1 \
 		|| { cat $(P)/f2py.log; exit 1; }
 	$(Q)if grep -n 'is mapped to C "float"' $(P)/f2py.log; then exit 1; fi
 	$(Q)cp $$($(PY) -c 'import numpy.f2py as f; print(f.get_include())')/fortranobject.[ch] $(P)
 	$(Q)$(PY) -c 'import numpy; print("-I" + numpy.get_include())' > $(P)/include.txt
 
-$(P)/%.o: $(P)/%.c $(P)/include.txt $(BUILD)/flags.txt
+$(PYTHON_INCLUDE)/Python.h:
+	@echo "$(PY) cannot be extended: $@ is missing (python3-dev of Debian holds it)" >&2; exit 1
+
+$(P)/%.o: $(P)/%.c $(P)/include.txt $(PYTHON_INCLUDE)/Python.h $(BUILD)/flags.txt
 	@echo "  CC    $<"
 	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) @$(P)/include.txt $(CFLAGS) -c $< -o $@
 
@@ -184,7 +193,7 @@ $(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o _core-f2pywrappers2.o f
 # would write into one that a running Python has mapped.
 pywrap: $(P)/_core$(EXT_SUFFIX)  ## the Python package, used as .venv/bin/python -m emcon
 	$(Q)for f in $< $(BUILD)/libemcon.so.0; do \
-		cmp -s $$f pywrap/emcon/$${f##*/} || install -m 755 $$f pywrap/emcon; done
+		cmp -s $$f '$(PACKAGE)'/$${f##*/} || install -m 755 $$f '$(PACKAGE)'; done
 
 # ---- use ----------------------------------------------------------------------------------------
 

@@ -15,11 +15,10 @@ A mesh, and a deck made of it: `emcon.mesh`.
 
 A run, step by step:
 
-    from emcon.stepper import Stepper
+    from emcon import Stepper
 
     with Stepper("ring.inp", h=0.02) as ring:
-        while not ring.is_done:
-            ring.step()
+        ring.run()
         print(ring.energies(), ring.momenta())
 
 Single kernels, for tests: `emcon.kernels`. From the shell: `python -m emcon plot ring`,
@@ -42,13 +41,19 @@ from .results import (Bodies, FieldFile, FieldSeries, HistoryFile, Pairs, Result
 
 if TYPE_CHECKING:
     from .animation import animate
+    from .errors import AnalysisError, InputError
+    from .model import Model
+    from .stepper import Stepper
 
-__all__ = ["Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries", "HistoryFile", "Pairs",
-           "ResultError", "ResultPaths", "Results", "Series", "__version__", "animate", "compare",
-           "energy_drift", "locate", "read_bodies", "read_history", "read_pairs"]
+__all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries",
+           "HistoryFile", "InputError", "Model", "Pairs", "ResultError", "ResultPaths", "Results",
+           "Series", "Stepper", "__version__", "animate", "compare", "energy_drift", "locate",
+           "read_bodies", "read_history", "read_pairs"]
 
-#: Names that are imported when first used: matplotlib takes half a second to load.
-_LATE = {"animate": ".animation"}
+#: Names that are imported when first used: matplotlib takes half a second to load, and results are
+#: read without the compiled extension.
+_LATE = {"animate": ".animation", "AnalysisError": ".errors", "InputError": ".errors",
+         "Model": ".model", "Stepper": ".stepper"}
 
 
 def __getattr__(name: str) -> Any:

@@ -7,19 +7,17 @@ module emcon_flat
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_handle, only : handle_build, handle_fail, handle_find, handle_fits, handle_free, &
-      handle_new, handle_pass, handle_read, model_t
+   use emcon_handle, only : handle_build, handle_find, handle_fits, handle_free, handle_new, &
+      handle_read, model_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_registry, only : law_create
-   use emcon_march, only : increment_t
    use emcon_nts_gap, only : nts_gap
    use emcon_scene, only : material_t
-   use emcon_stepper, only : stepper_advance, stepper_is_done
    implicit none
    private
-   public :: new_model, read_deck, build_model, close_model, last_error, model_size, advance, is_done
-   public :: get_positions, get_state, get_contact, get_pairs, get_ledger, law_kernel, nts_kernel
+   public :: new_model, read_deck, build_model, close_model, last_error, model_size, get_positions
+   public :: law_kernel, nts_kernel
 
 contains
 
@@ -89,48 +87,6 @@ contains
       end associate
    end subroutine model_size
 
-   !> One increment. `counts`: Newton iterations, cuts, active constraints; `times`: h, time.
-   subroutine advance(handle, counts, times, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(out) :: counts(3)
-      real(c_double), intent(out) :: times(2)
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-      type(increment_t) :: increment
-      type(error_t), allocatable :: error
-      !f2py threadsafe
-
-      counts = 0
-      times = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      ierr = err_none
-      if (stepper_is_done(model%stepper)) then
-         call handle_fail(model, "the analysis is at its end", err_input, ierr)
-         return
-      end if
-      call stepper_advance(model%stepper, increment, error)
-      call handle_pass(model, error, ierr)
-      counts = [increment%n_newton, increment%n_cut, increment%n_active]
-      times = [real(increment%h, c_double), real(model%stepper%march%state%time, c_double)]
-   end subroutine advance
-
-   !> 1 after the last increment of the last step.
-   subroutine is_done(handle, done, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(out) :: done
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-
-      done = 0
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      ierr = err_none
-      if (stepper_is_done(model%stepper)) done = 1
-   end subroutine is_done
-
    !> Reference positions and labels of the nodes.
    subroutine get_positions(handle, n_node, x, label, ierr)
       integer(c_int64_t), intent(in) :: handle
@@ -149,105 +105,6 @@ contains
       x = real(model%stepper%scene%x, c_double)
       label = model%stepper%scene%node_label
    end subroutine get_positions
-
-   !> Displacements and velocities.
-   subroutine get_state(handle, n_node, u, v, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(in) :: n_node
-      real(c_double), intent(out) :: u(2, n_node)
-      real(c_double), intent(out) :: v(2, n_node)
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-
-      u = 0.0_c_double
-      v = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      if (.not. handle_fits(model, n_node, model%stepper%march%system%solid%n_node, ierr)) return
-      u = real(model%stepper%march%state%u, c_double)
-      v = real(model%stepper%march%state%v, c_double)
-   end subroutine get_state
-
-   !> Multipliers (contact forces), active flags and slave node labels of all possible constraints.
-   subroutine get_contact(handle, n_constraint, lam, active, label, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(in) :: n_constraint
-      real(c_double), intent(out) :: lam(n_constraint)
-      integer(c_int), intent(out) :: active(n_constraint)
-      integer(c_int), intent(out) :: label(n_constraint)
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-      integer :: i, first, last, before
-
-      lam = 0.0_c_double
-      active = 0
-      label = 0
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      ierr = err_none
-      associate (system => model%stepper%march%system, &
-            state => model%stepper%march%state, scene => model%stepper%scene)
-         before = system%linear%n
-         if (.not. handle_fits(model, n_constraint, system%n_constraint - before, ierr)) return
-         lam = real(state%lam(before + 1:), c_double)
-         active = merge(1, 0, state%is_active(before + 1:))
-         do i = 1, size(system%contact)
-            first = system%first_constraint(i) - before + 1
-            last = system%first_constraint(i + 1) - before
-            label(first:last) = scene%node_label(system%contact(i)%contact%node)
-         end do
-      end associate
-   end subroutine get_contact
-
-   !> Of each contact pair: fx, fy, moment about the origin on the slave side, the same on the
-   !> master side, length in contact; and active constraints.
-   subroutine get_pairs(handle, n_pair, total, active, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(in) :: n_pair
-      real(c_double), intent(out) :: total(7, n_pair)
-      integer(c_int), intent(out) :: active(n_pair)
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-      integer :: k
-
-      total = 0.0_c_double
-      active = 0
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      ierr = err_none
-      associate (pair => model%stepper%march%state%pairs%total)
-         if (.not. handle_fits(model, n_pair, size(pair), ierr)) return
-         do k = 1, n_pair
-            total(1:3, k) = real(pair(k)%slave, c_double)
-            total(4:6, k) = real(pair(k)%master, c_double)
-            total(7, k) = real(pair(k)%length, c_double)
-            active(k) = pair(k)%n_active
-         end do
-      end associate
-   end subroutine get_pairs
-
-   !> Kinetic and strain energy, external and contact work, total, px, py, lz.
-   subroutine get_ledger(handle, values, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      real(c_double), intent(out) :: values(8)
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-
-      values = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      ierr = err_none
-      associate (ledger => model%stepper%march%ledger)
-         values(:5) = [real(ledger%kinetic, c_double), real(ledger%strain, c_double), &
-            real(ledger%external_work, c_double), real(ledger%contact_work, c_double), &
-            real(ledger%total, c_double)]
-         values(6:) = [real(ledger%momentum, c_double), real(ledger%angular, c_double)]
-      end associate
-   end subroutine get_ledger
 
    !> Response of a law (1 linear, 2 neo-Hooke, 3 coupled neo-Hooke) to a strain that goes from
    !> `strain` to `strain + dstrain`; components 11, 22, 2*12.

@@ -10,6 +10,7 @@ module emcon_element
    implicit none
    private
    public :: element_geometry_t, element_response_t, element_respond, element_strain
+   public :: element_point_strain, element_respond_known
 
    integer, parameter :: max_node = 4, max_gp = 4
 
@@ -41,43 +42,100 @@ contains
       type(element_response_t), intent(inout) :: response
       type(law_response_t) :: state
       real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2), strain(3), dstrain(3)
-      real(wp) :: nominal(2, 2), part(2)
-      integer :: n, k, i
+      integer :: k
 
-      n = geometry%n_node
+      call clear(response, with_tangent)
+      do k = 1, geometry%n_gp
+         call displacement_gradient(geometry, k, u0, grad0)
+         call displacement_gradient(geometry, k, du, dgrad)
+         call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
+         response%is_inverted = .not. is_regular(law%has_volume, strain + dstrain, f_end)
+         if (response%is_inverted) return
+         call law_response_plane(law, strain, dstrain, state)
+         call add_point(geometry, k, f_mid, f_end, nlgeom, with_tangent, state, response)
+      end do
+   end subroutine element_respond
+
+   !> Strain and its increment at point `k` of an element that moves from `u0` to `u0 + du`.
+   pure subroutine element_point_strain(geometry, k, u0, du, nlgeom, strain, dstrain, is_inverted)
+      type(element_geometry_t), intent(in) :: geometry
+      integer, intent(in) :: k
+      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)
+      logical, intent(in) :: nlgeom
+      real(wp), intent(out) :: strain(3), dstrain(3)       !! E11, E22, 2 E12
+      logical, intent(out) :: is_inverted                  !! at the end
+      real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2)
+
+      call displacement_gradient(geometry, k, u0, grad0)
+      call displacement_gradient(geometry, k, du, dgrad)
+      call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
+      is_inverted = .not. is_regular(.false., strain + dstrain, f_end)
+   end subroutine element_point_strain
+
+   !> As `element_respond`, with the response of the law at all points known.
+   pure subroutine element_respond_known(geometry, state, u0, du, nlgeom, with_tangent, response)
+      type(element_geometry_t), intent(in) :: geometry
+      type(law_response_t), intent(in) :: state(:)         !! (n_gp)
+      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)
+      logical, intent(in) :: nlgeom, with_tangent
+      type(element_response_t), intent(inout) :: response
+      type(law_response_t) :: weighted
+      real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2), strain(3), dstrain(3)
+      integer :: k
+
+      call clear(response, with_tangent)
+      do k = 1, geometry%n_gp
+         call displacement_gradient(geometry, k, u0, grad0)
+         call displacement_gradient(geometry, k, du, dgrad)
+         call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
+         weighted = state(k)
+         call add_point(geometry, k, f_mid, f_end, nlgeom, with_tangent, weighted, response)
+      end do
+   end subroutine element_respond_known
+
+   pure subroutine clear(response, with_tangent)
+      type(element_response_t), intent(inout) :: response
+      logical, intent(in) :: with_tangent
+
       response%energy = 0.0_wp
       response%force = 0.0_wp
       response%magnitude = 0.0_wp
       if (with_tangent) response%tangent = 0.0_wp
       response%is_inverted = .false.
-      do k = 1, geometry%n_gp
-         call displacement_gradient(geometry, k, u0, grad0)
-         call displacement_gradient(geometry, k, du, dgrad)
-         call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
-         response%is_inverted = .not. is_regular(law, strain + dstrain, f_end)
-         if (response%is_inverted) return
-         call law_response_plane(law, strain, dstrain, state)
-         response%energy = response%energy + geometry%weight(k)*state%energy
-         state%stress = geometry%weight(k)*state%stress
-         nominal(:, 1) = f_mid(:, 1)*state%stress(1) + f_mid(:, 2)*state%stress(3)
-         nominal(:, 2) = f_mid(:, 1)*state%stress(3) + f_mid(:, 2)*state%stress(2)
-         do i = 1, n
-            part = nominal(:, 1)*geometry%gradient(1, i, k) &
-               + nominal(:, 2)*geometry%gradient(2, i, k)
-            response%force(:, i) = response%force(:, i) + part
-            response%magnitude(:, i) = response%magnitude(:, i) + abs(part)
-         end do
-         if (with_tangent) then
-            state%tangent = geometry%weight(k)*state%tangent
-            call add_tangent(n, geometry%gradient(:, :, k), f_mid, f_end, state, &
-               merge(0.5_wp, 0.0_wp, nlgeom), response%tangent)
-         end if
+   end subroutine clear
+
+   !> Add what point `k` gives; `state` leaves with the weight of the point.
+   pure subroutine add_point(geometry, k, f_mid, f_end, nlgeom, with_tangent, state, response)
+      type(element_geometry_t), intent(in) :: geometry
+      integer, intent(in) :: k
+      real(wp), intent(in) :: f_mid(2, 2), f_end(2, 2)
+      logical, intent(in) :: nlgeom, with_tangent
+      type(law_response_t), intent(inout) :: state
+      type(element_response_t), intent(inout) :: response
+      real(wp) :: nominal(2, 2), part(2)
+      integer :: n, i
+
+      n = geometry%n_node
+      response%energy = response%energy + geometry%weight(k)*state%energy
+      state%stress = geometry%weight(k)*state%stress
+      nominal(:, 1) = f_mid(:, 1)*state%stress(1) + f_mid(:, 2)*state%stress(3)
+      nominal(:, 2) = f_mid(:, 1)*state%stress(3) + f_mid(:, 2)*state%stress(2)
+      do i = 1, n
+         part = nominal(:, 1)*geometry%gradient(1, i, k) &
+            + nominal(:, 2)*geometry%gradient(2, i, k)
+         response%force(:, i) = response%force(:, i) + part
+         response%magnitude(:, i) = response%magnitude(:, i) + abs(part)
       end do
-   end subroutine element_respond
+      if (with_tangent) then
+         state%tangent = geometry%weight(k)*state%tangent
+         call add_tangent(n, geometry%gradient(:, :, k), f_mid, f_end, state, &
+            merge(0.5_wp, 0.0_wp, nlgeom), response%tangent)
+      end if
+   end subroutine add_point
 
    !> Is the end state one that the law can answer to? Newton's method tries all kinds of things.
-   pure logical function is_regular(law, strain, f)
-      class(law_t), intent(in) :: law
+   pure logical function is_regular(has_volume, strain, f)
+      logical, intent(in) :: has_volume                    !! as in law_t
       real(wp), intent(in) :: strain(3), f(2, 2)
       real(wp), parameter :: largest = huge(1.0_wp)**0.2_wp   ! its powers in energies are finite
       real(wp), parameter :: noise = 64.0_wp*epsilon(1.0_wp)
@@ -86,7 +144,7 @@ contains
       is_regular = maxval(abs(f)) < largest .and. maxval(abs(strain)) < largest
       if (.not. is_regular) return
       is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp
-      if (.not. (is_regular .and. law%has_volume)) return
+      if (.not. (is_regular .and. has_volume)) return
       terms = (1.0_wp + 2.0_wp*abs(strain(1)))*(1.0_wp + 2.0_wp*abs(strain(2))) + strain(3)**2
       volume = (1.0_wp + 2.0_wp*strain(1))*(1.0_wp + 2.0_wp*strain(2)) - strain(3)**2
       is_regular = volume > noise*terms          ! det C, where it is more than round-off

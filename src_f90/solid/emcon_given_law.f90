@@ -1,0 +1,110 @@
+!> Constitutive laws that a program gives: the strain energy as a function of the strain at a point.
+!>
+!> Source: docs/theory.md, section 3.
+module emcon_given_law
+   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_law, only : law_response_t
+   use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
+      point_response_t
+   use emcon_scene, only : material_t, scene_t, where_text
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: given_law_t, given_points_t, given_response_t
+   public :: given_law_take, given_points_make_room, given_rest_stiffness, given_state
+
+   !> The energy W(E11, E22, 2 E12) per reference volume [M/(L T^2)] of a material. Without NLGEOM
+   !> the strain is the small one.
+   type :: given_law_t
+      character(len=:), allocatable :: material  !! its name
+      class(point_function_t), allocatable :: energy
+   end type given_law_t
+
+   !> All quadrature points of the elements of one law.
+   type :: given_points_t
+      real(wp), allocatable :: strain(:, :), dstrain(:, :)   !! (3, n)
+      type(point_response_t) :: response
+   end type given_points_t
+
+   !> What the given laws answer to a step.
+   type :: given_response_t
+      type(given_points_t), allocatable :: points(:)         !! one per material
+      integer :: inverted_element = 0            !! first one that cannot be answered for, or 0
+      integer :: material = 0                    !! that has no value there, or 0: det F <= 0
+      integer :: status = point_ok               !! what the law of `material` said
+   end type given_response_t
+
+contains
+
+   !> Take the law of `material` from those that are `given`.
+   subroutine given_law_take(scene, material, law, error, given)
+      type(scene_t), intent(in) :: scene
+      type(material_t), intent(in) :: material
+      type(given_law_t), intent(inout) :: law
+      type(error_t), allocatable, intent(out) :: error
+      type(given_law_t), intent(in), optional :: given(:)
+      integer :: i
+
+      if (present(given)) then
+         do i = 1, size(given)
+            if (given(i)%material /= material%name) cycle
+            law%material = material%name
+            allocate(law%energy, source=given(i)%energy)
+         end do
+      end if
+      if (.not. allocated(law%energy)) then
+         call raise(error, err_input, where_text(scene, material%origin) // ": error: material " &
+            // material%name // " is a *USER MATERIAL: a program has to give its strain energy, " &
+            // "after the deck is read and before the model is built")
+      else if (law%energy%n_variable /= 3) then
+         call raise(error, err_input, "the law given for material " // material%name // " has " &
+            // to_text(law%energy%n_variable) // " variables, but a strain has 3")
+      end if
+      if (allocated(error)) return
+      law%energy%weight = [1.0_wp, 1.0_wp, 0.5_wp]   ! |E|^2: axes do not matter
+   end subroutine given_law_take
+
+   !> Room for `n` points.
+   pure subroutine given_points_make_room(self, n)
+      type(given_points_t), intent(inout) :: self
+      integer, intent(in) :: n
+
+      if (allocated(self%strain)) return
+      allocate(self%strain(3, n), self%dstrain(3, n), source=0.0_wp)
+   end subroutine given_points_make_room
+
+   !> The response at point `i`. The stress normal to the plane is not known, and given as 0.
+   pure function given_state(self, i) result(state)
+      type(given_points_t), intent(in) :: self
+      integer, intent(in) :: i
+      type(law_response_t) :: state
+
+      state%energy = self%response%energy(i)
+      state%stress = self%response%gradient(:, i)
+      state%tangent = self%response%tangent(:, :, i)
+   end function given_state
+
+   !> Largest second derivative at rest, as half of it: what a step of no size has as its tangent.
+   subroutine given_rest_stiffness(law, stiffness, error)
+      type(given_law_t), intent(in) :: law
+      real(wp), intent(out) :: stiffness
+      type(error_t), allocatable, intent(out) :: error
+      type(point_response_t) :: response
+      real(wp), parameter :: rest(3, 1) = 0.0_wp
+      integer :: status
+
+      stiffness = 0.0_wp
+      call point_gradient(law%energy, rest, rest, .true., response, status)
+      if (status == point_ok) then
+         stiffness = maxval(abs(response%tangent(:, :, 1)))
+      else if (status == point_failed) then
+         call raise(error, err_analysis, "the law given for material " // law%material // &
+            " has failed at zero strain")
+      else
+         call raise(error, err_input, "the law given for material " // law%material // &
+            " has no finite value at zero strain")
+      end if
+   end subroutine given_rest_stiffness
+
+end module emcon_given_law
