@@ -137,6 +137,9 @@ $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
 	$(Q)$(FC) -o $@ $^ $(LIBS)
 
+# Optimising tests that hold whole models takes minutes and gigabytes, and gains nothing.
+$(call objects,$(KERNEL_SRC)): FFLAGS_release := -O0
+
 $(BUILD)/kernels: $(call objects,$(KERNEL_SRC)) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
 	$(Q)$(FC) -o $@ $^ $(LIBS)

@@ -34,9 +34,8 @@ module emcon_interface
       interface_add_tie, interface_prepare, interface_tie_matrices, interface_links, &
       interface_follow, interface_gather
 
-   !> Corners of master surfaces are rounded over this fraction of an edge, as in steps with
-   !> inertia of a deck.
-   real(wp), parameter :: corner_rounding = 1.0e-6_wp
+   !> Corners of master surfaces are rounded over this fraction of an edge, as in decks.
+   real(wp), parameter :: dynamic_rounding = 1.0e-6_wp, static_rounding = 1.0e-4_wp
 
    !> Read it freely; what is to be set by the host is named as such.
    type :: interface_t
@@ -50,6 +49,10 @@ module emcon_interface
       real(wp) :: gap_tolerance = 0.0_wp
       !> To be set: the host can try a step again in smaller parts.
       logical :: may_cut = .true.
+      !> To be set: statics, gradients at the end of the step, where new contacts are closed. With
+      !> this set at `interface_prepare`, corners are those of decks with static steps.
+      logical :: is_end = .false.
+      integer :: first = 1                       !! number of the first node, surface, pair in texts
       real(wp) :: largest_move = 0.0_wp          !! of a slave node onto its master by a tie [L]
       type(notes_t) :: notes                     !! remarks on the ties
       logical :: is_prepared = .false.
@@ -67,12 +70,14 @@ module emcon_interface
 contains
 
    !> Begin with the nodes of the host. Errors: shape, numbers that are not finite.
-   subroutine interface_init(self, x, error)
+   subroutine interface_init(self, x, error, first)
       type(interface_t), intent(out) :: self
       real(wp), intent(in) :: x(:, :)                      !! (2, n_node) reference positions [L]
       type(error_t), allocatable, intent(out) :: error
+      integer, intent(in), optional :: first               !! number that texts begin with; else 1
       integer :: i
 
+      if (present(first)) self%first = first
       call check_field(error, "interface_init", "x", x, -1)
       if (allocated(error)) return
       if (size(x, 2) == 0) then
@@ -84,7 +89,8 @@ contains
          scene%heading = ""
          allocate(scene%x, source=x)
          allocate(scene%u0(2, self%n_node), scene%v0(2, self%n_node), source=0.0_wp)
-         allocate(scene%node_label(self%n_node), source=[(i, i = 1, self%n_node)])
+         allocate(scene%node_label(self%n_node), &
+            source=[(self%first + i, i = 0, self%n_node - 1)])
          allocate(scene%file(0), scene%node_origin(self%n_node), scene%element_origin(0))
          allocate(scene%element_label(0), scene%element_kind(0), scene%element_section(0))
          allocate(scene%element_node(max_element_nodes, 0))
@@ -162,10 +168,10 @@ contains
          multiplier_dual)
       call check_number(error, place, "tolerance", tolerance)
       if (.not. allocated(error) .and. slave == master) call refuse(error, place, &
-         "slave and master are both surface " // to_text(slave))
+         "slave and master are both surface " // self%scene%surface(slave)%name)
       if (allocated(error)) return
-      tie%name = to_text(size(self%scene%tie) + 1) // " (" // self%scene%surface(slave)%name // &
-         " on " // self%scene%surface(master)%name // ")"
+      tie%name = to_text(size(self%scene%tie) + self%first) // " (" // &
+         self%scene%surface(slave)%name // " on " // self%scene%surface(master)%name // ")"
       tie%slave = slave
       tie%master = master
       tie%multiplier = multiplier
@@ -266,7 +272,8 @@ contains
             call new_contact(scene, scene%pair(i), system%contact(i)%contact, error)
             if (allocated(error)) return
             associate (contact => system%contact(i)%contact)
-               contact%rounding = corner_rounding
+               contact%meets_statics = self%is_end
+               contact%rounding = merge(static_rounding, dynamic_rounding, self%is_end)
                call contact%configure(scene%x, self%options(i))
                system%n_constraint = system%n_constraint + contact%n_constraint
             end associate

@@ -218,10 +218,9 @@ contains
             do k = 1, size(surface(pair%master)%edge, 2)
                do side = 1, 2
                   if (.not. is_slave(surface(pair%master)%edge(side, k))) cycle
-                  call refuse(error, place, "pair " // to_text(i) // ": slave surface " // &
-                     surface(pair%slave)%name // " and master surface " // &
-                     surface(pair%master)%name // " share node " // &
-                     to_text(surface(pair%master)%edge(side, k)))
+                  call refuse(error, place, "slave surface " // surface(pair%slave)%name // &
+                     " and master surface " // surface(pair%master)%name // " of a pair share " &
+                     // "node " // to_text(scene%node_label(surface(pair%master)%edge(side, k))))
                   return
                end do
             end do

@@ -1,11 +1,12 @@
 !> Interfaces that a host in another language, or in an older one, holds by a handle.
 !>
 !> A handle is three default integers that the host owns: the address of the interface in two of
-!> them, and a word made of these, by which an array that is no handle is told. Nothing else keeps
-!> the interface, so that any number live side by side, each in a thread of its own.
+!> them, and a word made of these, by which an array that is no handle is told. C and Python hold
+!> the address alone, 0 for none. Nothing else keeps the interface, so that any number live side by
+!> side, each in a thread of its own.
 module emcon_interface_handle
-   use, intrinsic :: iso_c_binding, only : c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
-      c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only : c_char, c_double, c_f_pointer, c_int, c_int64_t, &
+      c_loc, c_null_ptr, c_ptr
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, err_none, error_t, raise
    use emcon_interface, only : interface_t
@@ -14,6 +15,7 @@ module emcon_interface_handle
    implicit none
    private
    public :: host_t, host_new, host_find, host_free, host_pass, host_fit, host_put, host_index
+   public :: host_make, host_at, host_keep
    public :: handle_size, no_handle
 
    integer, parameter :: handle_size = 3
@@ -26,6 +28,11 @@ module emcon_interface_handle
       type(interface_t) :: face
       type(constraint_values_t) :: values        !! of the last evaluation
       character(len=:), allocatable :: message   !! of the last failure
+      !> What was asked for last, which C looks at in place.
+      type(csr_t) :: links, d, m, curvature, p, df
+      integer(c_int), allocatable :: id(:), redundant(:)   !! counted from 0
+      real(c_double), allocatable :: number(:, :)          !! (n, 6) `values` but its matrices
+      character(kind=c_char), allocatable :: text(:)
    end type host_t
 
 contains
@@ -36,12 +43,29 @@ contains
       type(host_t), pointer, intent(out) :: host
       integer(c_int64_t) :: address
 
-      allocate(host)
-      host%message = ""
-      address = transfer(c_loc(host), address)
+      address = host_make()
+      call host_at(address, host)
       handle(:2) = transfer(address, handle(:2))
       handle(3) = word_of(handle)
    end subroutine host_new
+
+   !> The address of a new interface, which `host_at` makes a pointer of, to be deallocated.
+   integer(c_int64_t) function host_make()
+      type(host_t), pointer :: host
+
+      allocate(host)
+      host%message = ""
+      host_make = transfer(c_loc(host), host_make)
+   end function host_make
+
+   !> The interface at an address; null for 0.
+   subroutine host_at(address, host)
+      integer(c_int64_t), intent(in) :: address
+      type(host_t), pointer, intent(out) :: host
+
+      host => null()
+      if (address /= 0) call c_f_pointer(transfer(address, c_null_ptr), host)
+   end subroutine host_at
 
    pure integer(c_int) function word_of(handle)
       integer(c_int), intent(in) :: handle(handle_size)
@@ -54,13 +78,11 @@ contains
       integer(c_int), intent(in) :: handle(handle_size)
       type(host_t), pointer, intent(out) :: host
       integer(c_int), intent(out) :: ierr
-      type(c_ptr) :: address
 
       host => null()
       ierr = err_input
       if (handle(3) /= word_of(handle) .or. all(handle(:2) == 0)) return
-      address = transfer(handle(:2), c_null_ptr)
-      call c_f_pointer(address, host)
+      call host_at(transfer(handle(:2), 0_c_int64_t), host)
       ierr = err_none
    end subroutine host_find
 
@@ -86,6 +108,23 @@ contains
       host%message = error%message
       ierr = error%code
    end subroutine host_pass
+
+   !> Keep the values of the last evaluation as C and Python read them.
+   subroutine host_keep(host)
+      type(host_t), intent(inout) :: host
+
+      host%id = int(host%values%id - 1, c_int)
+      if (allocated(host%number)) deallocate(host%number)
+      allocate(host%number(host%values%n, 6))
+      associate (values => host%values, number => host%number)
+         number(:, 1) = real(values%target, c_double)
+         number(:, 2) = real(values%gap0, c_double)
+         number(:, 3) = real(values%gap1, c_double)
+         number(:, 4) = real(values%dgap, c_double)
+         number(:, 5) = real(values%defect, c_double)
+         number(:, 6) = real(values%size, c_double)
+      end associate
+   end subroutine host_keep
 
    !> An error if the host's array has not the extent that is needed.
    subroutine host_fit(name, actual, needed, error)

@@ -35,7 +35,8 @@ module emcon_interface_step
    public :: step_done, step_cycling, step_too_far, step_stands_off
 
    !> The selected constraints over a step, f = mean gap - target. Linearised in the motion at the
-   !> end: force lam_k g_k by the discrete gradients g, defect by the gradients c.
+   !> end: force lam_k g_k by the discrete gradients g, defect by the gradients c. In statics
+   !> (`is_end`) the start is the end: gap0 = gap1, dgap = 0, g = c.
    type :: constraint_values_t
       integer :: n = 0
       integer, allocatable :: id(:)              !! (n) ascending, 1..n_constraint
@@ -74,6 +75,7 @@ contains
       self%state%u = u0
       self%state%is_active = was_active
       call take_options(self)
+      call constraints_select(self%active%set, [integer ::])
       call active_set_begin(self%active, self%system, self%scene, self%state, du)
       active = self%active%is_active
       self%has_stencils = .true.
@@ -93,14 +95,24 @@ contains
          "interface_gaps", "state has " // to_text(size(state)) // " entries, not " // &
          to_text(self%n_constraint))
       if (allocated(error)) return
+      call measure(self, u0, du)
       do i = 1, size(self%system%contact)
-         associate (contact => self%system%contact(i)%contact, &
-               first => self%system%first_constraint)
-            call contact%measure(self%scene%x, u0, du)
-            state(first(i) + 1:first(i + 1)) = contact%state
+         associate (first => self%system%first_constraint)
+            state(first(i) + 1:first(i + 1)) = self%system%contact(i)%contact%state
          end associate
       end do
    end subroutine interface_gaps
+
+   !> Measure all gaps, which the contacts keep.
+   subroutine measure(self, u0, du)
+      type(interface_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      integer :: i
+
+      do i = 1, size(self%system%contact)
+         call self%system%contact(i)%contact%measure(self%scene%x, u0, du)
+      end do
+   end subroutine measure
 
    !> The slave node of each possible constraint.
    subroutine interface_slave_nodes(self, node, error)
@@ -128,11 +140,14 @@ contains
       logical, intent(in) :: active(:)           !! (n_constraint)
       type(error_t), allocatable, intent(out) :: error
       character(len=*), parameter :: place = "interface_select"
+      integer :: i
 
       call check_motion(self, place, u0, du, error)
       call check_begun(self, place, error)
       call check_mask(self, place, "active", active, error)
-      if (.not. allocated(error)) call check_near(self, place, active, u0, du, error)
+      if (allocated(error)) return
+      call measure(self, u0, du)
+      call check_near(self, place, pack([(i, i = 1, size(active))], active), error)
       if (allocated(error)) return
       call take_options(self)
       self%active%is_active = active
@@ -147,14 +162,12 @@ contains
       real(wp), intent(in) :: target(:)          !! (n) mean gaps [L]
       type(error_t), allocatable, intent(out) :: error
       character(len=*), parameter :: place = "interface_choose"
-      logical :: active(self%n_constraint)
       integer :: k, last
 
       call check_motion(self, place, u0, du, error)
       call check_begun(self, place, error)
       call check_list(error, place, "target", target, size(id))
       if (allocated(error)) return
-      active = .false.
       last = 0
       do k = 1, size(id)
          if (id(k) <= last .or. id(k) > self%n_constraint) then
@@ -163,9 +176,9 @@ contains
             return
          end if
          last = id(k)
-         active(last) = .true.
       end do
-      call check_near(self, place, active, u0, du, error)
+      call measure(self, u0, du)
+      call check_near(self, place, id, error)
       if (allocated(error)) return
       call constraints_select(self%active%set, id)
       self%active%set%target = target
@@ -177,12 +190,14 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(constraint_values_t), intent(inout) :: values
       type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: place = "interface_evaluate"
 
-      call check_motion(self, "interface_evaluate", u0, du, error)
-      call check_begun(self, "interface_evaluate", error)
+      call check_motion(self, place, u0, du, error)
+      call check_begun(self, place, error)
+      if (.not. allocated(error)) call check_near(self, place, self%active%set%id, error)
       if (allocated(error)) return
       associate (set => self%active%set)
-         call constraints_evaluate(set, self%system, self%scene, pose_t(), u0, du)
+         call constraints_evaluate(set, self%system, self%scene, pose_t(is_end=self%is_end), u0, du)
          call constraints_rows(set, self%system%numbering)
          values%n = set%n
          values%id = set%id
@@ -332,29 +347,28 @@ contains
    pure subroutine take_options(self)
       type(interface_t), intent(inout) :: self
 
-      self%active%holds_gap = self%initiation == initiation_persistent
+      self%active%has_inertia = .not. self%is_end
+      self%active%holds_gap = self%initiation == initiation_persistent .and. .not. self%is_end
       self%active%gap_tolerance = self%gap_tolerance
       self%active%may_cut = self%may_cut
    end subroutine take_options
 
-   !> A constraint without a surface within reach cannot act.
-   subroutine check_near(self, place, active, u0, du, error)
-      type(interface_t), intent(inout) :: self
+   !> A constraint without a surface within reach, as last measured, cannot act.
+   pure subroutine check_near(self, place, id, error)
+      type(interface_t), intent(in) :: self
       character(len=*), intent(in) :: place
-      logical, intent(in) :: active(:)
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      integer, intent(in) :: id(:)
       type(error_t), allocatable, intent(out) :: error
-      type(gap_state_t) :: state(self%n_constraint)
-      integer :: id, pair, i
+      integer :: k, pair, i
 
-      call interface_gaps(self, u0, du, state, error)
-      if (allocated(error)) return
-      do id = 1, size(active)
-         if (.not. active(id) .or. state(id)%is_near) cycle
-         call constraint_place(self%system, id, pair, i)
-         call refuse(error, place, "constraint " // to_text(id) // " (slave node " // &
-            to_text(self%system%contact(pair)%contact%node(i)) // " of pair " // to_text(pair) // &
-            ") has no surface within reach")
+      do k = 1, size(id)
+         call constraint_place(self%system, id(k), pair, i)
+         associate (contact => self%system%contact(pair)%contact)
+            if (contact%state(i)%is_near) cycle
+            call refuse(error, place, "constraint " // to_text(id(k) - 1 + self%first) // &
+               " (slave node " // to_text(self%scene%node_label(contact%node(i))) // " of pair " &
+               // to_text(pair - 1 + self%first) // ") has no surface within reach")
+         end associate
          return
       end do
    end subroutine check_near

@@ -7,6 +7,7 @@ module emcon_stepper
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_given_law, only : given_law_t
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_measure
@@ -32,6 +33,7 @@ module emcon_stepper
       logical :: is_read = .false.               !! `scene` is complete
       type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
       type(notes_t) :: notes                     !! what was done before the first step
+      type(given_law_t), allocatable :: given_law(:)     !! by `stepper_give_law`
    end type stepper_t
 
 contains
@@ -134,7 +136,7 @@ contains
       if (allocated(error)) return
       call ties_move_nodes(self%scene, self%notes, error)    ! contact may have moved masters
       if (allocated(error)) return
-      call march_init(self%march, self%scene, error)
+      call march_init(self%march, self%scene, error, self%given_law)
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
       if (.not. allocated(error)) call notes_append(self%notes, self%march%system%notes)
@@ -308,6 +310,7 @@ contains
       type(restart_t), intent(in) :: restart
       type(error_t), allocatable, intent(out) :: error
 
+      self%source = deck_source_t()
       call restart_get(restart, "deck_line", self%source%line, error)
       if (.not. allocated(error)) call restart_get(restart, "deck_file_name", &
          self%source%file_name, error)

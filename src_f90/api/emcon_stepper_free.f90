@@ -11,6 +11,7 @@ module emcon_stepper_free
    use emcon_march_step, only : follow_links
    use emcon_pair_record, only : pair_record_init
    use emcon_scene, only : procedure_static
+   use emcon_solid, only : obstacle_text
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
    use emcon_system, only : pose_t, system_respond
@@ -220,8 +221,8 @@ contains
          call system_respond(system, self%scene, rest, next%u, next%v, system%zero, system%zero, &
             .false.)
          if (system%response%inverted_element > 0) then
-            call raise(error, err_analysis, "element " // to_text(self%scene%element_label( &
-               system%response%inverted_element)) // " is inverted by the displacements u")
+            call raise(error, err_analysis, obstacle_text(self%scene, system%response, &
+               " by the displacements u"))
             return
          end if
          next%internal = system%response%force

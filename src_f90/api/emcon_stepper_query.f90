@@ -17,6 +17,7 @@ module emcon_stepper_query
    use emcon_march_step, only : follow_links, march_guess
    use emcon_null_space, only : null_space_t
    use emcon_numbering, only : pick_unknowns
+   use emcon_solid, only : obstacle_text
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
    use emcon_system, only : system_respond
@@ -64,7 +65,7 @@ contains
       call stepper_check_open(stepper, error)
       if (allocated(error)) return
       if (self%revision < 0) then
-         call march_init(self%march, stepper%scene, error)
+         call march_init(self%march, stepper%scene, error, stepper%given_law)
          if (allocated(error)) return
          allocate(self%contact, source=self%march%system%zero)
          self%revision = 0
@@ -162,8 +163,8 @@ contains
             call system_respond(system, stepper%scene, pose, state%u, state%v, march%du, &
                march%offset, with_tangent)
             if (system%response%inverted_element > 0) then
-               call raise(error, err_analysis, "element " // to_text(stepper%scene%element_label( &
-                  system%response%inverted_element)) // " is inverted by the displacements u1")
+               call raise(error, err_analysis, obstacle_text(stepper%scene, system%response, &
+                  " by the displacements u1"))
                return
             end if
             call begin_contact(self, stepper)

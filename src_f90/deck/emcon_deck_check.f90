@@ -46,7 +46,7 @@ contains
          if (.not. is_used(i)) cycle
          associate (given => scene%material(i))
             if (given%law == 0) call add_error(reader%log, given%origin, "material " &
-               // given%name // " has no law: *ELASTIC or *HYPERELASTIC is missing")
+               // given%name // " has no law: *ELASTIC, *HYPERELASTIC or *USER MATERIAL is missing")
             if (given%density > 0.0_wp .or. given%density < 0.0_wp) cycle
             if (is_dynamic) then
                call add_error(reader%log, given%origin, "material " // given%name &

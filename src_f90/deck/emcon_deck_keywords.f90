@@ -48,6 +48,7 @@ module emcon_deck_keywords
       keyword_t("DENSITY", in_model), &
       keyword_t("ELASTIC", in_model, "TYPE="), &
       keyword_t("HYPERELASTIC", in_model, "!OGDEN,!MOONEY-RIVLIN,!YEOH,!POLYNOMIAL,!N"), &
+      keyword_t("USER MATERIAL", in_model, "CONSTANTS=,~UNSYMM,!TYPE,!HYBRIDFORMULATION"), &
       keyword_t("INITIAL CONDITIONS", in_model, "TYPE=,!USER"), &
       keyword_t("AMPLITUDE", in_both, "NAME=,TIME=,DEFINITION=,!USER,!VALUE,!SMOOTH"), &
       keyword_t("TIME POINTS", in_both, "NAME=,GENERATE"), &
@@ -104,7 +105,6 @@ module emcon_deck_keywords
       keyword_t("CYCLIC HARDENING", in_model, "", "materials are elastic"), &
       keyword_t("CREEP", in_model, "", "materials are elastic"), &
       keyword_t("VISCOELASTIC", in_model, "", "materials are elastic"), &
-      keyword_t("USER MATERIAL", in_model, "", "materials are elastic"), &
       keyword_t("HYPERFOAM", in_model, "", "use *HYPERELASTIC, NEO HOOKE"), &
       keyword_t("DEPVAR", in_model, "", "materials have no state variables"), &
       keyword_t("DAMPING", in_both, "", "there is no damping: energy is to be conserved"), &

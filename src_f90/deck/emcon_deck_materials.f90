@@ -4,11 +4,11 @@ module emcon_deck_materials
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, is_blank, next_line
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
-      option_name, reader_t, refuse_option
+      option_count, option_name, reader_t, refuse_option
    use emcon_deck_sets, only : find_set, set_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
-   use emcon_scene, only : law_neo_hooke, material_t, scene_t, where_text
+   use emcon_scene, only : law_given, law_neo_hooke, material_t, scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private
@@ -33,12 +33,17 @@ contains
             select case (card%name)
             case ("MATERIAL")
                call start_material(reader, card, scene, n)
-            case ("DENSITY", "ELASTIC", "HYPERELASTIC")
+            case ("DENSITY", "ELASTIC", "HYPERELASTIC", "USERMATERIAL")
                if (n == 0) then
                   if (.not. reader%doubt_names) call card_error(reader, card, &
                      "there is no *MATERIAL before")
                else if (card%name == "DENSITY") then
                   call read_density(reader, card, scene%material(n))
+               else if (scene%material(n)%law /= 0) then
+                  call card_error(reader, card, "material " // scene%material(n)%name &
+                     // " has a law already")
+               else if (card%name == "USERMATERIAL") then
+                  call read_given(reader, card, scene%material(n))
                else
                   call read_law(reader, card, scene%material(n))
                end if
@@ -93,10 +98,6 @@ contains
       logical :: ok
       character(len=:), allocatable :: fault, variants
 
-      if (material%law /= 0) then
-         call card_error(reader, card, "material " // material%name // " has a law already")
-         return
-      end if
       i_row = 0
       variants = ""
       do i = 1, size(law_rows)
@@ -126,6 +127,31 @@ contains
          material%constant = value(:row%n_constant)
       end associate
    end subroutine read_law
+
+   !> A law that a program gives: its constants, in any number of lines.
+   subroutine read_given(reader, card, material)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(material_t), intent(inout) :: material
+      type(data_t) :: data
+      real(wp) :: value
+      integer :: i, n_constant
+
+      material%law = law_given
+      n_constant = merge(-1, 0, has_option(card, "CONSTANTS"))
+      call option_count(reader, card, "CONSTANTS", 0, n_constant)
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         do i = 1, data%n
+            value = 0.0_wp
+            call get_real(reader, data, i, "constant", value)
+            material%constant = [material%constant, value]
+         end do
+      end do
+      if (n_constant < 0 .or. size(material%constant) == n_constant) return
+      call card_error(reader, card, "CONSTANTS is " // to_text(n_constant) &
+         // ", but the data lines hold " // to_text(size(material%constant)))
+   end subroutine read_given
 
    subroutine check_isotropic(reader, card)
       type(reader_t), intent(inout) :: reader

@@ -5,6 +5,7 @@ module emcon_march
    use emcon_active_set, only : active_set_init
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_given_law, only : given_law_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_parts, only : march_in_parts
@@ -17,6 +18,7 @@ module emcon_march
       procedure_static, scene_t, step_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
+   use emcon_solid, only : obstacle_text
    use emcon_state, only : state_t
    use emcon_system, only : pose_t, system_begin_step, system_init, system_respond
    use emcon_text, only : note_add, to_text
@@ -42,13 +44,14 @@ module emcon_march
 contains
 
    !> Build the system of `scene` and put it into its initial state.
-   subroutine march_init(self, scene, error)
+   subroutine march_init(self, scene, error, given_law)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      type(given_law_t), intent(in), optional :: given_law(:)    !! as a program gives them
       integer :: n
 
-      call system_init(self%system, scene, error)
+      call system_init(self%system, scene, error, given_law)
       if (allocated(error)) return
       n = size(scene%x, 2)
       allocate(self%du(2, n), self%v1(2, n), self%offset(2, n), source=0.0_wp)
@@ -212,9 +215,8 @@ contains
          rest%is_end = .true.
          call system_respond(self%system, scene, rest, state%u, state%v, self%du, self%du, .false.)
          if (self%system%response%inverted_element > 0) then
-            call raise(error, err_analysis, "element " // to_text(scene%element_label( &
-               self%system%response%inverted_element)) // &
-               " is inverted by the displacements at the start of the step")
+            call raise(error, err_analysis, obstacle_text(scene, self%system%response, &
+               " by the displacements at the start of the step"))
             return
          end if
          state%internal = self%system%response%force

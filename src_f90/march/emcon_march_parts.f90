@@ -8,6 +8,7 @@ module emcon_march_parts
    use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : scene_t
+   use emcon_solid, only : obstacle_text
    use emcon_text, only : note_add, to_text
    implicit none
    private
@@ -62,8 +63,7 @@ contains
 
       select case (status)
       case (step_inverted)
-         text = "element " // to_text(scene%element_label(max(1, self%newton%inverted_element))) &
-            // " is inverted"
+         text = obstacle_text(scene, self%system%response, "")
       case (step_diverged)
          text = "Newton's method does not converge (relative residual " // &
             to_text(self%newton%history(max(1, self%newton%n_history))) // " after " // &

@@ -8,10 +8,12 @@ module emcon_newton
       constraints_rows
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
+   use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
+   use emcon_solid, only : obstacle_text
    use emcon_system, only : pose_t, system_respond, system_tangent_times, system_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
@@ -264,6 +266,10 @@ contains
             with_tangent=.not. self%is_polish)
          self%inverted_element = system%response%inverted_element
          if (self%inverted_element == 0) exit
+         if (system%response%given%status == point_failed) then
+            call raise(error, err_analysis, obstacle_text(scene, system%response, ""))
+            return
+         end if
          if (i == most_halvings .or. self%n_solve == 0) return
          self%correction = 0.5_wp*self%correction
          call add_to_dofs(system%numbering, self%correction, -1.0_wp, du)

@@ -11,7 +11,7 @@ module emcon_scene
    public :: contact_pair_t, contact_options_t, prescribed_t, load_t, output_t, step_t, scene_t
    public :: tie_t, tie_rows_t, equation_t
    public :: where_text, find_amplitude_value
-   public :: law_linear, law_neo_hooke, law_coupled_neo_hooke
+   public :: law_linear, law_neo_hooke, law_coupled_neo_hooke, law_given
    public :: load_point, load_pressure, load_gravity
    public :: formulation_nts, formulation_segment, formulation_mortar
    public :: integration_segments, integration_elements
@@ -23,8 +23,9 @@ module emcon_scene
    public :: output_node_file, output_element_file, output_contact_file
    public :: output_node_print, output_element_print, output_contact_print, output_energy_print
 
-   !> Constitutive laws. `law_linear` is linear elasticity, under NLGEOM St. Venant-Kirchhoff.
-   integer, parameter :: law_linear = 1, law_neo_hooke = 2, law_coupled_neo_hooke = 3
+   !> Constitutive laws. `law_linear` is linear elasticity, under NLGEOM St. Venant-Kirchhoff;
+   !> `law_given` is a function that a program gives.
+   integer, parameter :: law_linear = 1, law_neo_hooke = 2, law_coupled_neo_hooke = 3, law_given = 4
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3
    integer, parameter :: formulation_nts = 1, formulation_segment = 2, formulation_mortar = 3
    integer, parameter :: integration_segments = 1, integration_elements = 2
@@ -68,7 +69,7 @@ module emcon_scene
       character(len=:), allocatable :: name
       type(origin_t) :: origin
       integer :: law = 0                             !! one of `law_`; 0: none was given
-      real(wp), allocatable :: constant(:)           !! as in the deck: E, nu | C10, D1
+      real(wp), allocatable :: constant(:)           !! as in the deck: E, nu | C10, D1 | any
       real(wp) :: density = 0.0_wp                   !! [M/L^3]
    end type material_t
 

@@ -1,17 +1,22 @@
 !> All elements of a scene: reference geometry, laws, mass; forces and tangents over a step.
 module emcon_solid
-   use emcon_element, only : element_geometry_t, element_respond, element_response_t
+   use emcon_element, only : element_geometry_t, element_point_strain, element_respond, &
+      element_respond_known, element_response_t
    use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_given_law, only : given_law_t, given_law_take, given_points_make_room, &
+      given_response_t, given_rest_stiffness, given_state
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create
-   use emcon_scene, only : scene_t
+   use emcon_point_function, only : point_failed, point_gradient, point_ok
+   use emcon_scene, only : law_given, scene_t
    use emcon_shape, only : shape_create, shape_t
    use emcon_text, only : to_text
    implicit none
    private
    public :: solid_t, solid_init, solid_respond, solid_response_t, solid_tangent_times
+   public :: solid_evaluate_given, obstacle_text
 
    type :: solid_t
       integer :: n_element = 0
@@ -21,6 +26,10 @@ module emcon_solid
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
       type(law_box_t), allocatable :: law(:)             !! one per material
+      type(given_law_t), allocatable :: given(:)         !! one per material, or one in its place
+      logical :: has_given = .false.                     !! some law is a given one
+      integer, allocatable :: n_point(:)                 !! quadrature points, of each given law
+      integer, allocatable :: first_point(:)             !! (n_element) among these; 0: law of ours
       real(wp), allocatable :: mass(:, :, :)             !! consistent: (4, 4, n_element) [M]
       real(wp), allocatable :: volume_mass(:, :)         !! int rho N_i: (4, n_element) [M]
       real(wp), allocatable :: thickness(:)              !! (n_element) [L]
@@ -35,16 +44,19 @@ module emcon_solid
       real(wp), allocatable :: rounding(:, :)            !! (2, n_node) times epsilon: round-off
       real(wp), allocatable :: energy(:)                 !! (n_element) at the end of the step
       integer :: inverted_element = 0                    !! first one with det F <= 0, or 0
+      type(given_response_t) :: given                    !! of given laws: may tell more of that
    end type solid_response_t
 
 contains
 
-   !> Geometry, laws and mass of the elements of `scene`.
-   subroutine solid_init(self, scene, error)
+   !> Geometry, laws and mass of the elements of `scene`, with the laws that a program gives.
+   subroutine solid_init(self, scene, error, given)
       type(solid_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      type(given_law_t), intent(in), optional :: given(:)
       type(shape_t) :: stiffness(size(element_kinds)), mass(size(element_kinds))
+      real(wp) :: at_rest(size(scene%material))
       integer :: e, k, n
 
       n = size(scene%element_kind)
@@ -56,31 +68,75 @@ contains
       allocate(self%mass(max_element_nodes, max_element_nodes, n), source=0.0_wp)
       allocate(self%volume_mass(max_element_nodes, n), source=0.0_wp)
       allocate(self%stiffness(max_element_nodes, n), source=0.0_wp)
-      allocate(self%law(size(scene%material)))
-      do k = 1, size(scene%material)
-         if (scene%material(k)%law == 0) cycle
-         call law_create(scene%material(k), self%law(k)%law, error)
-         if (allocated(error)) return
-      end do
+      call init_laws(self, scene, at_rest, error, given)
+      if (allocated(error)) return
       do k = 1, size(element_kinds)
          call shape_create(k, stiffness(k), mass(k))
       end do
       do e = 1, n
          self%law_of(e) = scene%section(scene%element_section(e))%material
          self%thickness(e) = scene%section(scene%element_section(e))%thickness
-         call init_element(self, scene%x, e, stiffness(self%kind(e)), mass(self%kind(e)))
-         call estimate_stiffness(self, e)
+         call init_element(self, scene%x, scene%material(self%law_of(e))%density, e, &
+            stiffness(self%kind(e)), mass(self%kind(e)))
+         call estimate_stiffness(self, at_rest(self%law_of(e)), e)
          if (any(self%geometry(e)%weight(:self%geometry(e)%n_gp) <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
                " is inverted or has no area; check the order of its nodes")
             return
          end if
       end do
+      call number_points(self)
    end subroutine solid_init
 
-   pure subroutine init_element(self, x, e, stiffness, mass)
+   !> The laws, and the largest entry of the tangent of each at rest.
+   subroutine init_laws(self, scene, at_rest, error, given)
       type(solid_t), intent(inout) :: self
-      real(wp), intent(in) :: x(:, :)
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(out) :: at_rest(:)                !! (n_material) [M/(L T^2)]
+      type(error_t), allocatable, intent(out) :: error
+      type(given_law_t), intent(in), optional :: given(:)
+      real(wp), parameter :: rest(3) = 0.0_wp
+      type(law_response_t) :: state
+      integer :: k
+
+      allocate(self%law(size(scene%material)), self%given(size(scene%material)))
+      at_rest = 0.0_wp
+      do k = 1, size(scene%material)
+         select case (scene%material(k)%law)
+         case (0)
+            cycle
+         case (law_given)
+            call given_law_take(scene, scene%material(k), self%given(k), error, given)
+            if (.not. allocated(error)) call given_rest_stiffness(self%given(k), at_rest(k), error)
+         case default
+            call law_create(scene%material(k), self%law(k)%law, error)
+            if (allocated(error)) return
+            call law_response_plane(self%law(k)%law, rest, rest, state)
+            at_rest(k) = maxval(abs(state%tangent))
+         end select
+         if (allocated(error)) return
+      end do
+   end subroutine init_laws
+
+   !> Number the quadrature points of each given law through all its elements.
+   pure subroutine number_points(self)
+      type(solid_t), intent(inout) :: self
+      integer :: e
+
+      allocate(self%n_point(size(self%given)), self%first_point(self%n_element), source=0)
+      do e = 1, self%n_element
+         associate (k => self%law_of(e))
+            if (.not. allocated(self%given(k)%energy)) cycle
+            self%first_point(e) = self%n_point(k) + 1
+            self%n_point(k) = self%n_point(k) + self%geometry(e)%n_gp
+         end associate
+      end do
+      self%has_given = any(self%n_point > 0)
+   end subroutine number_points
+
+   pure subroutine init_element(self, x, density, e, stiffness, mass)
+      type(solid_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:, :), density
       integer, intent(in) :: e
       type(shape_t), intent(in) :: stiffness, mass
       real(wp) :: local(2, max_element_nodes), gradient(2, max_element_nodes), det, rho_dv
@@ -100,7 +156,7 @@ contains
       end do
       do k = 1, mass%n_gp
          call reference_gradient(n, local, mass%slope(:, :, k), gradient, det)
-         rho_dv = self%law(self%law_of(e))%law%density*mass%weight(k)*det*self%thickness(e)
+         rho_dv = density*mass%weight(k)*det*self%thickness(e)
          self%volume_mass(:, e) = self%volume_mass(:, e) + rho_dv*mass%value(:, k)
          do i = 1, n
             self%mass(:, i, e) = self%mass(:, i, e) + rho_dv*mass%value(i, k)*mass%value(:, k)
@@ -110,18 +166,16 @@ contains
 
    !> A displacement u rounds the strain by epsilon |grad N| |u|, however small the strain is; what
    !> force that makes follows from the law's stiffness at rest.
-   pure subroutine estimate_stiffness(self, e)
+   pure subroutine estimate_stiffness(self, at_rest, e)
       type(solid_t), intent(inout) :: self
+      real(wp), intent(in) :: at_rest
       integer, intent(in) :: e
-      real(wp), parameter :: rest(3) = 0.0_wp
-      type(law_response_t) :: state
       real(wp) :: spread
       integer :: k, i
 
-      call law_response_plane(self%law(self%law_of(e))%law, rest, rest, state)
       associate (geometry => self%geometry(e))
          do k = 1, geometry%n_gp
-            spread = geometry%weight(k)*maxval(abs(state%tangent)) &
+            spread = geometry%weight(k)*at_rest &
                *sum(abs(geometry%gradient(:, :, k)))
             do i = 1, geometry%n_node
                self%stiffness(i, e) = self%stiffness(i, e) &
@@ -156,7 +210,7 @@ contains
    !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
    !> to the matrix entries `value` (slot > 0) and `side` (slot < 0). Where `u0` was computed as a
    !> change of `before`, it is rounded with that too.
-   pure subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side, before)
+   subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side, before)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
@@ -176,14 +230,18 @@ contains
       response%magnitude = 0.0_wp
       response%rounding = 0.0_wp
       response%inverted_element = 0
+      if (self%has_given) then
+         call solid_evaluate_given(self, u0, du, nlgeom, with_tangent, response%given)
+         response%inverted_element = response%given%inverted_element
+         if (response%inverted_element > 0) return
+      end if
       local0 = 0.0_wp
       dlocal = 0.0_wp
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
          if (present(before)) largest = max(largest, maxval(abs(before(:, self%node(:n, e)))))
-         call element_respond(self%geometry(e), self%law(self%law_of(e))%law, local0, dlocal, &
-            nlgeom, with_tangent, part)
+         call respond_element(self, e, response%given, local0, dlocal, nlgeom, with_tangent, part)
          if (part%is_inverted) then
             response%inverted_element = e
             return
@@ -201,6 +259,109 @@ contains
          end if
       end do
    end subroutine solid_respond
+
+   !> Response of element `e`, by its law or from what the given laws have answered.
+   pure subroutine respond_element(self, e, given, local0, dlocal, nlgeom, with_tangent, part)
+      type(solid_t), intent(in) :: self
+      integer, intent(in) :: e
+      type(given_response_t), intent(in) :: given
+      real(wp), intent(in) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      logical, intent(in) :: nlgeom, with_tangent
+      type(element_response_t), intent(inout) :: part
+      type(law_response_t) :: state(max_element_nodes)
+      integer :: k
+
+      associate (geometry => self%geometry(e), law => self%law_of(e), first => self%first_point(e))
+         if (first == 0) then
+            call element_respond(geometry, self%law(law)%law, local0, dlocal, nlgeom, &
+               with_tangent, part)
+         else
+            do k = 1, geometry%n_gp
+               state(k) = given_state(given%points(law), first - 1 + k)
+            end do
+            call element_respond_known(geometry, state, local0, dlocal, nlgeom, with_tangent, part)
+         end if
+      end associate
+   end subroutine respond_element
+
+   !> Let the given laws answer to the step, each in one call for all its points.
+   subroutine solid_evaluate_given(self, u0, du, nlgeom, with_tangent, given)
+      type(solid_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      logical, intent(in) :: nlgeom, with_tangent
+      type(given_response_t), intent(inout) :: given
+      integer :: k
+
+      given%material = 0
+      given%status = point_ok
+      call gather_strains(self, u0, du, nlgeom, given)
+      if (given%inverted_element > 0) return
+      do k = 1, size(self%given)
+         if (self%n_point(k) == 0) cycle
+         associate (points => given%points(k))
+            call point_gradient(self%given(k)%energy, points%strain, points%dstrain, &
+               with_tangent, points%response, given%status)
+         end associate
+         if (given%status == point_ok) cycle
+         given%material = k
+         given%inverted_element = findloc(self%law_of, k, 1)
+         return
+      end do
+   end subroutine solid_evaluate_given
+
+   !> The strains of the elements of given laws, and the first of these that is inverted.
+   pure subroutine gather_strains(self, u0, du, nlgeom, given)
+      type(solid_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      logical, intent(in) :: nlgeom
+      type(given_response_t), intent(inout) :: given
+      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
+      logical :: is_inverted
+      integer :: e, i, k
+
+      if (.not. allocated(given%points)) allocate(given%points(size(self%given)))
+      do k = 1, size(self%given)
+         call given_points_make_room(given%points(k), self%n_point(k))
+      end do
+      given%inverted_element = 0
+      local0 = 0.0_wp
+      dlocal = 0.0_wp
+      do e = 1, self%n_element
+         if (self%first_point(e) == 0) cycle
+         call gather(self%node(:self%geometry(e)%n_node, e), u0, du, local0, dlocal, largest)
+         do k = 1, self%geometry(e)%n_gp
+            i = self%first_point(e) - 1 + k
+            associate (points => given%points(self%law_of(e)))
+               call element_point_strain(self%geometry(e), k, local0, dlocal, nlgeom, &
+                  points%strain(:, i), points%dstrain(:, i), is_inverted)
+            end associate
+            if (is_inverted) then
+               given%inverted_element = e
+               return
+            end if
+         end do
+      end do
+   end subroutine gather_strains
+
+   !> Why `response` is none: an element is inverted, `by` what, or a given law does not answer.
+   function obstacle_text(scene, response, by) result(text)
+      type(scene_t), intent(in) :: scene
+      type(solid_response_t), intent(in) :: response
+      character(len=*), intent(in) :: by
+      character(len=:), allocatable :: text
+
+      if (response%given%material == 0) then
+         text = "element " // to_text(scene%element_label(max(1, response%inverted_element))) // &
+            " is inverted" // by
+         return
+      end if
+      text = "the law given for material " // scene%material(response%given%material)%name
+      if (response%given%status == point_failed) then
+         text = text // " has failed"
+      else
+         text = text // " has no finite value at a strain that is met"
+      end if
+   end function obstacle_text
 
    !> Displacements of the nodes of an element relative to its first node, which does not round them
    !> with the distance that a body has flown, and the largest displacement at the end.
@@ -221,7 +382,7 @@ contains
 
    !> Add `factor` times the tangent of the step times `direction` to `product`. Elements that
    !> `direction` does not touch are passed over.
-   pure subroutine solid_tangent_times(self, u0, du, nlgeom, factor, direction, product)
+   subroutine solid_tangent_times(self, u0, du, nlgeom, factor, direction, product)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :), direction(:, :)   !! (2, n_node)
       logical, intent(in) :: nlgeom
@@ -229,17 +390,19 @@ contains
       real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
       type(element_response_t) :: part
       real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
+      type(given_response_t) :: given
       real(wp) :: image(2*max_element_nodes)
       integer :: e, i, n, node
 
+      if (self%has_given) call solid_evaluate_given(self, u0, du, nlgeom, .true., given)
+      if (given%inverted_element > 0) return
       local0 = 0.0_wp
       dlocal = 0.0_wp
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          if (.not. any(abs(direction(:, self%node(:n, e))) > 0.0_wp)) cycle
          call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
-         call element_respond(self%geometry(e), self%law(self%law_of(e))%law, local0, dlocal, &
-            nlgeom, .true., part)
+         call respond_element(self, e, given, local0, dlocal, nlgeom, .true., part)
          if (part%is_inverted) return
          image = 0.0_wp
          do i = 1, n

@@ -1,14 +1,18 @@
 !> Stress and strain for output: at nodes, extrapolated from the quadrature points and averaged, and
 !> as means over elements.
 !>
-!> Cauchy stress; without NLGEOM the stress itself. Components xx, yy, zz, xy, yz, xz.
+!> Cauchy stress; without NLGEOM the stress itself. Components xx, yy, zz, xy, yz, xz. Of a law that
+!> a program gives zz is not known: it is 0 here, in von Mises' stress too. Where such a law does
+!> not answer, the stress is not a number.
 module emcon_stress
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_element, only : element_strain
    use emcon_element_kinds, only : max_element_nodes
+   use emcon_given_law, only : given_response_t, given_state
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_shape, only : shape_values
-   use emcon_solid, only : solid_t
+   use emcon_solid, only : solid_evaluate_given, solid_t
    implicit none
    private
    public :: nodal_stress, element_means, von_mises
@@ -16,20 +20,22 @@ module emcon_stress
 contains
 
    !> Stress at the nodes: each element's field through its quadrature points, mean over elements.
-   pure subroutine nodal_stress(solid, u, nlgeom, stress)
+   subroutine nodal_stress(solid, u, nlgeom, stress)
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)            !! (2, n_node)
       logical, intent(in) :: nlgeom
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
+      type(given_response_t) :: given
       integer :: count_at(solid%n_node), e, i, k, node
       real(wp) :: at_gp(6), weight(max_element_nodes, max_element_nodes), strain(3)
 
+      call respond_at(solid, u, nlgeom, given)
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
          weight = extrapolation(solid%kind(e), solid%geometry(e)%n_gp)
          do k = 1, solid%geometry(e)%n_gp
-            call point_state(solid, e, k, u, nlgeom, at_gp, strain)
+            call point_state(solid, e, k, u, nlgeom, given, at_gp, strain)
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
                stress(:, node) = stress(:, node) + weight(k, i)*at_gp
@@ -43,6 +49,20 @@ contains
          if (count_at(i) > 0) stress(:, i) = stress(:, i)/real(count_at(i), wp)
       end do
    end subroutine nodal_stress
+
+   !> What the given laws answer at the displacement `u`.
+   subroutine respond_at(solid, u, nlgeom, given)
+      type(solid_t), intent(in) :: solid
+      real(wp), intent(in), contiguous :: u(:, :)
+      logical, intent(in) :: nlgeom
+      type(given_response_t), intent(inout) :: given
+      real(wp), allocatable :: zero(:, :)
+
+      if (.not. solid%has_given) return
+      allocate(zero, mold=u)
+      zero = 0.0_wp
+      call solid_evaluate_given(solid, u, zero, nlgeom, .false., given)
+   end subroutine respond_at
 
    !> weight(k, i): part of quadrature point k in the value at node i.
    pure function extrapolation(kind, n_gp) result(weight)
@@ -61,11 +81,12 @@ contains
    end function extrapolation
 
    !> Stress (6) and strain (E11, E22, 2 E12) at quadrature point `k` of element `e`.
-   pure subroutine point_state(solid, e, k, u, nlgeom, stress, strain)
+   pure subroutine point_state(solid, e, k, u, nlgeom, given, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e, k
       real(wp), intent(in) :: u(:, :)
       logical, intent(in) :: nlgeom
+      type(given_response_t), intent(in) :: given
       real(wp), intent(out) :: stress(6), strain(3)
       type(law_response_t) :: state
       real(wp) :: grad(2, 2), zero(2, 2), dstrain(3), f(2, 2), f_end(2, 2), s(2, 2), det
@@ -78,7 +99,13 @@ contains
          grad(:, 2) = grad(:, 2) + u(:, solid%node(i, e))*solid%geometry(e)%gradient(2, i, k)
       end do
       call element_strain(grad, zero, nlgeom, strain, dstrain, f, f_end)
-      call law_response_plane(solid%law(solid%law_of(e))%law, strain, dstrain, state)
+      if (solid%first_point(e) == 0) then
+         call law_response_plane(solid%law(solid%law_of(e))%law, strain, dstrain, state)
+      else if (given%inverted_element == 0) then
+         state = given_state(given%points(solid%law_of(e)), solid%first_point(e) - 1 + k)
+      else
+         state%stress = ieee_value(strain, ieee_quiet_nan)
+      end if
       s = reshape([state%stress(1), state%stress(3), state%stress(3), state%stress(2)], [2, 2])
       det = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1)
       s = matmul(matmul(f, s), transpose(f))/det
@@ -86,22 +113,24 @@ contains
    end subroutine point_state
 
    !> Means over the reference volume of each element, and that volume.
-   pure subroutine element_means(solid, u, nlgeom, stress, strain, volume)
+   subroutine element_means(solid, u, nlgeom, stress, strain, volume)
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)
       logical, intent(in) :: nlgeom
       real(wp), intent(out) :: stress(:, :)      !! (6, n_element)
       real(wp), intent(out) :: strain(:, :)      !! (3, n_element) E11, E22, 2 E12
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
+      type(given_response_t) :: given
       real(wp) :: stress_k(6), strain_k(3), weight
       integer :: e, k
 
+      call respond_at(solid, u, nlgeom, given)
       stress = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight(:solid%geometry(e)%n_gp))
          do k = 1, solid%geometry(e)%n_gp
-            call point_state(solid, e, k, u, nlgeom, stress_k, strain_k)
+            call point_state(solid, e, k, u, nlgeom, given, stress_k, strain_k)
             weight = solid%geometry(e)%weight(k)/volume(e)
             stress(:, e) = stress(:, e) + weight*stress_k
             strain(:, e) = strain(:, e) + weight*strain_k

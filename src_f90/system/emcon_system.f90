@@ -9,6 +9,7 @@ module emcon_system
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : error_t
+   use emcon_given_law, only : given_law_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
@@ -70,14 +71,15 @@ module emcon_system
 
 contains
 
-   !> What stays the same in all steps of `scene`.
-   subroutine system_init(self, scene, error)
+   !> What stays the same in all steps of `scene`, with the laws that a program gives.
+   subroutine system_init(self, scene, error, given_law)
       type(system_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      type(given_law_t), intent(in), optional :: given_law(:)
       integer :: i, k, n
 
-      call solid_init(self%solid, scene, error)
+      call solid_init(self%solid, scene, error, given_law)
       if (allocated(error)) return
       call init_mass(self, error)
       if (allocated(error)) return

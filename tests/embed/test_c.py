@@ -3,53 +3,28 @@
 from __future__ import annotations
 
 import ctypes
-import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from embed_tools import API, HERE, ROOT, build, check_memory, run
 
-ROOT = Path(__file__).parents[2]
-HERE = Path(__file__).parent
 sys.path.insert(0, str(ROOT/"pywrap"))
 
 from emcon.stepper import Stepper  # noqa: E402
 
 RING = ROOT/"input_decks"/"ring.inp"
-HEADER = (ROOT/"src_f90"/"api"/"emcon.h").read_text(encoding="utf-8")
-FUNCTIONS = set(re.findall(r"^[a-z][\w *]*?(emcon_\w+)\(", HEADER, re.MULTILINE))
-
-
-def run(*command: object, **more: object) -> str:
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, **more)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
-@pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of programs that use the installed library."""
-    prefix = tmp_path_factory.mktemp("installed")
-    run("make", "install", f"PREFIX={prefix}", cwd=ROOT)
-    return os.environ | {"PKG_CONFIG_PATH": str(prefix/"lib"/"pkgconfig"),
-                         "LD_LIBRARY_PATH": str(prefix/"lib"), "PREFIX": str(prefix)}
-
-
-def build(compiler: str, source: str, program: Path, env: dict[str, str], *options: str) -> None:
-    if not shutil.which(compiler):
-        pytest.skip(f"there is no {compiler} here")
-    flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
-    run(compiler, "-pedantic", "-Wall", "-Wextra", "-Werror", *options, HERE/source, "-o", program,
-        *flags, env=env)
+HEADERS = {path.name: path.read_text(encoding="utf-8") for path in sorted(API.glob("*.h"))}
+FUNCTIONS = {name for text in HEADERS.values()
+             for name in re.findall(r"^[a-z][\w *]*?(emcon_\w+)\(", text, re.MULTILINE)}
 
 
 @pytest.fixture(scope="module")
 def impact(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
     program = tmp_path_factory.mktemp("impact")/"impact"
-    build("cc", "impact.c", program, installed, "-std=c99")
+    build("cc", HERE/"impact.c", program, installed, "-std=c99")
     return program
 
 
@@ -77,30 +52,24 @@ def test_c_tells_what_is_wrong_with_a_deck(
 
 def test_threads_in_cpp(installed: dict[str, str], tmp_path: Path) -> None:
     program = tmp_path/"two_models"
-    build("c++", "two_models.cpp", program, installed, "-std=c++11", "-pthread")
+    build("c++", HERE/"two_models.cpp", program, installed, "-std=c++11", "-pthread")
     assert "no such file" in run(program, RING, env=installed)
 
 
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR", "SEGMENT"])
 def test_c_loses_no_memory(impact: Path, installed: dict[str, str], formulation: str) -> None:
-    if not shutil.which("valgrind"):
-        pytest.skip("there is no valgrind here")
-    done = subprocess.run(
-        ["valgrind", "--leak-check=full", "--errors-for-leak-kinds=definite", "--error-exitcode=9",
-         "--quiet", impact, RING, f"h=0.1\nt_end=0.2\nformulation={formulation}"],
-        env=installed, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    check_memory(installed, impact, RING, f"h=0.1\nt_end=0.2\nformulation={formulation}")
 
 
-def test_library_exports_what_the_header_declares(installed: dict[str, str]) -> None:
+def test_library_exports_what_the_headers_declare(installed: dict[str, str]) -> None:
     """A function that is declared is there; a change of the interface shows in the version."""
     library = ctypes.CDLL(str(Path(installed["PREFIX"])/"lib"/"libemcon.so.0"))
-    assert len(FUNCTIONS) > 10
+    assert {"emcon.h", "emcon_interface.h"} <= set(HEADERS)
     for name in FUNCTIONS:
         assert hasattr(library, name), name
     version = [ctypes.c_int() for _ in range(3)]
     library.emcon_version(*(ctypes.byref(number) for number in version))
-    header = [int(re.search(rf"EMCON_VERSION_{part} (\d+)", HEADER).group(1))
+    header = [int(re.search(rf"EMCON_VERSION_{part} (\d+)", HEADERS["emcon.h"]).group(1))
               for part in ("MAJOR", "MINOR", "PATCH")]
     assert [number.value for number in version] == header
     text = subprocess.run(["nm", "-D", "--defined-only", library._name], capture_output=True,

@@ -21,6 +21,7 @@ program main
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
    use test_gauss, only : collect_gauss
+   use test_given_law, only : collect_given_law
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
    use test_initial_contact, only : collect_initial_contact
@@ -41,6 +42,7 @@ program main
    use test_numbering, only : collect_numbering
    use test_deck_parameters, only : collect_deck_parameters
    use test_deck_ties, only : collect_deck_ties
+   use test_point_function, only : collect_point_function
    use test_reduction, only : collect_reduction
    use test_results, only : collect_results
    use test_rigid_motion, only : collect_rigid_motion
@@ -94,6 +96,7 @@ program main
    call run("dgrad_series", collect_dgrad_series)
    call run("dgrad", collect_dgrad)
    call run("dgrad_wide", collect_dgrad_wide)
+   call run("point_function", collect_point_function)
    call run("shape", collect_shape)
    call run("law", collect_law)
    call run("element", collect_element)
@@ -135,6 +138,7 @@ program main
    call run("deck_ties", collect_deck_ties)
    call run("stepper_free", collect_stepper_free)
    call run("stepper_query", collect_stepper_query)
+   call run("given_law", collect_given_law)
    call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then

@@ -9,7 +9,9 @@ module test_interface
    use emcon_interface, only : interface_add_pair, interface_add_surface, interface_add_tie, &
       interface_follow, interface_init, interface_links, interface_prepare, interface_t, &
       interface_tie_matrices
+   use emcon_interface_areas, only : interface_areas
    use emcon_interface_null_space, only : interface_null_space, interface_particular
+   use emcon_interface_settings, only : interface_set
    use emcon_interface_step, only : constraint_values_t, interface_begin_step, interface_choose, &
       interface_curvature, interface_evaluate, interface_gaps, interface_second_times, &
       interface_select, interface_slave_nodes
@@ -43,6 +45,8 @@ contains
          test_case_t("bits of the scene with elements", test_bits), &
          test_case_t("identity and momenta", test_identity), &
          test_case_t("second derivatives", test_second), &
+         test_case_t("statics", test_statics), &
+         test_case_t("areas", test_areas), &
          test_case_t("null space beside a tie", test_null_space), &
          test_case_t("ties: bits of the scene with elements", test_ties), &
          test_case_t("a host's impact", test_impact), &
@@ -251,6 +255,88 @@ contains
       end do
    end subroutine test_second
 
+   !> With `is_end`: gradients at the end, their derivatives, and closed gaps.
+   subroutine test_statics(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: width = eps**(1.0_wp/3.0_wp)
+      type(contact_options_t) :: options
+      type(scene_t) :: scene
+      type(interface_t) :: face
+      type(constraint_values_t) :: values
+      real(wp), allocatable :: u0(:, :), du(:, :), way(:, :), product(:, :), lam(:), change(:)
+      logical, allocatable :: none(:), active(:)
+      integer :: i
+
+      do i = 1, size(formulations)
+         call make_step(formulations(i), options, scene, face, u0, du, error)
+         if (allocated(error)) return
+         face%is_end = .true.
+         allocate(none(face%n_constraint), active(face%n_constraint), source=.false.)
+         call interface_begin_step(face, u0, du, none, active, error)
+         if (.not. allocated(error)) call evaluate_all(face, u0, du, values, error)
+         if (allocated(error)) return
+         call check_near(error, real(values%g%value, wp), real(values%c%value, wp), 0.0_wp, &
+            1.0_wp, "gradients at the end")
+         call check_near(error, values%defect, values%gap1, 0.0_wp, 1.0_wp, "defects")
+         allocate(way, product, mold=du)
+         allocate(lam(values%n))
+         call shake(way, 1.0_wp)
+         call random_number(lam)
+         call interface_second_times(face, lam, way, product, error)
+         if (allocated(error)) return
+         call interface_evaluate(face, u0, du + width*way, values, error)
+         if (allocated(error)) return
+         change = matmul(lam, real(dense_of(values%g), wp))
+         call interface_evaluate(face, u0, du - width*way, values, error)
+         if (allocated(error)) return
+         change = (change - matmul(lam, real(dense_of(values%g), wp)))/(2.0_wp*width)
+         call check_near(error, reshape(product, [size(way)]), change, 100.0_wp*width**2, 10.0_wp, &
+            "differences")
+         active = .false.
+         active(values%id) = .true.
+         call interface_select(face, u0, du, active, error)
+         if (.not. allocated(error)) call interface_evaluate(face, u0, du, values, error)
+         if (allocated(error)) return
+         call check_near(error, values%target, 0.0_wp*values%target, 0.0_wp, 1.0_wp, "closed gaps")
+         deallocate(none, active, way, product, lam)
+      end do
+   end subroutine test_statics
+
+   !> Where all of the slave surface is covered, areas and lengths sum up to its length.
+   subroutine test_areas(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_options_t) :: options
+      type(interface_t) :: face
+      real(wp) :: x(2, 7), zero(2, 7)
+      real(wp), allocatable :: area(:), length(:)
+      logical, allocatable :: held(:, :), none(:), active(:)
+      integer :: i, master, slave
+
+      x = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 0.0_wp, 0.125_wp, 0.625_wp, &
+         0.125_wp, 1.25_wp, 0.125_wp, 2.0_wp, 0.125_wp], shape(x))
+      zero = 0.0_wp
+      allocate(held(2, 7), source=.false.)
+      do i = 1, size(formulations)
+         call interface_init(face, x, error)
+         if (.not. allocated(error)) call interface_add_surface(face, "LOWER", &
+            reshape([2, 1, 3, 2], [2, 2]), master, error)
+         if (.not. allocated(error)) call interface_add_surface(face, "UPPER", &
+            reshape([4, 5, 5, 6, 6, 7], [2, 3]), slave, error)
+         if (.not. allocated(error)) call interface_add_pair(face, slave, master, &
+            formulations(i), options, error)
+         if (.not. allocated(error)) call interface_prepare(face, held, error)
+         if (allocated(error)) return
+         allocate(none(face%n_constraint), active(face%n_constraint), source=.false.)
+         allocate(area(face%n_constraint), length(face%n_constraint))
+         call interface_begin_step(face, zero, zero, none, active, error)
+         if (.not. allocated(error)) call interface_select(face, zero, zero, .not. none, error)
+         if (.not. allocated(error)) call interface_areas(face, zero, area, length, error)
+         if (allocated(error)) return
+         call check_near(error, [sum(area), sum(length)], [2.0_wp, 2.0_wp], tol, 2.0_wp, "sums")
+         deallocate(none, active, area, length)
+      end do
+   end subroutine test_areas
+
    !> P^T (G T)^T = 0 and C T DF = 0, with the master block tied to another one, which is held.
    subroutine test_null_space(error)
       type(error_t), allocatable, intent(out) :: error
@@ -451,7 +537,7 @@ contains
       call expect(error, refused, "options%normal_angle is -1")
       options%normal_angle = 60.0_wp
       call interface_add_tie(face, 2, 2, multiplier_dual, -1.0_wp, refused)
-      call expect(error, refused, "both surface 2")
+      call expect(error, refused, "both surface UPPER")
       call interface_add_pair(face, 2, 3, formulation_nts, options, refused)
       call interface_prepare(face, u > 1.0_wp, refused)
       call expect(error, refused, "share node 3")
@@ -516,12 +602,21 @@ contains
       call expect(error, refused, "after interface_prepare")
       call interface_evaluate(face, u, u, values, refused)
       call expect(error, refused, "before interface_begin_step")
+      call interface_areas(face, u, dw(:2), dw(3:4), refused)
+      call expect(error, refused, "before interface_begin_step")
       call interface_begin_step(face, u, u, [.false., .false.], active, refused)
       call interface_select(face, u, u, [.true., .true.], refused)
       call interface_null_space(face, p, df, redundant, refused)
       call expect(error, refused, "before interface_evaluate")
       call interface_particular(face, [0.0_wp, 0.0_wp], dw, refused)
       call expect(error, refused, "before interface_null_space")
+      call interface_set(face, 3, 0.0_wp, .true., .false., refused)
+      call expect(error, refused, "initiation is 3, not in 1..2")
+      call interface_areas(face, u, dw(:1), dw(3:4), refused)
+      call expect(error, refused, "area and length have 1 and 2 entries, not 2")
+      call interface_begin_step(face, u, u, [.false., .false.], active, refused)
+      call interface_evaluate(face, u, u, values, refused)
+      call check_equal(error, values%n, 0, "a new step begins without a selection")
    end subroutine test_order
 
 end module test_interface

@@ -1,0 +1,554 @@
+"""Contact and ties for a host code that has its own solids. Needs the compiled extension.
+
+The host gives nodes, surfaces, pairs and ties once; in each step it gives displacements and gets
+gaps, discrete gradients, their derivatives and the next active set. Elements, time stepping and
+solver are the host's:
+
+    from emcon.interface import Interface
+
+    with Interface(nodes) as face:                          # (n_node, 2) [L]
+        lower = face.add_surface("lower", lower_edges)      # (k, 2), the body to the left
+        upper = face.add_surface("upper", upper_edges)
+        face.add_pair(upper, lower, "mortar")
+        face.prepare(held)
+
+        active = face.begin_step(u0, du, was_active)        # a step from u0 by du
+        outcome = None
+        while outcome is None:
+            face.select(u0, du, active)
+            ...                                             # Newton's method on face.evaluate
+            active, outcome = face.update_active(u0, du, lam, active)
+
+`tests/embed/interface_springs.py` is a complete host. Numbers count from 0; freedom a of node i is
+2 i + a; the plane has thickness 1. Units are any consistent set, [L] [M] [T]. Wrong arguments and
+calls out of order raise `InputError`; the interface stays usable.
+"""
+
+from __future__ import annotations
+
+import enum
+import functools
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from .arguments import flag_array, number, real_array
+from .csr import Csr
+from .errors import _KINDS, InputError
+
+__all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome"]
+
+_build = _core.emcon_flat_interface
+_step = _core.emcon_flat_interface_step
+
+_FORMULATIONS = {"node to segment": 1, "segment": 2, "mortar": 3}
+_INTEGRATIONS = {"segments": 1, "elements": 2}
+_MULTIPLIERS = {"standard": 1, "dual": 2}
+_NORMALS = {"edge": 1, "nodal": 2}
+_SMOOTHINGS = {"none": 1, "hermite": 2}
+_INITIATIONS = {"persistent": 1, "admissible": 2}
+_G, _C, _CURVATURE, _P, _DF, _LINKS, _D, _M = range(1, 9)
+
+_Args = ParamSpec("_Args")
+_R = TypeVar("_R")
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Ints = NDArray[np.int32]
+
+
+class Outcome(enum.Enum):
+    """How the search for the active set ended."""
+
+    DONE = 0
+    #: The sets repeat: try a smaller step.
+    CYCLING = 5
+    #: The motion leaves what contact was chosen for: try a smaller step.
+    TOO_FAR = 6
+    #: A contact would begin farther away than `gap_tolerance`: try a smaller step.
+    STANDS_OFF = 7
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Where all possible contacts stand at both ends of a step, (n_contact,) each.
+
+    `start`, `end`: gaps, > 0 open [L], of mortar contact weighted means; meaningless where
+    `is_near` is False: there is no surface within reach. `is_over`: not past the surface's end.
+    `edge`: length of an edge, to which tolerances relate [L].
+    """
+
+    is_near: Flags
+    is_over: Flags
+    start: Floats
+    end: Floats
+    edge: Floats
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """The n selected contacts over a step; contact k holds its gap at `target[k]`.
+
+    f is the difference of gap and target times the part of the surface that is covered: `start`
+    and `end` are f at the ends of the step, `change` is g du to relative accuracy, `defect` is what
+    has to become 0. The force on the nodes is `lam @ g`, the linearised defect `c @ d(du)`. In
+    statics the start is the end.
+    """
+
+    contact: Ints       #: (n,) numbers of contacts, ascending
+    target: Floats      #: (n,) [L]
+    start: Floats       #: (n,) [L]
+    end: Floats         #: (n,) [L]
+    change: Floats      #: (n,) [L]
+    defect: Floats      #: (n,) [L]
+    edge: Floats        #: (n,) length of an edge, to which defects relate [L]
+    g: Csr              #: (n, 2 n_node) discrete gradients
+    c: Csr              #: (n, 2 n_node) gradients at the end, same pattern
+
+    @property
+    def n(self) -> int:
+        """How many contacts are selected."""
+        return len(self.contact)
+
+
+@dataclass(frozen=True)
+class NullSpace:
+    """P and DF, (n_unknown, n_unknown - n): P^T T^T g^T = 0 and c T DF = 0.
+
+    If `redundant` is not empty, these places of the selection follow from others, and there are no
+    matrices: `Interface.drop` them.
+    """
+
+    p: Csr | None
+    df: Csr | None
+    redundant: Ints
+
+
+def _exclusive(is_prepared: bool | None = True
+               ) -> Callable[[Callable[_Args, _R]], Callable[_Args, _R]]:
+    """For methods that call the library: one at a time, at the stage they need, None for any."""
+    def decorate(method: Callable[_Args, _R]) -> Callable[_Args, _R]:
+        @functools.wraps(method)
+        def guarded(*arguments: Any, **more: Any) -> _R:
+            self = arguments[0]
+            # No lock: Ctrl-C between taking one and the `try` would leave it taken. CPython looks
+            # for signals and other threads at calls and loops only.
+            if self._is_busy:
+                raise InputError("the interface is in use by another thread; give each its own")
+            try:
+                self._is_busy = True
+                if not self._handle:
+                    raise InputError("the interface is closed")
+                if is_prepared and not self._is_prepared:
+                    raise InputError("called before Interface.prepare")
+                if is_prepared is False and self._is_prepared:
+                    raise InputError("called after Interface.prepare; begin with a new Interface")
+                return method(*arguments, **more)
+            finally:
+                self._is_busy = False
+        return guarded
+    return decorate
+
+
+class Interface:
+    """Surfaces of a host with their contacts and ties; the module's text shows the order of calls.
+
+    `nodes`: reference positions, (n_node, 2) [L]; the host's nodes that no surface holds may be
+    left out. Arrays that come back are copies. Any number of interfaces live side by side; each may
+    be used from any thread, but not from two at once: that raises `InputError`.
+    """
+
+    def __init__(self, nodes: ArrayLike) -> None:
+        self._handle = 0
+        self._is_busy = False
+        self._is_prepared = False
+        try:
+            self.n_node = len(nodes)  # type: ignore[arg-type]
+        except TypeError:
+            raise InputError(f"nodes is {nodes!r}, not an array (n_node, 2)") from None
+        x = real_array(nodes, "nodes", (self.n_node, 2))
+        if not self.n_node:
+            raise InputError("there are no nodes")
+        self.n_contact = 0      #: contacts possible, known after `prepare`
+        self.n_unknown = 0      #: freedoms neither held nor tied to others, known after `prepare`
+        self._n_surface = self._n_tie = 0
+        self._handle = int(_build.new_interface(x.T)[0])
+
+    # ---- life ------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Free the interface. Harmless when closed; any other call then raises `InputError`."""
+        if self._is_busy:
+            raise InputError("the interface is in use by another thread: it cannot be closed")
+        handle, self._handle = self._handle, 0
+        _build.close_interface(handle)
+
+    def __enter__(self) -> Interface:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", 0):
+            self.close()
+
+    def _call(self, routine: Callable[..., Any], *arguments: Any) -> Any:
+        """The results of a routine but the status, which is last; raises what that means."""
+        found = routine(self._handle, *arguments)
+        results = found if isinstance(found, tuple) else (found,)
+        if results[-1]:
+            text = _build.message(self._handle).decode("utf-8", "replace").rstrip()
+            raise _KINDS.get(results[-1], RuntimeError)(text)
+        return results[0] if len(results) == 2 else results[:-1]
+
+    # ---- to build it -----------------------------------------------------------------------------
+
+    @_exclusive(False)
+    def add_surface(self, name: str, edges: ArrayLike) -> int:
+        """Add a surface and return its number.
+
+        `edges`: first and last node of each edge, (k, 2) integers, the body to the left, so that
+        the outward normal is the edge turned by -90 degrees; in any order, connected or in parts.
+        Raises `InputError` for nodes that do not exist, edges without length, surfaces that branch.
+        """
+        if not isinstance(name, str) or "\0" in name:
+            raise InputError(f"name is {name!r}, not a text")
+        edge = _whole("edges", edges, 2, self.n_node)
+        if edge.shape[1] != 2 or not len(edge):
+            raise InputError(f"edges is to have the shape (k, 2), k > 0, not {edge.shape}")
+        self._n_surface = 1 + int(self._call(_build.add_surface, name.encode(), edge.T))
+        return self._n_surface - 1
+
+    @_exclusive(False)
+    def add_pair(self, slave: int, master: int, formulation: str = "mortar", *,
+                 integration: str = "segments", n_point: int | None = None,
+                 multiplier: str = "dual", normal: str = "nodal", smoothing: str = "none",
+                 normal_angle: float = 60.0, smoothing_angle: float = 60.0) -> None:
+        """Add a contact pair of two surfaces by their numbers, or of one with itself.
+
+        `formulation`: "node to segment", "segment", "mortar". `integration` of mortar contact:
+        "segments" (exact) or "elements", with `n_point` Gauss points (1..10, 2..10 on segments).
+        `multiplier`: "standard" or "dual". `normal` of slave nodes: "edge" or "nodal".
+        `smoothing` of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to
+        180 degrees, are corners. Rigid obstacles are masters of held nodes.
+        """
+        choice = [_choice("integration", integration, _INTEGRATIONS),
+                  0 if n_point is None else _number("n_point", n_point, 1, 10),
+                  _choice("multiplier", multiplier, _MULTIPLIERS),
+                  _choice("normal", normal, _NORMALS),
+                  _choice("smoothing", smoothing, _SMOOTHINGS)]
+        # 0 stands for the default in the library; the least angle above makes corners as well.
+        angles = [number(normal_angle, "normal_angle") or np.nextafter(0.0, 1.0),
+                  number(smoothing_angle, "smoothing_angle") or np.nextafter(0.0, 1.0)]
+        sides = self._surfaces(slave, master)
+        kind = _choice("formulation", formulation, _FORMULATIONS)
+        self._call(_build.add_pair, *sides, kind, choice, angles)
+
+    @_exclusive(False)
+    def add_tie(self, slave: int, master: int, *, multiplier: str = "dual",
+                tolerance: float | None = None) -> int:
+        """Tie two surfaces that meet, whatever their meshes; return the tie's number.
+
+        `tolerance`: how far apart they may be [L]; None: a tenth of an edge.
+        """
+        reach = -1.0 if tolerance is None else number(tolerance, "tolerance")
+        if tolerance is not None and reach < 0:
+            raise InputError(f"tolerance is {tolerance}, which is negative")
+        sides = self._surfaces(slave, master)
+        kind = _choice("multiplier", multiplier, _MULTIPLIERS)
+        self._call(_build.add_tie, *sides, kind, reach)
+        self._n_tie += 1
+        return self._n_tie - 1
+
+    def _surfaces(self, slave: int, master: int) -> tuple[int, int]:
+        if not self._n_surface:
+            raise InputError("there is no surface yet; call Interface.add_surface")
+        return (_number("slave", slave, 0, self._n_surface - 1),
+                _number("master", master, 0, self._n_surface - 1))
+
+    @_exclusive(None)
+    def configure(self, *, initiation: str = "persistent", gap_tolerance: float = 0.0,
+                  is_last_try: bool = False, is_end: bool = False) -> None:
+        """Settings, also between steps; those not named are the defaults again.
+
+        `initiation`: "persistent" contact holds the gap that its first step began with, which keeps
+        energy, "admissible" closes it. `gap_tolerance`: no contact begins with a larger gap per
+        edge, 0 for any. `is_last_try`: the host cannot try the step in smaller parts. `is_end`:
+        statics, gradients at the end of the step and closed gaps; set it before `prepare`, too.
+        """
+        kind = _choice("initiation", initiation, _INITIATIONS)
+        self._call(_build.set_options, kind, number(gap_tolerance, "gap_tolerance"),
+                   int(bool(is_last_try)), int(bool(is_end)))
+
+    @_exclusive(False)
+    def prepare(self, held: ArrayLike | None = None) -> Floats:
+        """Finish; from here on there are steps. Returns the positions, (n_node, 2) [L].
+
+        `held`: freedoms that the host moves by itself, (n_node, 2) booleans, None for none. Slave
+        nodes of ties are moved onto their masters: the host takes over the positions. After an
+        error it may be called again.
+        """
+        if held is None:
+            held = np.zeros((self.n_node, 2), bool)
+        flags = flag_array(held, "held", (self.n_node, 2))
+        self._call(_build.prepare, flags.T)
+        sizes = self._call(_build.sizes)
+        self.n_contact, self.n_unknown = int(sizes[4]), int(sizes[5])
+        self._is_prepared = True
+        return self._call(_build.positions, self.n_node)[0].T
+
+    @property
+    def positions(self) -> Floats:
+        """Reference positions, (n_node, 2) [L]; after `prepare` those that fulfil the ties."""
+        return self._positions()[0]
+
+    @property
+    def largest_move(self) -> float:
+        """How far `prepare` has moved a slave node onto its master at most [L]."""
+        return self._positions()[1]
+
+    @_exclusive(None)
+    def _positions(self) -> tuple[Floats, float]:
+        x, move = self._call(_build.positions, self.n_node)
+        return x.T, float(move)
+
+    @property
+    @_exclusive(None)
+    def notes(self) -> list[str]:
+        """Remarks on the ties, made by `prepare`."""
+        n = _build.notes(self._handle, 0)[0]
+        texts = [_build.notes(self._handle, i)[1] for i in range(n)]
+        return [text.decode("utf-8", "replace").rstrip() for text in texts]
+
+    @property
+    def slave_nodes(self) -> Ints:
+        """The slave node of each possible contact, (n_contact,)."""
+        return self._contacts()[0]
+
+    @property
+    def pair_of_contact(self) -> Ints:
+        """The number of the pair of each possible contact, (n_contact,)."""
+        return self._contacts()[1]
+
+    @_exclusive()
+    def _contacts(self) -> tuple[Ints, Ints]:
+        return self._call(_build.contacts, self.n_contact)
+
+    # ---- ties and held freedoms ------------------------------------------------------------------
+
+    @_exclusive()
+    def tie_matrices(self, tie: int = 0) -> tuple[Csr, Csr]:
+        """D and M of a tie, (n_row, n_node) [L]: D x = M x in both directions."""
+        if not self._n_tie:
+            raise InputError("there is no tie")
+        self._call(_build.tie_matrices, _number("tie", tie, 0, self._n_tie - 1))
+        return self._matrix(_D), self._matrix(_M)
+
+    @_exclusive()
+    def links(self) -> Csr:
+        """T, (2 n_node, n_unknown), of u = T w: a residual becomes T^T r, a tangent T^T K T.
+
+        Rows of held freedoms are empty.
+        """
+        self._call(_build.links)
+        return self._matrix(_LINKS)
+
+    def follow(self, field: ArrayLike) -> Floats:
+        """A displacement or velocity, (n_node, 2), whose tied freedoms follow the others."""
+        return self._changed(_build.follow, field)
+
+    def gather(self, field: ArrayLike) -> Floats:
+        """Forces, (n_node, 2); those on tied freedoms went to the ones that they follow."""
+        return self._changed(_build.gather, field)
+
+    @_exclusive()
+    def _changed(self, routine: Any, field: ArrayLike) -> Floats:
+        values = self._field("field", field).copy("F")
+        self._call(routine, values)
+        return values.T
+
+    # ---- a step from the displacements u0 by du, (n_node, 2) each [L] ----------------------------
+
+    @_exclusive()
+    def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike) -> Flags:
+        """Begin a step with the motion `du` that is expected.
+
+        `was_active`: contacts that acted at the end of the step before, (n_contact,) booleans.
+        Returns those that still can.
+        """
+        was = self._flags("was_active", was_active)
+        return self._call(_step.begin_step, *self._motion(u0, du), was).astype(bool)
+
+    @_exclusive()
+    def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
+        """All gaps at both ends of the step."""
+        flag, gap = self._call(_step.gaps, *self._motion(u0, du), self.n_contact)
+        return Gaps(*flag.T.astype(bool), *gap.T)
+
+    @_exclusive()
+    def select(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
+        """Select the contacts `active`, (n_contact,) booleans; return how many there are."""
+        flags = self._flags("active", active)
+        self._call(_step.select_active, *self._motion(u0, du), flags)
+        return int(flags.sum())
+
+    @_exclusive()
+    def choose(self, u0: ArrayLike, du: ArrayLike, contact: ArrayLike, target: ArrayLike) -> None:
+        """Select contacts by their numbers, (n,) ascending, with gaps to hold, (n,) [L].
+
+        `update_active` does not go with these.
+        """
+        numbers = _whole("contact", contact, 1, self.n_contact)
+        if (np.diff(numbers) <= 0).any():
+            raise InputError("contact has numbers that do not ascend")
+        gap = real_array(target, "target", (len(numbers),))
+        self._call(_step.choose, *self._motion(u0, du), numbers, gap)
+
+    @_exclusive()
+    def evaluate(self, u0: ArrayLike, du: ArrayLike) -> Constraints:
+        """Values and gradients of the selected contacts."""
+        n = self._call(_step.evaluate, *self._motion(u0, du))
+        contact, values = self._call(_step.get_constraints, n)
+        return Constraints(contact, *values.T, self._matrix(_G), self._matrix(_C))
+
+    @_exclusive()
+    def curvature(self, lam: ArrayLike) -> Csr:
+        """sum of lam[k] d g[k]/d u1, (2 n_node, 2 n_node); the step's tangent gets minus this.
+
+        `lam`: multipliers of the selected contacts as last evaluated, (n,) [M L/T^2].
+        """
+        self._call(_step.curvature, self._selected("lam", lam))
+        return self._matrix(_CURVATURE)
+
+    @_exclusive()
+    def second_times(self, lam: ArrayLike, direction: ArrayLike) -> Floats:
+        """`curvature(lam)` times a direction, (n_node, 2) like the result."""
+        along = self._field("direction", direction)
+        return self._call(_step.second_times, self._selected("lam", lam), along).T
+
+    @_exclusive()
+    def update_active(self, u0: ArrayLike, du: ArrayLike, lam: ArrayLike, active: ArrayLike,
+                      magnitude: ArrayLike | None = None) -> tuple[Flags, Outcome | None]:
+        """The next active set from a solved step: with what would penetrate, without what pulls.
+
+        `active`: what was selected; `lam`: its multipliers. `magnitude`, (n_node, 2): sums of the
+        sizes of the contributions to the residual, which tell signs of round-off from tension;
+        None: the contact forces. Returns the next set and None, or the last one and its `Outcome`.
+        """
+        u, d = self._motion(u0, du)
+        flags = self._flags("active", active)
+        sizes = u if magnitude is None else self._field("magnitude", magnitude)
+        is_done, outcome = self._call(_step.update_active, u, d, self._selected("lam", lam),
+                                      int(magnitude is not None), sizes, flags)
+        return flags.astype(bool), Outcome(int(outcome)) if is_done else None
+
+    @_exclusive()
+    def areas(self, u1: ArrayLike) -> tuple[Floats, Floats]:
+        """Areas that the multipliers of the step to `u1` act on, (n_contact,) [L^2], and lengths.
+
+        The pressure of a contact is its multiplier over its area. The lengths, (n_contact,) [L],
+        are those of slave surface that belong to the contacts at the end.
+        """
+        return self._call(_step.areas, self._field("u1", u1), self.n_contact)
+
+    # ---- without multipliers ---------------------------------------------------------------------
+
+    @_exclusive()
+    def null_space(self) -> NullSpace:
+        """P and DF for the constraints as last evaluated.
+
+        Raises `AnalysisError` if there is no good choice of unknowns to eliminate: solve with the
+        multipliers.
+        """
+        n = self._call(_step.null_space)
+        redundant = self._call(_step.get_redundant, n)
+        if n:
+            return NullSpace(None, None, redundant)
+        return NullSpace(self._matrix(_P), self._matrix(_DF), redundant)
+
+    @_exclusive()
+    def drop(self, redundant: ArrayLike) -> Flags:
+        """Leave selected contacts out for the rest of the step; return what is left, (n_contact,).
+
+        `redundant`: their places in the selection, as `null_space` tells.
+        """
+        place = _whole("redundant", redundant, 1, self._n_selected())
+        return self._call(_step.drop, place, self.n_contact).astype(bool)
+
+    @_exclusive()
+    def multipliers(self, residual: ArrayLike) -> Floats:
+        """lam, (n,), after `null_space`, from the residual T^T r without contact, (n_unknown,)."""
+        force = real_array(residual, "residual", (self.n_unknown,))
+        return self._call(_step.multipliers, force, self._n_selected())
+
+    @_exclusive()
+    def particular(self, defect: ArrayLike) -> Floats:
+        """The motion of dependent unknowns alone that closes `defect`, (n,); (n_unknown,) [L].
+
+        After `null_space`. Newton's step is this plus DF times that of the others.
+        """
+        return self._call(_step.particular, self._selected("defect", defect), self.n_unknown)
+
+    # ---- helpers ---------------------------------------------------------------------------------
+
+    def _field(self, name: str, values: ArrayLike) -> Floats:
+        """As the library wants it, (2, n_node), without a copy where that is possible."""
+        return real_array(values, name, (self.n_node, 2)).T
+
+    def _motion(self, u0: ArrayLike, du: ArrayLike) -> tuple[Floats, Floats]:
+        return self._field("u0", u0), self._field("du", du)
+
+    def _flags(self, name: str, values: ArrayLike) -> Ints:
+        return flag_array(values, name, (self.n_contact,))
+
+    def _n_selected(self) -> int:
+        return int(self._call(_build.sizes)[6])
+
+    def _selected(self, name: str, values: ArrayLike) -> Floats:
+        """One number for each selected contact."""
+        return real_array(values, name, (self._n_selected(),))
+
+    def _matrix(self, which: int) -> Csr:
+        """A copy of what the library keeps."""
+        n_row, n_column, n_entry = map(int, self._call(_build.matrix_size, which))
+        return Csr((n_row, n_column), *self._call(_build.get_matrix, which, n_row, n_entry))
+
+
+# ---- arguments -----------------------------------------------------------------------------------
+
+def _whole(name: str, values: ArrayLike, n_axis: int, n: int) -> Ints:
+    """Integers in 0..n-1, an array of `n_axis` axes."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iu" and array.size:
+        raise InputError(f"{name} is to hold integers, not {array.dtype}")
+    if array.ndim != n_axis:
+        raise InputError(f"{name} is to have {n_axis} axes, not the shape {array.shape}")
+    bad = np.argwhere((array < 0) | (array >= n))
+    if len(bad):
+        place = tuple(map(int, bad[0]))
+        raise InputError(f"{name}{list(place)} is {array[place]}, not in 0..{n - 1}")
+    return np.ascontiguousarray(array, np.int32)
+
+
+def _number(name: str, value: int, least: int, most: int) -> int:
+    try:
+        found = operator.index(value)
+    except TypeError:
+        raise InputError(f"{name} is {value!r}, not an integer") from None
+    if not least <= found <= most:
+        raise InputError(f"{name} is {found}, not in {least}..{most}")
+    return found
+
+
+def _choice(name: str, value: str, choices: dict[str, int]) -> int:
+    if not isinstance(value, str) or value.lower() not in choices:
+        raise InputError(f"{name} is {value!r}, not one of {', '.join(map(repr, choices))}")
+    return choices[value.lower()]

@@ -1,0 +1,571 @@
+!> Materials whose strain energy a program gives, against laws of ours that are the same.
+module test_given_law
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_deck_source, only : deck_source_t
+   use emcon_dgrad_series, only : log1p_excess, log1p_of
+   use emcon_diagnostics, only : diagnostics_t
+   use emcon_errors, only : err_analysis, err_input, error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_law_linear, only : lame_constants
+   use emcon_march, only : increment_t
+   use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
+   use emcon_restart, only : restart_t
+   use emcon_scene, only : law_coupled_neo_hooke, law_given, law_linear, scene_t
+   use emcon_solid, only : solid_respond, solid_response_t, solid_tangent_times
+   use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_load, &
+      stepper_read_source, stepper_save, stepper_t
+   use emcon_stepper_given, only : stepper_give_law
+   use emcon_stepper_query, only : query_evaluate, query_free, query_t
+   use emcon_stress, only : nodal_stress
+   use emcon_text, only : string_t, to_text
+   use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
+      poisson, prescribe, shake, young
+   implicit none
+   private
+   public :: collect_given_law
+
+   !> The solvers compute in double precision, whatever the state is.
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+
+   !> St. Venant-Kirchhoff or coupled neo-Hooke, which can be told to fail.
+   type, extends(point_function_t) :: elastic_t
+      integer :: law = law_linear
+      real(wp) :: lam = 0.0_wp, mu = 0.0_wp
+      real(wp) :: limit = huge(1.0_wp)           !! of strains; beyond it there is only
+      integer :: beyond = point_ok
+   contains
+      procedure :: evaluate => elastic_evaluate
+   end type elastic_t
+
+contains
+
+   subroutine collect_given_law(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("forces and tangents of our own laws", test_forces), &
+         test_case_t("tangent against differences", test_tangent), &
+         test_case_t("two blocks meet, one of a given law", test_drop), &
+         test_case_t("second order to our own law, energy to round-off", test_spin), &
+         test_case_t("static stretch, and stress", test_static), &
+         test_case_t("a query has the given law too", test_query), &
+         test_case_t("outside: the step is cut", test_outside), &
+         test_case_t("failed: an error, the state stands", test_failed), &
+         test_case_t("bad laws at rest", test_bad_rest), &
+         test_case_t("wrong order of calls, wrong names", test_bad_calls), &
+         test_case_t("restart file of a deck with a given law", test_restart)]
+   end subroutine collect_given_law
+
+   !> With y = det C - 1 and phi(y) = y - ln(1 + y), as in emcon_law_coupled_neo_hooke.
+   subroutine elastic_evaluate(self, z, wants_hessian, value, gradient, hessian, status)
+      class(elastic_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: z(:, :)
+      logical, intent(in) :: wants_hessian
+      real(wp), intent(inout), contiguous :: value(:)
+      real(wp), intent(inout), contiguous :: gradient(:, :)
+      real(wp), intent(inout), contiguous :: hessian(:, :, :)
+      integer, intent(out) :: status
+      real(wp), parameter :: de1(3) = [1.0_wp, 1.0_wp, 0.0_wp]
+      real(wp) :: e1, e2, de2(3), dde2(3, 3), y, dy(3), w_y, w_yy
+      integer :: i, j
+
+      status = point_ok
+      if (any(abs(z) > self%limit)) status = self%beyond
+      if (status /= point_ok) return
+      dde2 = 0.0_wp
+      dde2(1, 2) = 1.0_wp
+      dde2(2, 1) = 1.0_wp
+      dde2(3, 3) = -0.5_wp
+      do i = 1, size(z, 2)
+         e1 = z(1, i) + z(2, i)
+         e2 = z(1, i)*z(2, i) - 0.25_wp*z(3, i)**2
+         de2 = [z(2, i), z(1, i), -0.5_wp*z(3, i)]
+         y = e1
+         dy = de1
+         w_y = (self%lam + 2.0_wp*self%mu)*e1
+         w_yy = self%lam + 2.0_wp*self%mu
+         value(i) = 0.5_wp*w_y*e1 - 2.0_wp*self%mu*e2
+         if (self%law == law_coupled_neo_hooke) then
+            y = 2.0_wp*e1 + 4.0_wp*e2
+            if (.not. y > -1.0_wp) status = point_outside
+            if (status /= point_ok) return
+            dy = 2.0_wp*de1 + 4.0_wp*de2
+            w_y = (0.5_wp*self%mu*y + 0.25_wp*self%lam*log1p_of(y))/(1.0_wp + y)
+            w_yy = (0.5_wp*self%mu + 0.25_wp*self%lam*(1.0_wp - log1p_of(y)))/(1.0_wp + y)**2
+            value(i) = 0.5_wp*self%mu*log1p_excess(y) - 2.0_wp*self%mu*e2 &
+               + 0.125_wp*self%lam*log1p_of(y)**2
+         end if
+         gradient(:, i) = w_y*dy - 2.0_wp*self%mu*de2
+         if (.not. wants_hessian) cycle
+         do j = 1, 3
+            hessian(:, j, i) = w_yy*dy(j)*dy - 2.0_wp*self%mu*dde2(:, j)
+            if (self%law == law_coupled_neo_hooke) hessian(:, j, i) = hessian(:, j, i) &
+               + 4.0_wp*w_y*dde2(:, j)
+         end do
+      end do
+   end subroutine elastic_evaluate
+
+   pure function elastic_of(law) result(elastic)
+      integer, intent(in) :: law
+      type(elastic_t) :: elastic
+
+      elastic%n_variable = 3
+      elastic%law = law
+      call lame_constants(young, poisson, elastic%lam, elastic%mu)
+   end function elastic_of
+
+   !> Build the model of `scene`: with `elastic` its first material is given so, else of that law.
+   subroutine open_with(stepper, scene, law, is_given, error)
+      type(stepper_t), intent(inout) :: stepper
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: law
+      logical, intent(in) :: is_given
+      type(error_t), allocatable, intent(out) :: error
+
+      stepper%scene = scene
+      stepper%scene%material(1)%law = merge(law_given, law, is_given)
+      stepper%is_read = .true.
+      if (is_given) call stepper_give_law(stepper, "Rubber", elastic_of(law), error)
+      if (.not. allocated(error)) call stepper_build(stepper, error)
+   end subroutine open_with
+
+   !> Two steppers of the same scene, the first with the given law.
+   subroutine open_both(given, own, scene, law, error)
+      type(stepper_t), intent(inout) :: given, own
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: law
+      type(error_t), allocatable, intent(out) :: error
+
+      call open_with(given, scene, law, .true., error)
+      if (.not. allocated(error)) call open_with(own, scene, law, .false., error)
+   end subroutine open_both
+
+   subroutine size_response(response, stepper)
+      type(solid_response_t), intent(out) :: response
+      type(stepper_t), intent(in) :: stepper
+      integer :: n
+
+      n = stepper%march%system%solid%n_node
+      allocate(response%force(2, n), response%magnitude(2, n), response%rounding(2, n))
+      allocate(response%energy(stepper%march%system%solid%n_element))
+   end subroutine size_response
+
+   !> Of a quadratic energy the discrete gradients are the same, of the other the gradients are.
+   subroutine test_forces(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call compare_forces("CPE3", law_linear, error)
+      if (.not. allocated(error)) call compare_forces("CPE4", law_linear, error)
+      if (.not. allocated(error)) call compare_forces("CPE3", law_coupled_neo_hooke, error)
+      if (.not. allocated(error)) call compare_forces("CPE4", law_coupled_neo_hooke, error)
+   end subroutine test_forces
+
+   subroutine compare_forces(name, law, error)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: law
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: given, own
+      type(solid_response_t) :: one, other
+      real(wp) :: u0(2, 16), du(2, 16), way(2, 16), product(2, 16), expected(2, 16)
+
+      call make_block(scene, name, [3, 3], block)
+      call add_step(scene, .true., 1.0_wp, 1)
+      call clamp(scene%step(1), [1, 2])
+      call open_both(given, own, scene, law, error)
+      if (allocated(error)) return
+      call size_response(one, given)
+      call size_response(other, own)
+      call shake(u0, 0.1_wp)
+      call shake(du, 0.1_wp)
+      call shake(way, 1.0_wp)
+      if (law /= law_linear) du = 0.0_wp
+      call solid_respond(given%march%system%solid, u0, du, .true., one)
+      call solid_respond(own%march%system%solid, u0, du, .true., other)
+      call check_near(error, one%force, other%force, 64.0_wp*eps, young, "force")
+      call check_near(error, one%energy, other%energy, 64.0_wp*eps, young, "energy")
+      call check_near(error, one%rounding, other%rounding, 16.0_wp*eps, young, "rounding")
+      product = 0.0_wp
+      expected = 0.0_wp
+      call solid_tangent_times(given%march%system%solid, u0, du, .true., 1.0_wp, way, product)
+      call solid_tangent_times(own%march%system%solid, u0, du, .true., 1.0_wp, way, expected)
+      call check_near(error, product, expected, 256.0_wp*eps, young, "tangent")
+      call stepper_close(given)
+      call stepper_close(own)
+   end subroutine compare_forces
+
+   !> Of a step that is corrected; differences of second order, at their best distance.
+   subroutine test_tangent(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: d = 0.1_wp*epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: given
+      type(solid_response_t) :: up, down
+      real(wp) :: u0(2, 9), du(2, 9), way(2, 9), product(2, 9)
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      call add_step(scene, .true., 1.0_wp, 1)
+      call clamp(scene%step(1), [1, 2])
+      call open_with(given, scene, law_coupled_neo_hooke, .true., error)
+      if (allocated(error)) return
+      call size_response(up, given)
+      call size_response(down, given)
+      call shake(u0, 0.1_wp)
+      call shake(du, 0.2_wp)
+      call shake(way, 1.0_wp)
+      product = 0.0_wp
+      associate (solid => given%march%system%solid)
+         call solid_tangent_times(solid, u0, du, .true., 1.0_wp, way, product)
+         call solid_respond(solid, u0, du + d*way, .true., up)
+         call solid_respond(solid, u0, du - d*way, .true., down)
+         call check_equal(error, up%inverted_element, 0, "inverted")
+         ! third derivatives of the law are a hundred times its modulus at such strains
+         call check_near(error, product, (up%force - down%force)/(2.0_wp*d), 1.0e4_wp*d**2, &
+            young, "tangent")
+         call solid_respond(solid, u0, du, .true., up)
+         call solid_respond(solid, u0, 0.0_wp*du, .true., down)
+         call check_near(error, sum(up%force*du), sum(up%energy) - sum(down%energy), 256.0_wp*eps, &
+            sum(up%magnitude*abs(du)) + sum(up%energy), "work of the step")
+      end associate
+      call stepper_close(given)
+   end subroutine test_tangent
+
+   !> The upper block is of the given law, the lower one not; in both models it is the same law.
+   subroutine test_drop(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 20
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(stepper_t) :: given, own
+      type(increment_t) :: increment
+      real(wp) :: total, largest
+      integer :: k, n_contact, i
+
+      call make_two_blocks(scene, 0.0927_wp, lower, upper)
+      scene%material = [scene%material, scene%material]
+      scene%material(2)%name = "STEEL"
+      scene%material(2)%law = law_linear
+      scene%section = [scene%section, scene%section]
+      scene%section(2)%material = 2
+      scene%element_section(:4) = 2
+      call add_step(scene, .false., 0.02_wp, n)
+      call clamp(scene%step(1), [(i, i = 1, 5)])
+      scene%v0(1, 11:) = 0.3_wp
+      scene%v0(2, 11:) = -1.0_wp
+      call open_both(given, own, scene, law_linear, error)
+      if (allocated(error)) return
+      total = given%march%ledger%total
+      n_contact = 0
+      do k = 1, n
+         call stepper_advance(given, increment, error)
+         if (.not. allocated(error)) call stepper_advance(own, increment, error)
+         if (allocated(error)) return
+         n_contact = n_contact + merge(1, 0, increment%n_active > 0)
+         largest = given%march%ledger%kinetic + given%march%ledger%strain
+         call check_near(error, given%march%ledger%total, total, 1.0e3_wp*eps, largest, "total")
+         ! round-off of each step, that a soft block carries on
+         call check_near(error, given%march%state%u, own%march%state%u, 1.0e6_wp*eps, 1.0_wp, &
+            "displacements of step " // to_text(k))
+         if (allocated(error)) return
+      end do
+      call check_true(error, n_contact > 1, "there was contact")
+      call stepper_close(given)
+      call stepper_close(own)
+   end subroutine test_drop
+
+   !> A stretched block that spins: the two discrete gradients differ by the second order in h.
+   subroutine test_spin(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: coarse, fine
+
+      call spin_distance(20, coarse, error)
+      if (.not. allocated(error)) call spin_distance(40, fine, error)
+      if (allocated(error)) return
+      call check_true(error, coarse > 1.0e-6_wp, "the two differ, by " // to_text(coarse))
+      call check_true(error, fine < coarse/3.5_wp, "second order: " // to_text(coarse) // ", " // &
+         to_text(fine))
+   end subroutine test_spin
+
+   !> How far the solutions are apart after `n` steps.
+   subroutine spin_distance(n, distance, error)
+      integer, intent(in) :: n
+      real(wp), intent(out) :: distance
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: given, own
+      type(increment_t) :: increment
+      real(wp) :: total
+      integer :: k
+
+      distance = 0.0_wp
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%u0(1, :) = 0.2_wp*scene%x(1, :)
+      scene%v0(1, :) = -2.0_wp*scene%x(2, :)
+      scene%v0(2, :) = 2.0_wp*(scene%x(1, :) - 1.0_wp)
+      call add_step(scene, .false., 0.4_wp/real(n, wp), n)
+      call open_both(given, own, scene, law_coupled_neo_hooke, error)
+      if (allocated(error)) return
+      total = given%march%ledger%total
+      do k = 1, n
+         call stepper_advance(given, increment, error)
+         if (.not. allocated(error)) call stepper_advance(own, increment, error)
+         if (allocated(error)) return
+         call check_near(error, given%march%ledger%total, total, 1.0e3_wp*eps, total, "total")
+         call check_near(error, given%march%ledger%angular, own%march%ledger%angular, &
+            1.0e3_wp*eps, 10.0_wp, "angular momentum")
+         if (allocated(error)) return
+      end do
+      distance = norm2(given%march%state%u - own%march%state%u)
+      call stepper_close(given)
+      call stepper_close(own)
+   end subroutine spin_distance
+
+   !> Statics take gradients at the end: the same solution. The given law says nothing of zz.
+   subroutine test_static(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: given, own
+      type(increment_t) :: increment
+      real(wp) :: stress(6, 9), expected(6, 9)
+      integer :: k
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      scene%x(:, 5) = [1.15_wp, 0.9_wp]
+      call add_step(scene, .true., 0.5_wp, 2)
+      call clamp(scene%step(1), [1, 4, 7])
+      do k = 3, 9, 3
+         call prescribe(scene%step(1), k, 1, 0.4_wp)
+         call prescribe(scene%step(1), k, 2, 0.1_wp)
+      end do
+      call open_both(given, own, scene, law_coupled_neo_hooke, error)
+      do k = 1, 2
+         if (.not. allocated(error)) call stepper_advance(given, increment, error)
+         if (.not. allocated(error)) call stepper_advance(own, increment, error)
+      end do
+      if (allocated(error)) return
+      call check_near(error, given%march%state%u, own%march%state%u, 1.0e3_wp*eps, 1.0_wp, "u")
+      call check_near(error, given%march%state%reaction, own%march%state%reaction, 1.0e3_wp*eps, &
+         young, "reactions")
+      call nodal_stress(given%march%system%solid, given%march%state%u, .true., stress)
+      call nodal_stress(own%march%system%solid, own%march%state%u, .true., expected)
+      call check_true(error, all(abs(expected(3, :)) > 1.0_wp), "there is a stress zz")
+      expected(3, :) = 0.0_wp
+      call check_near(error, stress, expected, 1.0e3_wp*eps, young, "stress")
+      call stepper_close(given)
+      call stepper_close(own)
+   end subroutine test_static
+
+   !> The march that a query builds for itself answers as the model does.
+   subroutine test_query(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: given
+      type(query_t) :: query
+      real(wp) :: u1(2, 9)
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      call add_step(scene, .false., 0.1_wp, 2)
+      call open_with(given, scene, law_linear, .true., error)
+      if (allocated(error)) return
+      call shake(u1, 0.1_wp)
+      call query_evaluate(query, given, 0.1_wp, u1, .true., error)
+      if (allocated(error)) return
+      call solid_respond(given%march%system%solid, given%march%state%u, u1, .true., &
+         given%march%system%response)
+      call check_near(error, query%march%system%response%force, &
+         given%march%system%response%force, 64.0_wp*eps, young, "force")
+      call query_free(query)
+      call stepper_close(given)
+   end subroutine test_query
+
+   !> A pull to 0.4 with a law that ends at `limit`, or fails there.
+   subroutine open_pull(stepper, limit, beyond, error)
+      type(stepper_t), intent(inout) :: stepper
+      real(wp), intent(in) :: limit
+      integer, intent(in) :: beyond
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(elastic_t) :: elastic
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      scene%material(1)%law = law_given
+      call add_step(scene, .true., 0.25_wp, 4)
+      call clamp(scene%step(1), [1, 3])
+      call prescribe(scene%step(1), 2, 1, 0.4_wp)
+      call prescribe(scene%step(1), 4, 1, 0.4_wp)
+      elastic = elastic_of(law_linear)
+      elastic%limit = limit
+      elastic%beyond = beyond
+      stepper%scene = scene
+      stepper%is_read = .true.
+      call stepper_give_law(stepper, "RUBBER", elastic, error)
+      if (.not. allocated(error)) call stepper_build(stepper, error)
+   end subroutine open_pull
+
+   !> E11 is 0.345 at the displacement 0.3 and 0.48 at 0.4.
+   subroutine test_outside(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+
+      call open_pull(stepper, 0.38_wp, point_outside, error)
+      do while (.not. allocated(error) .and. stepper%march%state%n_grid < 3)
+         call stepper_advance(stepper, increment, error)
+      end do
+      if (allocated(error)) return
+      call stepper_advance(stepper, increment, refused)
+      call check_error(error, refused, err_analysis, &
+         "the law given for material RUBBER has no finite value at a strain that is met", "outside")
+      call check_true(error, increment%n_cut > 1, "it was cut")
+      call check_true(error, stepper%march%state%u(1, 2) > 0.3_wp, "parts of it succeeded")
+      call check_true(error, stepper%march%state%u(1, 2) < sqrt(1.0_wp + 2.0_wp*0.38_wp) - 1.0_wp, &
+         "what succeeded is inside")
+      call stepper_close(stepper)
+   end subroutine test_outside
+
+   subroutine test_failed(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      real(wp) :: u(2, 4)
+
+      call open_pull(stepper, 0.25_wp, point_failed, error)
+      do while (.not. allocated(error) .and. stepper%march%state%n_grid < 2)
+         call stepper_advance(stepper, increment, error)
+      end do
+      if (allocated(error)) return
+      u = stepper%march%state%u
+      call stepper_advance(stepper, increment, refused)
+      call check_error(error, refused, err_analysis, &
+         "the law given for material RUBBER has failed", "failed")
+      call check_equal(error, increment%n_cut, 0, "cuts")
+      call check_equal(error, stepper%march%state%n_grid, 2, "grid point")
+      call check_near(error, stepper%march%state%u, u, 0.0_wp, 1.0_wp, "displacements")
+      call stepper_close(stepper)
+   end subroutine test_failed
+
+   subroutine test_bad_rest(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(stepper_t) :: outside, failed
+
+      call open_pull(outside, -1.0_wp, point_outside, refused)
+      call check_error(error, refused, err_input, "no finite value at zero strain", "outside")
+      call open_pull(failed, -1.0_wp, point_failed, refused)
+      call check_error(error, refused, err_analysis, "has failed at zero strain", "failed")
+   end subroutine test_bad_rest
+
+   subroutine test_bad_calls(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: stepper, flat, built
+      type(elastic_t) :: elastic
+
+      elastic = elastic_of(law_linear)
+      call stepper_give_law(stepper, "RUBBER", elastic, refused)
+      call check_error(error, refused, err_input, "there is no scene", "nothing read")
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .true., 1.0_wp, 1)
+      call clamp(scene%step(1), [1, 2])
+      stepper%scene = scene
+      stepper%is_read = .true.
+      call stepper_give_law(stepper, "RUBBER", elastic, refused)
+      call check_error(error, refused, err_input, "has a law of its own", "not a user material")
+      stepper%scene%material(1)%law = law_given
+      call stepper_give_law(stepper, "STEEL", elastic, refused)
+      call check_error(error, refused, err_input, "there is no material STEEL", "unknown")
+      call stepper_build(stepper, refused)
+      call check_error(error, refused, err_input, "material RUBBER is a *USER MATERIAL", &
+         "none given")
+      call stepper_close(stepper)
+      elastic%n_variable = 2
+      call make_block(flat%scene, "CPE4", [1, 1], block)
+      call add_step(flat%scene, .true., 1.0_wp, 1)
+      flat%scene%material(1)%law = law_given
+      flat%is_read = .true.
+      call stepper_give_law(flat, "RUBBER", elastic, refused)
+      call check_true(error, .not. allocated(refused), "given")
+      call stepper_give_law(flat, "rubber", elastic, refused)
+      call check_error(error, refused, err_input, "is given already", "given twice")
+      call stepper_build(flat, refused)
+      call check_error(error, refused, err_input, "has 2 variables", "variables")
+      call stepper_close(flat)
+      if (allocated(error)) return
+      call open_with(built, scene, law_linear, .true., error)
+      if (allocated(error)) return
+      call stepper_give_law(built, "RUBBER", elastic, refused)
+      call check_error(error, refused, err_input, "built already", "too late")
+      call stepper_close(built)
+   end subroutine test_bad_calls
+
+   !> The file holds the deck; the law has to be given again, after a deck is read.
+   subroutine test_restart(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(stepper_t) :: first, bare, second
+      type(restart_t) :: restart
+      type(increment_t) :: increment
+      integer :: k
+
+      call read_sample(first, error)
+      if (.not. allocated(error)) call stepper_give_law(first, "RUBBER", elastic_of(law_linear), &
+         error)
+      if (.not. allocated(error)) call stepper_build(first, error)
+      if (.not. allocated(error)) call stepper_advance(first, increment, error)
+      if (allocated(error)) return
+      call check_near(error, first%scene%material(1)%constant, [1.0_wp, 2.0_wp, 3.0_wp], 0.0_wp, &
+         1.0_wp, "constants")
+      call stepper_save(first, restart)
+      call stepper_load(bare, restart, refused)
+      call check_error(error, refused, err_input, "sample.inp:8: error: material RUBBER is a " // &
+         "*USER MATERIAL", "without the law")
+      if (allocated(error)) return
+      call read_sample(second, error)
+      if (.not. allocated(error)) call stepper_give_law(second, "RUBBER", elastic_of(law_linear), &
+         error)
+      if (.not. allocated(error)) call stepper_load(second, restart, error)
+      do k = 1, 3
+         if (.not. allocated(error)) call stepper_advance(first, increment, error)
+         if (.not. allocated(error)) call stepper_advance(second, increment, error)
+      end do
+      if (allocated(error)) return
+      call check_near(error, second%march%state%u, first%march%state%u, 0.0_wp, 1.0_wp, "u")
+      call stepper_close(first)
+      call stepper_close(bare)
+      call stepper_close(second)
+   end subroutine test_restart
+
+   subroutine read_sample(stepper, error)
+      type(stepper_t), intent(inout) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      type(diagnostics_t) :: diagnostics
+      character(len=40), parameter :: line(*) = [character(len=40) :: "*NODE, NSET=ALL", &
+         "1, 0., 0.", "2, 1., 0.", "3, 1., 1.", "4, 0., 1.", "*ELEMENT, TYPE=CPE4, ELSET=B", &
+         "1, 1, 2, 3, 4", "*MATERIAL, NAME=RUBBER", "*USER MATERIAL, CONSTANTS=3", "1., 2.", "3.", &
+         "*DENSITY", "1.", "*SOLID SECTION, ELSET=B, MATERIAL=RUBBER", &
+         "*INITIAL CONDITIONS, TYPE=VELOCITY", "3, 1, 1.", "*STEP, NLGEOM", "*DYNAMIC, DIRECT", &
+         "0.1, 1.", "*END STEP"]
+      integer :: i
+
+      allocate(stepper%source%line(size(line)), stepper%source%file_name(1), stepper%override(0))
+      stepper%source%file_name(1)%text = "sample.inp"
+      do i = 1, size(line)
+         stepper%source%line(i)%text = trim(line(i))
+      end do
+      allocate(stepper%source%file(size(line)), source=1)
+      stepper%source%number = [(i, i = 1, size(line))]
+      diagnostics%file_name = stepper%source%file_name
+      call stepper_read_source(stepper, diagnostics, error)
+   end subroutine read_sample
+
+end module test_given_law
