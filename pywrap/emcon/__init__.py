@@ -21,6 +21,8 @@ A run, step by step:
         ring.run()
         print(ring.energies(), ring.momenta())
 
+Contact and ties for a code with its own solids: `emcon.interface`.
+
 Single kernels, for tests: `emcon.kernels`. From the shell: `python -m emcon plot ring`,
 `summary ring`, `animate ring`, `compare ring other/ring`.
 
