@@ -2,6 +2,7 @@
 !> and what elimination leaves.
 module emcon_link_lines
    use emcon_scene, only : multiplier_dual, scene_t, tie_t
+   use emcon_surface_edges, only : surface_edges
    use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    use emcon_ties, only : find_crosspoints
@@ -59,6 +60,7 @@ contains
       type(system_t), intent(in) :: system
       type(notes_t), intent(inout) :: notes
       integer :: n_node(system%n_body), n_element(system%n_body), first(system%n_body)
+      character(len=:), allocatable :: text
       integer :: i, b
 
       n_node = 0
@@ -72,8 +74,10 @@ contains
          first(b) = scene%element_label(i)
       end do
       do b = 1, min(system%n_body, most_subdomains)
-         call note_add(notes, "subdomain " // to_text(b) // ": " // to_text(n_element(b)) // &
-            " elements from " // to_text(first(b)) // " on, " // to_text(n_node(b)) // " nodes")
+         text = "subdomain " // to_text(b) // ": "
+         if (n_element(b) > 0) text = text // to_text(n_element(b)) // " elements from " // &
+            to_text(first(b)) // " on, "
+         call note_add(notes, text // to_text(n_node(b)) // " nodes")
       end do
    end subroutine add_subdomains
 
@@ -82,11 +86,14 @@ contains
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
       character(len=:), allocatable :: text
+      integer, allocatable :: slave(:, :), master(:, :)
 
+      call surface_edges(scene, scene%surface(tie%slave), slave)
+      call surface_edges(scene, scene%surface(tie%master), master)
       text = tie%name // ": " // scene%surface(tie%slave)%name // " (slave, " // &
-         to_text(size(scene%surface(tie%slave)%element)) // " edges) to " // &
+         to_text(size(slave, 2)) // " edges) to " // &
          scene%surface(tie%master)%name // " (" // &
-         to_text(size(scene%surface(tie%master)%element)) // " edges), " // &
+         to_text(size(master, 2)) // " edges), " // &
          to_text(size(tie%rows%slave)) // " " // &
          trim(merge("dual    ", "standard", tie%multiplier == multiplier_dual)) // " multipliers"
    end function tie_text

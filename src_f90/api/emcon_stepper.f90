@@ -7,6 +7,8 @@ module emcon_stepper
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_given_check, only : given_check_scene
+   use emcon_given_force, only : given_count, given_t
    use emcon_given_law, only : given_law_t
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
@@ -15,7 +17,7 @@ module emcon_stepper
       march_is_done, march_resume, march_t
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
    use emcon_scene, only : scene_t
-   use emcon_text, only : notes_append, notes_t, string_t
+   use emcon_text, only : notes_append, notes_t, string_t, to_text
    use emcon_ties, only : ties_move_nodes, ties_prepare
    implicit none
    private
@@ -27,6 +29,7 @@ module emcon_stepper
    type :: stepper_t
       type(scene_t) :: scene
       type(march_t) :: march
+      type(given_t) :: given                     !! forces and mass from outside
       type(deck_source_t) :: source              !! the deck as read, for restart files
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.
@@ -130,13 +133,15 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
+      call given_check_scene(self%given, self%scene, error)
+      if (allocated(error)) return
       call ties_prepare(self%scene, self%notes, error)
       if (allocated(error)) return
       call initial_contact_prepare(self%scene, self%notes, error)
       if (allocated(error)) return
       call ties_move_nodes(self%scene, self%notes, error)    ! contact may have moved masters
       if (allocated(error)) return
-      call march_init(self%march, self%scene, error, self%given_law)
+      call march_init(self%march, self%scene, error, self%given_law, self%given)
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
       if (.not. allocated(error)) call notes_append(self%notes, self%march%system%notes)
@@ -220,6 +225,7 @@ contains
    subroutine stepper_save(self, restart)
       type(stepper_t), intent(in) :: self
       type(restart_t), intent(inout) :: restart
+      integer :: n(2)
 
       call restart_put(restart, "deck_line", self%source%line)
       call restart_put(restart, "deck_file", self%source%file)
@@ -242,6 +248,8 @@ contains
          call restart_put(restart, "is_active", merge(1, 0, state%is_active))
       end associate
       call save_pairs(self, restart)
+      n = given_count(self%given)
+      if (any(n > 0)) call restart_put(restart, "given", n)
    end subroutine stepper_save
 
    subroutine save_pairs(self, restart)
@@ -259,7 +267,8 @@ contains
       end associate
    end subroutine save_pairs
 
-   !> Build the model of a restart file and put it into the state that was saved.
+   !> Build the model of a restart file and put it into the state that was saved. Forces and mass
+   !> are not in the file: `self` has to have them, given for the same deck.
    subroutine stepper_load(self, restart, error)
       type(stepper_t), intent(inout) :: self
       type(restart_t), intent(in) :: restart
@@ -269,7 +278,8 @@ contains
       integer, allocatable :: active(:)
       real(wp) :: time(2), work(2)
 
-      call load_source(self, restart, error)
+      call check_given(self, restart, error)
+      if (.not. allocated(error)) call load_source(self, restart, error)
       if (allocated(error)) return
       call restart_get(restart, "is_lenient", flag, error)
       if (allocated(error)) return
@@ -304,6 +314,32 @@ contains
       if (allocated(error)) return
       call restart_get(restart, "internal", self%march%state%internal, error)
    end subroutine stepper_load
+
+   !> What the model of the file was given, `self` has been given too.
+   subroutine check_given(self, restart, error)
+      type(stepper_t), intent(in) :: self
+      type(restart_t), intent(in) :: restart
+      type(error_t), allocatable, intent(out) :: error
+      integer :: n(2)
+
+      n = 0
+      if (restart_size(restart, "given") > 0) call restart_get(restart, "given", n, error)
+      if (allocated(error)) return
+      if (any(n /= given_count(self%given))) call raise(error, err_input, &
+         "the restart file is of a model with " // count_text(n) // ", not with " // &
+         count_text(given_count(self%given)) // ": they are not in the file, read the deck and " // &
+         "give them again before the restart file is loaded")
+
+   contains
+
+      pure function count_text(n) result(text)
+         integer, intent(in) :: n(2)
+         character(len=:), allocatable :: text
+
+         text = to_text(n(1)) // " given forces and " // trim(adjustl(merge("   mass", "no mass", n(2) > 0)))
+      end function count_text
+
+   end subroutine check_given
 
    subroutine load_source(self, restart, error)
       type(stepper_t), intent(inout) :: self

@@ -3,7 +3,7 @@
 !> The state is read from `stepper%march%state`, energies and momenta from `stepper%march%ledger`.
 module emcon_stepper_free
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
@@ -11,10 +11,9 @@ module emcon_stepper_free
    use emcon_march_step, only : follow_links
    use emcon_pair_record, only : pair_record_init
    use emcon_scene, only : procedure_static
-   use emcon_solid, only : obstacle_text
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
-   use emcon_system, only : pose_t, system_respond
+   use emcon_system, only : pose_t, system_check_response, system_respond
    use emcon_text, only : to_text
    implicit none
    private
@@ -220,13 +219,11 @@ contains
       associate (system => self%march%system)
          call system_respond(system, self%scene, rest, next%u, next%v, system%zero, system%zero, &
             .false.)
-         if (system%response%inverted_element > 0) then
-            call raise(error, err_analysis, obstacle_text(self%scene, system%response, &
-               " by the displacements u"))
-            return
-         end if
+         call system_check_response(system, "u", error)
+         if (allocated(error)) return
          next%internal = system%response%force
          next%energy = system%response%energy
+         next%potential = system%potential
          next%contact = 0.0_wp
          next%reaction = 0.0_wp
          call pair_record_init(next%pairs, system)

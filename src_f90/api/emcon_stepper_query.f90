@@ -17,10 +17,9 @@ module emcon_stepper_query
    use emcon_march_step, only : follow_links, march_guess
    use emcon_null_space, only : null_space_t
    use emcon_numbering, only : pick_unknowns
-   use emcon_solid, only : obstacle_text
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
-   use emcon_system, only : system_respond
+   use emcon_system, only : system_check_response, system_respond
    use emcon_text, only : to_text
    implicit none
    private
@@ -65,7 +64,7 @@ contains
       call stepper_check_open(stepper, error)
       if (allocated(error)) return
       if (self%revision < 0) then
-         call march_init(self%march, stepper%scene, error, stepper%given_law)
+         call march_init(self%march, stepper%scene, error, stepper%given_law, stepper%given)
          if (allocated(error)) return
          allocate(self%contact, source=self%march%system%zero)
          self%revision = 0
@@ -162,11 +161,8 @@ contains
          associate (pose => march%scheme%pose(now(self), h))
             call system_respond(system, stepper%scene, pose, state%u, state%v, march%du, &
                march%offset, with_tangent)
-            if (system%response%inverted_element > 0) then
-               call raise(error, err_analysis, obstacle_text(stepper%scene, system%response, &
-                  " by the displacements u1"))
-               return
-            end if
+            call system_check_response(system, "u1", error)
+            if (allocated(error)) return
             call begin_contact(self, stepper)
             call active_set_select(march%active, system, stepper%scene, state%u, march%du)
             call constraints_evaluate(march%active%set, system, stepper%scene, pose, state%u, &

@@ -4,11 +4,11 @@
 !> to b is (b - a) turned by -90 degrees. A surface may consist of several connected parts.
 module emcon_chain
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
-   use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, surface_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
+   use emcon_surface_edges, only : surface_edges
    use emcon_text, only : to_text
    implicit none
    private
@@ -65,28 +65,6 @@ contains
       if (allocated(error)) return
       call chain_number(self)
    end subroutine chain_init
-
-   !> The edges of `surface` by their first and last nodes; none for a nodal one.
-   pure subroutine surface_edges(scene, surface, edge)
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      integer, allocatable, intent(out) :: edge(:, :)      !! (2, n_edge)
-      integer :: i, n
-
-      if (allocated(surface%edge)) then
-         allocate(edge, source=surface%edge)
-         return
-      end if
-      n = 0
-      if (.not. surface%is_nodal) n = size(surface%element)
-      allocate(edge(2, n))
-      do i = 1, n
-         associate (e => surface%element(i))
-            edge(:, i) = scene%element_node( &
-               element_kinds(scene%element_kind(e))%face_node(:, surface%face(i)), e)
-         end associate
-      end do
-   end subroutine surface_edges
 
    !> Find the neighbours of each edge.
    subroutine link_edges(self, scene, surface, error)

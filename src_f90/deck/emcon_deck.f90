@@ -10,6 +10,7 @@ module emcon_deck
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
    use emcon_deck_equations, only : read_equations
+   use emcon_deck_given, only : read_given
    use emcon_deck_geometry, only : check_shapes
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
@@ -67,6 +68,7 @@ contains
       call read_nodes(reader, scene)
       call read_elements(reader, scene)
       call read_sets(reader, scene)
+      call read_given(reader, scene)
       call read_surfaces(reader, scene)
       call read_materials(reader, scene)
       call read_sections(reader, scene)

@@ -68,7 +68,8 @@ contains
    end function first_true
 
    !> Nodes without element have no mass and no stiffness: a warning, an error if a force acts on
-   !> them. In the degrees of freedom that stand in an equation they are part of the model.
+   !> them. In the degrees of freedom that stand in an equation they are part of the model, and so
+   !> are nodes of *GIVEN FORCES.
    subroutine check_nodes(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
@@ -85,6 +86,7 @@ contains
          end do
       end do
       if (.not. any(is_bare) .or. all(is_bare)) return
+      if (allocated(scene%given_node)) is_bare(scene%given_node) = .false.
       call mark_coupled(scene, is_coupled)
       is_idle = is_bare .and. .not. any(is_coupled, 1)
       if (any(is_idle)) call add_warning(reader%log, scene%node_origin(first_true(is_idle)), &

@@ -1,11 +1,12 @@
 !> The contact pairs, as far as they can be judged before anything moves.
 module emcon_deck_check_contact
-   use emcon_deck_check_surfaces, only : face_nodes, mark_nodes
+   use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
       formulation_segment, multiplier_standard, scene_t, step_t, surface_t
+   use emcon_surface_edges, only : surface_edges
    use emcon_text, only : to_text
    implicit none
    private
@@ -116,7 +117,8 @@ contains
       integer :: n_free(size(scene%node_label))
       integer :: own(size(scene%node_label))
       logical :: is_master(size(scene%node_label))
-      integer :: k, node(2)
+      integer, allocatable :: edge(:, :)
+      integer :: k
 
       own = scene%n_dim
       do k = 1, size(step%prescribed)
@@ -129,12 +131,12 @@ contains
       if (any(is_master .and. own > 0)) then
          n_free = scene%n_dim
       else if (step%contact%multiplier == multiplier_standard) then
-         associate (slave => scene%surface(pair%slave))
-            do k = 1, size(slave%element)
-               node = face_nodes(scene, slave%element(k), slave%face(k))
+         call surface_edges(scene, scene%surface(pair%slave), edge)
+         do k = 1, size(edge, 2)
+            associate (node => edge(:, k))
                if (all(node > 0)) n_free(node) = max(n_free(node), own(node(2:1:-1)))
-            end do
-         end associate
+            end associate
+         end do
       end if
    end function constraint_freedom
 
@@ -172,14 +174,17 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       integer, intent(in) :: power
-      integer :: i, node(2)
+      integer, allocatable :: edge(:, :)
+      integer :: i
 
       surface_length = 0.0_wp
-      do i = 1, size(surface%element)
-         node = face_nodes(scene, surface%element(i), surface%face(i))
-         if (any(node == 0)) cycle
-         surface_length = surface_length + norm2(scale(scene%x(:, node(2)), power) &
-            - scale(scene%x(:, node(1)), power))
+      call surface_edges(scene, surface, edge)
+      do i = 1, size(edge, 2)
+         associate (node => edge(:, i))
+            if (any(node == 0)) cycle
+            surface_length = surface_length + norm2(scale(scene%x(:, node(2)), power) &
+               - scale(scene%x(:, node(1)), power))
+         end associate
       end do
    end function surface_length
 

@@ -3,11 +3,11 @@ module emcon_deck_check_surfaces
    use emcon_deck_reader, only : reader_t
    use emcon_deck_surfaces, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_diagnostics, only : add_error, label_list
-   use emcon_element_kinds, only : element_kinds
    use emcon_scene, only : scene_t, surface_t
+   use emcon_surface_edges, only : surface_edges
    implicit none
    private
-   public :: check_surfaces, mark_nodes, face_nodes
+   public :: check_surfaces, mark_nodes, find_common_edges
 
 contains
 
@@ -67,14 +67,15 @@ contains
       character(len=*), intent(in) :: title
       integer, allocatable :: n_end(:, :)
       logical, allocatable :: is_branch(:)
-      integer :: i, k, node(2)
+      integer, allocatable :: edge(:, :)
+      integer :: i, k
 
       allocate(n_end(2, size(scene%node_label)), source=0)
-      do i = 1, size(surface%element)
-         node = face_nodes(scene, surface%element(i), surface%face(i))
-         if (any(node == 0)) return
+      call surface_edges(scene, surface, edge)
+      if (any(edge == 0)) return
+      do i = 1, size(edge, 2)
          do k = 1, 2
-            n_end(k, node(k)) = n_end(k, node(k)) + 1
+            n_end(k, edge(k, i)) = n_end(k, edge(k, i)) + 1
          end do
       end do
       is_branch = n_end(1, :) > 1 .or. n_end(2, :) > 1
@@ -88,23 +89,38 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       logical, intent(inout) :: is_in(:)           !! (n_node)
-      integer :: i, node(2)
+      integer, allocatable :: edge(:, :)
+      integer :: i
 
       is_in(surface%node) = .true.
-      do i = 1, size(surface%element)
-         node = face_nodes(scene, surface%element(i), surface%face(i))
-         if (all(node > 0)) is_in(node) = .true.
+      call surface_edges(scene, surface, edge)
+      do i = 1, size(edge, 2)
+         if (all(edge(:, i) > 0)) is_in(edge(:, i)) = .true.
       end do
    end subroutine mark_nodes
 
-   !> First and last node of a face, along the boundary; 0 if the element had errors.
-   pure function face_nodes(scene, element, face) result(node)
+   !> Which of the edges of `surface` belong to the surface `other` too, of edges or of nodes?
+   pure subroutine find_common_edges(scene, surface, other, is_common)
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: element, face
-      integer :: node(2)
+      type(surface_t), intent(in) :: surface, other
+      logical, allocatable, intent(out) :: is_common(:)      !! (n_edge)
+      integer, allocatable :: edge(:, :), list(:, :), last(:)
+      logical, allocatable :: is_in(:)
+      integer :: i
 
-      node = scene%element_node( &
-         element_kinds(scene%element_kind(element))%face_node(:, face), element)
-   end function face_nodes
+      call surface_edges(scene, surface, edge)
+      call surface_edges(scene, other, list)
+      allocate(last(0:size(scene%node_label)), source=0)
+      do i = 1, size(list, 2)
+         last(list(1, i)) = list(2, i)
+      end do
+      allocate(is_in(size(scene%node_label)), source=.false.)
+      if (other%is_nodal) is_in(other%node) = .true.
+      allocate(is_common(size(edge, 2)))
+      do i = 1, size(is_common)
+         is_common(i) = all(edge(:, i) > 0)
+         if (is_common(i)) is_common(i) = last(edge(1, i)) == edge(2, i) .or. all(is_in(edge(:, i)))
+      end do
+   end subroutine find_common_edges
 
 end module emcon_deck_check_surfaces

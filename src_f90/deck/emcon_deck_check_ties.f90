@@ -1,10 +1,10 @@
 !> The ties, as far as they can be judged by their meshes alone.
 module emcon_deck_check_ties
-   use emcon_deck_check_surfaces, only : face_nodes, mark_nodes
+   use emcon_deck_check_surfaces, only : find_common_edges, mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, label_list
-   use emcon_element_kinds, only : element_kinds
-   use emcon_scene, only : scene_t, surface_t, tie_t, where_text
+   use emcon_scene, only : scene_t, tie_t, where_text
+   use emcon_surface_edges, only : surface_edges
    implicit none
    private
    public :: check_ties
@@ -16,15 +16,13 @@ contains
    subroutine check_ties(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      integer, allocatable :: owner(:, :)          !! (face, element) the tie in which it is slave
       integer :: i
 
       if (size(scene%tie) == 0 .or. reader%doubt_shapes) return
-      allocate(owner(maxval(element_kinds%n_face), size(scene%element_label)), source=0)
       do i = 1, size(scene%tie)
          if (scene%tie(i)%slave == 0) cycle
          call check_common_nodes(reader, scene, scene%tie(i))
-         call check_common_faces(reader, scene, i, owner)
+         call check_common_faces(reader, scene, i)
       end do
       if (size(scene%pair) == 0) return
       do i = 1, size(scene%tie)
@@ -49,24 +47,33 @@ contains
    end subroutine check_common_nodes
 
    !> A face that follows two masters is over-constrained.
-   subroutine check_common_faces(reader, scene, i_tie, owner)
+   subroutine check_common_faces(reader, scene, i_tie)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_tie
-      integer, intent(inout) :: owner(:, :)
-      integer, allocatable :: earlier(:)
+      integer, allocatable :: earlier(:), edge(:, :)
+      logical, allocatable :: is_common(:)
+      character(len=:), allocatable :: text
       integer :: i
 
       associate (slave => scene%surface(scene%tie(i_tie)%slave))
-         allocate(earlier(size(slave%element)), source=0)
-         do i = 1, size(slave%element)
-            earlier(i) = owner(slave%face(i), slave%element(i))
-            owner(slave%face(i), slave%element(i)) = i_tie
+         call surface_edges(scene, slave, edge)
+         allocate(earlier(size(edge, 2)), source=0)
+         do i = 1, i_tie - 1
+            if (scene%tie(i)%slave == 0) cycle
+            call find_common_edges(scene, slave, scene%surface(scene%tie(i)%slave), is_common)
+            where (is_common) earlier = i
          end do
          if (all(earlier == 0)) return
+         if (allocated(slave%edge)) then
+            text = ": edges from node " // label_list(scene%node_label(pack(edge(1, :), &
+               earlier > 0)))
+         else
+            text = ": faces of element " // label_list(scene%element_label(pack(slave%element, &
+               earlier > 0)))
+         end if
          call add_error(reader%log, scene%tie(i_tie)%origin, title(scene, scene%tie(i_tie)) &
-            // ": faces of element " // label_list(scene%element_label(pack(slave%element, &
-            earlier > 0))) // " are slave in tie " // scene%tie(maxval(earlier))%name &
+            // text // " are slave in tie " // scene%tie(maxval(earlier))%name &
             // " too, at " // where_text(scene, scene%tie(maxval(earlier))%origin) &
             // "; they can follow one master only: one *SURFACE may hold the faces of both masters")
       end associate
@@ -104,31 +111,13 @@ contains
    pure logical function have_common_face(scene, tied, other)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: tied, other
-      logical :: is_in(size(scene%node_label))
-      integer :: i, node(2)
+      logical, allocatable :: is_common(:)
 
       have_common_face = tied == other
       if (have_common_face) return
-      is_in = .false.
-      call mark_nodes(scene, scene%surface(other), is_in)
-      associate (surface => scene%surface(tied))
-         do i = 1, size(surface%element)
-            node = face_nodes(scene, surface%element(i), surface%face(i))
-            if (any(node == 0)) cycle
-            if (.not. all(is_in(node))) cycle
-            have_common_face = has_face(scene%surface(other), surface%element(i), surface%face(i))
-            if (have_common_face) return
-         end do
-      end associate
+      call find_common_edges(scene, scene%surface(tied), scene%surface(other), is_common)
+      have_common_face = any(is_common)
    end function have_common_face
-
-   !> Whether `surface`, which has all nodes of a face, has the face: one of nodes does.
-   pure logical function has_face(surface, element, face)
-      type(surface_t), intent(in) :: surface
-      integer, intent(in) :: element, face
-
-      has_face = surface%is_nodal .or. any(surface%element == element .and. surface%face == face)
-   end function has_face
 
    !> "*TIE: slave surface S and master surface M of tie NAME"
    pure function title(scene, tie) result(text)

@@ -43,6 +43,7 @@ module emcon_deck_keywords
       keyword_t("NSET", in_both, "NSET=,GENERATE,!ELSET,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM"), &
+      keyword_t("GIVEN FORCES", in_model, "NSET="), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,!ORIENTATION,!OFFSET,!CONTROLS"), &
       keyword_t("MATERIAL", in_model, "NAME="), &
       keyword_t("DENSITY", in_model), &

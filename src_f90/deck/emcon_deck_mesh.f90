@@ -149,10 +149,21 @@ contains
             scene%element_origin(repeated(i)), scene%element_origin( &
             find_label(reader%element_map, scene%element_label(repeated(i)))))
       end do
-      if (n == 0 .and. .not. reader%doubt_elements) then
+      if (n == 0 .and. .not. (reader%doubt_elements .or. is_given(reader))) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no element")
       end if
    end subroutine read_elements
+
+   !> Does the deck say that forces come from elsewhere?
+   pure logical function is_given(reader)
+      type(reader_t), intent(in) :: reader
+      integer :: i
+
+      is_given = .false.
+      do i = 1, size(reader%card)
+         is_given = is_given .or. reader%card(i)%name == "GIVENFORCES"
+      end do
+   end function is_given
 
    subroutine read_element_card(reader, card, scene, n)
       type(reader_t), intent(inout) :: reader

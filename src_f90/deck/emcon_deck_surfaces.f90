@@ -1,12 +1,14 @@
 !> *SURFACE, and the faces that elements share.
 module emcon_deck_surfaces
-   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
-      next_line
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, get_name, &
+      is_blank, next_line
+   use emcon_deck_labels, only : find_label
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
    use emcon_deck_sets, only : get_elements, get_nodes
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds
+   use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, surface_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
@@ -82,18 +84,63 @@ contains
       case ("NODE")
          surface%is_nodal = .true.
          call read_nodes(reader, card, scene, surface)
+      case ("EDGE")
+         call read_edges(reader, card, scene, surface)
       case ("CYLINDER", "CUTTINGSURFACE", "REVOLUTION", "SEGMENTS", "USER")
-         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE", "surfaces belong to elements")
+         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE", &
+            "surfaces belong to elements")
       case default
-         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE", "")
+         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE", "")
       end select
       n_item = size(surface%element) + size(surface%node)
+      if (allocated(surface%edge)) n_item = size(surface%edge, 2)
       if (n_item == 0 .and. reader%log%n_errors == n_before .and. .not. reader%doubt_names &
          .and. .not. reader%doubt_elements) then
          call card_error(reader, card, "the surface has no " &
             // trim(merge("node", "face", surface%is_nodal)))
       end if
    end subroutine read_surface
+
+   !> Edges between nodes: their first and last node, the body to the left.
+   subroutine read_edges(reader, card, scene, surface)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(inout) :: surface
+      type(data_t) :: data
+      integer :: label(2), node(2), k, n
+
+      n = 0
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         n = n + 1
+      end do
+      allocate(surface%edge(2, n))
+      n = 0
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, 2, 2, "first node, last node")
+         do k = 1, 2
+            if (data%ok) call get_integer(reader, data, k, "node label", label(k))
+            if (.not. data%ok) exit
+            node(k) = find_label(reader%node_map, label(k))
+            if (node(k) > 0) cycle
+            if (.not. reader%doubt_nodes) call data_error(reader, data, "node " &
+               // to_text(label(k)) // " does not exist")
+            data%ok = .false.
+         end do
+         if (.not. data%ok) cycle
+         if (all(abs(scene%x(:, node(1)) - scene%x(:, node(2))) <= 0.0_wp) .and. &
+            .not. reader%doubt_positions) then
+            call data_error(reader, data, "the edge from node " // to_text(label(1)) &
+               // " to node " // to_text(label(2)) // " has no length")
+            cycle
+         end if
+         n = n + 1
+         surface%edge(:, n) = node
+      end do
+      surface%edge = surface%edge(:, :n)
+   end subroutine read_edges
 
    !> Nodes of a surface in the order of the deck, each once.
    subroutine read_nodes(reader, card, scene, surface)

@@ -7,10 +7,11 @@ module emcon_ledger
    private
    public :: ledger_t, ledger_measure, body_momenta
 
-   !> total = kinetic + strain - external_work stays constant up to the work of contact.
+   !> total = kinetic + strain + potential - external_work stays constant up to the work of contact.
    type :: ledger_t
       real(wp) :: kinetic = 0.0_wp               !! [M L^2/T^2]
       real(wp) :: strain = 0.0_wp
+      real(wp) :: potential = 0.0_wp             !! of given forces
       real(wp) :: external_work = 0.0_wp         !! of loads and prescribed motion, since the start
       real(wp) :: contact_work = 0.0_wp          !! of contact forces, since the start
       real(wp) :: total = 0.0_wp
@@ -31,7 +32,8 @@ contains
       call mass_times(system, state%v, system%f_work)
       self%kinetic = 0.5_wp*sum(state%v*system%f_work)
       self%strain = sum(state%energy)
-      self%total = self%kinetic + self%strain - self%external_work
+      self%potential = state%potential
+      self%total = self%kinetic + self%strain + self%potential - self%external_work
       self%momentum = sum(system%f_work, dim=2)
       self%angular = 0.0_wp
       do i = 1, size(x, 2)

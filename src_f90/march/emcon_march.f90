@@ -5,6 +5,7 @@ module emcon_march
    use emcon_active_set, only : active_set_init
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_given_force, only : given_t
    use emcon_given_law, only : given_law_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
@@ -18,9 +19,9 @@ module emcon_march
       procedure_static, scene_t, step_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
-   use emcon_solid, only : obstacle_text
    use emcon_state, only : state_t
-   use emcon_system, only : pose_t, system_begin_step, system_init, system_respond
+   use emcon_system, only : pose_t, system_begin_step, system_check_response, system_init, &
+      system_respond
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
    use emcon_velocity_update, only : velocity_update_free, velocity_update_reset
@@ -43,15 +44,16 @@ module emcon_march
 
 contains
 
-   !> Build the system of `scene` and put it into its initial state.
-   subroutine march_init(self, scene, error, given_law)
+   !> Build the system of `scene`, and of what it is given, and put it into its initial state.
+   subroutine march_init(self, scene, error, given_law, given)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(given_law_t), intent(in), optional :: given_law(:)    !! as a program gives them
+      type(given_t), intent(in), optional :: given
       integer :: n
 
-      call system_init(self%system, scene, error, given_law)
+      call system_init(self%system, scene, error, given_law, given)
       if (allocated(error)) return
       n = size(scene%x, 2)
       allocate(self%du(2, n), self%v1(2, n), self%offset(2, n), source=0.0_wp)
@@ -214,13 +216,11 @@ contains
          self%du = 0.0_wp
          rest%is_end = .true.
          call system_respond(self%system, scene, rest, state%u, state%v, self%du, self%du, .false.)
-         if (self%system%response%inverted_element > 0) then
-            call raise(error, err_analysis, obstacle_text(scene, self%system%response, &
-               " by the displacements at the start of the step"))
-            return
-         end if
+         call system_check_response(self%system, "at the start of the step", error)
+         if (allocated(error)) return
          state%internal = self%system%response%force
          state%energy = self%system%response%energy
+         state%potential = self%system%potential
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
       self%revision = self%revision + 1

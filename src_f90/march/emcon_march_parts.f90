@@ -8,7 +8,6 @@ module emcon_march_parts
    use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : scene_t
-   use emcon_solid, only : obstacle_text
    use emcon_text, only : note_add, to_text
    implicit none
    private
@@ -63,7 +62,7 @@ contains
 
       select case (status)
       case (step_inverted)
-         text = obstacle_text(scene, self%system%response, "")
+         text = self%system%refusal
       case (step_diverged)
          text = "Newton's method does not converge (relative residual " // &
             to_text(self%newton%history(max(1, self%newton%n_history))) // " after " // &
@@ -95,7 +94,10 @@ contains
       if (.not. self%scheme%has_inertia) then
          motion = free_motion_text(self%system, scene, &
             scene%step(self%state%i_step)%prescribed, with_contact=.true.)
-         if (len(motion) > 0) text = text // "; without contact " // motion
+         if (len(motion) == 0) return
+         text = text // "; without contact "
+         if (self%system%given%is_any) text = text // "and given forces "
+         text = text // motion
       end if
    end function failure_text
 

@@ -207,6 +207,7 @@ contains
             merge(0.5_wp, 0.0_wp, self%scheme%has_inertia))
          state%internal = system%response%force
          state%energy = system%response%energy
+         state%potential = system%potential
          if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             correction_reason(self%correction) // ": solved as a saddle point")
          increment%residual = self%newton%history(:self%newton%n_history)

@@ -8,12 +8,10 @@ module emcon_newton
       constraints_rows
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t
-   use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
-   use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
-   use emcon_solid, only : obstacle_text
    use emcon_system, only : pose_t, system_respond, system_tangent_times, system_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
@@ -31,7 +29,7 @@ module emcon_newton
    !> Corrections with an old factorisation at most, and the factor each has to gain.
    integer, parameter :: most_polish = 3
    real(wp), parameter :: polish_gain = 0.5_wp
-   !> A correction that inverts an element is halved so often at most.
+   !> A correction that inverts an element, or that a given force refuses, is halved so often at most.
    integer, parameter :: most_halvings = 6
    !> A new best residual is at least this much smaller. After so many iterations without one the
    !> step has failed; after a few it has converged, if it is below this multiple of epsilon.
@@ -265,11 +263,9 @@ contains
          call system_respond(system, scene, pose, u0, v0, du, offset, &
             with_tangent=.not. self%is_polish)
          self%inverted_element = system%response%inverted_element
-         if (self%inverted_element == 0) exit
-         if (system%response%given%status == point_failed) then
-            call raise(error, err_analysis, obstacle_text(scene, system%response, ""))
-            return
-         end if
+         if (allocated(system%failure)) allocate(error, source=system%failure)
+         if (allocated(error)) return
+         if (.not. allocated(system%refusal)) exit
          if (i == most_halvings .or. self%n_solve == 0) return
          self%correction = 0.5_wp*self%correction
          call add_to_dofs(system%numbering, self%correction, -1.0_wp, du)

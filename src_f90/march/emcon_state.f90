@@ -27,6 +27,7 @@ module emcon_state
       real(wp), allocatable :: reaction(:, :)    !! (2, n_node) forces at prescribed freedoms
       real(wp), allocatable :: internal(:, :)    !! (2, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy
+      real(wp) :: potential = 0.0_wp             !! energy of the given forces
    end type state_t
 
 end module emcon_state

@@ -53,7 +53,7 @@ module emcon_scene
       integer, allocatable :: item(:)                !! ascending, distinct indices
    end type named_set_t
 
-   !> A surface: element faces in the order of the deck, or nodes; or, without elements, edges.
+   !> A surface: element faces in the order of the deck, or nodes, or edges between nodes.
    type :: surface_t
       character(len=:), allocatable :: name
       type(origin_t) :: origin
@@ -61,7 +61,7 @@ module emcon_scene
       integer, allocatable :: element(:)             !! (n_face)
       integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind
       integer, allocatable :: node(:)                !! (n_node), only if `is_nodal`
-      !> (2, n_edge) first and last nodes, the body to the left; only if there are no elements
+      !> (2, n_edge) first and last nodes, the body to the left; only of a surface of edges
       integer, allocatable :: edge(:, :)
    end type surface_t
 
@@ -221,6 +221,8 @@ module emcon_scene
       type(contact_pair_t), allocatable :: pair(:)
       type(tie_t), allocatable :: tie(:)
       type(equation_t), allocatable :: equation(:)
+      type(origin_t) :: given_origin
+      integer, allocatable :: given_node(:)          !! ascending: what these do comes from outside
       real(wp), allocatable :: u0(:, :)              !! (n_dim, n_node) initial displacement [L]
       real(wp), allocatable :: v0(:, :)              !! (n_dim, n_node) initial velocity [L/T]
       type(step_t), allocatable :: step(:)

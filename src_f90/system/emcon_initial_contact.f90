@@ -91,7 +91,8 @@ contains
       end associate
    end subroutine check_crossing
 
-   !> "face S1 of element 7 (nodes 1, 2)" for edge `e` of the chain of `surface`.
+   !> "face S1 of element 7 (nodes 1, 2)" for edge `e` of the chain of `surface`, or of a surface of
+   !> edges "the edge (nodes 1, 2)".
    function face_text(scene, surface, chain, e) result(text)
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
@@ -99,9 +100,10 @@ contains
       integer, intent(in) :: e
       character(len=:), allocatable :: text
 
-      text = "face S" // to_text(surface%face(e)) // " of element " // &
-         to_text(scene%element_label(surface%element(e))) // " (nodes " // &
-         to_text(scene%node_label(chain%edge(1, e))) // ", " // &
+      text = "the edge"
+      if (.not. allocated(surface%edge)) text = "face S" // to_text(surface%face(e)) // &
+         " of element " // to_text(scene%element_label(surface%element(e)))
+      text = text // " (nodes " // to_text(scene%node_label(chain%edge(1, e))) // ", " // &
          to_text(scene%node_label(chain%edge(2, e))) // ")"
    end function face_text
 

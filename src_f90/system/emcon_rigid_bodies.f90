@@ -15,6 +15,7 @@ module emcon_rigid_bodies
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : prescribed_t, scene_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
+   use emcon_surface_edges, only : surface_edges
    use emcon_system, only : system_t
    implicit none
    private
@@ -25,10 +26,11 @@ module emcon_rigid_bodies
    !> ties are sums of some ten products, coordinates of slave nodes likewise.
    real(dp), parameter :: rounding = 32.0_dp*max(real(epsilon(1.0_wp), dp), epsilon(1.0_dp))
 
-   !> The bodies: first those of elements, as numbered in `system_t`, then single nodes.
+   !> The bodies: first those of elements and given forces, as numbered in `system_t`, then single
+   !> nodes of equations.
    type :: rigid_bodies_t
       integer :: n = 0
-      integer :: n_mesh = 0                          !! of elements
+      integer :: n_mesh = 0                          !! those of `system_t`
       integer, allocatable :: of_node(:)             !! (n_node) 0: none
       real(wp), allocatable :: x(:, :)               !! (2, n_node) [L]
       real(wp), allocatable :: center(:, :)          !! (2, n) [L]
@@ -80,7 +82,8 @@ contains
       end do
    end subroutine rigid_rows_find
 
-   !> Bodies, where they are, and which of their motions need to be prevented.
+   !> Bodies, where they are, and which of their motions need to be prevented. Those of bodies that
+   !> contact or a given force may hold need not (`contact_holds`).
    subroutine rigid_bodies_find(system, scene, rows, contact_holds, bodies)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
@@ -108,6 +111,7 @@ contains
          do k = 1, size(system%contact)
             call mark_contact_bodies(system, scene, k, touches)
          end do
+         if (system%given%is_any) touches(pack(system%body, system%given%has_force)) = .true.
       end if
       allocate(bodies%is_free(3, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh
@@ -118,6 +122,7 @@ contains
          if (b > bodies%n_mesh) bodies%is_free(:2, b) = is_in_row(:, i)
       end do
       call measure_bodies(bodies)
+      bodies%is_free(3, :) = bodies%is_free(3, :) .and. bodies%size > 0.0_wp
    end subroutine rigid_bodies_find
 
    !> Centres and sizes.
@@ -156,21 +161,20 @@ contains
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: pair
       logical, intent(inout) :: touches(:)
-      integer :: i, surface(2), k
+      integer, allocatable :: edge(:, :), node(:)
+      integer :: i, surface(2)
 
       surface = [scene%pair(pair)%slave, scene%pair(pair)%master]
       do i = 1, 2
          associate (s => scene%surface(surface(i)))
+            call surface_edges(scene, s, edge)
             if (s%is_nodal) then
-               do k = 1, size(s%node)
-                  if (system%body(s%node(k)) > 0) touches(system%body(s%node(k))) = .true.
-               end do
+               node = s%node
             else
-               do k = 1, size(s%element)
-                  touches(system%body(scene%element_node(1, s%element(k)))) = .true.
-               end do
+               node = edge(1, :)
             end if
          end associate
+         touches(pack(system%body(node), system%body(node) > 0)) = .true.
       end do
    end subroutine mark_contact_bodies
 

@@ -91,30 +91,49 @@ contains
       member = pack(member, group == 1)
    end subroutine keep_moving_together
 
-   !> "the body of element 3 is", or all bodies and nodes of `member`.
+   !> "the body of element 3 is", or all bodies and nodes of `member`. A body without elements is
+   !> named by its first node.
    function name_text(bodies, system, scene, member) result(text)
       type(rigid_bodies_t), intent(in) :: bodies
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: member(:)
       character(len=:), allocatable :: text
-      integer :: label(bodies%n), i, n
+      integer :: label(bodies%n), i
+      logical :: has_element(bodies%n)
 
+      has_element = .false.
+      do i = size(bodies%of_node), 1, -1
+         if (bodies%of_node(i) > 0) label(bodies%of_node(i)) = scene%node_label(i)
+      end do
       do i = size(scene%element_label), 1, -1
-         label(system%body(system%solid%node(1, i))) = scene%element_label(i)
+         associate (b => system%body(system%solid%node(1, i)))
+            label(b) = scene%element_label(i)
+            has_element(b) = .true.
+         end associate
       end do
-      do i = 1, size(bodies%of_node)
-         if (bodies%of_node(i) > bodies%n_mesh) label(bodies%of_node(i)) = scene%node_label(i)
-      end do
-      n = count(member <= bodies%n_mesh)
-      text = list_text("the body of element ", "the bodies of elements ", label(member(:n)))
-      if (n > 0 .and. n < size(member)) text = text // " and "
-      text = text // list_text("node ", "nodes ", label(member(n + 1:)))
+      text = ""
+      call add("the body of element ", "the bodies of elements ", has_element(member))
+      call add("the body of node ", "the bodies of nodes ", member <= bodies%n_mesh .and. &
+         bodies%size(member) > 0.0_wp .and. .not. has_element(member))
+      call add("node ", "nodes ", .not. (bodies%size(member) > 0.0_wp .or. has_element(member)))
       if (size(member) == 1) then
          text = text // " is"
       else
          text = text // ", tied to each other, are"
       end if
+
+   contains
+
+      subroutine add(one, more, is_meant)
+         character(len=*), intent(in) :: one, more
+         logical, intent(in) :: is_meant(:)      !! (members)
+
+         if (.not. any(is_meant)) return
+         if (len(text) > 0) text = text // " and "
+         text = text // list_text(one, more, label(pack(member, is_meant)))
+      end subroutine add
+
    end function name_text
 
    !> `one` or `more` and the labels; empty if there is none.

@@ -7,23 +7,30 @@ module emcon_system
    use emcon_contact, only : contact_box_t
    use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_from_elements, csr_t
-   use emcon_element_kinds, only : element_kinds, max_element_nodes
-   use emcon_errors, only : error_t
+   use emcon_element_kinds, only : max_element_nodes
+   use emcon_element_lists, only : element_lists
+   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_given_force, only : given_t
    use emcon_given_law, only : given_law_t
+   use emcon_given_sum, only : given_sum_add_tangent, given_sum_append, given_sum_init, &
+      given_sum_is_symmetric, given_sum_links, given_sum_massless, given_sum_place, &
+      given_sum_respond, given_sum_t, given_sum_tangent_times
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
+   use emcon_mass, only : mass_init, mass_place
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
+   use emcon_point_function, only : point_failed
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
-   use emcon_scene, only : law_linear, method_null_space, scene_t
-   use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t, &
+   use emcon_scene, only : law_linear, method_null_space, procedure_dynamic, scene_t
+   use emcon_solid, only : obstacle_text, solid_init, solid_respond, solid_response_t, solid_t, &
       solid_tangent_times
-   use emcon_text, only : note_add, notes_t
+   use emcon_text, only : note_add, notes_t, to_text
    use emcon_timer, only : stopwatch_t
    implicit none
    private
    public :: system_t, pose_t, system_init, system_begin_step, system_respond, &
-      system_tangent_times, mass_times
+      system_check_response, system_tangent_times, mass_times
 
    !> Where forces are evaluated and how inertia enters: all that a scheme decides.
    type :: pose_t
@@ -38,14 +45,15 @@ module emcon_system
 
    type :: system_t
       type(solid_t) :: solid
+      type(given_sum_t) :: given                 !! forces and mass from outside
       type(csr_t) :: mass                        !! node by node, the same in all directions
       type(linear_rows_t) :: linear              !! rows of ties and equations
       type(contact_box_t), allocatable :: contact(:)
       integer, allocatable :: first_constraint(:)   !! (n_pair + 1) constraints before each pair
       integer :: n_constraint = 0
       integer :: n_body = 0
-      integer, allocatable :: body(:)            !! (n_node) connected part; 0: no element
-      logical, allocatable :: is_alive(:, :)     !! (2, n_node) in an element or in an equation
+      integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
+      logical, allocatable :: is_alive(:, :)     !! (2, n_node) in an element, given, in an equation
       integer :: i_step = 0                      !! step of the deck the rest belongs to
       logical :: nlgeom = .false.
       logical :: has_linear_laws = .false.
@@ -60,7 +68,11 @@ module emcon_system
       type(reduction_t) :: reduction             !! brings dependent freedoms into `matrix`
       type(notes_t) :: notes                     !! on the linear constraints of the step
       real(dp), allocatable :: mass_value(:)     !! mass in the pattern of `matrix`
-      type(solid_response_t) :: response
+      type(solid_response_t) :: response         !! of all that has a potential
+      real(wp) :: potential = 0.0_wp             !! energy of the given forces at the end
+      !> Why there is no response: what "the displacements" did to what. Not allocated: there is one
+      character(len=:), allocatable :: refusal
+      type(error_t), allocatable :: failure      !! with which a giver ends the analysis
       real(wp), allocatable :: inertia(:, :)     !! (2, n_node) s M (b du - w v0)
       real(wp), allocatable :: external(:, :)    !! (2, n_node) loads
       real(wp), allocatable :: residual(:, :)    !! (2, n_node) without contact forces
@@ -71,34 +83,28 @@ module emcon_system
 
 contains
 
-   !> What stays the same in all steps of `scene`, with the laws that a program gives.
-   subroutine system_init(self, scene, error, given_law)
+   !> What stays the same in all steps of `scene`, and of what the model is given beside it.
+   subroutine system_init(self, scene, error, given_law, given)
       type(system_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(given_law_t), intent(in), optional :: given_law(:)
-      integer :: i, k, n
+      type(given_t), intent(in), optional :: given
+      integer :: n
 
       call solid_init(self%solid, scene, error, given_law)
       if (allocated(error)) return
-      call init_mass(self, error)
+      if (present(given)) call given_sum_init(self%given, given, scene, error)
+      if (allocated(error)) return
+      call mass_init(self%mass, self%solid, self%given, error)
       if (allocated(error)) return
       allocate(self%unresolved(0))
       self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear)
       call linear_rows_init(self%linear, scene)
       call init_contact(self, scene, error)
       if (allocated(error)) return
+      call find_bodies(self, scene)
       n = self%solid%n_node
-      call bodies_find(self%solid%node, n, self%body, self%n_body)
-      allocate(self%is_alive(2, n))
-      self%is_alive = spread(self%body > 0, 1, 2)
-      do i = 1, size(scene%equation)
-         associate (equation => scene%equation(i))
-            do k = 1, size(equation%node)
-               self%is_alive(equation%dof(k), equation%node(k)) = .true.
-            end do
-         end associate
-      end do
       allocate(self%response%force(2, n), self%response%magnitude(2, n), source=0.0_wp)
       allocate(self%response%rounding(2, n), source=0.0_wp)
       allocate(self%response%energy(self%solid%n_element), source=0.0_wp)
@@ -107,51 +113,48 @@ contains
       allocate(self%u_work(2, n), self%f_work(2, n), self%zero(2, n), source=0.0_wp)
    end subroutine system_init
 
-   !> The mass matrix, node by node.
-   subroutine init_mass(self, error)
+   !> Bodies, and which freedoms are part of the model.
+   subroutine find_bodies(self, scene)
       type(system_t), intent(inout) :: self
-      type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: start(:), list(:), slot(:)
-      integer :: e, i, j, k, n
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: node(:, :), link(:, :)
+      integer :: i, k
 
-      call element_lists(self%solid, 1, start, list)
-      call csr_from_elements(self%mass, self%solid%n_node, start, list, slot, error)
-      if (allocated(error)) return
-      k = 0
+      allocate(node, source=self%solid%node)
+      if (self%given%is_any) then
+         call given_sum_links(self%given, link)
+         k = size(node, 2)
+         node = reshape(node, [max_element_nodes, k + size(link, 2)], pad=[0])
+         node(:2, k + 1:) = link
+      end if
+      call bodies_find(node, self%solid%n_node, self%body, self%n_body)
+      allocate(self%is_alive(2, self%solid%n_node))
+      self%is_alive = spread(self%body > 0, 1, 2)
+      if (self%given%is_any) call keep_alive(self)
+      do i = 1, size(scene%equation)
+         associate (equation => scene%equation(i))
+            do k = 1, size(equation%node)
+               self%is_alive(equation%dof(k), equation%node(k)) = .true.
+            end do
+         end associate
+      end do
+   end subroutine find_bodies
+
+   !> Of nodes without element only those freedoms that are given something.
+   pure subroutine keep_alive(self)
+      type(system_t), intent(inout) :: self
+      integer :: i, e
+
+      do i = 1, size(self%is_alive, 2)
+         self%is_alive(:, i) = self%given%joined%row_start(2*i:2*i + 1) &
+            > self%given%joined%row_start(2*i - 1:2*i)
+      end do
       do e = 1, self%solid%n_element
-         n = start(e + 1) - start(e)
-         do j = 1, n
-            do i = 1, n
-               k = k + 1
-               self%mass%value(slot(k)) = self%mass%value(slot(k)) &
-                  + real(self%solid%mass(i, j, e), dp)
-            end do
+         do i = 1, max_element_nodes
+            if (self%solid%node(i, e) > 0) self%is_alive(:, self%solid%node(i, e)) = .true.
          end do
       end do
-   end subroutine init_mass
-
-   !> Lists of the degrees of freedom of all elements, as `csr_from_elements` reads them;
-   !> degree of freedom a of node i is `n_dim*(i - 1) + a`.
-   pure subroutine element_lists(solid, n_dim, start, list)
-      type(solid_t), intent(in) :: solid
-      integer, intent(in) :: n_dim
-      integer, allocatable, intent(out) :: start(:), list(:)
-      integer :: e, i, a, k
-
-      allocate(start(solid%n_element + 1), list(n_dim*max_element_nodes*solid%n_element))
-      k = 0
-      do e = 1, solid%n_element
-         start(e) = k + 1
-         do i = 1, element_kinds(solid%kind(e))%n_node
-            do a = 1, n_dim
-               k = k + 1
-               list(k) = n_dim*(solid%node(i, e) - 1) + a
-            end do
-         end do
-      end do
-      start(solid%n_element + 1) = k + 1
-      list = list(:k)
-   end subroutine element_lists
+   end subroutine keep_alive
 
    !> The contact pairs and the numbers of their constraints, after the linear ones.
    subroutine init_contact(self, scene, error)
@@ -193,10 +196,28 @@ contains
          call number_and_lay_out(self, scene, is_too_full, error)
          if (allocated(error)) return
       end if
-      call place_mass(self)
+      call mass_place(self%solid, self%given, self%slot, freedom_numbers(self%numbering), &
+         self%reduction, self%matrix)
+      self%mass_value = self%matrix%value
+      if (self%given%is_any) call begin_given(self, scene, error)
+      if (allocated(error)) return
       call loads_init(self%loads, scene, scene%step(i_step), self%numbering, self%matrix, &
          self%reduction)
    end subroutine system_begin_step
+
+   !> Find the places of given tangents. In dynamics what is forced needs mass.
+   subroutine begin_given(self, scene, error)
+      type(system_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer :: node
+
+      call given_sum_place(self%given, freedom_numbers(self%numbering), self%reduction, self%matrix)
+      if (scene%step(self%i_step)%procedure /= procedure_dynamic) return
+      node = given_sum_massless(self%given, self%numbering%unknown, self%mass)
+      if (node > 0) call raise(error, err_input, "node " // to_text(scene%node_label(node)) // &
+         " has given forces but no mass: a dynamic step needs it")
+   end subroutine begin_given
 
    !> The linear constraints of the step, less those that follow from others.
    subroutine begin_linear(self, scene)
@@ -219,6 +240,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: full
       integer, allocatable :: start(:), list(:), number(:)
+      integer :: n
 
       if (self%is_reduced .and. self%linear%n > 0) then
          self%numbering = self%linked
@@ -227,61 +249,37 @@ contains
             scene%step(self%i_step)%prescribed)
       end if
       call element_lists(self%solid, 2, start, list)
+      n = sum((start(2:) - start(:size(start) - 1))**2)
+      if (self%given%is_any) call given_sum_append(self%given, start, list)
       call append_bare_freedoms(self, start, list)
       allocate(number, source=freedom_numbers(self%numbering))
       list = number(list)
       call csr_from_elements(full, self%numbering%n_unknown + self%numbering%n_dependent, start, &
          list, self%slot, error)
       if (allocated(error)) return
+      if (self%given%is_any) self%slot = self%slot(:n)
       call reduction_init(self%reduction, self%numbering, full, self%matrix, self%slot, &
          is_too_full)
    end subroutine number_and_lay_out
 
-   !> Freedoms without element that stand in equations, as lists of one each.
+   !> Freedoms that stand in no list so far, as lists of one each.
    pure subroutine append_bare_freedoms(self, start, list)
       type(system_t), intent(in) :: self
       integer, allocatable, intent(inout) :: start(:), list(:)
       integer, allocatable :: bare(:)
-      integer :: a, i, n
+      logical, allocatable :: is_bare(:)
+      integer :: i, n
 
-      allocate(bare(0))
-      do i = 1, size(self%body)
-         if (self%body(i) > 0) cycle
-         bare = [bare, pack([(2*(i - 1) + a, a = 1, 2)], self%is_alive(:, i))]
-      end do
+      is_bare = reshape(self%is_alive, [size(self%is_alive)])
+      is_bare(list) = .false.
+      bare = pack([(i, i = 1, size(is_bare))], is_bare)
       n = size(list)
       list = [list, bare]
       start = [start, [(n + 1 + i, i = 1, size(bare))]]
    end subroutine append_bare_freedoms
 
-   !> Put the mass into the pattern of the matrix.
-   subroutine place_mass(self)
-      type(system_t), intent(inout) :: self
-      integer :: e, i, j, a, k, n, before
-
-      self%matrix%value = 0.0_dp
-      before = 0
-      do e = 1, self%solid%n_element
-         n = element_kinds(self%solid%kind(e))%n_node
-         do j = 1, n
-            do i = 1, n
-               do a = 1, 2
-                  k = self%slot(before + 2*(i - 1) + a + 2*n*(2*(j - 1) + a - 1))
-                  associate (mass => real(self%solid%mass(i, j, e), dp))
-                     if (k > 0) self%matrix%value(k) = self%matrix%value(k) + mass
-                     if (k < 0) self%reduction%side%value(-k) = self%reduction%side%value(-k) + mass
-                  end associate
-               end do
-            end do
-         end do
-         before = before + 4*n*n
-      end do
-      call reduction_add(self%reduction, self%matrix)
-      self%mass_value = self%matrix%value
-   end subroutine place_mass
-
    !> Residual of the step from `u0`, `v0` to `u0 + du` without contact forces, and with
-   !> `with_tangent` the tangent. `inverted_element` in `response` tells of a failure.
+   !> `with_tangent` the tangent. `refusal` or `failure` is allocated where there is none.
    subroutine system_respond(self, scene, pose, u0, v0, du, offset, with_tangent)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -290,6 +288,8 @@ contains
       real(wp), intent(in), contiguous :: offset(:, :)       !! (2, n_node) to `du`, for inertia
       logical, intent(in) :: with_tangent
 
+      if (allocated(self%refusal)) deallocate(self%refusal)
+      if (allocated(self%failure)) deallocate(self%failure)
       self%external = 0.0_wp
       if (with_tangent) self%is_symmetric = has_symmetric_tangent(self, pose)
       if (with_tangent) self%matrix%value = real(pose%mass_scale*pose%rate, dp)*self%mass_value
@@ -300,7 +300,12 @@ contains
          self%u_work = u0 + 0.5_wp*du
          call respond_at(u0, du, 1.0_wp, 0.5_wp)
       end if
-      if (self%response%inverted_element > 0) return
+      if (self%response%inverted_element > 0) then
+         self%refusal = obstacle_text(scene, self%response, "")
+         if (self%response%given%status == point_failed) call raise(self%failure, err_analysis, &
+            self%refusal)
+      end if
+      if (allocated(self%refusal) .or. allocated(self%failure)) return
       if (pose%mass_scale > 0.0_wp) then
          self%f_work = pose%rate*(du + offset) - pose%v_weight*v0
          call mass_times(self, self%f_work, self%inertia)
@@ -327,15 +332,48 @@ contains
                solid_factor, self%slot, self%matrix%value, self%reduction%side%value, before=u0)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external, load_factor, self%matrix%value, self%reduction%side%value)
+            if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
             call reduction_add(self%reduction, self%matrix)
          else
             call solid_respond(self%solid, start, step, self%nlgeom, self%response, before=u0)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external)
+            if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
          end if
       end subroutine respond_at
 
    end subroutine system_respond
+
+   !> Add the given forces to what the elements respond.
+   subroutine add_given(self, is_end, u0, du, with_tangent)
+      type(system_t), intent(inout) :: self
+      logical, intent(in) :: is_end, with_tangent
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+
+      if (self%response%inverted_element > 0) return
+      call given_sum_respond(self%given, u0, du, is_end, with_tangent, self%refusal, &
+         self%failure)
+      if (allocated(self%refusal) .or. allocated(self%failure)) return
+      self%response%force = self%response%force + self%given%force
+      self%response%magnitude = self%response%magnitude + self%given%magnitude
+      self%response%rounding = self%response%rounding + self%given%rounding
+      self%potential = self%given%energy
+      if (with_tangent) call given_sum_add_tangent(self%given, self%matrix%value, &
+         self%reduction%side%value)
+   end subroutine add_given
+
+   !> An error if the last response was none, for the displacements that the words `by` name.
+   subroutine system_check_response(self, by, error)
+      type(system_t), intent(in) :: self
+      character(len=*), intent(in) :: by
+      type(error_t), allocatable, intent(out) :: error
+
+      if (allocated(self%failure)) then
+         allocate(error, source=self%failure)
+      else if (allocated(self%refusal)) then
+         call raise(error, err_analysis, self%refusal // " by the displacements " // by)
+      end if
+   end subroutine system_check_response
 
    !> Second derivatives of a potential are symmetric: those of discrete gradients of quadratic
    !> energies and of gradients at the end, unless a pressure follows the surface.
@@ -345,6 +383,7 @@ contains
 
       has_symmetric_tangent = pose%is_end .or. (self%has_linear_laws .and. .not. self%nlgeom)
       if (self%nlgeom .and. self%loads%has_pressure) has_symmetric_tangent = .false.
+      if (.not. given_sum_is_symmetric(self%given, pose%is_end)) has_symmetric_tangent = .false.
    end function has_symmetric_tangent
 
    !> The tangent of internal forces and inertia at u0 + du times `direction`, on all nodes: what
@@ -364,6 +403,8 @@ contains
       else
          call solid_tangent_times(self%solid, u0, du, self%nlgeom, 1.0_wp, direction, product)
       end if
+      if (self%given%is_any) call given_sum_tangent_times(self%given, u0, du, pose%is_end, &
+         direction, product)
    end subroutine system_tangent_times
 
    !> M field, in both directions.

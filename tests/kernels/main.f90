@@ -21,6 +21,7 @@ program main
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
    use test_gauss, only : collect_gauss
+   use test_given_force, only : collect_given_force
    use test_given_law, only : collect_given_law
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
@@ -107,6 +108,7 @@ program main
    call run("nts", collect_nts)
    call run("interface", collect_interface)
    call run("joints", collect_joints)
+   call run("given_force", collect_given_force)
    call run("hermite_gap", collect_hermite_gap)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar", collect_mortar)

@@ -1,0 +1,72 @@
+!> *GIVEN FORCES: nodes whose forces and mass come from the program that reads the deck.
+module emcon_deck_given
+   use emcon_deck_fields, only : data_error, data_open, data_t, next_line
+   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
+   use emcon_deck_sets, only : find_set, set_names
+   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_element_kinds, only : element_kinds
+   use emcon_scene, only : scene_t
+   use emcon_sort, only : unique_sorted
+   implicit none
+   private
+   public :: read_given
+
+contains
+
+   !> All cards. Without NSET they name the nodes that belong to no element.
+   subroutine read_given(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      integer, allocatable :: list(:)
+      type(data_t) :: data
+      integer :: i
+
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "GIVENFORCES") cycle
+         if (.not. allocated(scene%given_node)) then
+            allocate(scene%given_node(0))
+            scene%given_origin = reader%card(i)%origin
+         end if
+         call data_open(data, reader%card(i))
+         if (next_line(reader, data)) call data_error(reader, data, "has no data lines")
+         call find_nodes(reader, reader%card(i), scene, list)
+         list = [scene%given_node, list]
+         scene%given_node = unique_sorted(list)
+      end do
+   end subroutine read_given
+
+   subroutine find_nodes(reader, card, scene, list)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: list(:)
+      character(len=:), allocatable :: name
+      logical :: is_bare(0:size(scene%node_label))
+      integer :: e, i, k
+
+      allocate(list(0))
+      if (has_option(card, "NSET")) then
+         call need_name(reader, card, "NSET", name)
+         if (name == "") return
+         k = find_set(scene%node_set, name)
+         if (k > 0) then
+            list = scene%node_set(k)%item
+         else if (.not. reader%doubt_names) then
+            call card_error(reader, card, "unknown node set " // quoted(name) &
+               // suggestion(name, set_names(scene%node_set)))
+         end if
+         return
+      end if
+      is_bare = .true.
+      do e = 1, size(scene%element_label)
+         do k = 1, element_kinds(scene%element_kind(e))%n_node
+            is_bare(scene%element_node(k, e)) = .false.
+         end do
+      end do
+      list = pack([(i, i = 1, size(scene%node_label))], is_bare(1:))
+      if (size(list) == 0 .and. .not. (reader%doubt_nodes .or. reader%doubt_elements)) &
+         call card_error(reader, card, "all nodes belong to elements; name those that are given " &
+         // "forces by NSET=")
+   end subroutine find_nodes
+
+end module emcon_deck_given

@@ -1,0 +1,34 @@
+!> Which degrees of freedom meet in which element.
+module emcon_element_lists
+   use emcon_element_kinds, only : element_kinds, max_element_nodes
+   use emcon_solid, only : solid_t
+   implicit none
+   private
+   public :: element_lists
+
+contains
+
+   !> Lists of the degrees of freedom of all elements, as `csr_from_elements` reads them;
+   !> degree of freedom a of node i is `n_dim*(i - 1) + a`.
+   pure subroutine element_lists(solid, n_dim, start, list)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: n_dim
+      integer, allocatable, intent(out) :: start(:), list(:)
+      integer :: e, i, a, k
+
+      allocate(start(solid%n_element + 1), list(n_dim*max_element_nodes*solid%n_element))
+      k = 0
+      do e = 1, solid%n_element
+         start(e) = k + 1
+         do i = 1, element_kinds(solid%kind(e))%n_node
+            do a = 1, n_dim
+               k = k + 1
+               list(k) = n_dim*(solid%node(i, e) - 1) + a
+            end do
+         end do
+      end do
+      start(solid%n_element + 1) = k + 1
+      list = list(:k)
+   end subroutine element_lists
+
+end module emcon_element_lists

@@ -1,0 +1,195 @@
+!> Whether what is given to a model fits it.
+module emcon_given_check
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use emcon_csr, only : csr_find, csr_t
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_given_force, only : given_count, given_force_t, given_t
+   use emcon_kinds, only : dp, wp
+   use emcon_scene, only : scene_t, where_text
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: given_check_force, given_check_mass, given_check_scene, given_name
+
+   !> Entries of an assembled mass are rounded by less than this part of what they are sums of.
+   real(dp), parameter :: noise = 64.0_dp*epsilon(1.0_dp)
+
+contains
+
+   !> "the given force NAME"
+   pure function given_name(force) result(text)
+      class(given_force_t), intent(in) :: force
+      character(len=:), allocatable :: text
+
+      text = "the given force"
+      if (allocated(force%name)) text = text // " " // force%name
+   end function given_name
+
+   !> The pattern of `force` is one over the freedoms of `n_node` nodes.
+   subroutine given_check_force(force, n_node, error)
+      class(given_force_t), intent(in) :: force
+      integer, intent(in) :: n_node
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_pattern(force%pattern, 2*n_node, given_name(force) // ": its pattern", &
+         "2 freedoms for each of " // to_text(n_node) // " nodes", error)
+   end subroutine given_check_force
+
+   !> `mass` is a matrix between `n_node` nodes that can be one: finite, symmetric, not negative.
+   subroutine given_check_mass(mass, scene, error)
+      type(csr_t), intent(in) :: mass
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, j, k
+
+      call check_pattern(mass, size(scene%x, 2), "the given mass", to_text(size(scene%x, 2)) // &
+         " nodes", error)
+      if (allocated(error)) return
+      if (.not. allocated(mass%value)) then
+         call raise(error, err_input, "the given mass has no values")
+      else if (size(mass%value) /= size(mass%column)) then
+         call raise(error, err_input, "the given mass has " // to_text(size(mass%value)) // &
+            " values for " // to_text(size(mass%column)) // " places")
+      end if
+      if (allocated(error)) return
+      do i = 1, mass%n_row
+         do k = mass%row_start(i) + 1, mass%row_start(i + 1)
+            j = mass%column(k) + 1
+            if (.not. ieee_is_finite(mass%value(k))) then
+               call refuse("is not finite")
+            else if (i == j .and. mass%value(k) < 0.0_dp) then
+               call refuse("is negative: " // to_text(real(mass%value(k), wp)))
+            else if (i /= j .and. abs(mass%value(k)) > bound(i, j)) then
+               call refuse("is larger than those between each node and itself allow: " // &
+                  to_text(real(mass%value(k), wp)))
+            else if (abs(mass%value(k) - entry(j, i)) > noise*bound(i, j)) then
+               call refuse("is not that of the other way round: " // &
+                  to_text(real(mass%value(k), wp)) // ", " // to_text(real(entry(j, i), wp)))
+            end if
+            if (allocated(error)) return
+         end do
+      end do
+
+   contains
+
+      pure real(dp) function entry(i, j)
+         integer, intent(in) :: i, j
+         integer :: k
+
+         entry = 0.0_dp
+         k = csr_find(mass, i, j)
+         if (k > 0) entry = mass%value(k)
+      end function entry
+
+      !> A matrix that is not negative has m_ij^2 <= m_ii m_jj.
+      pure real(dp) function bound(i, j)
+         integer, intent(in) :: i, j
+
+         bound = (1.0_dp + noise)*sqrt(max(0.0_dp, entry(i, i)))*sqrt(max(0.0_dp, entry(j, j)))
+      end function bound
+
+      subroutine refuse(text)
+         character(len=*), intent(in) :: text
+
+         call raise(error, err_input, "the given mass between nodes " // &
+            to_text(scene%node_label(i)) // " and " // to_text(scene%node_label(j)) // " " // text)
+      end subroutine refuse
+
+   end subroutine given_check_mass
+
+   !> A square matrix of `n` rows in the form that `csr_t` promises.
+   subroutine check_pattern(pattern, n, title, extent, error)
+      type(csr_t), intent(in) :: pattern
+      integer, intent(in) :: n
+      character(len=*), intent(in) :: title, extent
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, k
+
+      if (pattern%n_row /= n .or. pattern%n_col /= n) then
+         call raise(error, err_input, title // " has " // to_text(pattern%n_row) // " rows and " &
+            // to_text(pattern%n_col) // " columns, not those of " // extent)
+      else if (.not. (allocated(pattern%row_start) .and. allocated(pattern%column))) then
+         call raise(error, err_input, title // " has no rows")
+      else if (size(pattern%row_start) /= n + 1) then
+         call raise(error, err_input, title // " has " // to_text(size(pattern%row_start)) // &
+            " row starts, not " // to_text(n + 1))
+      else if (pattern%row_start(1) /= 0 .or. pattern%row_start(n + 1) /= size(pattern%column)) &
+         then
+         call raise(error, err_input, title // ": its row starts run from " // &
+            to_text(pattern%row_start(1)) // " to " // to_text(pattern%row_start(n + 1)) // &
+            ", not from 0 to " // to_text(size(pattern%column)))
+      end if
+      if (allocated(error)) return
+      do i = 1, n
+         if (pattern%row_start(i + 1) < pattern%row_start(i)) then
+            call raise(error, err_input, title // ": row " // to_text(i) // " ends before it begins")
+            return
+         end if
+      end do
+      do i = 1, n
+         do k = pattern%row_start(i) + 1, pattern%row_start(i + 1)
+            if (pattern%column(k) >= 0 .and. pattern%column(k) < n) then
+               if (k == pattern%row_start(i) + 1) cycle
+               if (pattern%column(k) > pattern%column(k - 1)) cycle
+            end if
+            call raise(error, err_input, title // ": column " // to_text(pattern%column(k)) // &
+               " in row " // to_text(i) // " is not in 0.." // to_text(n - 1) // &
+               " or not above the one before it")
+            return
+         end do
+      end do
+   end subroutine check_pattern
+
+   !> There is something to compute, and each node that the deck says is given has forces or mass.
+   subroutine given_check_scene(given, scene, error)
+      type(given_t), intent(in) :: given
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, n
+
+      if (all(given_count(given) == 0)) then
+         if (allocated(scene%given_node)) then
+            call raise(error, err_input, where_text(scene, scene%given_origin) // ": error: " // &
+               "*GIVEN FORCES: no forces were given; they come from a program that calls the " // &
+               "library, see docs/embedding.md")
+         else if (size(scene%element_kind) == 0) then
+            call raise(error, err_input, "there are no elements, and no forces were given")
+         end if
+      end if
+      if (allocated(error) .or. .not. allocated(scene%given_node)) return
+      do i = 1, size(scene%given_node)
+         n = scene%given_node(i)
+         if (has_row(given%mass, n)) cycle
+         if (has_force(n)) cycle
+         call raise(error, err_input, where_text(scene, scene%given_origin) // ": error: *GIVEN " &
+            // "FORCES names node " // to_text(scene%node_label(n)) // &
+            ", which has neither forces nor mass in what was given")
+         return
+      end do
+
+   contains
+
+      pure logical function has_force(node)
+         integer, intent(in) :: node
+         integer :: k
+
+         has_force = .false.
+         if (.not. allocated(given%force)) return
+         do k = 1, size(given%force)
+            associate (pattern => given%force(k)%force%pattern)
+               has_force = has_force .or. has_row(pattern, 2*node - 1) .or. has_row(pattern, 2*node)
+            end associate
+         end do
+      end function has_force
+
+   end subroutine given_check_scene
+
+   pure logical function has_row(matrix, i)
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: i
+
+      has_row = i <= matrix%n_row
+      if (has_row) has_row = matrix%row_start(i + 1) > matrix%row_start(i)
+   end function has_row
+
+end module emcon_given_check

@@ -1,0 +1,158 @@
+!> A potential V of the position of single nodes: gravity of a centre, a spring to a place, a soft
+!> wall. Its forces come from the function alone, as discrete gradients.
+module emcon_node_potential
+   use emcon_csr, only : csr_from_elements
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_given_force, only : given_failed, given_force_t, given_ok, given_outside
+   use emcon_kinds, only : dp, wp
+   use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
+      point_outside, point_response_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: node_potential_t, node_potential_init
+
+   type, extends(given_force_t) :: node_potential_t
+      integer, allocatable :: node(:)                !! (n)
+      class(point_function_t), allocatable :: potential  !! of x, y [L]: V [M L^2/T^2]
+      real(wp), allocatable, private :: x(:, :)      !! (2, n) reference positions [L]
+      real(wp), allocatable, private :: z(:, :), dz(:, :)   !! (2, n) [L]
+      type(point_response_t), private :: response
+   contains
+      procedure :: place
+      procedure :: respond
+   end type node_potential_t
+
+contains
+
+   !> The potential `potential`, called `name` in messages, on each of the nodes `node` of a model of
+   !> `n_node` nodes.
+   subroutine node_potential_init(self, name, node, n_node, potential, error)
+      type(node_potential_t), intent(out) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: node(:)                 !! 1..n_node, each once
+      integer, intent(in) :: n_node
+      class(point_function_t), intent(in) :: potential
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: slot(:)
+      integer :: i, n
+
+      n = size(node)
+      call check(name, node, n_node, potential, error)
+      if (allocated(error)) return
+      self%name = name
+      self%node = node
+      allocate(self%potential, source=potential)
+      allocate(self%x(2, n), self%z(2, n), self%dz(2, n), source=0.0_wp)
+      self%is_symmetric_at_end = .true.
+      call csr_from_elements(self%pattern, 2*n_node, [(2*i + 1, i = 0, n)], &
+         [(2*node(i) - 1, 2*node(i), i = 1, n)], slot, error)
+   end subroutine node_potential_init
+
+   subroutine check(name, node, n_node, potential, error)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: node(:), n_node
+      class(point_function_t), intent(in) :: potential
+      type(error_t), allocatable, intent(out) :: error
+      logical, allocatable :: is_in(:)
+      integer :: i
+
+      if (potential%n_variable /= 2) then
+         call refuse("is a function of " // to_text(potential%n_variable) // &
+            " variables, not of the 2 coordinates of a node")
+         return
+      end if
+      if (allocated(potential%weight)) then
+         if (size(potential%weight) /= 2 .or. .not. all(potential%weight > 0.0_wp)) then
+            call refuse("needs 2 weights above 0, or none")
+            return
+         end if
+      end if
+      allocate(is_in(n_node), source=.false.)
+      do i = 1, size(node)
+         if (node(i) < 1 .or. node(i) > n_node) then
+            call refuse("names node " // to_text(node(i)) // ", which is not in 1.." // &
+               to_text(n_node))
+         else if (is_in(node(i))) then
+            call refuse("names node " // to_text(node(i)) // " twice")
+         end if
+         if (allocated(error)) return
+         is_in(node(i)) = .true.
+      end do
+
+   contains
+
+      subroutine refuse(text)
+         character(len=*), intent(in) :: text
+
+         call raise(error, err_input, "the potential " // name // " " // text)
+      end subroutine refuse
+
+   end subroutine check
+
+   !> Take the reference positions of the nodes.
+   subroutine place(self, x)
+      class(node_potential_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+
+      self%x = x(:, self%node)
+   end subroutine place
+
+   !> As `given_force_t` has it.
+   subroutine respond(self, u0, du, is_end, wants_tangent, force, magnitude, energy, tangent, &
+      status)
+      class(node_potential_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      logical, intent(in) :: is_end, wants_tangent
+      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
+      real(wp), intent(out) :: energy
+      real(dp), intent(inout), contiguous :: tangent(:)
+      integer, intent(out) :: status
+      integer :: i, n
+
+      n = size(self%node)
+      do i = 1, n
+         self%z(:, i) = self%x(:, i) + u0(:, self%node(i))
+         self%dz(:, i) = du(:, self%node(i))
+      end do
+      if (is_end) then
+         self%z = self%z + self%dz
+         self%dz = 0.0_wp
+      end if
+      energy = 0.0_wp
+      call point_gradient(self%potential, self%z, self%dz, wants_tangent, self%response, status)
+      select case (status)
+      case (point_ok)
+         status = given_ok
+      case (point_outside)
+         status = given_outside
+         return
+      case (point_failed)
+         status = given_failed
+         self%reason = "its function failed"
+         return
+      end select
+      energy = sum(self%response%energy(:n))
+      do i = 1, n
+         force(:, self%node(i)) = self%response%gradient(:, i)
+         magnitude(:, self%node(i)) = abs(self%response%gradient(:, i))
+      end do
+      if (wants_tangent) call put_tangent(self, merge(2.0_wp, 1.0_wp, is_end), tangent)
+   end subroutine respond
+
+   !> `factor` times the tangents into the rows of the nodes.
+   subroutine put_tangent(self, factor, tangent)
+      class(node_potential_t), intent(in) :: self
+      real(wp), intent(in) :: factor
+      real(dp), intent(inout) :: tangent(:)
+      integer :: i, a, k
+
+      do i = 1, size(self%node)
+         do a = 1, 2
+            k = self%pattern%row_start(2*(self%node(i) - 1) + a)
+            tangent(k + 1:k + 2) = real(factor*self%response%tangent(a, :, i), dp)
+         end do
+      end do
+   end subroutine put_tangent
+
+end module emcon_node_potential
