@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _core
 from .errors import InputError, check
+from .given import reraise
 
 _flat = _core.emcon_flat
 
@@ -32,6 +33,8 @@ class Handle:
         self.n_changes = 0
         self.n_reports = 0
         self._is_busy = False
+        #: Functions of Python that the model calls; they live as long as it does.
+        self.given: list[Any] = []
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """`function(address, *arguments)` without its last result, the status.
@@ -47,10 +50,19 @@ class Handle:
             self._is_busy = True
             found = function(self.address, *arguments)
             values = found if isinstance(found, tuple) else (found,)
-            check(self.address, values[-1])
+            if values[-1]:
+                self._fail(values[-1])
         finally:
             self._is_busy = False
         return values[0] if len(values) == 2 else values[:-1]
+
+    def _fail(self, status: int) -> NoReturn:
+        """Raise what `status` stands for, or the exception of a given function behind it."""
+        try:
+            check(self.address, status)
+        except Exception as failure:  # noqa: BLE001  either that is raised, or its cause
+            reraise(self.given, failure)
+        raise RuntimeError("a call has failed without a status")
 
     def change(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """The same for calls after which evaluations no longer belong to the model."""
@@ -65,6 +77,7 @@ class Handle:
         self.n_changes += 1
         if address:
             _flat.close_model(address)
+        self.given = []
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a stepper cannot be copied or sent to another process; use save, or "

@@ -28,6 +28,8 @@ from .cards import (Block, Cards, Dof, Number, Numbering, Where, array_of, calle
                     text_lines, whole)
 from .deck_text import number, table, write_text
 from .errors import InputError, check
+from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_derivatives,
+                    reraise)
 from .steps import Step
 
 if TYPE_CHECKING:
@@ -36,10 +38,14 @@ if TYPE_CHECKING:
 
 _flat = _core.emcon_flat
 _source = _core.emcon_flat_source
+_given = _core.emcon_flat_given
 
 #: Nodes of an element, by kind.
 _CORNERS = {"CPE3": 3, "CPE4": 4}
 _LARGEST_TEXT = 2**31 - 1
+#: Strains at which the derivatives of a law are checked: of some size, and on no axis.
+_STRAINS = np.array([[0.03, -0.02, 0.01], [-0.01, 0.05, -0.04], [0.02, 0.01, 0.07],
+                     [-0.04, -0.03, 0.02], [0.11, 0.06, -0.09]])
 
 
 class Model(Cards):
@@ -62,10 +68,10 @@ class Model(Cards):
         self._steps: list[Step] = []
         self._overrides: dict[str, str] = {}
         self._lenient = False
-        # given from outside, for `_give`: by material; forces; the host's mass and forces
-        self._laws: dict[str, Any] = {}
-        self._potentials: list[Any] = []
-        self._host: Any = None
+        # given from outside, by `_give`
+        self._laws: dict[str, PointFunction] = {}
+        self._potentials: list[tuple[PointFunction, str | NDArray[np.int64] | None]] = []
+        self._hosts: list[tuple[Solid, Any]] = []
         if heading:
             self.heading(heading)
 
@@ -265,31 +271,41 @@ class Model(Cards):
                  elastic: Sequence[Number] | None = None,
                  neo_hooke: Sequence[Number] | None = None,
                  coupled_neo_hooke: Sequence[Number] | None = None,
-                 user: Sequence[Number] | None = None) -> Model:
+                 user: Sequence[Number] | None = None,
+                 law: PointFunction | None = None) -> Model:
         """`*MATERIAL` with one law; stresses in [M/(L T^2)].
 
         density             [M/L^3]; required in dynamic steps and for gravity
         elastic             (E, nu): St. Venant-Kirchhoff under NLGEOM, linear without
         neo_hooke           (C10, D1): C10 (J^(-2/3) tr C - 3) + (J - 1)^2/D1
         coupled_neo_hooke   (E, nu): mu/2 (tr C - 3) - mu ln J + lambda/2 ln^2 J
-        user                constants (k,) of a law that is given to the model
+        law                 a function of strains (n, 3), E11, E22, 2 E12 of Green and Lagrange (the
+                            small ones without NLGEOM), that returns energies per reference volume
+                            (n,), stresses (n, 3) and tangents (n, 3, 3), the first and second
+                            derivatives; checked here by differences, see `check_derivatives`
+        user                constants (k,) of `*USER MATERIAL`, for decks of other programs; the law
+                            does not see them
         """
-        laws = {"ELASTIC": elastic, "HYPERELASTIC, NEO HOOKE": neo_hooke,
-                "HYPERELASTIC, COUPLED NEO HOOKE": coupled_neo_hooke, "USER MATERIAL": user}
-        chosen = [(law, values) for law, values in laws.items() if values is not None]
+        if law is not None and user is None:
+            user = ()
+        kinds = {"ELASTIC": elastic, "HYPERELASTIC, NEO HOOKE": neo_hooke,
+                 "HYPERELASTIC, COUPLED NEO HOOKE": coupled_neo_hooke, "USER MATERIAL": user}
+        chosen = [(kind, values) for kind, values in kinds.items() if values is not None]
         if len(chosen) != 1:
             raise InputError(f"material {name} has one law, not {len(chosen)}")
-        law, values = chosen[0]
+        kind, values = chosen[0]
         constants = list(values)
-        if law != "USER MATERIAL" and len(constants) != 2:
-            raise InputError(f"material {name}: {law} has 2 constants, not {len(constants)}")
+        if kind != "USER MATERIAL" and len(constants) != 2:
+            raise InputError(f"material {name}: {kind} has 2 constants, not {len(constants)}")
         options: dict[str, object] = {}
-        if law == "ELASTIC":
+        if kind == "ELASTIC":
             options = {"TYPE": "ISO"}
-        elif law == "USER MATERIAL":
+        elif kind == "USER MATERIAL":
             options = {"CONSTANTS": len(constants)}
         text = card("MATERIAL", {"NAME": name})
-        text += card(law, options, [constants[k:k + 8] for k in range(0, len(constants), 8)])
+        text += card(kind, options, [constants[k:k + 8] for k in range(0, len(constants), 8)])
+        if law is not None:
+            self.give_law(name, law)
         self._add(text if density is None else text + card("DENSITY", rows=[(density,)]))
         return self
 
@@ -350,12 +366,47 @@ class Model(Cards):
             rows.append((*self._names(term[0], self._nodes, "*EQUATION"), *term[1:]))
         return self._card("EQUATION", rows=rows)
 
+    # --- what a deck cannot say --------------------------------------------------------------
+
+    def give_law(self, material: str, law: PointFunction) -> Model:
+        """The law of a `*USER MATERIAL`, as `law` of `material`, for the model of a deck."""
+        check_derivatives(law, _STRAINS)
+        self._laws[material] = law
+        return self
+
     def given_forces(self, nodes: str | None = None) -> Model:
-        """`*GIVEN FORCES`: nodes whose forces and mass another program gives.
+        """`*GIVEN FORCES`: nodes whose forces and mass another program gives; `host` does.
 
         nodes   node set; default the nodes that belong to no element
         """
         return self._card("GIVEN FORCES", {"NSET": nodes})
+
+    def host(self, solid: Solid, mass: Any = None, *, nodes: str | None = None) -> Model:
+        """Forces and mass of the solid of a host code, on nodes that need no elements.
+
+        solid   an object with a method respond(u0, du): see `emcon.given.Solid`; also other
+                forces between nodes
+        mass    (n, n) between nodes, or (2 n, 2 n), the same in both directions, over all nodes of
+                the model: a sparse matrix of scipy, a `Csr`, or an array [M]
+        nodes   node set; default the nodes that belong to no element
+        """
+        self._hosts.append((solid, mass))
+        return self.given_forces(nodes)
+
+    def potential(self, function: PointFunction, nodes: Where | None = None) -> Model:
+        """A potential of the present position of each of some nodes: V [M L^2/T^2].
+
+        function   of positions (n, 2) [L]; returns V (n,) and its first and second derivatives,
+                   (n, 2) and (n, 2, 2)
+        nodes      node set, or (k,) nodes; default all
+
+        Energies count it as `potential`; the discrete gradient made of it keeps the total.
+        """
+        where = None
+        if nodes is not None:
+            where = nodes if isinstance(nodes, str) else self._nodes.labels(nodes, "a potential")
+        self._potentials.append((function, where))
+        return self
 
     # --- steps -----------------------------------------------------------------------------
 
@@ -401,8 +452,21 @@ class Model(Cards):
         from .stepper import Stepper
         return Stepper(self)
 
-    def build(self, handle: int) -> None:
-        """Read the model into the new library model `handle`. Raises `InputError`."""
+    def build(self, handle: int) -> list[Any]:
+        """Read the model into the new library model `handle`, and build it.
+
+        Returns what has to live as long as the library's model. Raises `InputError`, and what
+        given functions raise.
+        """
+        given = self.read(handle)
+        try:
+            check(handle, _flat.build_model(handle))
+        except Exception as failure:  # noqa: BLE001  either that is raised, or its cause
+            reraise(given, failure)
+        return given
+
+    def read(self, handle: int) -> list[Any]:
+        """`build` without the building, for a state that is loaded instead."""
         blocks = self._all_blocks()
         text = "".join(block.text for block in blocks).encode(errors="surrogateescape")
         if len(text) > _LARGEST_TEXT:
@@ -415,11 +479,21 @@ class Model(Cards):
         overrides = "\n".join(f"{name}={value}" for name, value in self._overrides.items())
         check(handle, _source.read_text(handle, text, places.T, os.fsencode(names),
                                         overrides.encode(), int(self._lenient)))
-        self._give(handle)
-        check(handle, _flat.build_model(handle))
+        return self._give(handle)
 
-    def _give(self, handle: int) -> None:
+    def _give(self, handle: int) -> list[Any]:
         """Hand over what is given from outside, between reading and building."""
+        given: list[Any] = [GivenLaw(material, law) for material, law in self._laws.items()]
+        given += [GivenPotential(f"potential {k}", function, nodes)
+                  for k, (function, nodes) in enumerate(self._potentials, 1)]
+        if self._hosts:
+            n, ierr = _given.count_nodes(handle)
+            check(handle, ierr)
+            given += [GivenSolid(f"solid {k}", solid, mass, int(n))
+                      for k, (solid, mass) in enumerate(self._hosts, 1)]
+        for item in given:
+            item.give(handle)
+        return given
 
     def _all_blocks(self) -> list[Block]:
         blocks = list(self._blocks)

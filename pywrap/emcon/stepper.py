@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,11 +90,11 @@ class Stepper(Queries, Conditions):
                              "Model")
         self._begin(model.build)
 
-    def _begin(self, build: Callable[[int], None]) -> None:
-        """A library model, made by `build` of its handle."""
+    def _begin(self, build: Callable[[int], list[Any]]) -> None:
+        """A library model, made by `build` of its handle; it returns what has to live with it."""
         self._handle = Handle()
         try:
-            build(self._handle.address)
+            self._handle.given = build(self._handle.address)
             sizes = self._handle.call(_flat.model_size)
         except BaseException:
             self.close()
@@ -103,13 +103,16 @@ class Stepper(Queries, Conditions):
          self.n_pair) = (int(size) for size in sizes)
 
     @classmethod
-    def from_restart(cls, path: str | os.PathLike[str]) -> Stepper:
+    def from_restart(cls, path: str | os.PathLike[str], model: Model | None = None) -> Stepper:
         """The stepper that a restart file holds, of `write_restart` or of a run of the program.
 
-        It goes on to the same bits. Raises `OSError` for what is no such file.
+        It goes on to the same bits. `model` is needed where laws, potentials or a host's solid were
+        given to it: these are not in the file. Raises `OSError` for what is no such file.
         """
-        def build(address: int) -> None:
+        def build(address: int) -> list[Any]:
+            given = [] if model is None else model.read(address)
             check(address, _state.read_restart(address, os.fsencode(path)))
+            return given
 
         stepper = cls.__new__(cls)
         stepper._begin(build)
@@ -298,13 +301,18 @@ class Stepper(Queries, Conditions):
     @property
     def ledger(self) -> dict[str, float]:
         """`energies` and `momenta` together."""
-        names = ("kinetic", "strain", "external_work", "contact_work", "total", "px", "py", "lz")
+        names = ("kinetic", "strain", "potential", "external_work", "contact_work", "total",
+                 "px", "py", "lz")
         return dict(zip(names, map(float, self._handle.call(_state.get_ledger))))
 
     def energies(self) -> dict[str, float]:
-        """Energies and works: kinetic, strain, external_work, contact_work, total."""
-        return dict(list(self.ledger.items())[:5])
+        """Energies and works [M L^2/T^2]: kinetic, strain, potential, external_work, contact_work,
+        total.
+
+        `potential` is that of given forces; total = kinetic + strain + potential - external_work.
+        """
+        return dict(list(self.ledger.items())[:6])
 
     def momenta(self) -> dict[str, float]:
         """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`."""
-        return dict(list(self.ledger.items())[5:])
+        return dict(list(self.ledger.items())[6:])

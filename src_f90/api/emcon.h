@@ -141,6 +141,48 @@ void emcon_close(emcon_model *model);
  * with the model. */
 const char *emcon_message(emcon_model *model);
 
+/* ---- what is given between reading and building ---------------------------------------------- */
+
+/* A model can be given what a deck cannot say: laws, potentials, and the solid of a host code. The
+ * functions are called whenever the model is stepped or queried, in the thread that does so, and
+ * must live as long as the model. They return 0; 1 for a state at which there is no energy, as in
+ * an inverted element: the step is tried again in smaller parts; or anything else to make the call
+ * of the library fail. A function must not call the library with the model that calls it. */
+
+/* An energy at n_point points z of n_variable variables each, z[n_variable*point + variable]:
+ * `value` (n_point), `gradient` (n_point x n_variable), and unless it is NULL `hessian` (n_point x
+ * n_variable x n_variable). The library makes a discrete gradient of it, which keeps the energy. */
+typedef int (*emcon_point_function)(void *user, int n_point, int n_variable, const double *z,
+                                    int wants_hessian, double *value, double *gradient,
+                                    double *hessian);
+
+/* Forces of a step from displacements `u0` by `du`, both 2*n_node: `force` (2*n_node), the energy
+ * at the end, and unless it is NULL `tangent`, the derivative of the forces by u0 + du, in the
+ * slots of the pattern that was given. The energy is kept if force . du is its change. For du = 0
+ * the forces are the gradient of the energy, and the tangent of a discrete gradient is half its
+ * second derivative. `magnitude` (2*n_node), sums of |contributions| to the forces, tells what of
+ * them is round-off; left at 0, it is taken as |force|. */
+typedef int (*emcon_force_function)(void *user, int n_node, const double *u0, const double *du,
+                                    int wants_tangent, double *force, double *magnitude,
+                                    double *energy, double *tangent);
+
+/* The strain energy per reference volume of the *USER MATERIAL `name`, a function of the strains
+ * E11, E22, 2*E12. */
+int emcon_give_law(emcon_model *model, const char *name, emcon_point_function law, void *user);
+
+/* A potential of the present position of each of n nodes, numbers from 0. `name`, for messages, may
+ * be NULL. */
+int emcon_give_potential(emcon_model *model, const char *name, int n, const int *node,
+                         emcon_point_function potential, void *user);
+
+/* Forces between nodes: `pattern` (2*n_node x 2*n_node, its values are not looked at) tells which
+ * depend on which. Nodes of no element are part of the model where they stand in it. */
+int emcon_give_force(emcon_model *model, const char *name, const emcon_csr *pattern,
+                     emcon_force_function force, void *user);
+
+/* A mass beside that of the elements, n_node x n_node, the same in both directions. */
+int emcon_give_mass(emcon_model *model, const emcon_csr *mass);
+
 /* ---- the run of the deck --------------------------------------------------------------------- */
 
 /* One increment on the grid of the deck. An error after the last one. After a failed increment the

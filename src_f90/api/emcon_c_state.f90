@@ -58,7 +58,7 @@ contains
       associate (from => model%stepper%march%ledger)
          to%kinetic = real(from%kinetic, c_double)
          to%strain = real(from%strain, c_double)
-         to%potential = 0.0_c_double
+         to%potential = real(from%potential, c_double)
          to%external_work = real(from%external_work, c_double)
          to%contact_work = real(from%contact_work, c_double)
          to%total = real(from%total, c_double)

@@ -255,10 +255,10 @@ contains
       end associate
    end subroutine get_pairs
 
-   !> Kinetic and strain energy, external and contact work, total, px, py, lz.
+   !> Kinetic and strain energy, that of given forces, external and contact work, total, px, py, lz.
    subroutine get_ledger(handle, values, ierr)
       integer(c_int64_t), intent(in) :: handle
-      real(c_double), intent(out) :: values(8)
+      real(c_double), intent(out) :: values(9)
       integer(c_int), intent(out) :: ierr
       type(model_t), pointer :: model
 
@@ -268,10 +268,10 @@ contains
       if (.not. associated(model)) return
       ierr = err_none
       associate (ledger => model%stepper%march%ledger)
-         values(:5) = [real(ledger%kinetic, c_double), real(ledger%strain, c_double), &
-            real(ledger%external_work, c_double), real(ledger%contact_work, c_double), &
-            real(ledger%total, c_double)]
-         values(6:) = [real(ledger%momentum, c_double), real(ledger%angular, c_double)]
+         values(:6) = [real(ledger%kinetic, c_double), real(ledger%strain, c_double), &
+            real(ledger%potential, c_double), real(ledger%external_work, c_double), &
+            real(ledger%contact_work, c_double), real(ledger%total, c_double)]
+         values(7:) = [real(ledger%momentum, c_double), real(ledger%angular, c_double)]
       end associate
    end subroutine get_ledger
 

@@ -7,9 +7,8 @@ module emcon_stepper
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_given, only : given_count, given_t
    use emcon_given_check, only : given_check_scene
-   use emcon_given_force, only : given_count, given_t
-   use emcon_given_law, only : given_law_t
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_measure
@@ -29,14 +28,13 @@ module emcon_stepper
    type :: stepper_t
       type(scene_t) :: scene
       type(march_t) :: march
-      type(given_t) :: given                     !! forces and mass from outside
+      type(given_t) :: given                     !! laws, forces and mass from outside
       type(deck_source_t) :: source              !! the deck as read, for restart files
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.
       logical :: is_read = .false.               !! `scene` is complete
       type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
       type(notes_t) :: notes                     !! what was done before the first step
-      type(given_law_t), allocatable :: given_law(:)     !! by `stepper_give_law`
    end type stepper_t
 
 contains
@@ -141,7 +139,7 @@ contains
       if (allocated(error)) return
       call ties_move_nodes(self%scene, self%notes, error)    ! contact may have moved masters
       if (allocated(error)) return
-      call march_init(self%march, self%scene, error, self%given_law, self%given)
+      call march_init(self%march, self%scene, error, self%given)
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
       if (.not. allocated(error)) call notes_append(self%notes, self%march%system%notes)
@@ -327,8 +325,8 @@ contains
       if (allocated(error)) return
       if (any(n /= given_count(self%given))) call raise(error, err_input, &
          "the restart file is of a model with " // count_text(n) // ", not with " // &
-         count_text(given_count(self%given)) // ": they are not in the file, read the deck and " // &
-         "give them again before the restart file is loaded")
+         count_text(given_count(self%given)) // ": they are not in the file, read the deck " // &
+         "and give them again before the restart file is loaded")
 
    contains
 
@@ -336,7 +334,7 @@ contains
          integer, intent(in) :: n(2)
          character(len=:), allocatable :: text
 
-         text = to_text(n(1)) // " given forces and " // trim(adjustl(merge("   mass", "no mass", n(2) > 0)))
+         text = to_text(n(1)) // " given forces and " // to_text(n(2)) // " masses"
       end function count_text
 
    end subroutine check_given

@@ -64,7 +64,7 @@ contains
       call stepper_check_open(stepper, error)
       if (allocated(error)) return
       if (self%revision < 0) then
-         call march_init(self%march, stepper%scene, error, stepper%given_law, stepper%given)
+         call march_init(self%march, stepper%scene, error, stepper%given)
          if (allocated(error)) return
          allocate(self%contact, source=self%march%system%zero)
          self%revision = 0

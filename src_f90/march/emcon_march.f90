@@ -5,8 +5,7 @@ module emcon_march
    use emcon_active_set, only : active_set_init
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : err_analysis, err_input, error_t, raise
-   use emcon_given_force, only : given_t
-   use emcon_given_law, only : given_law_t
+   use emcon_given, only : given_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_parts, only : march_in_parts
@@ -45,15 +44,14 @@ module emcon_march
 contains
 
    !> Build the system of `scene`, and of what it is given, and put it into its initial state.
-   subroutine march_init(self, scene, error, given_law, given)
+   subroutine march_init(self, scene, error, given)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given_law(:)    !! as a program gives them
       type(given_t), intent(in), optional :: given
       integer :: n
 
-      call system_init(self%system, scene, error, given_law, given)
+      call system_init(self%system, scene, error, given)
       if (allocated(error)) return
       n = size(scene%x, 2)
       allocate(self%du(2, n), self%v1(2, n), self%offset(2, n), source=0.0_wp)

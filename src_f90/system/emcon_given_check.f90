@@ -3,7 +3,8 @@ module emcon_given_check
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given_force, only : given_count, given_force_t, given_t
+   use emcon_given, only : given_count, given_t
+   use emcon_given_force, only : given_force_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : to_text

@@ -6,15 +6,14 @@
 module emcon_given_force
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
+   use emcon_point_function, only : given_failed => point_failed, given_ok => point_ok, &
+      given_outside => point_outside
    implicit none
    private
-   public :: given_force_t, given_force_box_t, given_t, given_add_force, given_copy, &
-      given_count
-   public :: given_ok, given_outside, given_failed
-
+   public :: given_force_t, given_force_box_t
    !> How a response ended. Outside: there is none at these displacements, as for an inverted
    !> element; the step is cut. Failed: there is no use in going on.
-   integer, parameter :: given_ok = 0, given_outside = 1, given_failed = 2
+   public :: given_ok, given_outside, given_failed
 
    type, abstract :: given_force_t
       character(len=:), allocatable :: name      !! for messages
@@ -55,12 +54,6 @@ module emcon_given_force
       class(given_force_t), allocatable :: force
    end type given_force_box_t
 
-   !> All that a model is given: forces, and mass beside that of elements.
-   type :: given_t
-      type(given_force_box_t), allocatable :: force(:)
-      type(csr_t) :: mass                        !! (n_node x n_node) [M]; without rows: none
-   end type given_t
-
 contains
 
    !> Told once, before the first response: the reference positions `x` of the nodes, which ties and
@@ -69,46 +62,5 @@ contains
       class(given_force_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)        !! (2, n_node) [L]
    end subroutine place
-
-   !> Append a copy of `force`.
-   subroutine given_add_force(self, force)
-      type(given_t), intent(inout) :: self
-      class(given_force_t), intent(in) :: force
-      type(given_force_box_t), allocatable :: longer(:)
-      integer :: i, n
-
-      n = 0
-      if (allocated(self%force)) n = size(self%force)
-      allocate(longer(n + 1))
-      do i = 1, n
-         call move_alloc(self%force(i)%force, longer(i)%force)
-      end do
-      allocate(longer(n + 1)%force, source=force)
-      call move_alloc(longer, self%force)
-   end subroutine given_add_force
-
-   !> Number of forces, and of masses.
-   pure function given_count(self) result(n)
-      type(given_t), intent(in) :: self
-      integer :: n(2)
-
-      n = [0, merge(1, 0, self%mass%n_row > 0)]
-      if (allocated(self%force)) n(1) = size(self%force)
-   end function given_count
-
-   !> `copy` becomes independent of `self`.
-   subroutine given_copy(self, copy)
-      type(given_t), intent(in) :: self
-      type(given_t), intent(out) :: copy
-      integer :: i, n
-
-      n = 0
-      if (allocated(self%force)) n = size(self%force)
-      allocate(copy%force(n))
-      do i = 1, n
-         allocate(copy%force(i)%force, source=self%force(i)%force)
-      end do
-      copy%mass = self%mass
-   end subroutine given_copy
 
 end module emcon_given_force

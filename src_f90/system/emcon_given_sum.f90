@@ -3,8 +3,9 @@ module emcon_given_sum
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_from_entries, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_given, only : given_copy_forces, given_t
    use emcon_given_check, only : given_check_force, given_check_mass, given_name
-   use emcon_given_force, only : given_copy, given_failed, given_ok, given_outside, given_t
+   use emcon_given_force, only : given_failed, given_ok, given_outside
    use emcon_kinds, only : dp, wp
    use emcon_reduction, only : reduction_slot, reduction_t
    use emcon_scene, only : scene_t
@@ -43,7 +44,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: i, n
 
-      call given_copy(given, self%given)
+      call given_copy_forces(given, self%given)
       n = size(scene%x, 2)
       associate (force => self%given%force)
          self%is_any = size(force) > 0 .or. given%mass%n_row > 0

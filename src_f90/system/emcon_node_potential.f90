@@ -3,10 +3,9 @@
 module emcon_node_potential
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given_force, only : given_failed, given_force_t, given_ok, given_outside
+   use emcon_given_force, only : given_failed, given_force_t, given_ok
    use emcon_kinds, only : dp, wp
-   use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
-      point_outside, point_response_t
+   use emcon_point_function, only : point_function_t, point_gradient, point_response_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -121,17 +120,8 @@ contains
       end if
       energy = 0.0_wp
       call point_gradient(self%potential, self%z, self%dz, wants_tangent, self%response, status)
-      select case (status)
-      case (point_ok)
-         status = given_ok
-      case (point_outside)
-         status = given_outside
-         return
-      case (point_failed)
-         status = given_failed
-         self%reason = "its function failed"
-         return
-      end select
+      if (status == given_failed) self%reason = "its function failed"
+      if (status /= given_ok) return
       energy = sum(self%response%energy(:n))
       do i = 1, n
          force(:, self%node(i)) = self%response%gradient(:, i)

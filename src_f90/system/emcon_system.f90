@@ -10,8 +10,7 @@ module emcon_system
    use emcon_element_kinds, only : max_element_nodes
    use emcon_element_lists, only : element_lists
    use emcon_errors, only : err_analysis, err_input, error_t, raise
-   use emcon_given_force, only : given_t
-   use emcon_given_law, only : given_law_t
+   use emcon_given, only : given_t
    use emcon_given_sum, only : given_sum_add_tangent, given_sum_append, given_sum_init, &
       given_sum_is_symmetric, given_sum_links, given_sum_massless, given_sum_place, &
       given_sum_respond, given_sum_t, given_sum_tangent_times
@@ -84,17 +83,19 @@ module emcon_system
 contains
 
    !> What stays the same in all steps of `scene`, and of what the model is given beside it.
-   subroutine system_init(self, scene, error, given_law, given)
+   subroutine system_init(self, scene, error, given)
       type(system_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given_law(:)
       type(given_t), intent(in), optional :: given
       integer :: n
 
-      call solid_init(self%solid, scene, error, given_law)
-      if (allocated(error)) return
-      if (present(given)) call given_sum_init(self%given, given, scene, error)
+      if (present(given)) then
+         call solid_init(self%solid, scene, error, given%law)
+         if (.not. allocated(error)) call given_sum_init(self%given, given, scene, error)
+      else
+         call solid_init(self%solid, scene, error)
+      end if
       if (allocated(error)) return
       call mass_init(self%mass, self%solid, self%given, error)
       if (allocated(error)) return

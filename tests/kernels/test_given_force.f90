@@ -11,7 +11,7 @@ module test_given_force
    use emcon_scene, only : equation_t, formulation_mortar, formulation_nts, scene_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_is_done, &
       stepper_save, stepper_t
-   use emcon_stepper_forces, only : stepper_give_force, stepper_give_mass
+   use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
    use emcon_stepper_free, only : stepper_set_state
    use emcon_stepper_query, only : query_evaluate, query_free, query_residual, query_t
    use emcon_surface_edges, only : surface_edges

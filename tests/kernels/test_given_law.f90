@@ -504,7 +504,7 @@ contains
       call open_with(built, scene, law_linear, .true., error)
       if (allocated(error)) return
       call stepper_give_law(built, "RUBBER", elastic, refused)
-      call check_error(error, refused, err_input, "built already", "too late")
+      call check_error(error, refused, err_input, "before the model is built", "too late")
       call stepper_close(built)
    end subroutine test_bad_calls
 

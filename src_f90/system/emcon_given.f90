@@ -1,0 +1,81 @@
+!> What a model is given from outside between reading its deck and building it.
+module emcon_given
+   use emcon_csr, only : csr_t
+   use emcon_given_force, only : given_force_box_t, given_force_t
+   use emcon_given_law, only : given_law_t
+   use emcon_point_function, only : point_function_t
+   implicit none
+   private
+   public :: given_t, given_add_force, given_add_law, given_copy_forces, given_count
+
+   !> Laws by the names of materials, forces between nodes, and mass beside that of elements.
+   type :: given_t
+      type(given_law_t), allocatable :: law(:)
+      type(given_force_box_t), allocatable :: force(:)
+      type(csr_t) :: mass                        !! (n_node x n_node) [M]; without rows: none
+   end type given_t
+
+contains
+
+   !> Append a copy of `force`.
+   subroutine given_add_force(self, force)
+      type(given_t), intent(inout) :: self
+      class(given_force_t), intent(in) :: force
+      type(given_force_box_t), allocatable :: longer(:)
+      integer :: i, n
+
+      n = 0
+      if (allocated(self%force)) n = size(self%force)
+      allocate(longer(n + 1))
+      do i = 1, n
+         call move_alloc(self%force(i)%force, longer(i)%force)
+      end do
+      allocate(longer(n + 1)%force, source=force)
+      call move_alloc(longer, self%force)
+   end subroutine given_add_force
+
+   !> Number of forces, and of masses.
+   pure function given_count(self) result(n)
+      type(given_t), intent(in) :: self
+      integer :: n(2)
+
+      n = [0, merge(1, 0, self%mass%n_row > 0)]
+      if (allocated(self%force)) n(1) = size(self%force)
+   end function given_count
+
+   !> Append a copy of the strain energy of the material `name`.
+   subroutine given_add_law(self, name, energy)
+      type(given_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      class(point_function_t), intent(in) :: energy
+      type(given_law_t), allocatable :: longer(:)
+      integer :: i, n
+
+      n = 0
+      if (allocated(self%law)) n = size(self%law)
+      allocate(longer(n + 1))
+      do i = 1, n
+         longer(i)%material = self%law(i)%material
+         call move_alloc(self%law(i)%energy, longer(i)%energy)
+      end do
+      longer(n + 1)%material = name
+      allocate(longer(n + 1)%energy, source=energy)
+      call move_alloc(longer, self%law)
+   end subroutine given_add_law
+
+   !> Forces and mass of `self`, independent of it.
+   subroutine given_copy_forces(self, copy)
+      type(given_t), intent(in) :: self
+      type(given_t), intent(out) :: copy
+      integer :: i, n
+
+      n = 0
+      if (allocated(self%force)) n = size(self%force)
+      allocate(copy%force(n))
+      do i = 1, n
+         allocate(copy%force(i)%force, source=self%force(i)%force)
+      end do
+      copy%mass = self%mass
+   end subroutine given_copy_forces
+
+end module emcon_given
