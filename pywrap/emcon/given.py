@@ -44,13 +44,15 @@ class Outside(Exception):
 class Solid(Protocol):
     """A solid, or any other forces between nodes, of a host code."""
 
-    def respond(self, u0: Array, du: Array) -> tuple[ArrayLike, float, Any]:
+    def respond(self, u0: Array, du: Array,
+                wants_tangent: bool) -> tuple[ArrayLike, float, Any]:
         """Forces of the step from displacements `u0` by `du`, both (n, 2) and read-only [L].
 
         Returns forces (n, 2) [M L/T^2], the energy at the end, and the derivative of the forces by
         u0 + du, (2 n, 2 n), freedom a of node i being 2 i + a: a sparse matrix of scipy, a `Csr`,
-        or an array. Energy is kept if force . du = E(u0 + du) - E(u0). For du = 0 the forces are
-        the gradient of E.
+        or an array; None will do if `wants_tangent` is false. Energy is kept if force . du =
+        E(u0 + du) - E(u0). For du = 0 the forces are the gradient of E, and the tangent is that of
+        a step too: half the second derivative of E.
         """
         ...
 
@@ -191,8 +193,8 @@ class GivenSolid(_Given):
 
     def __init__(self, name: str, solid: Solid, mass: Any, n_node: int) -> None:
         if not callable(getattr(solid, "respond", None)):
-            raise InputError(f"{name}: an object with a method respond(u0, du) is needed, not "
-                             f"{solid!r}")
+            raise InputError(f"{name}: an object with a method respond(u0, du, wants_tangent) "
+                             f"is needed, not {solid!r}")
         super().__init__(name)
         self.solid = solid
         self.n_node = n_node
@@ -213,12 +215,12 @@ class GivenSolid(_Given):
         matrix = getattr(self.solid, "pattern", None)
         if matrix is None:
             rest = np.zeros((self.n_node, 2))
-            matrix = self.respond(rest, rest)[2]
+            matrix = self.respond(rest, rest, True)[2]
         return _symmetric_pattern(_as_csr(matrix, 2*self.n_node, f"{self.name}: the tangent"))
 
-    def respond(self, u0: Array, du: Array) -> tuple[Array, float, Any]:
+    def respond(self, u0: Array, du: Array, wants_tangent: bool) -> tuple[Array, float, Any]:
         """What the solid returns, with forces and energy of the right shape."""
-        result = self.solid.respond(u0, du)
+        result = self.solid.respond(u0, du, wants_tangent)
         if not isinstance(result, tuple) or len(result) != 3:
             raise InputError(f"{self.name}: respond is to return forces, energy and tangent, not "
                              f"{type(result).__name__}")
@@ -231,7 +233,7 @@ class GivenSolid(_Given):
         def deed() -> None:
             start, motion = _view(u0, n, 2), _view(du, n, 2)
             start.flags.writeable = motion.flags.writeable = False
-            forces, last, matrix = self.respond(start, motion)
+            forces, last, matrix = self.respond(start, motion, bool(wants_tangent))
             _view(force, n, 2)[:] = forces
             _view(energy, 1)[:] = last
             if wants_tangent:

@@ -384,7 +384,7 @@ class Model(Cards):
     def host(self, solid: Solid, mass: Any = None, *, nodes: str | None = None) -> Model:
         """Forces and mass of the solid of a host code, on nodes that need no elements.
 
-        solid   an object with a method respond(u0, du): see `emcon.given.Solid`; also other
+        solid   an object with a method respond(u0, du, wants_tangent): see `emcon.given.Solid`; also other
                 forces between nodes
         mass    (n, n) between nodes, or (2 n, 2 n), the same in both directions, over all nodes of
                 the model: a sparse matrix of scipy, a `Csr`, or an array [M]
