@@ -44,18 +44,22 @@ from .results import (Bodies, FieldFile, FieldSeries, HistoryFile, Pairs, Result
 if TYPE_CHECKING:
     from .animation import animate
     from .errors import AnalysisError, InputError
+    from .given import Outside, check_derivatives
+    from .interface import Interface
     from .model import Model
     from .stepper import Stepper
 
 __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries",
-           "HistoryFile", "InputError", "Model", "Pairs", "ResultError", "ResultPaths", "Results",
-           "Series", "Stepper", "__version__", "animate", "compare", "energy_drift", "locate",
-           "read_bodies", "read_history", "read_pairs"]
+           "HistoryFile", "InputError", "Interface", "Model", "Outside", "Pairs", "ResultError",
+           "ResultPaths", "Results", "Series", "Stepper", "__version__", "animate",
+           "check_derivatives", "compare", "energy_drift", "locate", "read_bodies", "read_history",
+           "read_pairs"]
 
 #: Names that are imported when first used: matplotlib takes half a second to load, and results are
 #: read without the compiled extension.
 _LATE = {"animate": ".animation", "AnalysisError": ".errors", "InputError": ".errors",
-         "Model": ".model", "Stepper": ".stepper"}
+         "Interface": ".interface", "Model": ".model", "Outside": ".given", "Stepper": ".stepper",
+         "check_derivatives": ".given"}
 
 
 def __getattr__(name: str) -> Any:

@@ -13,7 +13,7 @@ from .errors import InputError
 _MOST = np.iinfo(np.int32).max
 
 
-def real_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def real_array(value: ArrayLike | None, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Finite reals of the given shape, in C order; no copy of what is so already."""
     array = _array(value, name)
     if array.dtype.kind not in "fiu":
@@ -59,7 +59,7 @@ def positive(value: Any, name: str) -> float:
     return found
 
 
-def _array(value: ArrayLike, name: str) -> NDArray[Any]:
+def _array(value: ArrayLike | None, name: str) -> NDArray[Any]:
     try:
         return np.asarray(value)
     except (TypeError, ValueError) as error:

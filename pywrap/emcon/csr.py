@@ -71,7 +71,8 @@ def _product(rows: NDArray[Any], columns: NDArray[Any], data: NDArray[np.float64
     if x.dtype.kind not in "fiub" or x.ndim not in (1, 2) or x.shape[0] != n_col:
         raise InputError(f"a matrix with {n_col} columns cannot be multiplied with an array "
                          f"{x.shape} of {x.dtype}")
+    products = [np.bincount(rows, data*column[columns], minlength=n_row).astype(np.float64)
+                for column in np.atleast_2d(x.T)]
     if x.ndim == 1:
-        return np.bincount(rows, data*x[columns], minlength=n_row)
-    return np.stack([np.bincount(rows, data*column[columns], minlength=n_row)
-                     for column in x.T], axis=1) if x.shape[1] else np.zeros((n_row, 0))
+        return products[0]
+    return np.stack(products, axis=1) if products else np.zeros((n_row, 0))

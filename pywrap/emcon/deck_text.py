@@ -26,7 +26,7 @@ def number(value: float) -> str:
     return text[:-1] if text.endswith(".0") else text
 
 
-def table(*columns: NDArray[np.generic]) -> str:
+def table(*columns: NDArray[Any]) -> str:
     """Lines of the rows of two or more columns (n,), numbers as `number` writes them; n > 0.
 
     Whole numbers are not negative.

@@ -417,7 +417,9 @@ class Interface:
         """Values and gradients of the selected contacts."""
         n = self._call(_step.evaluate, *self._motion(u0, du))
         contact, values = self._call(_step.get_constraints, n)
-        return Constraints(contact, *values.T, self._matrix(_G), self._matrix(_C))
+        target, start, end, change, defect, edge = values.T
+        return Constraints(contact, target, start, end, change, defect, edge, self._matrix(_G),
+                           self._matrix(_C))
 
     @_exclusive()
     def curvature(self, lam: ArrayLike) -> Csr:

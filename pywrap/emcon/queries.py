@@ -122,8 +122,14 @@ class Queries:
     n_node: int
     n_constraint: int
     n_body: int
-    n_unknown: int
-    positions: NDArray[np.float64]
+
+    @property
+    def n_unknown(self) -> int:
+        raise NotImplementedError
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        raise NotImplementedError
 
     def guess(self, h: float) -> NDArray[np.float64]:
         """Displacements from which a step of size h would start to iterate, (n_node, 2) [L]."""
@@ -197,9 +203,12 @@ class Queries:
             u0, u1 = real_array(q0, "q0", shape) - x, real_array(q1, "q1", shape) - x
         u0, u1 = real_array(u0, "u0", shape), real_array(u1, "u1", shape)
         self._handle.n_reports += 1
-        place, values, *matrices = self._handle.change(_constraints, u0, u1, bool(keeps_gap))
-        return ConstraintReport(*place.T, *values.T, *matrices, self._handle,
-                                self._handle.n_reports, self.n_node)
+        place, values, gradient, jacobian = self._handle.change(_constraints, u0, u1,
+                                                                bool(keeps_gap))
+        numbers, pair, node = place.T
+        gap0, gap1, dgap, size = values.T
+        return ConstraintReport(numbers, pair, node, gap0, gap1, dgap, size, gradient, jacobian,
+                                self._handle, self._handle.n_reports, self.n_node)
 
     def body_momenta(self) -> NDArray[np.float64]:
         """px, py [M L/T] and lz about the origin [M L^2/T] of each body, (n_body, 3)."""
@@ -213,7 +222,7 @@ def contact_arguments(lam: ArrayLike | None, active: ArrayLike | None,
             _NO_FLAGS if active is None else flag_array(active, "active", (n,)))
 
 
-def _csr(address: int, number: int, sizes: NDArray[np.int32]) -> tuple[Csr | None, int]:
+def _csr(address: int, number: int, sizes: NDArray[np.int32]) -> tuple[Csr, int]:
     """Copy out the matrix that the library calls `number`."""
     n_row, n_col, n_entry = (int(n) for n in sizes)
     start, column, value, ierr = _query.get_csr(address, number, n_row, n_entry)

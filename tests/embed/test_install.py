@@ -100,7 +100,7 @@ def tree(tmp_path: Path) -> Path:
 def test_wheel_is_complete_and_for_this_interpreter(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     within = {name for name in names if name.startswith("emcon/")}
-    assert within == python_files(PACKAGE) | COMPILED | {"emcon/py.typed"}
+    assert within == python_files(PACKAGE) | COMPILED | {"emcon/py.typed", "emcon/_core.pyi"}
     assert {name.split("/")[0] for name in names} == {"emcon", f"emcon-{VERSION}.dist-info"}
     tag = f"cp{sys.version_info.major}{sys.version_info.minor}"
     platform = sysconfig.get_platform().replace("-", "_")
@@ -128,7 +128,7 @@ def test_nothing_slips_in_or_is_left(tree: Path, tmp_path: Path) -> None:
     (file,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(file) as archive:
         within = {name for name in archive.namelist() if name.startswith("emcon/")}
-        assert within == python_files(PACKAGE) | COMPILED | {"emcon/py.typed"}
+        assert within == python_files(PACKAGE) | COMPILED | {"emcon/py.typed", "emcon/_core.pyi"}
         assert all(archive.read(name) == b"made\n" for name in COMPILED)
     assert files(tree) == before | {"build/.lock"}
 
