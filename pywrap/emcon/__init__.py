@@ -8,6 +8,7 @@ Results of a run, read when asked for:
         ring.history["total"]                # (n_row), one row per increment
         u = ring.fields["displacement"]      # (n_frame, n_node, 3) [L]
         u[-1], u.at(2.5), u[:, 12]           # last frame, a time, a node over time
+    plot("ring")                             # ring.png
     animate("ring")                          # ring.gif
     print(compare("ring", "other/ring"))     # largest differences
 
@@ -47,25 +48,30 @@ if TYPE_CHECKING:
     from .given import Outside, check_derivatives
     from .interface import Interface
     from .model import Model
+    from .plotting import plot
     from .stepper import Stepper
 
 __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries",
            "HistoryFile", "InputError", "Interface", "Model", "Outside", "Pairs", "ResultError",
            "ResultPaths", "Results", "Series", "Stepper", "__version__", "animate",
-           "check_derivatives", "compare", "energy_drift", "locate", "read_bodies", "read_history",
-           "read_pairs"]
+           "check_derivatives", "compare", "energy_drift", "locate", "plot", "read_bodies",
+           "read_history", "read_pairs"]
 
 #: Names that are imported when first used: matplotlib takes half a second to load, and results are
 #: read without the compiled extension.
 _LATE = {"animate": ".animation", "AnalysisError": ".errors", "InputError": ".errors",
          "Interface": ".interface", "Model": ".model", "Outside": ".given", "Stepper": ".stepper",
-         "check_derivatives": ".given"}
+         "check_derivatives": ".given", "plot": ".plotting"}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _LATE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(_LATE[name], __name__), name)
+    try:
+        return getattr(importlib.import_module(_LATE[name], __name__), name)
+    except AttributeError as error:
+        raise ImportError(f"{error}: the compiled extension is not of this version of the "
+                          "package; make pywrap, or pip install ./pywrap, makes it anew") from error
 
 
 def _version() -> str:

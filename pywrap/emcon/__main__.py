@@ -75,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _plot(options: argparse.Namespace) -> None:
     # matplotlib takes half a second to load; the table does not need it
-    from .plot import write_picture
+    from .plotting import write_picture
 
     picture, notes = write_picture(locate(options.result), options.output, options.times)
     for note in notes:

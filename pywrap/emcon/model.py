@@ -43,6 +43,8 @@ _given = _core.emcon_flat_given
 #: Nodes of an element, by kind.
 _CORNERS = {"CPE3": 3, "CPE4": 4}
 _LARGEST_TEXT = 2**31 - 1
+#: The interaction of pairs that name none.
+_FRICTIONLESS = "FRICTIONLESS CONTACT"
 #: Strains at which the derivatives of a law are checked: of some size, and on no axis.
 _STRAINS = np.array([[0.03, -0.02, 0.01], [-0.01, 0.05, -0.04], [0.02, 0.01, 0.07],
                      [-0.04, -0.03, 0.02], [0.11, 0.06, -0.09]])
@@ -68,6 +70,7 @@ class Model(Cards):
         self._steps: list[Step] = []
         self._overrides: dict[str, str] = {}
         self._lenient = False
+        self._has_frictionless = False
         # given from outside, by `_give`
         self._laws: dict[str, PointFunction] = {}
         self._potentials: list[tuple[PointFunction, str | NDArray[np.int64] | None]] = []
@@ -333,13 +336,19 @@ class Model(Cards):
         self._add(text if friction is None else text + card("FRICTION", rows=[(friction,)]))
         return self
 
-    def contact_pair(self, slave: str, master: str, *, interaction: str,
+    def contact_pair(self, slave: str, master: str, *, interaction: str | None = None,
                      type: str = "NODE TO SURFACE", adjust: Number | None = None) -> Model:
         """`*CONTACT PAIR` of two surfaces, or of one with itself.
 
-        type     NODE TO SURFACE, SEGMENT or MORTAR
-        adjust   distance [L] up to which slave nodes are moved onto the master, or a node set
+        interaction   default one of its own, frictionless
+        type          NODE TO SURFACE, SEGMENT or MORTAR
+        adjust        distance [L] up to which slave nodes are moved onto the master, or a node set
         """
+        if interaction is None:
+            interaction = _FRICTIONLESS
+            if not self._has_frictionless:
+                self.interaction(interaction)
+                self._has_frictionless = True
         return self._card("CONTACT PAIR", {"INTERACTION": interaction, "TYPE": type,
                                            "ADJUST": adjust}, [(slave, master)])
 
@@ -420,7 +429,7 @@ class Model(Cards):
         h_min, h_max   bounds of the increment [T] where it is cut or grown
         direct         keep to h
         nlgeom         large displacements; stays on for later steps
-        increments     most increments of the step
+        increments     most increments of the step; default no limit
         amplitude      RAMP in static steps, STEP in dynamic ones: what holds anyway
         """
         options: dict[str, object] = {

@@ -24,6 +24,7 @@ __all__ = ["AnalysisError", "ConstraintReport", "Csr", "Evaluation", "Increment"
            "PairTotal", "Snapshot", "Stepper"]
 
 _flat = _core.emcon_flat
+_given = _core.emcon_flat_given
 _state = _core.emcon_flat_state
 
 #: Times that differ by less than this part are the same: sums of many steps are rounded.
@@ -202,6 +203,19 @@ class Stepper(Queries, Conditions):
 
     def _progress(self) -> tuple[float, NDArray[np.int32]]:
         return self._handle.call(_state.get_progress)
+
+    @property
+    def notes(self) -> list[str]:
+        """Warnings of the deck, and what was done before the first step: moved nodes and so on."""
+        count = int(self._handle.call(_flat.count_notes))
+        return [self._handle.call(_flat.get_note, i + 1).decode("utf-8", "replace").rstrip()
+                for i in range(count)]
+
+    def node_set(self, name: str) -> NDArray[np.intp]:
+        """The rows of a node set in arrays of nodes, (k,). Raises `InputError` if there is none."""
+        if not isinstance(name, str) or not name.strip():
+            raise InputError(f"a node set has a name, not {name!r}")
+        return np.flatnonzero(self._handle.call(_given.find_nodes, name.encode(), self.n_node)[1])
 
     # ---- state ------------------------------------------------------------------------------
 

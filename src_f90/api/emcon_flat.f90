@@ -17,7 +17,7 @@ module emcon_flat
    implicit none
    private
    public :: new_model, read_deck, build_model, close_model, last_error, model_size, get_positions
-   public :: law_kernel, nts_kernel
+   public :: count_notes, get_note, law_kernel, nts_kernel
 
 contains
 
@@ -105,6 +105,40 @@ contains
       x = real(model%stepper%scene%x, c_double)
       label = model%stepper%scene%node_label
    end subroutine get_positions
+
+   !> Remarks on the deck, and on what was done before the first step.
+   subroutine count_notes(handle, n, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      integer(c_int), intent(out) :: n
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+
+      n = 0
+      ierr = err_input
+      call handle_find(handle, model)
+      if (.not. associated(model)) return
+      ierr = err_none
+      n = size(model%stepper%diagnostic) + model%stepper%notes%n
+   end subroutine count_notes
+
+   !> Remark `i`, from 1.
+   subroutine get_note(handle, i, text, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      integer(c_int), intent(in) :: i
+      character(len=1024), intent(out) :: text
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+      integer :: n
+
+      text = " "
+      ierr = err_input
+      call handle_find(handle, model)
+      if (.not. associated(model)) return
+      ierr = err_none
+      n = size(model%stepper%diagnostic)
+      if (i <= n) text = model%stepper%diagnostic(i)%text
+      if (i > n) text = model%stepper%notes%item(i - n)%text
+   end subroutine get_note
 
    !> Response of a law (1 linear, 2 neo-Hooke, 3 coupled neo-Hooke) to a strain that goes from
    !> `strain` to `strain + dstrain`; components 11, 22, 2*12.

@@ -85,8 +85,8 @@ contains
             is_bare(scene%element_node(k, i)) = .false.
          end do
       end do
-      if (.not. any(is_bare) .or. all(is_bare)) return
       if (allocated(scene%given_node)) is_bare(scene%given_node) = .false.
+      if (.not. any(is_bare) .or. all(is_bare)) return
       call mark_coupled(scene, is_coupled)
       is_idle = is_bare .and. .not. any(is_coupled, 1)
       if (any(is_idle)) call add_warning(reader%log, scene%node_origin(first_true(is_idle)), &
@@ -102,6 +102,9 @@ contains
             is_loaded)
       end do
       call tell_bare(is_loaded .and. is_bare, "but is a slave node of *CONTACT PAIR")
+      is_bare = is_bare .and. .not. is_loaded
+      call mark_partners(scene, is_loaded)
+      call tell_bare(is_loaded .and. is_bare, "but is a node of a surface in *CONTACT PAIR or *TIE")
 
    contains
 
@@ -115,6 +118,24 @@ contains
       end subroutine tell_bare
 
    end subroutine check_nodes
+
+   !> Mark the nodes of all surfaces in ties, and of master surfaces in contact.
+   pure subroutine mark_partners(scene, is_in)
+      type(scene_t), intent(in) :: scene
+      logical, intent(inout) :: is_in(:)                         !! (n_node)
+      integer :: i
+
+      do i = 1, size(scene%pair)
+         if (scene%pair(i)%master > 0) call mark_nodes(scene, scene%surface(scene%pair(i)%master), &
+            is_in)
+      end do
+      do i = 1, size(scene%tie)
+         if (scene%tie(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%slave), &
+            is_in)
+         if (scene%tie(i)%master > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%master), &
+            is_in)
+      end do
+   end subroutine mark_partners
 
    !> The nodes on which a force acts in a direction that is not coupled.
    pure subroutine mark_loaded(scene, is_coupled, is_loaded)

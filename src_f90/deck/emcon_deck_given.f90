@@ -35,6 +35,8 @@ contains
       end do
    end subroutine read_given
 
+   !> The nodes of NSET, or those of no element: also where NSET is wrong, so that no other message
+   !> follows from that.
    subroutine find_nodes(reader, card, scene, list)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -44,18 +46,15 @@ contains
       logical :: is_bare(0:size(scene%node_label))
       integer :: e, i, k
 
-      allocate(list(0))
       if (has_option(card, "NSET")) then
          call need_name(reader, card, "NSET", name)
-         if (name == "") return
          k = find_set(scene%node_set, name)
          if (k > 0) then
             list = scene%node_set(k)%item
-         else if (.not. reader%doubt_names) then
-            call card_error(reader, card, "unknown node set " // quoted(name) &
-               // suggestion(name, set_names(scene%node_set)))
+            return
          end if
-         return
+         if (name /= "" .and. .not. reader%doubt_names) call card_error(reader, card, &
+            "unknown node set " // quoted(name) // suggestion(name, set_names(scene%node_set)))
       end if
       is_bare = .true.
       do e = 1, size(scene%element_label)
@@ -64,9 +63,9 @@ contains
          end do
       end do
       list = pack([(i, i = 1, size(scene%node_label))], is_bare(1:))
-      if (size(list) == 0 .and. .not. (reader%doubt_nodes .or. reader%doubt_elements)) &
-         call card_error(reader, card, "all nodes belong to elements; name those that are given " &
-         // "forces by NSET=")
+      if (size(list) == 0 .and. .not. (has_option(card, "NSET") .or. reader%doubt_nodes &
+         .or. reader%doubt_elements)) call card_error(reader, card, &
+         "all nodes belong to elements; name those that are given forces by NSET=")
    end subroutine find_nodes
 
 end module emcon_deck_given

@@ -1,7 +1,7 @@
 !> *SURFACE, and the faces that elements share.
 module emcon_deck_surfaces
-   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, get_name, &
-      is_blank, next_line
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
+      get_name, is_blank, next_line
    use emcon_deck_labels, only : find_label
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
@@ -96,8 +96,13 @@ contains
       if (allocated(surface%edge)) n_item = size(surface%edge, 2)
       if (n_item == 0 .and. reader%log%n_errors == n_before .and. .not. reader%doubt_names &
          .and. .not. reader%doubt_elements) then
-         call card_error(reader, card, "the surface has no " &
-            // trim(merge("node", "face", surface%is_nodal)))
+         if (surface%is_nodal) then
+            call card_error(reader, card, "the surface has no node")
+         else if (allocated(surface%edge)) then
+            call card_error(reader, card, "the surface has no edge")
+         else
+            call card_error(reader, card, "the surface has no face")
+         end if
       end if
    end subroutine read_surface
 

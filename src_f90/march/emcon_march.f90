@@ -289,7 +289,12 @@ contains
          end if
          stride = min(state%grid_stride, self%n_grid - state%n_grid)
          call cross_grid(self, scene, state%n_grid + stride, increment, error)
-         if (allocated(error)) return
+         if (allocated(error)) then
+            if (increment%done > 0.0_wp) call march_set_time(self, scene, state%step_time &
+               + increment%done)
+            call ledger_measure(self%ledger, self%system, scene%x, self%state)
+            return
+         end if
          state%n_grid = state%n_grid + stride
          state%increment = state%increment + 1
          state%step_time = grid_time(self, step, state%n_grid)

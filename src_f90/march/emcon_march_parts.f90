@@ -38,6 +38,7 @@ contains
          if (allocated(error)) return
          if (status == step_done) then
             place = place + 2**(self%n_level - level)
+            increment%done = scale(real(place, wp), -self%n_level)*increment%h
             if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
             cycle
          end if

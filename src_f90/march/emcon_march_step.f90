@@ -28,6 +28,7 @@ module emcon_march_step
    !> What one increment took.
    type :: increment_t
       real(wp) :: h = 0.0_wp
+      real(wp) :: done = 0.0_wp                  !! part of `h` that the state has gone on by
       integer :: n_newton = 0                    !! iterations, over all cuts and active sets
       integer :: n_cut = 0
       integer :: n_active = 0

@@ -29,7 +29,8 @@ module emcon_newton
    !> Corrections with an old factorisation at most, and the factor each has to gain.
    integer, parameter :: most_polish = 3
    real(wp), parameter :: polish_gain = 0.5_wp
-   !> A correction that inverts an element, or that a given force refuses, is halved so often at most.
+   !> A correction that inverts an element, or that a given force refuses, is halved so often at
+   !> most.
    integer, parameter :: most_halvings = 6
    !> A new best residual is at least this much smaller. After so many iterations without one the
    !> step has failed; after a few it has converged, if it is below this multiple of epsilon.

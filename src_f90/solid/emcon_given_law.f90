@@ -1,6 +1,6 @@
 !> Constitutive laws that a program gives: the strain energy as a function of the strain at a point.
 !>
-!> Source: docs/theory.md, section 3.
+!> Source: docs/theory.md, section 2 (functions given at points).
 module emcon_given_law
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp

@@ -123,7 +123,8 @@ contains
       if (allocated(error)) return
       do i = 1, n
          if (pattern%row_start(i + 1) < pattern%row_start(i)) then
-            call raise(error, err_input, title // ": row " // to_text(i) // " ends before it begins")
+            call raise(error, err_input, title // ": row " // to_text(i) // &
+               " ends before it begins")
             return
          end if
       end do

@@ -1,4 +1,6 @@
 !> What a model was given, joined: freedoms that it connects, its place in the matrix, its sum.
+!>
+!> Source: docs/theory.md, section 12.
 module emcon_given_sum
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_from_entries, csr_t
@@ -131,7 +133,7 @@ contains
    !> Append the freedoms that meet, two by two, to the lists of elements.
    pure subroutine given_sum_append(self, start, list)
       type(given_sum_t), intent(in) :: self
-      integer, allocatable, intent(inout) :: start(:), list(:)   !! as `csr_from_elements` reads them
+      integer, allocatable, intent(inout) :: start(:), list(:)   !! for `csr_from_elements`
       integer, allocatable :: pair(:, :)
       integer :: i, k, n
 

@@ -1,5 +1,7 @@
 !> A potential V of the position of single nodes: gravity of a centre, a spring to a place, a soft
 !> wall. Its forces come from the function alone, as discrete gradients.
+!>
+!> Source: docs/theory.md, sections 2 and 12.
 module emcon_node_potential
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_input, error_t, raise
@@ -24,8 +26,8 @@ module emcon_node_potential
 
 contains
 
-   !> The potential `potential`, called `name` in messages, on each of the nodes `node` of a model of
-   !> `n_node` nodes.
+   !> The potential `potential`, called `name` in messages, on each of the nodes `node` of a model
+   !> of `n_node` nodes.
    subroutine node_potential_init(self, name, node, n_node, potential, error)
       type(node_potential_t), intent(out) :: self
       character(len=*), intent(in) :: name

@@ -3,18 +3,15 @@
 !> It knows configurations and weights, not time stepping: a scheme asks for
 !> r = s M (b du - w v0) + f_int - f_ext and its tangent.
 module emcon_system
-   use emcon_bodies, only : bodies_find
    use emcon_contact, only : contact_box_t
    use emcon_contact_registry, only : new_contact
-   use emcon_csr, only : csr_from_elements, csr_t
-   use emcon_element_kinds, only : max_element_nodes
-   use emcon_element_lists, only : element_lists
+   use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_given, only : given_t
-   use emcon_given_sum, only : given_sum_add_tangent, given_sum_append, given_sum_init, &
-      given_sum_is_symmetric, given_sum_links, given_sum_massless, given_sum_place, &
-      given_sum_respond, given_sum_t, given_sum_tangent_times
+   use emcon_given_sum, only : given_sum_add_tangent, given_sum_init, given_sum_is_symmetric, &
+      given_sum_massless, given_sum_place, given_sum_respond, given_sum_t, given_sum_tangent_times
    use emcon_kinds, only : dp, wp
+   use emcon_layout, only : layout_bodies, layout_pattern
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
    use emcon_mass, only : mass_init, mass_place
@@ -104,7 +101,8 @@ contains
       call linear_rows_init(self%linear, scene)
       call init_contact(self, scene, error)
       if (allocated(error)) return
-      call find_bodies(self, scene)
+      call layout_bodies(self%solid, self%given, scene%equation, self%body, self%n_body, &
+         self%is_alive)
       n = self%solid%n_node
       allocate(self%response%force(2, n), self%response%magnitude(2, n), source=0.0_wp)
       allocate(self%response%rounding(2, n), source=0.0_wp)
@@ -113,49 +111,6 @@ contains
       allocate(self%residual(2, n), self%magnitude(2, n), source=0.0_wp)
       allocate(self%u_work(2, n), self%f_work(2, n), self%zero(2, n), source=0.0_wp)
    end subroutine system_init
-
-   !> Bodies, and which freedoms are part of the model.
-   subroutine find_bodies(self, scene)
-      type(system_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      integer, allocatable :: node(:, :), link(:, :)
-      integer :: i, k
-
-      allocate(node, source=self%solid%node)
-      if (self%given%is_any) then
-         call given_sum_links(self%given, link)
-         k = size(node, 2)
-         node = reshape(node, [max_element_nodes, k + size(link, 2)], pad=[0])
-         node(:2, k + 1:) = link
-      end if
-      call bodies_find(node, self%solid%n_node, self%body, self%n_body)
-      allocate(self%is_alive(2, self%solid%n_node))
-      self%is_alive = spread(self%body > 0, 1, 2)
-      if (self%given%is_any) call keep_alive(self)
-      do i = 1, size(scene%equation)
-         associate (equation => scene%equation(i))
-            do k = 1, size(equation%node)
-               self%is_alive(equation%dof(k), equation%node(k)) = .true.
-            end do
-         end associate
-      end do
-   end subroutine find_bodies
-
-   !> Of nodes without element only those freedoms that are given something.
-   pure subroutine keep_alive(self)
-      type(system_t), intent(inout) :: self
-      integer :: i, e
-
-      do i = 1, size(self%is_alive, 2)
-         self%is_alive(:, i) = self%given%joined%row_start(2*i:2*i + 1) &
-            > self%given%joined%row_start(2*i - 1:2*i)
-      end do
-      do e = 1, self%solid%n_element
-         do i = 1, max_element_nodes
-            if (self%solid%node(i, e) > 0) self%is_alive(:, self%solid%node(i, e)) = .true.
-         end do
-      end do
-   end subroutine keep_alive
 
    !> The contact pairs and the numbers of their constraints, after the linear ones.
    subroutine init_contact(self, scene, error)
@@ -240,8 +195,6 @@ contains
       logical, intent(out) :: is_too_full
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: full
-      integer, allocatable :: start(:), list(:), number(:)
-      integer :: n
 
       if (self%is_reduced .and. self%linear%n > 0) then
          self%numbering = self%linked
@@ -249,35 +202,12 @@ contains
          call numbering_init(self%numbering, self%is_alive, &
             scene%step(self%i_step)%prescribed)
       end if
-      call element_lists(self%solid, 2, start, list)
-      n = sum((start(2:) - start(:size(start) - 1))**2)
-      if (self%given%is_any) call given_sum_append(self%given, start, list)
-      call append_bare_freedoms(self, start, list)
-      allocate(number, source=freedom_numbers(self%numbering))
-      list = number(list)
-      call csr_from_elements(full, self%numbering%n_unknown + self%numbering%n_dependent, start, &
-         list, self%slot, error)
+      call layout_pattern(self%solid, self%given, self%is_alive, self%numbering, full, self%slot, &
+         error)
       if (allocated(error)) return
-      if (self%given%is_any) self%slot = self%slot(:n)
       call reduction_init(self%reduction, self%numbering, full, self%matrix, self%slot, &
          is_too_full)
    end subroutine number_and_lay_out
-
-   !> Freedoms that stand in no list so far, as lists of one each.
-   pure subroutine append_bare_freedoms(self, start, list)
-      type(system_t), intent(in) :: self
-      integer, allocatable, intent(inout) :: start(:), list(:)
-      integer, allocatable :: bare(:)
-      logical, allocatable :: is_bare(:)
-      integer :: i, n
-
-      is_bare = reshape(self%is_alive, [size(self%is_alive)])
-      is_bare(list) = .false.
-      bare = pack([(i, i = 1, size(is_bare))], is_bare)
-      n = size(list)
-      list = [list, bare]
-      start = [start, [(n + 1 + i, i = 1, size(bare))]]
-   end subroutine append_bare_freedoms
 
    !> Residual of the step from `u0`, `v0` to `u0 + du` without contact forces, and with
    !> `with_tangent` the tangent. `refusal` or `failure` is allocated where there is none.

@@ -33,6 +33,10 @@ static void without_model(void)
    TELL(emcon_read("none.inp", NULL, 0, NULL));
    TELL(emcon_read_text("*NODE", "none.inp", NULL, 0, NULL));
    TELL(emcon_load("none.h5", NULL));
+   TELL(emcon_give_law(m, "M", NULL, NULL));
+   TELL(emcon_give_potential(m, NULL, 1, i, NULL, NULL));
+   TELL(emcon_give_force(m, NULL, NULL, NULL, NULL));
+   TELL(emcon_give_mass(m, NULL));
    TELL(emcon_build(m));
    TELL(emcon_advance(m, NULL));
    TELL(emcon_is_done(m) - 1 + EMCON_ERROR_INPUT);

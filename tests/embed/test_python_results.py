@@ -234,7 +234,7 @@ def test_plot_writes_a_picture_beside_the_result(run: Path,
 
 
 def test_plot_shows_the_frames_nearest_to_the_times(run: Path) -> None:
-    from emcon.plot import draw
+    from emcon.plotting import draw
 
     figure, notes = draw(locate(run), [0.1, 0.9, 1.1, 2.0])
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
@@ -244,7 +244,7 @@ def test_plot_shows_the_frames_nearest_to_the_times(run: Path) -> None:
 
 
 def test_plot_force_is_the_sum_over_the_slave_nodes(run: Path) -> None:
-    from emcon.plot import draw
+    from emcon.plotting import draw
 
     figure, _ = draw(locate(run))
     line = next(line for line in figure.axes[-1].lines if len(line.get_ydata()) == len(TIMES))
@@ -252,7 +252,7 @@ def test_plot_force_is_the_sum_over_the_slave_nodes(run: Path) -> None:
 
 
 def test_views_share_one_scale_and_hold_the_moving_body(run: Path) -> None:
-    from emcon.plot import draw
+    from emcon.plotting import draw
 
     figure, _ = draw(locate(run))
     scenes = [axes for axes in figure.axes if axes.get_title()]

@@ -197,7 +197,7 @@ contains
          hessian(:, :, i) = 0.0_wp
          if (.not. self%is_harmonic) hessian(:, :, i) = -3.0_wp*self%k/r**5 &
             *spread(z(:, i), 2, 2)*spread(z(:, i), 1, 2)
-         do a = 1, 2
+         do a = 1, size(z, 1)
             hessian(a, a, i) = hessian(a, a, i) + merge(self%k, self%k/r**3, self%is_harmonic)
          end do
       end do

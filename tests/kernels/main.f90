@@ -21,6 +21,8 @@ program main
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
    use test_gauss, only : collect_gauss
+   use test_given_check, only : collect_given_check
+   use test_given_deck, only : collect_given_deck
    use test_given_force, only : collect_given_force
    use test_given_law, only : collect_given_law
    use test_hermite_gap, only : collect_hermite_gap
@@ -37,6 +39,7 @@ program main
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
    use test_newton, only : collect_newton
+   use test_node_potential, only : collect_node_potential
    use test_nts, only : collect_nts
    use test_nts_gap, only : collect_nts_gap
    use test_null_space, only : collect_null_space
@@ -108,7 +111,10 @@ program main
    call run("nts", collect_nts)
    call run("interface", collect_interface)
    call run("joints", collect_joints)
+   call run("given_check", collect_given_check)
+   call run("given_deck", collect_given_deck)
    call run("given_force", collect_given_force)
+   call run("node_potential", collect_node_potential)
    call run("hermite_gap", collect_hermite_gap)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar", collect_mortar)

@@ -200,13 +200,23 @@ def _add_panels(figure: Figure) -> list[Axes]:
                              PANEL_HEIGHT/total)) for k in range(3)]
 
 
-def write_picture(paths: ResultPaths, output: Path | None = None,
-                  times: Sequence[float] | None = None) -> tuple[Path, list[str]]:
-    """Draw the run and write the picture (`output`, default NAME.png); returns it and the notes.
+def plot(result: str | os.PathLike[str], output: str | os.PathLike[str] | None = None,
+         times: Sequence[float] | None = None) -> Path:
+    """Draw a run: bodies at some times, energies, drift, contact force; returns the picture's path.
+
+    result   base name of the run, or any one of its files
+    output   file to write, its suffix tells the format; default NAME.png
+    times    of the bodies that are shown [T]
 
     Raises `ResultError` for a result that cannot be drawn or a format that is not known, `OSError`
     where the file cannot be written.
     """
+    return write_picture(locate(result), None if output is None else Path(output), times)[0]
+
+
+def write_picture(paths: ResultPaths, output: Path | None = None,
+                  times: Sequence[float] | None = None) -> tuple[Path, list[str]]:
+    """As `plot`; returns the path and notes on what is missing or left out."""
     output = paths.picture if output is None else output
     kind = output.suffix[1:].lower()
     known = sorted(Figure().canvas.get_supported_filetypes())

@@ -1,0 +1,201 @@
+"""The examples of docs/python.md, run in order; `python tests/embed/python_doc.py --write` puts
+what they print, and their pictures, into the page anew.
+
+A chapter is one namespace and one folder, with `input_decks` beside it and `emcon` on the path. A
+python block whose first line is `# name.py` is a file: all chapters find it, and it is run as a
+script where it stands. A text block right after a python block is what that prints; `text varies`
+says that it is not the same each time. Pictures of the page are files that its examples leave.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import itertools
+import json
+import linecache
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT/"docs"/"python.md"
+#: Of one chapter [s].
+LONGEST = 300
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block; lines of the page count from 0, `last` is that of its closing fence."""
+
+    language: str
+    text: str
+    first: int
+    last: int
+    chapter: str
+
+
+@dataclass(frozen=True)
+class Example:
+    """Python and what it prints; None where the page does not show that."""
+
+    code: Block
+    output: Block | None
+
+    @property
+    def file(self) -> str | None:
+        """The name of the script that the block is."""
+        name = re.match(r"# (\w+\.py)\n", self.code.text)
+        return name[1] if name else None
+
+    @property
+    def varies(self) -> bool:
+        return self.output is not None and self.output.language == "text varies"
+
+
+def blocks(lines: list[str]) -> list[Block]:
+    """All fenced blocks of a page."""
+    found: list[Block] = []
+    chapter, start = "", None
+    for k, line in enumerate(lines):
+        if start is None and line.startswith("## "):
+            chapter = line[3:].strip()
+        if not line.startswith("```"):
+            continue
+        if start is None:
+            start = k
+        else:
+            found.append(Block(lines[start][3:].strip(), "".join(lines[start + 1:k]), start, k,
+                               chapter))
+            start = None
+    return found
+
+
+def examples(page: str) -> dict[str, list[Example]]:
+    """The examples of each chapter, in order."""
+    lines = page.splitlines(keepends=True)
+    found: dict[str, list[Example]] = {}
+    all_blocks = blocks(lines)
+    for block, after in zip(all_blocks, [*all_blocks[1:], None]):
+        if block.language != "python":
+            continue
+        shows = (after is not None and after.language.startswith("text")
+                 and not "".join(lines[block.last + 1:after.first]).strip())
+        found.setdefault(block.chapter, []).append(Example(block, after if shows else None))
+    return found
+
+
+def pictures(page: str) -> dict[str, str]:
+    """Names of the pictures of the page, and the chapters that they stand in."""
+    return {name: chapter.partition("\n")[0].strip()
+            for chapter in re.split(r"^## ", page, flags=re.MULTILINE)
+            for name in re.findall(r"!\[[^\]]*\]\((\w+\.png)\)", chapter)}
+
+
+# --- running -----------------------------------------------------------------------------------
+
+def run_chapter(page: str, title: str, folder: Path) -> list[str]:
+    """What each example of a chapter prints. Raises `AssertionError` where one fails."""
+    chapters = examples(page)
+    chapter = chapters[title]
+    for example in itertools.chain(*chapters.values()):
+        if example.file:
+            (folder/example.file).write_text(example.code.text, encoding="utf-8")
+    (folder/"input_decks").symlink_to(ROOT/"input_decks")
+    path = os.pathsep.join([str(ROOT/"build"/"release"), os.environ.get("PATH", "")])
+    env = os.environ | {"PYTHONPATH": str(ROOT/"pywrap"), "PATH": path, "MPLBACKEND": "agg"}
+    work = json.dumps([(example.code.text, example.file) for example in chapter])
+    done = subprocess.run([sys.executable, str(Path(__file__).resolve()), "--run"], cwd=folder,
+                          env=env, input=work, capture_output=True, text=True, timeout=LONGEST)
+    assert done.returncode == 0, done.stderr
+    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    printed: list[str] = answer["printed"]
+    if answer["failed"]:
+        block = chapter[len(printed)].code
+        raise AssertionError(f"docs/python.md, block at line {block.first + 1}: {answer['failed']}")
+    return printed
+
+
+def run_blocks() -> None:
+    """In a process of its own: run the code that standard input holds, answer on the output."""
+    printed: list[str] = []
+    failed = ""
+    namespace: dict[str, Any] = {"__name__": "__doc_example__"}
+    sys.path[0] = os.getcwd()
+    for k, (text, file) in enumerate(json.load(sys.stdin)):
+        out = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(out):
+                if file is None:
+                    name = "example.py"
+                    linecache.cache[name] = (len(text), None, text.splitlines(True), name)
+                    exec(compile(text, name, "exec"), namespace)
+                else:
+                    out.write(run_script(file))
+        except BaseException:
+            failed = f"block {k + 1} of the chapter\n{out.getvalue()}{traceback.format_exc()}"
+            break
+        printed.append(out.getvalue())
+    print("\n" + json.dumps({"printed": printed, "failed": failed}))
+
+
+def run_script(name: str) -> str:
+    done = subprocess.run([sys.executable, name], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{name} ends with {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def tidy(text: str) -> str:
+    """Without blanks at line ends and empty lines at the end: what is compared."""
+    return "".join(line.rstrip() + "\n" for line in text.rstrip().splitlines())
+
+
+# --- writing the page --------------------------------------------------------------------------
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Run the examples of docs/python.md.")
+    parser.add_argument("--write", action="store_true",
+                        help="put outputs and pictures into the page anew")
+    parser.add_argument("--only", metavar="TEXT", default="",
+                        help="only chapters with TEXT in the title")
+    parser.add_argument("--run", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.run:
+        run_blocks()
+        return
+    page = PAGE.read_text(encoding="utf-8")
+    lines = page.splitlines(keepends=True)
+    changes: list[tuple[Block, str]] = []
+    for title, chapter in examples(page).items():
+        if options.only.lower() not in title.lower():
+            continue
+        start = time.perf_counter()
+        with tempfile.TemporaryDirectory() as folder:
+            printed = run_chapter(page, title, Path(folder))
+            for name, place in pictures(page).items():
+                if options.write and place == title:
+                    (PAGE.parent/name).write_bytes((Path(folder)/name).read_bytes())
+        print(f"{time.perf_counter() - start:6.1f} s  {title}")
+        for example, text in zip(chapter, printed):
+            if example.output is None:
+                print(text, end="")
+            elif tidy(text) != example.output.text:
+                changes.append((example.output, tidy(text)))
+    for block, text in reversed(changes):
+        print(f"line {block.first + 1}:\n{text}", end="")
+        lines[block.first + 1:block.last] = [text]
+    if options.write:
+        PAGE.write_text("".join(lines), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
