@@ -33,22 +33,20 @@ Units are those of the deck, any consistent set: length [L], mass [M], time [T].
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .comparison import Comparison, Difference, compare
-from .results import (Bodies, FieldFile, FieldSeries, HistoryFile, Pairs, ResultError, ResultPaths,
-                      Results, Series, energy_drift, locate, read_bodies, read_history, read_pairs)
-
 if TYPE_CHECKING:
     from .animation import animate
+    from .comparison import Comparison, Difference, compare
     from .errors import AnalysisError, InputError
     from .given import Outside, check_derivatives
     from .interface import Interface
     from .model import Model
     from .plotting import plot
+    from .results import (Bodies, FieldFile, FieldSeries, HistoryFile, Pairs, ResultError,
+                          ResultPaths, Results, Series, energy_drift, locate, read_bodies,
+                          read_history, read_pairs)
     from .stepper import Stepper
 
 __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries",
@@ -57,29 +55,45 @@ __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "
            "check_derivatives", "compare", "energy_drift", "locate", "plot", "read_bodies",
            "read_history", "read_pairs"]
 
-#: Names that are imported when first used: matplotlib takes half a second to load, and results are
-#: read without the compiled extension.
-_LATE = {"animate": ".animation", "AnalysisError": ".errors", "InputError": ".errors",
-         "Interface": ".interface", "Model": ".model", "Outside": ".given", "Stepper": ".stepper",
-         "check_derivatives": ".given", "plot": ".plotting"}
+#: The names of the package by module, imported when first used: matplotlib and HDF5 take long to
+#: load, and results are read without the compiled extension.
+_PLACES = {
+    "animation": "animate",
+    "comparison": "Comparison Difference compare",
+    "errors": "AnalysisError InputError",
+    "given": "Outside check_derivatives",
+    "interface": "Interface",
+    "model": "Model",
+    "plotting": "plot",
+    "results": "Bodies FieldFile FieldSeries HistoryFile Pairs ResultError ResultPaths Results "
+               "Series energy_drift locate read_bodies read_history read_pairs",
+    "stepper": "Stepper",
+}
+_LATE = {name: module for module, names in _PLACES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LATE:
+    if name == "__version__":
+        found: Any = _version()
+    elif name not in _LATE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    try:
-        return getattr(importlib.import_module(_LATE[name], __name__), name)
-    except AttributeError as error:
-        raise ImportError(f"{error}: the compiled extension is not of this version of the "
-                          "package; make pywrap, or pip install ./pywrap, makes it anew") from error
+    else:
+        try:
+            found = getattr(importlib.import_module(f".{_LATE[name]}", __name__), name)
+        except AttributeError as error:
+            raise ImportError(f"{error}: the compiled extension is not of this version of the "
+                              "package; make pywrap, or pip install ./pywrap, makes it anew"
+                              ) from error
+    globals()[name] = found
+    return found
 
 
 def _version() -> str:
     """The version in `pyproject.toml`: beside the package in the source tree, else as installed."""
+    import importlib.metadata
+    import tomllib
     project = Path(__file__).parents[1]/"pyproject.toml"
     if project.is_file():
         return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
     return importlib.metadata.version("emcon")
 
-
-__version__ = _version()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -38,12 +39,20 @@ def flag_array(value: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[n
 def labels(value: ArrayLike, name: str) -> NDArray[np.int32]:
     """Whole numbers, one or a list of them, (n,)."""
     array = np.atleast_1d(_array(value, name))
-    if array.dtype.kind not in "iu" or array.ndim > 1:
+    if array.dtype.kind not in "iu" and array.size or array.ndim > 1:
         raise InputError(f"{name} is to be a whole number or a list of such, not "
                          f"{array.ndim}-dimensional {array.dtype}")
     if array.size and (array.min() < 0 or array.max() > _MOST):
         raise InputError(f"{name} is out of range: 0 to {_MOST}")
     return np.ascontiguousarray(array, dtype=np.int32)
+
+
+def path_bytes(path: str | os.PathLike[str]) -> bytes:
+    """The name of a file."""
+    name = os.fsencode(path)
+    if not name or b"\0" in name:
+        raise InputError(f"{path!r} is not the name of a file")
+    return name
 
 
 def number(value: Any, name: str) -> float:
@@ -60,6 +69,8 @@ def positive(value: Any, name: str) -> float:
 
 
 def _array(value: ArrayLike | None, name: str) -> NDArray[Any]:
+    if np.ma.is_masked(value):
+        raise InputError(f"{name} has masked entries")
     try:
         return np.asarray(value)
     except (TypeError, ValueError) as error:

@@ -277,7 +277,9 @@ def field_of(name: object, what: str) -> str:
 
 
 def array_of(values: ArrayLike | None, what: str) -> NDArray[Any]:
-    """Any array; `InputError` for lists of unlike lengths."""
+    """Any array; `InputError` for lists of unlike lengths, and for masked entries."""
+    if np.ma.is_masked(values):
+        raise InputError(f"{what} has masked entries")
     try:
         return np.asarray(values)
     except ValueError as fault:

@@ -57,6 +57,8 @@ class Conditions:
             label, place, value = np.broadcast_arrays(label, place, value)
         except ValueError as error:
             raise InputError("labels, places and values are to be of the same number") from error
+        if not label.size:
+            raise InputError("no node or element is named")
         self._handle.change(_conditions.set_loads, kind, label, place, value)
 
     def prescribe(self, node: int, dof: int, value: float) -> None:

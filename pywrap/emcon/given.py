@@ -1,15 +1,20 @@
 """What Python gives to a model: laws, potentials, the solid of a host code.
 
-The library calls them through function pointers of C, whichever thread it works in. An exception
-cannot pass through it: it is kept, the call of the library fails, and the exception is raised
-again where the `Stepper` was called.
+The library calls them through function pointers of C, in the thread that called the `Stepper`. An
+exception cannot pass through it: it is kept, the call of the library fails, and the exception is
+raised again where the `Stepper` was called. Arrays that a function gets are copies of its own.
 """
 
 from __future__ import annotations
 
 import ctypes
+import signal
+import threading
 from collections.abc import Callable
-from typing import Any, NoReturn, Protocol
+from functools import cached_property
+from typing import Any, Protocol
+from warnings import warn
+from weakref import WeakMethod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from .csr import Csr
 from .errors import InputError, check
+from .given_matrices import as_csr, check_csr, fitting, is_sparse, keys_of, symmetric_pattern
 
 _flat = _core.emcon_flat_given
 
@@ -26,6 +32,14 @@ Array = NDArray[np.float64]
 PointFunction = Callable[[Array], tuple[ArrayLike, ArrayLike, ArrayLike]]
 
 _OK, _OUTSIDE, _FAILED = 0, 1, 2
+_REAL = np.dtype(float).str
+
+#: Strains at which the derivatives of a law are checked: of some size, and on no axis.
+_STRAINS = np.array([[0.03, -0.02, 0.01], [-0.01, 0.05, -0.04], [0.02, 0.01, 0.07],
+                     [-0.04, -0.03, 0.02], [0.11, 0.06, -0.09]])
+
+#: What makes small ones of them, as in bodies that are about to touch.
+_SMALL = 1e-6
 
 _INT, _POINTER = ctypes.c_int, ctypes.c_void_p
 _POINT = ctypes.CFUNCTYPE(_INT, _POINTER, _INT, _INT, _POINTER, _INT, _POINTER, _POINTER,
@@ -46,51 +60,67 @@ class Solid(Protocol):
 
     def respond(self, u0: Array, du: Array,
                 wants_tangent: bool) -> tuple[ArrayLike, float, Any]:
-        """Forces of the step from displacements `u0` by `du`, both (n, 2) and read-only [L].
+        """Forces of the step from displacements `u0` by `du`, both (n, 2) [L].
 
         Returns forces (n, 2) [M L/T^2], the energy at the end, and the derivative of the forces by
         u0 + du, (2 n, 2 n), freedom a of node i being 2 i + a: a sparse matrix of scipy, a `Csr`,
-        or an array; None will do if `wants_tangent` is false. Energy is kept if force . du =
+        or an array; None will do if `wants_tangent` is false. Nodes that meet in it at rest are
+        those that may meet later; an attribute `pattern`, a matrix with all entries that may come,
+        goes before. Energy is kept if force . du =
         E(u0 + du) - E(u0). For du = 0 the forces are the gradient of E, and the tangent is that of
         a step too: half the second derivative of E.
         """
         ...
 
 
+class _Memory:
+    """Reals of the library, as numpy finds them: no copy, and no type made for each size."""
+
+    def __init__(self, address: int, shape: tuple[int, ...]) -> None:
+        self.__array_interface__ = {"version": 3, "typestr": _REAL, "data": (address, False),
+                                    "shape": shape}
+
+
 def _view(address: int, *shape: int) -> Array:
-    """The array of the library at `address`, no copy."""
-    count = int(np.prod(shape))
-    return np.frombuffer((ctypes.c_double*count).from_address(address)).reshape(shape)
+    """The array of the library at `address`; not to be used after the call."""
+    return np.asarray(_Memory(address, shape))
 
 
-def _fitting(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
-    """What a given function has returned, as an array of the shape that is needed."""
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise InputError(f"{what}: no array can be made of it: {error}") from error
-    if array.dtype.kind not in "fiu":
-        raise InputError(f"{what} is of dtype {array.dtype}, not real numbers")
-    if array.shape != shape:
-        raise InputError(f"{what} has the shape {array.shape}, not {shape}")
-    return array
+def _check_three(result: Any, name: str, what: str) -> None:
+    """A given function has returned three things."""
+    if not isinstance(result, (tuple, list)):
+        raise InputError(f"{name}: its function is to return {what}, not "
+                         f"{type(result).__name__}")
+    if len(result) != 3:
+        raise InputError(f"{name}: its function is to return {what}, three things, not "
+                         f"{len(result)}")
 
 
 class _Given:
     """A function behind a pointer. It must live as long as the models that were given it."""
 
+    kind: Any = None           #: of the pointer
+
     def __init__(self, name: str) -> None:
         self.name = name
+        #: What the function has raised in the call of the library that is under way.
         self.exception: BaseException | None = None
-        self.pointer: Any = None
+        # a weak one: what is given goes when its model goes, without the garbage collector
+        call: Callable[[], Any] = WeakMethod(self._call)
+        self.pointer = self.kind(lambda *arguments: call()(*arguments))
 
     def give(self, handle: int) -> None:
         """Give the function to the library model `handle`, which was read and not yet built."""
         raise NotImplementedError
 
+    def _call(self, *arguments: Any, **none: Any) -> int:
+        """What the library calls."""
+        raise NotImplementedError
+
     @property
     def address(self) -> int:
-        return int(ctypes.cast(self.pointer, _POINTER).value or 0)
+        # ctypes.cast would make the pointer keep itself
+        return int(_POINTER.from_buffer(self.pointer).value or 0)
 
     def guarded(self, deed: Callable[[], None]) -> int:
         """The status of a deed; its exception is kept."""
@@ -103,22 +133,17 @@ class _Given:
             return _FAILED
         return _OK
 
-    def take_exception(self) -> BaseException | None:
-        """The exception of the last call, once."""
-        exception, self.exception = self.exception, None
-        return exception
-
 
 class GivenPoints(_Given):
     """An energy at points, of `variables` variables each."""
 
+    kind = _POINT
+
     def __init__(self, name: str, function: PointFunction, variables: int) -> None:
-        if not callable(function):
-            raise InputError(f"{name}: a function is needed, not {function!r}")
+        check_function(name, function)
         super().__init__(name)
         self.function = function
         self.variables = variables
-        self.pointer = _POINT(self._call)
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array, Array]:
         """Energies (n,), gradients (n, m) and second derivatives (n, m, m) at `points` (n, m).
@@ -127,24 +152,20 @@ class GivenPoints(_Given):
         """
         z = np.asarray(points, dtype=float)
         result = self.function(z)
-        if not isinstance(result, tuple) or len(result) != 3:
-            raise InputError(f"{self.name}: the function is to return energies, gradients and "
-                             f"second derivatives, not {type(result).__name__}")
+        _check_three(result, self.name, "energies, gradients and second derivatives")
         n, m = len(z), self.variables
-        return (_fitting(result[0], f"{self.name}: the energy", (n,)),
-                _fitting(result[1], f"{self.name}: the gradient", (n, m)),
-                _fitting(result[2], f"{self.name}: the second derivative", (n, m, m)))
+        return (fitting(result[0], f"{self.name}: the energy", (n,)),
+                fitting(result[1], f"{self.name}: the gradient", (n, m)),
+                fitting(result[2], f"{self.name}: the second derivative", (n, m, m)))
 
     def _call(self, user: int, n: int, m: int, z: int, wants_hessian: int, value: int,
               gradient: int, hessian: int) -> int:
         def deed() -> None:
-            points = _view(z, n, m)
-            points.flags.writeable = False
-            energy, first, second = self.evaluate(points)
-            _view(value, n)[:] = energy
+            energy, first, second = self.evaluate(_view(z, n, m).copy())
             _view(gradient, n, m)[:] = first
             if wants_hessian:
                 _view(hessian, n, m, m)[:] = second
+            _view(value, n)[:] = energy
         return self.guarded(deed)
 
 
@@ -174,6 +195,8 @@ class GivenPotential(GivenPoints):
     def _indices(self, handle: int) -> NDArray[np.int64]:
         n = _status_last(handle, _flat.count_nodes(handle))[0]
         name = self.nodes if isinstance(self.nodes, str) else ""
+        if isinstance(self.nodes, str) and not name.strip():
+            raise InputError(f"{self.name}: {name!r} is not the name of a node set")
         label, is_in = _status_last(handle, _flat.find_nodes(handle, name.encode(), n))
         if self.nodes is None:
             return np.arange(n)
@@ -185,87 +208,157 @@ class GivenPotential(GivenPoints):
         if np.any(label[found] != self.nodes):
             missing = np.asarray(self.nodes)[label[found] != self.nodes][0]
             raise InputError(f"{self.name}: there is no node {missing}")
+        if len(np.unique(found)) < len(found):
+            twice = np.sort(label[found])
+            raise InputError(f"{self.name} names node {twice[:-1][np.diff(twice) == 0][0]} twice")
         return found
 
 
 class GivenSolid(_Given):
-    """The solid of a host, with the pattern of its tangent, and its mass."""
+    """The solid of a host, with the pattern of its tangent."""
 
-    def __init__(self, name: str, solid: Solid, mass: Any, n_node: int) -> None:
-        if not callable(getattr(solid, "respond", None)):
-            raise InputError(f"{name}: an object with a method respond(u0, du, wants_tangent) "
-                             f"is needed, not {solid!r}")
+    kind = _FORCE
+
+    def __init__(self, name: str, solid: Solid, n_node: int) -> None:
+        check_solid(name, solid)
         super().__init__(name)
         self.solid = solid
         self.n_node = n_node
-        self.mass = None if mass is None else given_mass(mass, n_node)
         self.pattern = self._first_pattern()
-        self.pointer = _FORCE(self._call)
+        #: Pattern of the last tangent that was not sorted like `pattern`, and its places there.
+        self._foreign: tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None = None
 
     def give(self, handle: int) -> None:
-        pattern = self.pattern
-        check(handle, _flat.give_force(handle, self.name.encode(), pattern.indptr, pattern.indices,
-                                       self.address))
-        if self.mass is not None:
-            check(handle, _flat.give_mass(handle, self.mass.indptr, self.mass.indices,
-                                          self.mass.data))
+        check(handle, _flat.give_force(handle, self.name.encode(), self.pattern.indptr,
+                                       self.pattern.indices, self.address))
 
     def _first_pattern(self) -> Csr:
-        """Which freedoms depend on which: `solid.pattern`, or as in the tangent at rest."""
-        matrix = getattr(self.solid, "pattern", None)
-        if matrix is None:
-            rest = np.zeros((self.n_node, 2))
-            matrix = self.respond(rest, rest, True)[2]
-        return _symmetric_pattern(_as_csr(matrix, 2*self.n_node, f"{self.name}: the tangent"))
+        """Which freedoms depend on which: `solid.pattern`, or those of nodes that meet at rest.
 
-    def respond(self, u0: Array, du: Array, wants_tangent: bool) -> tuple[Array, float, Any]:
+        There a spring along an axis has no entries across it.
+        """
+        n = 2*self.n_node
+        matrix = getattr(self.solid, "pattern", None)
+        if matrix is not None:
+            pattern = as_csr(matrix, n, f"{self.name}: its pattern")
+            check_csr(pattern, f"{self.name}: its pattern")
+            return symmetric_pattern(n, *np.divmod(keys_of(pattern), n))
+        matrix = self.respond(np.zeros((self.n_node, 2)), np.zeros((self.n_node, 2)), True)[2]
+        tangent = as_csr(matrix, n, f"{self.name}: the tangent")
+        check_csr(tangent, f"{self.name}: the tangent")
+        node = [part//2 for part in np.divmod(keys_of(tangent), n)]
+        row, column = (np.concatenate([2*node[k] + part[k] for part in np.ndindex(2, 2)])
+                       for k in (0, 1))
+        return symmetric_pattern(n, row, column)
+
+    def respond(self, u0: Array, du: Array, wants_tangent: bool) -> tuple[Array, Array, Any]:
         """What the solid returns, with forces and energy of the right shape."""
         result = self.solid.respond(u0, du, wants_tangent)
-        if not isinstance(result, tuple) or len(result) != 3:
-            raise InputError(f"{self.name}: respond is to return forces, energy and tangent, not "
-                             f"{type(result).__name__}")
-        energy = _fitting(result[1], f"{self.name}: the energy", ())
-        return (_fitting(result[0], f"{self.name}: the force", (self.n_node, 2)), float(energy),
-                result[2])
+        _check_three(result, self.name, "forces, energy and tangent")
+        return (fitting(result[0], f"{self.name}: the force", (self.n_node, 2)),
+                fitting(result[1], f"{self.name}: the energy", ()), result[2])
 
     def _call(self, user: int, n: int, u0: int, du: int, wants_tangent: int, force: int,
               magnitude: int, energy: int, tangent: int) -> int:
         def deed() -> None:
-            start, motion = _view(u0, n, 2), _view(du, n, 2)
-            start.flags.writeable = motion.flags.writeable = False
-            forces, last, matrix = self.respond(start, motion, bool(wants_tangent))
+            forces, last, matrix = self.respond(_view(u0, n, 2).copy(), _view(du, n, 2).copy(),
+                                                bool(wants_tangent))
             _view(force, n, 2)[:] = forces
-            _view(energy, 1)[:] = last
             if wants_tangent:
-                csr = _as_csr(matrix, 2*n, f"{self.name}: the tangent")
-                _view(tangent, len(self.pattern.data))[:] = self._in_pattern(csr)
+                self._put(matrix, _view(tangent, len(self.pattern.indices)))
+            _view(energy, 1)[0] = last
         return self.guarded(deed)
 
-    def _in_pattern(self, matrix: Csr) -> Array:
-        """The entries of `matrix` in the slots of the pattern."""
-        pattern = self.pattern
-        if (np.array_equal(matrix.indptr, pattern.indptr)
-                and np.array_equal(matrix.indices, pattern.indices)):
-            return matrix.data
-        keys, slots = _keys(matrix), _keys(pattern)
-        place = np.minimum(np.searchsorted(slots, keys), len(slots) - 1)
-        if len(keys) and not np.array_equal(slots[place], keys):
-            row, column = divmod(int(keys[slots[place] != keys][0]), matrix.shape[1])
-            raise InputError(f"{self.name}: the tangent has an entry ({row}, {column}) that it did "
-                             "not have at rest; give the solid an attribute `pattern` with all")
-        data = np.zeros(len(slots))
-        data[place] = matrix.data
-        return data
+    def _put(self, matrix: Any, slots: Array) -> None:
+        """Put the entries of a tangent into the slots of the pattern."""
+        pattern, n, what = self.pattern, 2*self.n_node, f"{self.name}: the tangent"
+        if not is_sparse(matrix):
+            dense = fitting(matrix, what, (n, n))
+            if len(slots) == n*n:
+                slots.reshape(n, n)[:] = dense
+                return
+            row, column = np.nonzero(dense)
+            self._find(row*n + column, n)
+            slots[:] = dense[pattern.rows, pattern.indices]
+            return
+        csr = as_csr(matrix, n, what)
+        if _same_pattern(csr, pattern.indptr, pattern.indices):
+            slots[:] = csr.data
+            return
+        if self._foreign is None or not _same_pattern(csr, *self._foreign[:2]):
+            check_csr(csr, what)
+            place = self._find(keys_of(csr), n)
+            self._foreign = csr.indptr.copy(), csr.indices.copy(), place
+        slots[:] = 0.0
+        slots[self._foreign[2]] = csr.data
+
+    def _find(self, keys: NDArray[np.int64], n: int) -> NDArray[np.intp]:
+        """Places of entries in the pattern."""
+        place = np.searchsorted(self._slots, keys)
+        known = self._slots[np.minimum(place, len(self._slots) - 1)] if len(self._slots) else keys
+        missing = keys[(known != keys) | (place == len(self._slots))]
+        if len(missing):
+            row, column = divmod(int(missing[0]), n)
+            raise InputError(f"{self.name}: the tangent has an entry ({row}, {column}) that is not "
+                             "in its pattern, that of the nodes that meet at rest; give the solid "
+                             "an attribute `pattern`, a matrix with all entries that may come")
+        return place
+
+    @cached_property
+    def _slots(self) -> NDArray[np.int64]:
+        return keys_of(self.pattern)
 
 
-def reraise(given: list[Any], failure: Exception) -> NoReturn:
-    """Raise what a given function has raised in place of the library's `failure`, or that."""
-    for item in given:
-        exception = item.take_exception()
-        if exception is not None:
-            exception.add_note(f"{item.name}: {failure}")
-            raise exception
-    raise failure
+def check_function(name: str, function: Any) -> None:
+    if not callable(function):
+        raise InputError(f"{name}: a function is needed, not {function!r}")
+
+
+def check_solid(name: str, solid: Any) -> None:
+    if not callable(getattr(solid, "respond", None)):
+        raise InputError(f"{name}: an object with a method respond(u0, du, wants_tangent) is "
+                         f"needed, not {solid!r}")
+
+
+def _same_pattern(matrix: Csr, start: NDArray[Any], column: NDArray[Any]) -> bool:
+    return np.array_equal(matrix.indptr, start) and np.array_equal(matrix.indices, column)
+
+
+def uninterrupted(function: Callable[..., Any], *arguments: Any) -> Any:
+    """`function(*arguments)`; Ctrl-C takes effect after it, a second one at once.
+
+    It would be raised where the library calls back, outside of any `try`, and be lost.
+    """
+    handler: Any = signal.getsignal(signal.SIGINT)
+    if not callable(handler) or threading.current_thread() is not threading.main_thread():
+        return function(*arguments)
+    came: list[int] = []
+
+    def keep(number: int, frame: Any) -> None:
+        came.append(number)
+        if len(came) > 1:
+            handler(number, frame)
+
+    try:
+        signal.signal(signal.SIGINT, keep)
+        return function(*arguments)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if came:
+            handler(signal.SIGINT, None)
+
+
+def raise_kept(given: list[Any], status: int, failure: Callable[[], str]) -> None:
+    """Raise what a given function has raised in the call, with the library's text as a note."""
+    raised = [(item.name, item.exception) for item in given if item.exception is not None]
+    if not raised:
+        return
+    name, exception = raised[0]
+    try:
+        exception.add_note(f"{name}: {failure()}" if status else f"raised by {name}")
+        raise exception
+    finally:
+        del raised, exception      # its traceback has this frame
 
 
 def _status_last(handle: int, found: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -273,64 +366,28 @@ def _status_last(handle: int, found: tuple[Any, ...]) -> tuple[Any, ...]:
     return found[:-1]
 
 
-def given_mass(matrix: Any, n_node: int) -> Csr:
-    """A mass matrix (n, n) between nodes, or (2 n, 2 n) that is the same in both directions.
+def check_law(material: str, law: PointFunction) -> None:
+    """`check_derivatives` of a strain energy, at small strains where it has no values at others.
 
-    Raises `InputError` for one that couples the directions, or differs between them.
+    Warns of one whose small values are differences of large ones.
     """
-    n = getattr(matrix, "shape", np.shape(matrix))[0]
-    if n == n_node:
-        return _as_csr(matrix, n_node, "the mass")
-    full = _as_csr(matrix, 2*n_node, "the mass")
-    row, column = np.divmod(_keys(full), 2*n_node)
-    along, across = [(row % 2 == a) & (column % 2 == a) for a in (0, 1)]
-    least = np.finfo(float).eps*np.abs(full.data).max(initial=0.0)
-    if np.any(np.abs(full.data[~(along | across)]) > least):
-        raise InputError("the mass couples the two directions; one of nodes is needed")
-    halves = [_sorted_csr(n_node, row[part]//2, column[part]//2, full.data[part])
-              for part in (along, across)]
-    if (not np.array_equal(_keys(halves[0]), _keys(halves[1]))
-            or np.any(np.abs(halves[0].data - halves[1].data) > 8*least)):
-        raise InputError("the mass is not the same in both directions; one of nodes is needed")
-    return halves[0]
-
-
-def _as_csr(matrix: Any, n: int, what: str) -> Csr:
-    """A matrix (n, n) of scipy, as a `Csr`, or as an array, with sorted columns."""
-    if not isinstance(matrix, Csr) and not hasattr(matrix, "tocsr"):
-        dense = _fitting(matrix, what, (n, n))
-        return Csr((n, n), np.arange(0, n*n + 1, n, dtype=np.int32),
-                   np.tile(np.arange(n, dtype=np.int32), n), np.ravel(dense).astype(float))
-    if matrix.shape != (n, n):
-        raise InputError(f"{what} has the shape {matrix.shape}, not {(n, n)}")
-    if isinstance(matrix, Csr):
-        return matrix
-    matrix = matrix.tocsr()
-    if not matrix.has_canonical_format:
-        matrix = matrix.copy()
-        matrix.sum_duplicates()
-    return Csr((n, n), np.asarray(matrix.indptr, dtype=np.int32),
-               np.asarray(matrix.indices, dtype=np.int32),
-               _fitting(matrix.data, what, (len(matrix.indices),)).astype(float))
-
-
-def _keys(matrix: Csr) -> NDArray[np.int64]:
-    """Row times width plus column of each entry, ascending."""
-    return matrix.rows.astype(np.int64)*matrix.shape[1] + matrix.indices
-
-
-def _sorted_csr(n: int, row: NDArray[np.int64], column: NDArray[np.int64], data: Array) -> Csr:
-    """The matrix of entries that ascend by rows and columns."""
-    start = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
-    return Csr((n, n), start, column.astype(np.int32), data)
-
-
-def _symmetric_pattern(matrix: Csr) -> Csr:
-    """The pattern with every entry's mirror image, and no values."""
-    n = matrix.shape[0]
-    row, column = np.divmod(_keys(matrix), n)
-    keys = np.union1d(row*n + column, column*n + row)
-    return _sorted_csr(n, keys//n, keys % n, np.zeros(len(keys)))
+    for part in (1.0, 0.125, 0.015625):
+        try:
+            check_derivatives(law, part*_STRAINS)
+        except Outside:
+            continue
+        break
+    z = np.vstack((np.zeros(3), _SMALL*_STRAINS))
+    try:
+        energy, gradient, hessian = GivenPoints(f"the law of {material}", law, 3).evaluate(z.copy())
+    except Outside:
+        return
+    mean = 0.5*((gradient[0] + gradient[1:])*z[1:]).sum(axis=1)
+    size = np.abs(hessian).max()*(z[1:]**2).sum(axis=1)
+    if np.any(np.abs(energy[1:] - energy[0] - mean) > 1e-3*size):
+        warn(f"the energy of {material} has lost its digits at strains of {_SMALL*0.1:.0e}: steps "
+             "with little motion may not converge. Write log1p(x) for log(1 + x), and sums of "
+             "strains for differences of stretches", stacklevel=4)
 
 
 def check_derivatives(function: PointFunction, points: ArrayLike, scale: float = 1.0) -> None:
@@ -343,24 +400,37 @@ def check_derivatives(function: PointFunction, points: ArrayLike, scale: float =
     of the gradient, by more than differences of second order can tell.
     """
     z = np.asarray(points, dtype=float)
+    if z.ndim != 2 or not np.isfinite(z).all():
+        raise InputError(f"points are an (n, m) array of finite numbers, not one of {z.shape}")
     given = GivenPoints("the function", function, z.shape[1])
-    energy, gradient, hessian = given.evaluate(z)
+    value = given.evaluate(z.copy())
+    for array, what in zip(value, ("energy", "gradient", "second derivative")):
+        if not np.isfinite(array).all():
+            point = int(np.argwhere(~np.isfinite(array))[0, 0])
+            raise InputError(f"the {what} at {z[point].tolist()} is infinite or NaN")
+    energy, gradient, hessian = (float(np.abs(array).max(initial=0.0)) for array in value)
+    # what an energy and a gradient may consist of, before terms cancel
+    size = (energy + scale*(gradient + scale*hessian), gradient + scale*hessian)
     step = scale*np.finfo(float).eps**(1/3)
     for k in range(z.shape[1]):
-        move = np.zeros(z.shape[1])
-        move[k] = step
-        coarse, fine = ([(after - before)/(2*t*step) for after, before in
-                         zip(given.evaluate(z + t*move)[:2], given.evaluate(z - t*move)[:2])]
-                        for t in (2.0, 1.0))
-        for order, given_value, size in ((0, gradient[:, k], energy), (1, hessian[:, :, k],
-                                                                      gradient)):
-            noise = 16*np.finfo(float).eps*np.abs(size).max()/step
-            doubt = np.abs(coarse[order] - fine[order]).max() + noise
-            off = np.abs(fine[order] - given_value)
+        coarse, fine = (_difference(given, z, k, t*step) for t in (2.0, 1.0))
+        for order, derivative in enumerate((value[1][:, k], value[2][:, :, k])):
+            noise = 16*np.finfo(float).eps*size[order]/step
+            doubt = np.abs(coarse[order] - fine[order]).max(initial=0.0) + noise
+            off = np.abs(fine[order] - derivative)
             if not np.all(off <= doubt):
                 point = int(np.unravel_index(np.argmax(off), off.shape)[0])
-                raise InputError(
-                    f"the {('gradient', 'second derivative')[order]} by variable {k} at "
-                    f"{z[point].tolist()} is not the derivative of the "
-                    f"{('energy', 'gradient')[order]}: it is off by {off.max():.3g}, differences "
-                    f"tell {doubt:.1g}")
+                what, of = (("gradient", "energy"), ("second derivative", "gradient"))[order]
+                raise InputError(f"the {what} by variable {k} at {z[point].tolist()} is not the "
+                                 f"derivative of the {of}: it is off by {off.max():.3g}, "
+                                 f"differences tell it to {doubt:.1g}")
+
+
+def _difference(given: GivenPoints, z: Array, k: int, step: float) -> tuple[Array, Array]:
+    """Central differences of energies (n,) and gradients (n, m) by variable `k`."""
+    after, before = z.copy(), z.copy()
+    after[:, k] += step
+    before[:, k] -= step
+    width = after[:, k] - before[:, k]
+    (e1, g1, _), (e0, g0, _) = given.evaluate(after), given.evaluate(before)
+    return (e1 - e0)/width, (g1 - g0)/width[:, None]

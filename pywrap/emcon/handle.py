@@ -9,14 +9,9 @@ import numpy as np
 
 from . import _core
 from .errors import InputError, check
-from .given import reraise
+from .given import raise_kept, uninterrupted
 
 _flat = _core.emcon_flat
-
-#: Reals of a block whose return teaches the C library to keep what is freed below this size. Else
-#: the work space of each factorisation goes back to the system, and its pages are cleared anew:
-#: a sixth of the time of a run.
-_LESSON = 2**21
 
 
 class Handle:
@@ -27,7 +22,6 @@ class Handle:
     """
 
     def __init__(self) -> None:
-        np.empty(_LESSON)
         self.address = int(_flat.new_model())
         #: Counts what makes evaluations stale, and what replaces the report of constraints.
         self.n_changes = 0
@@ -48,21 +42,20 @@ class Handle:
                              "function of yours was called from")
         try:
             self._is_busy = True
-            found = function(self.address, *arguments)
+            found = (uninterrupted(function, self.address, *arguments) if self.given
+                     else function(self.address, *arguments))
             values = found if isinstance(found, tuple) else (found,)
-            if values[-1]:
-                self._fail(values[-1])
+            raise_kept(self.given, values[-1], self._text)
+            check(self.address, values[-1])
         finally:
             self._is_busy = False
+            for item in self.given:
+                item.exception = None
         return values[0] if len(values) == 2 else values[:-1]
 
-    def _fail(self, status: int) -> NoReturn:
-        """Raise what `status` stands for, or the exception of a given function behind it."""
-        try:
-            check(self.address, status)
-        except Exception as failure:  # noqa: BLE001  either that is raised, or its cause
-            reraise(self.given, failure)
-        raise RuntimeError("a call has failed without a status")
+    def _text(self) -> str:
+        """Of the last error."""
+        return str(_flat.last_error(self.address).decode("utf-8", "replace").rstrip())
 
     def change(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """The same for calls after which evaluations no longer belong to the model."""

@@ -28,11 +28,13 @@ from .cards import (Block, Cards, Dof, Number, Numbering, Where, array_of, calle
                     text_lines, whole)
 from .deck_text import number, table, write_text
 from .errors import InputError, check
-from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_derivatives,
-                    reraise)
+from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_function,
+                    check_law, check_solid)
+from .given_matrices import give_masses, given_mass
 from .steps import Step
 
 if TYPE_CHECKING:
+    from .handle import Handle
     from .mesh import Mesh
     from .stepper import Stepper
 
@@ -45,9 +47,6 @@ _CORNERS = {"CPE3": 3, "CPE4": 4}
 _LARGEST_TEXT = 2**31 - 1
 #: The interaction of pairs that name none.
 _FRICTIONLESS = "FRICTIONLESS CONTACT"
-#: Strains at which the derivatives of a law are checked: of some size, and on no axis.
-_STRAINS = np.array([[0.03, -0.02, 0.01], [-0.01, 0.05, -0.04], [0.02, 0.01, 0.07],
-                     [-0.04, -0.03, 0.02], [0.11, 0.06, -0.09]])
 
 
 class Model(Cards):
@@ -262,7 +261,7 @@ class Model(Cards):
                 raise InputError(f"{what}: faces are pairs of an element or an element set and a "
                                  "face")
             pairs = [(self._names(item, self._elements, what)[0], face) for item, face in pairs]
-        wrong = [face for _, face in pairs if face not in (1, 2, 3, 4)]
+        wrong = [face for _, face in pairs if np.ndim(face) or face not in (1, 2, 3, 4)]
         if wrong or not pairs:
             raise InputError(f"{what}: a face is 1 to 4, not {wrong[0]!r}" if wrong
                              else f"{what} has no faces")
@@ -379,7 +378,7 @@ class Model(Cards):
 
     def give_law(self, material: str, law: PointFunction) -> Model:
         """The law of a `*USER MATERIAL`, as `law` of `material`, for the model of a deck."""
-        check_derivatives(law, _STRAINS)
+        check_law(material, law)
         self._laws[material] = law
         return self
 
@@ -393,12 +392,14 @@ class Model(Cards):
     def host(self, solid: Solid, mass: Any = None, *, nodes: str | None = None) -> Model:
         """Forces and mass of the solid of a host code, on nodes that need no elements.
 
-        solid   an object with a method respond(u0, du, wants_tangent): see `emcon.given.Solid`; also other
-                forces between nodes
+        solid   an object with a method respond(u0, du, wants_tangent), see `emcon.given.Solid`; it
+                may stand for any forces between nodes
         mass    (n, n) between nodes, or (2 n, 2 n), the same in both directions, over all nodes of
-                the model: a sparse matrix of scipy, a `Csr`, or an array [M]
+                the model: a sparse matrix of scipy, a `Csr`, or an array [M]; those of several
+                solids, and of elements, add up
         nodes   node set; default the nodes that belong to no element
         """
+        check_solid(f"solid {len(self._hosts) + 1}", solid)
         self._hosts.append((solid, mass))
         return self.given_forces(nodes)
 
@@ -411,6 +412,7 @@ class Model(Cards):
 
         Energies count it as `potential`; the discrete gradient made of it keeps the total.
         """
+        check_function(f"potential {len(self._potentials) + 1}", function)
         where = None
         if nodes is not None:
             where = nodes if isinstance(nodes, str) else self._nodes.labels(nodes, "a potential")
@@ -461,20 +463,15 @@ class Model(Cards):
         from .stepper import Stepper
         return Stepper(self)
 
-    def build(self, handle: int) -> list[Any]:
-        """Read the model into the new library model `handle`, and build it.
+    def build(self, handle: Handle) -> None:
+        """Read the model into a new library model, and build it.
 
-        Returns what has to live as long as the library's model. Raises `InputError`, and what
-        given functions raise.
+        Raises `InputError`, and what given functions raise.
         """
-        given = self.read(handle)
-        try:
-            check(handle, _flat.build_model(handle))
-        except Exception as failure:  # noqa: BLE001  either that is raised, or its cause
-            reraise(given, failure)
-        return given
+        self.read(handle)
+        handle.call(_flat.build_model)
 
-    def read(self, handle: int) -> list[Any]:
+    def read(self, handle: Handle) -> None:
         """`build` without the building, for a state that is loaded instead."""
         blocks = self._all_blocks()
         text = "".join(block.text for block in blocks).encode(errors="surrogateescape")
@@ -486,20 +483,22 @@ class Model(Cards):
                            for block in blocks] or [(0, 1, self._place[1], 0)], dtype=np.int32)
         names = "\n".join(file.replace("\n", "?") for file in files)
         overrides = "\n".join(f"{name}={value}" for name, value in self._overrides.items())
-        check(handle, _source.read_text(handle, text, places.T, os.fsencode(names),
-                                        overrides.encode(), int(self._lenient)))
-        return self._give(handle)
+        handle.call(_source.read_text, text, places.T, os.fsencode(names), overrides.encode(),
+                    int(self._lenient))
+        handle.given = self._give(handle.address)
 
     def _give(self, handle: int) -> list[Any]:
-        """Hand over what is given from outside, between reading and building."""
+        """Hand over what is given from outside; returns what has to live with the model."""
         given: list[Any] = [GivenLaw(material, law) for material, law in self._laws.items()]
         given += [GivenPotential(f"potential {k}", function, nodes)
                   for k, (function, nodes) in enumerate(self._potentials, 1)]
         if self._hosts:
             n, ierr = _given.count_nodes(handle)
             check(handle, ierr)
-            given += [GivenSolid(f"solid {k}", solid, mass, int(n))
-                      for k, (solid, mass) in enumerate(self._hosts, 1)]
+            given += [GivenSolid(f"solid {k}", solid, int(n))
+                      for k, (solid, _) in enumerate(self._hosts, 1)]
+            give_masses(handle, [given_mass(mass, int(n)) for _, mass in self._hosts
+                                 if mass is not None])
         for item in given:
             item.give(handle)
         return given

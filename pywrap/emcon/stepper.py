@@ -6,16 +6,16 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from .arguments import number, positive, real_array
+from .arguments import number, path_bytes, positive, real_array
 from .conditions import Conditions
 from .csr import Csr
-from .errors import AnalysisError, InputError, check
+from .errors import AnalysisError, InputError
 from .handle import Handle
 from .model import Model
 from .queries import ConstraintReport, Evaluation, Queries, contact_arguments
@@ -67,7 +67,8 @@ class Snapshot:
                         "write_restart")
 
     def __del__(self) -> None:
-        _state.free_state(self._address)
+        if hasattr(self, "_address"):
+            _state.free_state(self._address)
 
 
 class Stepper(Queries, Conditions):
@@ -79,7 +80,8 @@ class Stepper(Queries, Conditions):
     as do a bad deck, bad arguments, and any call after `close`.
 
     Ctrl-C takes effect between increments. One that is under way is finished first; the stepper
-    is then at its end and can go on.
+    is then at its end and can go on. Where functions of yours are called in it, a second Ctrl-C
+    does not wait.
     """
 
     def __init__(self, model: str | os.PathLike[str] | Model, *, lenient: bool = False,
@@ -91,11 +93,11 @@ class Stepper(Queries, Conditions):
                              "Model")
         self._begin(model.build)
 
-    def _begin(self, build: Callable[[int], list[Any]]) -> None:
-        """A library model, made by `build` of its handle; it returns what has to live with it."""
+    def _begin(self, build: Callable[[Handle], None]) -> None:
+        """A library model, made by `build` in its handle."""
         self._handle = Handle()
         try:
-            self._handle.given = build(self._handle.address)
+            build(self._handle)
             sizes = self._handle.call(_flat.model_size)
         except BaseException:
             self.close()
@@ -110,10 +112,12 @@ class Stepper(Queries, Conditions):
         It goes on to the same bits. `model` is needed where laws, potentials or a host's solid were
         given to it: these are not in the file. Raises `OSError` for what is no such file.
         """
-        def build(address: int) -> list[Any]:
-            given = [] if model is None else model.read(address)
-            check(address, _state.read_restart(address, os.fsencode(path)))
-            return given
+        name = path_bytes(path)
+
+        def build(handle: Handle) -> None:
+            if model is not None:
+                model.read(handle)
+            handle.call(_state.read_restart, name)
 
         stepper = cls.__new__(cls)
         stepper._begin(build)
@@ -121,7 +125,10 @@ class Stepper(Queries, Conditions):
 
     def write_restart(self, path: str | os.PathLike[str]) -> None:
         """Write the deck, the state, and what was changed of the conditions of the present step."""
-        self._handle.call(_state.write_restart, os.fsencode(path))
+        name = path_bytes(path)
+        if os.path.exists(name) and not os.path.isfile(name):
+            raise OSError(f"{os.fsdecode(name)} is no file that could be replaced")
+        self._handle.call(_state.write_restart, name)
 
     def close(self) -> None:
         """Free the model. Harmless when closed; any other call then raises `InputError`."""
@@ -163,6 +170,8 @@ class Stepper(Queries, Conditions):
         """
         if until is not None:
             until = number(until, "until")
+        if callback is not None and not callable(callback):
+            raise InputError(f"the callback is to be a function, not {callback!r}")
         n = 0
         while not self.is_done:
             if until is not None:

@@ -5,7 +5,7 @@ module emcon_blas
    use, intrinsic :: iso_c_binding, only : c_int
    implicit none
    private
-   public :: blas_single_thread, blas_keep_memory, blas_enter, blas_leave, ieee_status_type
+   public :: blas_single_thread, blas_enter, blas_leave, ieee_status_type
 
    interface
       function emcon_blas_set_threads(n) result(done) bind(c)
@@ -14,13 +14,6 @@ module emcon_blas
          integer(c_int), value :: n
          integer(c_int) :: done
       end function emcon_blas_set_threads
-
-      !> Keep freed memory for the next factorisation; measured: a third of the time of small ones
-      !> goes into pages that were handed back and asked for again. It holds for the whole process:
-      !> a matter for a main program, not for a library inside another.
-      subroutine blas_keep_memory() bind(c, name="emcon_blas_keep_memory")
-         implicit none
-      end subroutine blas_keep_memory
    end interface
 
 contains

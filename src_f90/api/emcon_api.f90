@@ -34,11 +34,11 @@
 !>
 !> **Contact and ties for a program that has its own solids.** `interface_init`,
 !> `interface_add_surface`, `interface_add_pair` (options: `contact_options_t`),
-!> `interface_add_tie`, `interface_set`, `interface_prepare`. In each step `interface_begin_step`; then, until
-!> `interface_update_active` is done, `interface_select` or `interface_choose`, and Newton's method
-!> on `interface_evaluate`, `interface_curvature`, with the multipliers or with
-!> `interface_null_space`, `interface_particular`, `interface_multipliers`. Pressures are multipliers
-!> over `interface_areas`.
+!> `interface_add_tie`, `interface_set`, `interface_prepare`. In each step `interface_begin_step`;
+!> then, until `interface_update_active` is done, `interface_select` or `interface_choose`, and
+!> Newton's method on `interface_evaluate`, `interface_curvature`, with the multipliers or with
+!> `interface_null_space`, `interface_particular`, `interface_multipliers`. Pressures are
+!> multipliers over `interface_areas`.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_from_elements, csr_from_entries, csr_multiply, &

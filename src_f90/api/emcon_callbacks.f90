@@ -3,6 +3,7 @@
 !> Prototypes and what they are to do: emcon.h. A function returns 0, 1 for a state that it has no
 !> value for, or anything else for a failure.
 module emcon_callbacks
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_procpointer, c_funptr, &
       c_int, c_loc, c_null_funptr, c_null_ptr, c_ptr
    use emcon_csr, only : csr_t
@@ -141,7 +142,8 @@ contains
       m = size(z, 1)
       n = size(z, 2)
       allocate(at, source=real(z, c_double))
-      allocate(w(n), dw(m, n), source=0.0_c_double)
+      allocate(w(n), source=ieee_value(0.0_c_double, ieee_quiet_nan))   ! to see that it was set
+      allocate(dw(m, n), source=0.0_c_double)
       allocate(ddw(m, m, merge(n, 0, wants_hessian)), source=0.0_c_double)
       second = c_null_ptr
       if (wants_hessian) second = c_loc(ddw)
@@ -178,7 +180,7 @@ contains
       allocate(f, size_of, mold=start)
       f = 0.0_c_double
       size_of = 0.0_c_double
-      last = 0.0_c_double
+      last = ieee_value(0.0_c_double, ieee_quiet_nan)   ! to see that it was set
       allocate(k(merge(size(tangent), 0, wants_tangent)), source=0.0_c_double)
       slope = c_null_ptr
       if (wants_tangent) slope = c_loc(k)

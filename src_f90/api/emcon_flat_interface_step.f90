@@ -66,18 +66,18 @@ contains
          n_contact, c_loc(active), c_null_ptr)
    end subroutine select_active
 
-   subroutine choose(handle, n_node, u0, du, n, contact, target_gap, ierr)
+   subroutine choose(handle, n_node, u0, du, n, contact, n_target, target_gap, ierr)
       integer(c_int64_t), intent(in) :: handle
       integer(c_int), intent(in) :: n_node
       real(c_double), intent(in), target :: u0(2, n_node), du(2, n_node)
-      integer(c_int), intent(in) :: n
+      integer(c_int), intent(in) :: n, n_target     !! equal; f2py shares no size that is 0
       integer(c_int), intent(in), target :: contact(n)
-      real(c_double), intent(in), target :: target_gap(n)
+      real(c_double), intent(in), target :: target_gap(n_target)
       integer(c_int), intent(out) :: ierr
       !f2py threadsafe
 
-      ierr = emcon_interface_choose(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), n, &
-         c_loc(contact), c_loc(target_gap))
+      ierr = emcon_interface_choose(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), &
+         min(n, n_target), c_loc(contact), c_loc(target_gap))
    end subroutine choose
 
    !> `n` values for `get_constraints`, matrices for `get_matrix`.

@@ -1,8 +1,9 @@
 !> A batch run: deck in, files out, from the first increment or from a restart file.
 module emcon_run
-   use emcon_blas, only : blas_keep_memory, blas_single_thread
+   use emcon_blas, only : blas_single_thread
    use emcon_errors, only : err_file, err_input, err_interrupt, error_t, raise
    use emcon_files, only : file_exists, file_remove, make_directory, survive_file_size_limit
+   use emcon_heap, only : heap_keep
    use emcon_kinds, only : dp, wp
    use emcon_log, only : log_close, log_line, log_open, log_t
    use emcon_march, only : increment_t
@@ -61,7 +62,7 @@ contains
       logical :: is_single
 
       call blas_single_thread(is_single)
-      call blas_keep_memory()
+      call heap_keep()
       call survive_file_size_limit()
    end subroutine run_prepare
 

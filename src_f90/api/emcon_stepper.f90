@@ -9,6 +9,7 @@ module emcon_stepper
    use emcon_errors, only : err_input, error_t, raise
    use emcon_given, only : given_count, given_t
    use emcon_given_check, only : given_check_scene
+   use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_measure
@@ -121,6 +122,7 @@ contains
          call raise(error, err_input, "the model is built already")
       end if
       if (allocated(error)) return
+      call heap_adapt()
       call build(self, error)
       if (.not. allocated(error)) return
       self%is_read = .false.                     ! ties and contact may have moved nodes

@@ -1,4 +1,4 @@
-"""A host's solid, potential and law in the library's step: in C, C++ and Fortran; and wrong ones."""
+"""A host's solid, potential and law in the library's step, from C, C++, Fortran; and wrong ones."""
 
 from __future__ import annotations
 

@@ -45,7 +45,8 @@ contains
    !> step leaves another residual r. Newton's method polishes it below 4 eps of the inertia's
    !> contributions s M (b h v + 2 v) = 8 M v/h, s = b = 2/h; it moves the end of the step by no
    !> more than (s b M)^-1 r = 8 eps v h for every node, sqrt(n_node) of that in the worst node, and
-   !> the velocity by 2/h of that. The impact passes velocities on, no more than doubled in a contact.
+   !> the velocity by 2/h of that. The impact passes velocities on, no more than doubled in a
+   !> contact.
    subroutine compare(error, scene, tells_magnitude, is_kept)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t), intent(in) :: scene

@@ -12,16 +12,17 @@
 
 The sides of what the builders make have names: BLOCK_TOP, RING_OUTER, ... Each is a surface and
 the set of its nodes; the body itself is a set of nodes and of elements. `read` takes meshes from
-files of Gmsh and Abaqus.
+files of Gmsh and Abaqus; `boundary_edges` finds the edges of bodies in cells of any code.
 
 Lengths are in the deck's unit [L], angles in radians, counter-clockwise. Nodes and elements are
 named by their labels, whole numbers from 1 on, as in a deck.
 """
 
 from .checks import MeshError, MeshWarning
+from .edges import boundary_edges
 from .mesh import Mesh
 from .reading import read
 from .shapes import block, disc, grid, ring, strip
 
-__all__ = ["Mesh", "MeshError", "MeshWarning", "block", "disc", "grid", "read", "ring",
-           "strip"]
+__all__ = ["Mesh", "MeshError", "MeshWarning", "block", "boundary_edges", "disc", "grid", "read",
+           "ring", "strip"]

@@ -1,0 +1,121 @@
+"""Matrices and other results of functions of Python, in the forms that the library takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _core
+from .csr import Csr
+from .errors import InputError, check
+
+_flat = _core.emcon_flat_given
+
+Array = NDArray[np.float64]
+
+
+def fitting(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
+    """What a given function has returned, as an array of the shape that is needed."""
+    if values is None:
+        raise InputError(f"{what} is None")
+    if np.ma.is_masked(values):
+        raise InputError(f"{what} has masked entries")
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InputError(f"{what}: no array can be made of it: {error}") from error
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"{what} is of dtype {array.dtype}, not real numbers")
+    if array.shape != shape:
+        raise InputError(f"{what} has the shape {array.shape}, not {shape}")
+    return array
+
+
+def give_masses(handle: int, masses: list[Csr]) -> None:
+    """Give the sum of masses between nodes to the library model `handle`."""
+    if not masses:
+        return
+    n = masses[0].shape[0]
+    keys, place = np.unique(np.concatenate([keys_of(mass) for mass in masses]), return_inverse=True)
+    data = np.bincount(place, np.concatenate([mass.data for mass in masses]), len(keys))
+    total = masses[0] if len(masses) == 1 else _sorted_csr(n, keys//n, keys % n, data)
+    check(handle, _flat.give_mass(handle, total.indptr, total.indices, total.data))
+
+
+def given_mass(matrix: Any, n_node: int) -> Csr:
+    """A mass matrix (n, n) between nodes, or (2 n, 2 n) that is the same in both directions.
+
+    Raises `InputError` for one that couples the directions, or differs between them.
+    """
+    shape = tuple(matrix.shape if is_sparse(matrix) else np.shape(matrix))
+    if shape not in ((n_node, n_node), (2*n_node, 2*n_node)):
+        raise InputError(f"the mass has the shape {shape}; it is between {n_node} nodes, "
+                         f"{(n_node, n_node)}, or their freedoms, {(2*n_node, 2*n_node)}")
+    mass = as_csr(matrix, shape[0], "the mass")
+    check_csr(mass, "the mass")
+    if shape[0] == n_node:
+        return mass
+    row, column = np.divmod(keys_of(mass), 2*n_node)
+    along, across = [(row % 2 == a) & (column % 2 == a) for a in (0, 1)]
+    least = np.finfo(float).eps*np.abs(mass.data).max(initial=0.0)
+    if not np.all(np.abs(mass.data[~(along | across)]) <= least):
+        raise InputError("the mass couples the two directions; one of nodes is needed")
+    halves = [_sorted_csr(n_node, row[part]//2, column[part]//2, mass.data[part])
+              for part in (along, across)]
+    if (not np.array_equal(keys_of(halves[0]), keys_of(halves[1]))
+            or np.any(np.abs(halves[0].data - halves[1].data) > 8*least)):
+        raise InputError("the mass is not the same in both directions; one of nodes is needed")
+    return halves[0]
+
+
+def is_sparse(matrix: Any) -> bool:
+    return isinstance(matrix, Csr) or hasattr(matrix, "tocsr")
+
+
+def as_csr(matrix: Any, n: int, what: str) -> Csr:
+    """A matrix (n, n) of scipy, as a `Csr`, or as an array, with sorted columns."""
+    if not is_sparse(matrix):
+        dense = fitting(matrix, what, (n, n))
+        return Csr((n, n), np.arange(0, n*n + 1, n, dtype=np.int32),
+                   np.tile(np.arange(n, dtype=np.int32), n), np.ravel(dense).astype(float))
+    if tuple(matrix.shape) != (n, n):
+        raise InputError(f"{what} has the shape {matrix.shape}, not {(n, n)}")
+    if not isinstance(matrix, Csr):
+        matrix = matrix.tocsr()
+        if not matrix.has_canonical_format:
+            matrix = matrix.copy()
+            matrix.sum_duplicates()
+    return Csr((n, n), np.asarray(matrix.indptr, dtype=np.int32),
+               np.asarray(matrix.indices, dtype=np.int32),
+               fitting(matrix.data, what, np.shape(matrix.indices)).astype(float, copy=False))
+
+
+def check_csr(matrix: Csr, what: str) -> None:
+    """The rows of `matrix` are what a `Csr` promises."""
+    n, start, column = matrix.shape[0], matrix.indptr, matrix.indices
+    if (start.shape != (n + 1,) or start[0] != 0 or start[-1] != len(column)
+            or np.any(np.diff(start) < 0)):
+        raise InputError(f"{what}: indptr does not run from 0 to the number of its entries, "
+                         f"{len(column)}, in {n} rows")
+    if len(column) and (column.min() < 0 or column.max() >= n
+                        or np.any(np.diff(keys_of(matrix)) <= 0)):
+        raise InputError(f"{what}: indices are not columns 0 to {n - 1} that ascend in each row")
+
+
+def keys_of(matrix: Csr) -> NDArray[np.int64]:
+    """Row times width plus column of each entry, ascending."""
+    return matrix.rows.astype(np.int64)*matrix.shape[1] + matrix.indices
+
+
+def _sorted_csr(n: int, row: NDArray[np.int64], column: NDArray[np.int64], data: Array) -> Csr:
+    """The matrix of entries that ascend by rows and columns."""
+    start = np.searchsorted(row, np.arange(n + 1)).astype(np.int32)
+    return Csr((n, n), start, column.astype(np.int32), data)
+
+
+def symmetric_pattern(n: int, row: NDArray[np.int64], column: NDArray[np.int64]) -> Csr:
+    """The pattern (n, n) of entries and their mirror images, in any order; no values."""
+    keys = np.unique(np.concatenate((row*n + column, column*n + row)))
+    return _sorted_csr(n, keys//n, keys % n, np.zeros(len(keys)))

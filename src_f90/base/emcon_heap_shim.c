@@ -1,0 +1,24 @@
+/* What emcon_heap asks of the C library. */
+#include <stdlib.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+void emcon_heap_keep(void);
+void emcon_heap_adapt(void);
+
+/* Blocks up to 32 MB come from the heap, and what is freed stays in it up to 64 MB. */
+void emcon_heap_keep(void)
+{
+#ifdef __GLIBC__
+   mallopt(M_MMAP_THRESHOLD, 32*1024*1024);
+   mallopt(M_TRIM_THRESHOLD, 64*1024*1024);
+#endif
+}
+
+/* The pointer is volatile, else the compiler leaves both calls out. */
+void emcon_heap_adapt(void)
+{
+   void *volatile block = malloc(16*1024*1024);
+   free(block);
+}
