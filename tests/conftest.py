@@ -1,9 +1,14 @@
 """Fixtures for all tests. Helpers to import are in scene_tools.py, beside this file."""
 
 import concurrent.futures
+import signal
 
 import pytest
 import scene_tools
+
+# What a script runs in the background is told to ignore Ctrl-C; what is tested here is not.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Whole runs of the ring scene that tests of several files look at, dearest first.
 RING_RUNS = [

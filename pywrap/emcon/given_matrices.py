@@ -39,7 +39,8 @@ def give_masses(handle: int, masses: list[Csr]) -> None:
         return
     n = masses[0].shape[0]
     keys, place = np.unique(np.concatenate([keys_of(mass) for mass in masses]), return_inverse=True)
-    data = np.bincount(place, np.concatenate([mass.data for mass in masses]), len(keys))
+    data = np.bincount(place, np.concatenate([mass.data for mass in masses]),
+                       len(keys)).astype(float)
     total = masses[0] if len(masses) == 1 else _sorted_csr(n, keys//n, keys % n, data)
     check(handle, _flat.give_mass(handle, total.indptr, total.indices, total.data))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from .results import (Array, FieldFile, ResultError, ResultPaths, energy_drift, read_contact_force,
-                      read_history)
+from .results import (Array, FieldFile, ResultError, ResultPaths, energy_drift, locate,
+                      read_contact_force, read_history)
 from .scene import (BLACK, BLUE, GREY, LABEL_OFFSET, ORANGE, STYLE, Scene, colour_scale,
                     draw_bodies, draw_colour_bar, frame_view, read_scene)
 

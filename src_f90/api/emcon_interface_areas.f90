@@ -27,9 +27,10 @@ contains
       length = 0.0_wp
       call check_begun(self, place, error)
       call check_field(error, place, "u1", u1, self%n_node)
-      if (.not. allocated(error) .and. any([size(area), size(length)] /= self%n_constraint)) &
-         call refuse(error, place, "area and length have " // to_text(size(area)) // " and " // &
+      if (.not. allocated(error) .and. any([size(area), size(length)] /= self%n_constraint)) then
+        call refuse(error, place, "area and length have " // to_text(size(area)) // " and " // &
          to_text(size(length)) // " entries, not " // to_text(self%n_constraint))
+      end if
       if (allocated(error)) return
       do i = 1, size(self%system%contact)
          associate (first => self%system%first_constraint(i) + 1, &

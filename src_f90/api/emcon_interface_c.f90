@@ -124,8 +124,9 @@ contains
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       title = f_text(name)
-      if (.not. c_associated(name) .and. allocated(host%face%scene%surface)) &
-         title = to_text(size(host%face%scene%surface))
+      if (.not. c_associated(name) .and. allocated(host%face%scene%surface)) then
+        title = to_text(size(host%face%scene%surface))
+      end if
       call take_integers("edge", edge, 2_c_int*min(n_edge, most_edges), 1, node, error)
       if (host%face%n_node > 0) call check_range("edge", node, host%face%n_node, error)
       if (.not. allocated(error)) call interface_add_surface(host%face, title, &
@@ -165,10 +166,12 @@ contains
       if (wanted%multiplier /= 0) chosen%multiplier = wanted%multiplier
       if (wanted%normal /= 0) chosen%normal = wanted%normal
       if (wanted%smoothing /= 0) chosen%smoothing = wanted%smoothing
-      if (.not. abs(wanted%normal_angle) <= 0.0_c_double) &
-         chosen%normal_angle = real(wanted%normal_angle, wp)
-      if (.not. abs(wanted%smoothing_angle) <= 0.0_c_double) &
-         chosen%smoothing_angle = real(wanted%smoothing_angle, wp)
+      if (.not. abs(wanted%normal_angle) <= 0.0_c_double) then
+        chosen%normal_angle = real(wanted%normal_angle, wp)
+      end if
+      if (.not. abs(wanted%smoothing_angle) <= 0.0_c_double) then
+        chosen%smoothing_angle = real(wanted%smoothing_angle, wp)
+      end if
    end function chosen
 
    !> Both surfaces exist.

@@ -8,8 +8,8 @@ module emcon_heap
    public :: heap_keep, heap_adapt
 
    interface
-      !> Keep freed memory for the next that asks, in the whole process: a matter for a main program,
-      !> not for a library inside another.
+      !> Keep freed memory for the next that asks, in the whole process: a matter for a main
+      !> program, not for a library inside another.
       subroutine heap_keep() bind(c, name="emcon_heap_keep")
          implicit none
       end subroutine heap_keep

@@ -60,6 +60,9 @@ module emcon_point_function
    !> A defect below this multiple of its terms is round-off: of two values, a mean of three
    !> gradients, a product with the step, and the rounding of the end.
    real(wp), parameter :: noise = 8.0_wp*epsilon(1.0_wp)
+   !> One that is so much larger than the rule can miss is not its own: it is round-off of terms
+   !> that have cancelled in the function, and would spoil small steps.
+   real(wp), parameter :: credible = 1.0e4_wp
 
 contains
 
@@ -129,8 +132,9 @@ contains
          response%tangent(:, :, :n), status)
       if (status == point_ok) status = finite_status(wants_tangent, response%energy(:n), &
          response%gradient(:, :n), response%tangent(:, :, :n))
-      if (status == point_ok .and. wants_tangent) &
-         response%tangent(:, :, :n) = 0.5_wp*response%tangent(:, :, :n)
+      if (status == point_ok .and. wants_tangent) then
+        response%tangent(:, :, :n) = 0.5_wp*response%tangent(:, :, :n)
+      end if
    end subroutine evaluate_at_rest
 
    !> What is not finite is no value.
@@ -169,6 +173,7 @@ contains
          defect = (w1 - w0) - dot_product(g, dz)
          fourth = dot_product(of_end*(dw0 + dw1) + of_outer*(dwa + dwc) + of_middle*dwb, dz)
          if (abs(defect) <= noise*terms .or. missed*abs(fourth) <= noise*terms) return
+         if (abs(defect) > credible*missed*abs(fourth)) return
          call correct(given, dz, defect, dw1, wants_tangent, g, response%tangent(:, :, k))
       end associate
    end subroutine combine

@@ -253,36 +253,40 @@ contains
    !> not where it is held: there is a size to relate a residual to also without any load.
    pure subroutine complete_magnitude(pattern, force, magnitude)
       type(csr_t), intent(in) :: pattern
-      real(wp), intent(in) :: force(*)                   !! (2 n_node)
-      real(wp), intent(inout) :: magnitude(*)            !! (2 n_node)
-      integer :: i, k
+      real(wp), intent(in) :: force(:, :)                !! (2, n_node)
+      real(wp), intent(inout) :: magnitude(:, :)         !! (2, n_node)
+      integer :: a, i, j, k
 
-      associate (n => pattern%n_row)
-         if (any(magnitude(:n) > 0.0_wp)) then
-            magnitude(:n) = max(magnitude(:n), abs(force(:n)))
-            return
-         end if
-         do i = 1, n
-            do k = pattern%row_start(i) + 1, pattern%row_start(i + 1)
-               magnitude(i) = max(magnitude(i), abs(force(pattern%column(k) + 1)))
+      if (any(magnitude > 0.0_wp)) then
+         magnitude = max(magnitude, abs(force))
+         return
+      end if
+      magnitude = abs(force)
+      do i = 1, size(force, 2)
+         do a = 1, 2
+            do k = pattern%row_start(2*(i - 1) + a) + 1, pattern%row_start(2*(i - 1) + a + 1)
+               j = pattern%column(k)
+               magnitude(a, i) = max(magnitude(a, i), abs(force(1 + mod(j, 2), j/2 + 1)))
             end do
-            magnitude(i) = max(magnitude(i), abs(force(i)))
          end do
-      end associate
+      end do
    end subroutine complete_magnitude
 
    !> Positions are rounded by epsilon of their size, whatever a giver computes from them.
    pure subroutine add_rounding(pattern, tangent, position, rounding)
       type(csr_t), intent(in) :: pattern
       real(dp), intent(in) :: tangent(:)
-      real(wp), intent(in) :: position(*)                !! (2 n_node)
-      real(wp), intent(inout) :: rounding(*)             !! (2 n_node)
-      integer :: i, k
+      real(wp), intent(in) :: position(:, :)             !! (2, n_node)
+      real(wp), intent(inout) :: rounding(:, :)          !! (2, n_node)
+      integer :: a, i, j, k
 
-      do i = 1, pattern%n_row
-         do k = pattern%row_start(i) + 1, pattern%row_start(i + 1)
-            rounding(i) = rounding(i) &
-               + abs(real(tangent(k), wp))*position(pattern%column(k) + 1)
+      do i = 1, size(position, 2)
+         do a = 1, 2
+            do k = pattern%row_start(2*(i - 1) + a) + 1, pattern%row_start(2*(i - 1) + a + 1)
+               j = pattern%column(k)
+               rounding(a, i) = rounding(a, i) &
+                  + abs(real(tangent(k), wp))*position(1 + mod(j, 2), j/2 + 1)
+            end do
          end do
       end do
    end subroutine add_rounding

@@ -16,7 +16,8 @@ EPS = 2.0**-52
 # What is told of wrong calls, in the order of bad_calls.c; "" where all is well.
 HALF_MADE = [
     "deck is NULL", "no scene", "no scene", "typed:2: error: .*nowhere", "no scene",
-    "", "free to move", "no scene", "no scene", "", "", "not built yet", "not built yet", "", "", "path is NULL", "no scene", "not an HDF5 file",
+    "", "free to move", "no scene", "no scene", "", "", "not built yet", "not built yet", "", "",
+    "path is NULL", "no scene", "not an HDF5 file",
     "state.h5 does not exist",
 ]
 WITHOUT_ARRAYS = [""]*9 + [

@@ -20,7 +20,7 @@ from emcon import _core  # noqa: E402
 from emcon.deck_text import number, table  # noqa: E402
 from emcon.mesh import block, read  # noqa: E402
 from emcon.model import Model  # noqa: E402
-from emcon.stepper import InputError, Stepper  # noqa: E402
+from emcon.stepper import AnalysisError, InputError, Stepper  # noqa: E402
 
 RING = ROOT/"input_decks"/"ring.inp"
 KEYWORDS = ROOT/"src_f90"/"deck"/"emcon_deck_keywords.f90"
@@ -520,3 +520,40 @@ def test_model_of_a_deck_is_counted_by_labels(tmp_path: Path) -> None:
     model.step("STATIC").load(77, 1, 1.0)
     with pytest.raises(InputError, match=r"test_model\.py:.*77"):
         model.stepper()
+
+
+def crushed() -> Model:
+    """A block that is pushed through its own floor by the end of the step."""
+    model = Model.from_mesh(block(cells=(2, 2)))
+    model.material("RUBBER", coupled_neo_hooke=(100.0, 0.3)).section("RUBBER", "BLOCK")
+    model.boundary("BLOCK_BOTTOM")
+    model.step("STATIC", h=0.25, nlgeom=True).boundary("BLOCK_TOP", 2, -1.5)
+    return model
+
+
+def test_state_after_a_failed_increment_belongs_to_its_time() -> None:
+    with crushed().stepper() as stepper:
+        with pytest.raises(AnalysisError, match="the analysis stops at time"):
+            stepper.run()
+        assert 0.5 < stepper.time < 1.0 and stepper.time % 0.25 > 0.0
+        # without an amplitude the motion is a linear run: exact but for its rounding
+        pushed = stepper.u[stepper.node_set("BLOCK_TOP"), 1]
+        assert np.abs(pushed + 1.5*stepper.time).max() <= 8*np.finfo(float).eps*1.5
+        with pytest.raises(InputError, match="between two increments"):
+            stepper.step()
+
+
+def test_notes_tell_what_the_deck_reader_doubts() -> None:
+    model = Model.from_mesh(block((0.0, 0.0), (2.0, 1.0), (4, 2), "LOWER")
+                            + block((0.5, 1.0), (1.0, 1.0), (2, 2), "UPPER"))
+    model.material("RUBBER", elastic=(100.0, 0.3), density=1.0)
+    model.section("RUBBER", "LOWER").section("RUBBER", "UPPER")
+    model.contact_pair("LOWER_TOP", "UPPER_BOTTOM")
+    model.contact_pair("UPPER_LEFT", "LOWER_TOP")
+    model.step("DYNAMIC", 0.1, 0.1, nlgeom=True)
+    with model.stepper() as stepper:
+        assert any("the smaller one should be the slave" in note for note in stepper.notes)
+        with pytest.raises(InputError, match="no node set MIDDLE"):
+            stepper.node_set("MIDDLE")
+    with square().stepper() as stepper:
+        assert stepper.notes == []

@@ -233,6 +233,15 @@ def test_plot_writes_a_picture_beside_the_result(run: Path,
     assert is_png(picture) and str(picture) in out and err == ""
 
 
+def test_plot_by_name(run: Path, tmp_path: Path) -> None:
+    from emcon import plot
+
+    assert plot(run) == Path(str(run) + ".png")
+    assert is_png(plot(str(run), tmp_path/"some.png", [0.0]))
+    with pytest.raises(ResultError, match="picture format"):
+        plot(run, "some.inp")
+
+
 def test_plot_shows_the_frames_nearest_to_the_times(run: Path) -> None:
     from emcon.plotting import draw
 

@@ -399,23 +399,23 @@ contains
       sample = sample_of(mixed)
       sample%fault_below = 0.0_wp
       sample%fault = point_outside
-      call check_equal(error, status_of(sample, 0.1_wp, 0.1_wp), point_ok, "inside")
-      call check_equal(error, status_of(sample, 0.1_wp, -0.2_wp), point_outside, "outside at the end")
-      call check_equal(error, status_of(sample, -0.1_wp, 0.0_wp), point_outside, "outside at rest")
+      call check_equal(error, status_at(sample, 0.1_wp, 0.1_wp), point_ok, "inside")
+      call check_equal(error, status_at(sample, 0.1_wp, -0.2_wp), point_outside, "outside")
+      call check_equal(error, status_at(sample, -0.1_wp, 0.0_wp), point_outside, "outside at rest")
       sample%fault = point_failed
-      call check_equal(error, status_of(sample, 0.1_wp, -0.2_wp), point_failed, "failed at the end")
+      call check_equal(error, status_at(sample, 0.1_wp, -0.2_wp), point_failed, "failed at the end")
       sample%fault = point_ok
       sample%gives_nan = .true.
-      call check_equal(error, status_of(sample, 0.1_wp, -0.2_wp), point_outside, "not a number")
-      call check_equal(error, status_of(sample, -0.1_wp, 0.0_wp), point_outside, "not a number, at rest")
+      call check_equal(error, status_at(sample, 0.1_wp, -0.2_wp), point_outside, "not a number")
+      call check_equal(error, status_at(sample, -0.1_wp, 0.0_wp), point_outside, "no number")
       sample = sample_of(mixed)
       sample%spoils_hessian = .true.
-      call check_equal(error, status_of(sample, 0.1_wp, 0.1_wp), point_outside, "second derivatives")
-      call check_equal(error, status_of(sample, 0.1_wp, 0.0_wp), point_outside, "the same, at rest")
+      call check_equal(error, status_at(sample, 0.1_wp, 0.1_wp), point_outside, "hessian")
+      call check_equal(error, status_at(sample, 0.1_wp, 0.0_wp), point_outside, "the same, at rest")
    end subroutine test_status
 
    !> How the response of `sample` ends at two points, of which one moves from `start` by `step`.
-   integer function status_of(sample, start, step)
+   integer function status_at(sample, start, step)
       type(sample_t), intent(in) :: sample
       real(wp), intent(in) :: start, step
       type(point_response_t) :: response
@@ -425,8 +425,8 @@ contains
       dz = 0.0_wp
       z0(1, 2) = start
       dz(1, 2) = step
-      call point_gradient(sample, z0, dz, .true., response, status_of)
-   end function status_of
+      call point_gradient(sample, z0, dz, .true., response, status_at)
+   end function status_at
 
    !> The work space of many points serves for few, and the other way round.
    subroutine test_room(error)
