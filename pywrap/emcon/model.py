@@ -378,7 +378,7 @@ class Model(Cards):
 
     def give_law(self, material: str, law: PointFunction) -> Model:
         """The law of a `*USER MATERIAL`, as `law` of `material`, for the model of a deck."""
-        check_law(material, law)
+        check_law(law)
         self._laws[material] = law
         return self
 

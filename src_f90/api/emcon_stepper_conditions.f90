@@ -50,7 +50,8 @@ contains
       if (i > 0) return
       call raise(error, err_input, "there is no load of this kind on " // &
          trim(merge("node   ", "element", kind == load_point)) // " " // to_text(label) // &
-         " in step " // to_text(self%march%state%i_step) // " of the deck")
+         " in step " // to_text(self%march%state%i_step) // " of the deck; what is to be " // &
+         "changed has to stand there, if only with the value 0")
    end subroutine stepper_find_load
 
    !> Give load `i` of the present step the value `value`.

@@ -10,7 +10,6 @@ import signal
 import sys
 import threading
 import time
-import warnings
 import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -250,7 +249,12 @@ def test_laws_of_small_strains_are_checked_at_those() -> None:
         Model().material("RUBBER", law=lambda strain: small(strain, 1.1))
 
 
-def test_energies_that_lose_their_digits_are_told() -> None:
+def test_energies_that_lose_digits_do_no_harm() -> None:
+    """Round-off of the modulus in the energy is told from what the quadrature misses.
+
+    What of it is taken for real is divided by the change of strain, which is then above 1e-3: a
+    relative error of eps/1e-3^2 in stresses of such changes, times the steps.
+    """
     def careless(strain: np.ndarray) -> Any:
         _, stress, tangent = neo_hooke(strain)
         e1, e2, shear = strain.T
@@ -258,12 +262,10 @@ def test_energies_that_lose_their_digits_are_told() -> None:
         trace = (1 + 2*e1) + (1 + 2*e2)
         return MU/2*(trace - 2) - MU*ln + LAME/2*ln**2, stress, tangent
 
-    with pytest.warns(UserWarning, match="the energy of RUBBER has lost its digits.*log1p"):
-        Model().material("RUBBER", law=careless)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        for law in (quadratic, neo_hooke, tension_only, anisotropic):
-            Model().material("RUBBER", law=law)
+    for scene in (flying, impact):
+        (u, drift, _), (careful, _, _) = run(scene(careless)), run(scene(neo_hooke))
+        assert np.abs(u - careful).max() <= 40*EPS/1e-3**2*np.abs(careful).max()
+        assert drift <= 1e-12
 
 
 def test_points_to_check_have_to_be_some() -> None:
