@@ -46,7 +46,7 @@ contains
             self%override(i)%name = to_upper(trim(adjustl(text(:max(i_equal - 1, 0)))))
             self%override(i)%text = trim(adjustl(text(i_equal + 1:)))
             if (.not. is_name(self%override(i)%name) .or. self%override(i)%text == "") then
-               fault = "--set needs NAME=VALUE, not " // quoted(text)
+               fault = "a parameter is set by NAME=VALUE, not by " // quoted(text)
                self%override(i)%is_used = .true.
             end if
          end associate
@@ -133,7 +133,7 @@ contains
 
       fault = ""
       if (self%override(i)%is_used) return
-      fault = "--set: the deck has no parameter " // quoted(self%override(i)%name) &
+      fault = "the deck has no parameter " // quoted(self%override(i)%name) &
          // suggestion(self%override(i)%name, parameter_list(self%table))
    end function unused_override
 
