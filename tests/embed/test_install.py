@@ -23,6 +23,7 @@ from emcon.stepper import Stepper  # noqa: E402
 RING = ROOT/"input_decks"/"ring.inp"
 PROJECT = tomllib.loads((PACKAGE/"pyproject.toml").read_text(encoding="utf-8"))["project"]
 VERSION = PROJECT["version"]
+BESIDE = {"emcon/py.typed", "emcon/_core.pyi"}
 COMPILED = {f"emcon/_core{sysconfig.get_config_var('EXT_SUFFIX')}", "emcon/libemcon.so.0"}
 NO_PATH = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 ONE_INCREMENT = """
@@ -82,7 +83,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def tree(tmp_path: Path) -> Path:
     """A source tree with products of another interpreter in it, and a Makefile that is quick."""
     shutil.copytree(PACKAGE, tmp_path/"tree"/"pywrap",
-                    ignore=shutil.ignore_patterns("_core*", "libemcon*", "__pycache__", "build",
+                    ignore=shutil.ignore_patterns("_core*.so", "libemcon*", "__pycache__", "build",
                                                   "dist", "*.egg-info"))
     package = tmp_path/"tree"/"pywrap"
     (tmp_path/"tree"/"src_f90").mkdir()
@@ -100,7 +101,7 @@ def tree(tmp_path: Path) -> Path:
 def test_wheel_is_complete_and_for_this_interpreter(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     within = {name for name in names if name.startswith("emcon/")}
-    assert within == python_files(PACKAGE) | COMPILED | {"emcon/py.typed", "emcon/_core.pyi"}
+    assert within == python_files(PACKAGE) | COMPILED | BESIDE
     assert {name.split("/")[0] for name in names} == {"emcon", f"emcon-{VERSION}.dist-info"}
     tag = f"cp{sys.version_info.major}{sys.version_info.minor}"
     platform = sysconfig.get_platform().replace("-", "_")
@@ -128,7 +129,7 @@ def test_nothing_slips_in_or_is_left(tree: Path, tmp_path: Path) -> None:
     (file,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(file) as archive:
         within = {name for name in archive.namelist() if name.startswith("emcon/")}
-        assert within == python_files(PACKAGE) | COMPILED | {"emcon/py.typed", "emcon/_core.pyi"}
+        assert within == python_files(PACKAGE) | COMPILED | BESIDE
         assert all(archive.read(name) == b"made\n" for name in COMPILED)
     assert files(tree) == before | {"build/.lock"}
 
