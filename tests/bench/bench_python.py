@@ -22,7 +22,7 @@ sys.path[:0] = [str(ROOT/"pywrap"), str(ROOT/"tests")]
 sys.path.append(str(ROOT/"tests"/"bench"))
 
 import numpy as np  # noqa: E402
-from bench_ring import DECKS, END, ENVIRONMENT, PROGRAM, block_text, measure, table  # noqa: E402
+from bench_ring import DECKS, END, ENVIRONMENT, block_text, measure, table  # noqa: E402
 
 RING = DECKS/"ring.inp"
 OUTPUT = ("*NODE FILE", "*EL FILE", "*CONTACT FILE", "*CONTACT PRINT", "*RESTART", "*TIME POINTS")
@@ -41,14 +41,6 @@ def run_steps(deck):
             ring.step()
         faults = resource.getrusage(resource.RUSAGE_SELF).ru_minflt - faults
         return start, opened - start, time.process_time() - opened, faults
-
-
-def run_lesson(deck, learns):
-    """The same, with or without the block whose return sets the threshold of the C library."""
-    import emcon.handle as handle
-    if not int(learns):
-        handle._LESSON = 1
-    return run_steps(deck)
 
 
 def in_python(name, *arguments):
@@ -126,22 +118,6 @@ def bench_steps(folder, n=5):
         row(name, *np.median(seconds, axis=0).tolist(), float(np.median(ratio)),
             half_spread(ratio), float(np.median(inner/seconds[:, 0])), statistics.median(starts),
             int(statistics.median(faults)))  # fmt: skip
-
-
-def bench_lesson(n=3):
-    print(f"\nMemory kept between factorisations: the loop with the lesson of handle.py and "
-          f"without, {n} pairs")
-    row = table("with [s]", "without [s]", "ratio", "faults with", "faults without")
-    faults = {1: [], 0: []}
-
-    def run(learns):
-        *_, seconds, fault = in_python("run_lesson", RING, learns)[1]
-        faults[learns].append(fault)
-        return seconds
-
-    seconds = pairs(lambda: run(1), lambda: run(0), n)
-    row(*np.median(seconds, axis=0).tolist(), float(np.median(seconds[:, 1]/seconds[:, 0])),
-        *(int(statistics.median(faults[k])) for k in (1, 0)))
 
 
 def bench_opening(n=41):
@@ -336,7 +312,6 @@ if __name__ == "__main__":
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     with tempfile.TemporaryDirectory() as name:
         bench_steps(pathlib.Path(name))
-        bench_lesson()
         bench_opening()
         bench_queries()
         bench_arrays(pathlib.Path(name))
