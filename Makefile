@@ -124,11 +124,15 @@ $(O)/%.c.o: %.c $(BUILD)/flags.txt
 	@echo "  CC    $<"
 	$(Q)$(CCOMPILE) -MMD -MP -c $< -o $@
 
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pywrap/pyproject.toml)
+# Programs run with libraries of their own major version, as long as that is 0 of their minor one.
+SHARED := libemcon.so.$(shell echo $(VERSION) | sed 's/^\(0\.[0-9]*\|[1-9][0-9]*\)\..*/\1/')
+
 $(BUILD)/libemcon.a: $(LIB_OBJ)
 	@echo "  AR    $@"
 	$(Q)rm -f $@ && ar rcs $@ $^
 
-$(BUILD)/libemcon.so.0: $(LIB_OBJ)
+$(BUILD)/$(SHARED): $(LIB_OBJ)
 	@echo "  LINK  $@"
 	$(Q)$(FC) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $^ $(LIBS)
 	$(Q)ln -sf $(@F) $(BUILD)/libemcon.so
@@ -144,7 +148,7 @@ $(BUILD)/kernels: $(call objects,$(KERNEL_SRC)) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
 	$(Q)$(FC) -o $@ $^ $(LIBS)
 
-lib: $(BUILD)/libemcon.a $(BUILD)/libemcon.so.0  ## the library, build/release/libemcon.{a,so}
+lib: $(BUILD)/libemcon.a $(BUILD)/$(SHARED)  ## the library, build/release/libemcon.{a,so}
 app: $(BUILD)/emcon  ## the program, build/release/emcon
 # One program per file, timed, not tested; those without `bench_` are called by scripts.
 BENCHES := $(patsubst tests/bench/%.f90,$(BUILD)/%,$(wildcard tests/bench/*.f90))
@@ -188,14 +192,15 @@ $(P)/_core-f2pywrappers2.o: $(P)/_core-f2pywrappers2.f90 $(call objects,$(FLAT))
 	$(Q)$(FC) -O2 -g -fPIC -I$(BUILD)/mod -J$(P) $(FFLAGS) -c $< -o $@
 
 $(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o _core-f2pywrappers2.o fortranobject.o) \
-		$(BUILD)/libemcon.so.0
+		$(BUILD)/$(SHARED)
 	@echo "  LINK  $@"
 	$(Q)$(FC) -shared -o $@ $^ -Wl,-rpath,'$$ORIGIN'
 
 # The package holds the extension of the mode made last. `install` replaces a file, where `cp`
 # would write into one that a running Python has mapped.
 pywrap: $(P)/_core$(EXT_SUFFIX)  ## the Python package, used as .venv/bin/python -m emcon
-	$(Q)for f in $< $(BUILD)/libemcon.so.0; do \
+	$(Q)find '$(PACKAGE)' -name 'libemcon.so.*' ! -name $(SHARED) -delete
+	$(Q)for f in $< $(BUILD)/$(SHARED); do \
 		cmp -s $$f '$(PACKAGE)'/$${f##*/} || install -m 755 $$f '$(PACKAGE)'; done
 
 # ---- use ----------------------------------------------------------------------------------------
@@ -224,13 +229,12 @@ docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
 	.venv/bin/python -m ford --quiet .ci/ford.md
 	@echo "build/docs/index.html"
 
-VERSION = $(shell sed -n 's/^version = "\(.*\)"/\1/p' pywrap/pyproject.toml)
 TO = $(DESTDIR)$(PREFIX)
 install: app lib  ## program, library, modules, header and emcon.pc below PREFIX= (/usr/local)
 	install -d $(TO)/bin $(TO)/lib/pkgconfig $(TO)/include/emcon
 	install -m 755 $(BUILD)/emcon $(TO)/bin
-	install -m 755 $(BUILD)/libemcon.so.0 $(TO)/lib
-	ln -sf libemcon.so.0 $(TO)/lib/libemcon.so
+	install -m 755 $(BUILD)/$(SHARED) $(TO)/lib
+	ln -sf $(SHARED) $(TO)/lib/libemcon.so
 	install -m 644 $(BUILD)/libemcon.a $(TO)/lib
 	install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(basename $(notdir $(LIB_SRC)))) \
 		$(wildcard src_f90/api/*.h) $(TO)/include/emcon
@@ -243,7 +247,7 @@ status:  ## compiler, libraries and Python packages that were found
 	@$(SETUP) status
 
 clean:  ## remove build/ and the compiled extension (.venv stays)
-	rm -rf build pywrap/emcon/_core*.so pywrap/emcon/libemcon.so.0
+	rm -rf build pywrap/emcon/_core*.so pywrap/emcon/libemcon.so.*
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while IFS='	' read -r name text; do \

@@ -22,6 +22,8 @@ from setuptools.command.build_ext import build_ext
 from setuptools.command.sdist import sdist
 
 ROOT = Path(__file__).resolve().parents[1]
+#: The library, by whatever series its version is of.
+LIBRARY = "libemcon.so.*"
 
 
 def demand(condition: bool, text: str) -> None:
@@ -67,8 +69,8 @@ def make(objects: Path, package: Path) -> None:
         done = subprocess.run(["make", "--no-print-directory", f"-j{os.cpu_count() or 1}", "pywrap",
                                *(f"{name}={value}" for name, value in variables.items())],
                               cwd=ROOT, env=env, stdin=subprocess.DEVNULL, check=False)
-    made = [f"_core{variables['EXT_SUFFIX']}", "libemcon.so.0"]
-    demand(done.returncode == 0 and all((package/name).is_file() for name in made),
+    made = (package/f"_core{variables['EXT_SUFFIX']}").is_file() and any(package.glob(LIBRARY))
+    demand(done.returncode == 0 and made,
            "EMCON could not be compiled; the reason stands above")
 
 
@@ -83,7 +85,8 @@ class BuildExtension(build_ext):
     def get_output_mapping(self) -> dict[str, str]:
         mapping = super().get_output_mapping()
         if self.inplace:  # a strict editable installation links what stands here, nothing else
-            mapping[str(Path(self.build_lib)/"emcon"/"libemcon.so.0")] = "emcon/libemcon.so.0"
+            for library in (ROOT/"pywrap"/"emcon").glob(LIBRARY):
+                mapping[str(Path(self.build_lib)/"emcon"/library.name)] = f"emcon/{library.name}"
         return mapping
 
 

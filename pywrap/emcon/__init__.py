@@ -39,8 +39,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .animation import animate
     from .comparison import Comparison, Difference, compare
+    from .derivatives import check_derivatives
     from .errors import AnalysisError, InputError
-    from .given import Outside, check_derivatives
+    from .given import Outside
     from .interface import Interface
     from .model import Model
     from .plotting import plot
@@ -60,8 +61,9 @@ __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "
 _PLACES = {
     "animation": "animate",
     "comparison": "Comparison Difference compare",
+    "derivatives": "check_derivatives",
     "errors": "AnalysisError InputError",
-    "given": "Outside check_derivatives",
+    "given": "Outside",
     "interface": "Interface",
     "model": "Model",
     "plotting": "plot",

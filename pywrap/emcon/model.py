@@ -27,9 +27,10 @@ from . import _core
 from .cards import (Block, Cards, Dof, Number, Numbering, Where, array_of, caller, card, real,
                     text_lines, whole)
 from .deck_text import number, table, write_text
+from .derivatives import check_law
 from .errors import InputError, check
 from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_function,
-                    check_law, check_solid)
+                    check_solid)
 from .given_matrices import give_masses, given_mass
 from .steps import Step
 

@@ -16,6 +16,8 @@ from .errors import InputError
 from .handle import Handle
 
 _query = _core.emcon_flat_query
+#: Where the library keeps which matrix.
+_MASS, _TANGENT, _LINKS, _P, _DF, _G, _C = range(1, 8)
 _NO_REALS = np.empty(0)
 _NO_FLAGS = np.empty(0, dtype=np.int32)
 
@@ -29,7 +31,7 @@ class Evaluation:
 
     def __init__(self, stepper: Queries, with_tangent: bool, *arguments: Any) -> None:
         self._handle = stepper._handle
-        self._sizes = (stepper.n_node, stepper.n_unknown)
+        self._n_node, self._n_unknown = stepper.n_node, stepper.n_unknown
         self._n_constraint = stepper.n_constraint
         self._has_null_space = False
         self._handle.change(_query.evaluate, *arguments, int(with_tangent))
@@ -46,12 +48,11 @@ class Evaluation:
 
         With `contact` also less contact forces. At prescribed freedoms it is the reaction.
         """
-        nodal, _ = self._call(_query.get_residual, int(contact), *self._sizes)
-        return nodal.T
+        return self._call(_query.get_residual, int(contact), self._n_node).T
 
     def unknown_residual(self, *, contact: bool = True) -> NDArray[np.float64]:
         """The same on the unknowns, (n_unknown,): T^T r with the `links` T. 0 solves the step."""
-        return self._call(_query.get_residual, int(contact), *self._sizes)[1]
+        return self._call(_query.get_unknown_residual, int(contact), self._n_unknown)
 
     def tangent(self, *, contact: bool = True) -> Csr:
         """Derivative of the residual on the unknowns by them at the end, for given multipliers.
@@ -59,7 +60,7 @@ class Evaluation:
         (n_unknown, n_unknown) [M/T^2]. With `contact` the second derivatives of the gaps are in
         it, times the multipliers. Needs an evaluation ``with_tangent``.
         """
-        return self._call(_made, _query.make_tangent, int(contact))
+        return self._call(_made, _TANGENT, int(contact))
 
     def null_space(self) -> tuple[Csr, Csr]:
         """P and DF, each (2 n_node, independent unknowns), for the constraints that act.
@@ -168,7 +169,7 @@ class Queries:
     @property
     def mass(self) -> Csr:
         """The consistent mass between nodes, the same in both directions, (n_node, n_node) [M]."""
-        return self._handle.call(_made, _query.make_mass)
+        return self._handle.call(_made, _MASS)
 
     @property
     def links(self) -> Csr:
@@ -177,7 +178,7 @@ class Queries:
         Row 2 i + a is direction a of node i, both from 0. That of a prescribed freedom is empty,
         that of a dependent one has the weights of those that it follows.
         """
-        return self._handle.call(_made, _query.make_links)
+        return self._handle.call(_made, _LINKS)
 
     @property
     def unknowns(self) -> NDArray[np.int32]:
@@ -222,24 +223,24 @@ def contact_arguments(lam: ArrayLike | None, active: ArrayLike | None,
             _NO_FLAGS if active is None else flag_array(active, "active", (n,)))
 
 
-def _csr(address: int, number: int, sizes: NDArray[np.int32]) -> tuple[Csr, int]:
-    """Copy out the matrix that the library calls `number`."""
+def _csr(address: int, place: int, sizes: NDArray[np.int32]) -> tuple[Csr, int]:
+    """Copy out the matrix that the library keeps at `place`."""
     n_row, n_col, n_entry = (int(n) for n in sizes)
-    start, column, value, ierr = _query.get_csr(address, number, n_row, n_entry)
+    start, column, value, ierr = _query.get_csr(address, place, n_row, n_entry)
     return Csr((n_row, n_col), start, column, value), ierr
 
 
-def _made(address: int, make: Callable[..., Any], *arguments: Any) -> tuple[Csr | None, int]:
-    """The matrix that `make` makes."""
-    sizes, ierr = make(address, *arguments)
-    return _csr(address, 1, sizes) if ierr == 0 else (None, ierr)
+def _made(address: int, place: int, contact: int = 0) -> tuple[Csr | None, int]:
+    """The matrix that the library makes for `place`."""
+    sizes, ierr = _query.make_matrix(address, place, contact)
+    return _csr(address, place, sizes) if ierr == 0 else (None, ierr)
 
 
 def _null_space(address: int) -> tuple[tuple[Csr, Csr] | None, int]:
     sizes, ierr = _query.make_null_space(address)
     if ierr:
         return None, ierr
-    (p, _), (d, ierr) = (_csr(address, k + 1, sizes[:, k]) for k in range(2))
+    (p, _), (d, ierr) = (_csr(address, place, sizes[:, k]) for k, place in enumerate((_P, _DF)))
     return (p, d), ierr
 
 
@@ -249,5 +250,5 @@ def _constraints(address: int, u0: NDArray[np.float64], u1: NDArray[np.float64],
     if ierr:
         return None, ierr
     place, values, _ = _query.get_constraints(address, int(sizes[0, 0]))
-    (g, _), (c, ierr) = (_csr(address, k + 3, sizes[:, k]) for k in range(2))
+    (g, _), (c, ierr) = (_csr(address, place, sizes[:, k]) for k, place in enumerate((_G, _C)))
     return place, values, g, c, ierr

@@ -162,7 +162,7 @@ contains
       procedure(progress_interface), pointer :: tell
       type(model_t), pointer :: model
       type(increment_t) :: made
-      integer(c_int) :: stop
+      integer(c_int) :: answer
 
       call find_built(handle, model, emcon_run)
       if (emcon_run /= err_none) return
@@ -178,9 +178,9 @@ contains
          if (allocated(made%notes%item)) call log_lines(made%notes%item, made%notes%n)
          if (emcon_run /= err_none) return
          if (.not. associated(tell)) cycle
-         stop = tell(user, as_increment(model, made), &
+         answer = tell(user, as_increment(model, made), &
             real(stepper_fraction(model%stepper), c_double))
-         if (stop == 0) cycle
+         if (answer == 0) cycle
          call handle_fail(model, "stopped by the callback", err_interrupt, emcon_run)
          return
       end do

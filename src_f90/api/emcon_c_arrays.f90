@@ -2,16 +2,14 @@
 module emcon_c_arrays
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_ptr
-   use emcon_c_border, only : put_numbers, show_matrix
-   use emcon_c_types, only : csr_c
-   use emcon_csr, only : csr_t
+   use emcon_c_border, only : put_numbers
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
    implicit none
    private
    public :: take_list, take_field, take_integers, take_flags, check_range, check_ascending
-   public :: put_flags, put_matrix
+   public :: put_flags
 
 contains
 
@@ -152,16 +150,5 @@ contains
 
       call put_numbers(merge(1, 0, flag), to)
    end subroutine put_flags
-
-   !> Let C look at a matrix, if there is where to put it. One that was never made is empty.
-   subroutine put_matrix(matrix, to)
-      type(csr_t), intent(in), target :: matrix
-      type(c_ptr), intent(in) :: to
-      type(csr_c), pointer :: view
-
-      if (.not. c_associated(to)) return
-      call c_f_pointer(to, view)
-      call show_matrix(matrix, view)
-   end subroutine put_matrix
 
 end module emcon_c_arrays

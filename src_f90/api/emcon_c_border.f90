@@ -17,7 +17,7 @@ module emcon_c_border
    private
    public :: find_model, find_read, find_built, address_of, check_count, check_given
    public :: take_field, take_values, take_flags, put_field, put_values, put_numbers, put_number
-   public :: put_increment, as_increment, show_matrix, f_text, c_string
+   public :: put_increment, as_increment, show_matrix, put_matrix, f_text, c_string
 
 contains
 
@@ -34,8 +34,7 @@ contains
       type(model_t), pointer, intent(out) :: model
       integer(c_int), intent(out) :: ierr
 
-      call handle_find(address_of(handle), model)
-      ierr = merge(err_none, err_input, associated(model))
+      call handle_find(address_of(handle), model, ierr)
    end subroutine find_model
 
    !> The same for a model whose deck was read.
@@ -215,6 +214,17 @@ contains
       if (allocated(matrix%column)) to%column = c_loc(matrix%column)
       if (allocated(matrix%value)) to%value = c_loc(matrix%value)
    end subroutine show_matrix
+
+   !> The same for where C wants it, if it does.
+   subroutine put_matrix(matrix, to)
+      type(csr_t), intent(in), target :: matrix
+      type(c_ptr), intent(in) :: to
+      type(csr_c), pointer :: view
+
+      if (.not. c_associated(to)) return
+      call c_f_pointer(to, view)
+      call show_matrix(matrix, view)
+   end subroutine put_matrix
 
    !> The text of C up to its end; "" for NULL.
    function f_text(text) result(copy)

@@ -1,12 +1,12 @@
 !> The C interface: what the engine computes for a step. What each function does is said in emcon.h.
 module emcon_c_query
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, c_ptr
-   use emcon_c_border, only : check_count, check_given, find_built, put_field, put_numbers, &
-      put_values, show_matrix, take_field, take_flags, take_values
+   use emcon_c_border, only : check_count, check_given, find_built, put_field, put_matrix, &
+      put_numbers, put_values, show_matrix, take_field, take_flags, take_values
    use emcon_c_types, only : constraint_report_c, csr_c
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_none, error_t
-   use emcon_handle, only : handle_pass, model_t
+   use emcon_handle, only : at_df, at_links, at_mass, at_p, at_tangent, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_stepper_constraints, only : query_constraints, query_curvature_times, query_links, &
       query_multipliers, query_null_space
@@ -17,9 +17,6 @@ module emcon_c_query
    public :: emcon_guess, emcon_evaluate, emcon_residual, emcon_tangent, emcon_unknowns, emcon_mass
    public :: emcon_constraints_c, emcon_curvature_times, emcon_null_space_c, emcon_multipliers
    public :: emcon_links
-
-   !> Places of the matrices in `c_matrix` of a model.
-   integer, parameter :: at_mass = 1, at_tangent = 2, at_links = 3, at_p = 4, at_df = 5
 
 contains
 
@@ -51,22 +48,10 @@ contains
 
       call find_built(handle, model, emcon_mass)
       if (emcon_mass /= err_none) return
-      call query_mass(model%stepper, model%c_matrix(at_mass), error)
-      call give_matrix(model, at_mass, matrix)
+      call query_mass(model%stepper, model%matrix(at_mass), error)
+      call put_matrix(model%matrix(at_mass), matrix)
       call handle_pass(model, error, emcon_mass)
    end function emcon_mass
-
-   !> Let C see a matrix of the model.
-   subroutine give_matrix(model, place, to)
-      type(model_t), intent(in), target :: model
-      integer, intent(in) :: place                   !! one of `at_`
-      type(c_ptr), intent(in) :: to
-      type(csr_c), pointer :: matrix
-
-      if (.not. c_associated(to)) return
-      call c_f_pointer(to, matrix)
-      call show_matrix(model%c_matrix(place), matrix)
-   end subroutine give_matrix
 
    integer(c_int) function emcon_links(handle, matrix) bind(c)
       type(c_ptr), value :: handle, matrix
@@ -75,8 +60,8 @@ contains
 
       call find_built(handle, model, emcon_links)
       if (emcon_links /= err_none) return
-      call query_links(model%stepper, model%c_matrix(at_links), error)
-      call give_matrix(model, at_links, matrix)
+      call query_links(model%stepper, model%matrix(at_links), error)
+      call put_matrix(model%matrix(at_links), matrix)
       call handle_pass(model, error, emcon_links)
    end function emcon_links
 
@@ -150,8 +135,8 @@ contains
 
       call find_built(handle, model, emcon_tangent)
       if (emcon_tangent /= err_none) return
-      call query_tangent(model%query, with_contact /= 0, model%c_matrix(at_tangent), error)
-      call give_matrix(model, at_tangent, matrix)
+      call query_tangent(model%query, with_contact /= 0, model%matrix(at_tangent), error)
+      call put_matrix(model%matrix(at_tangent), matrix)
       call handle_pass(model, error, emcon_tangent)
    end function emcon_tangent
 
@@ -231,9 +216,9 @@ contains
 
       call find_built(handle, model, emcon_null_space_c)
       if (emcon_null_space_c /= err_none) return
-      call query_null_space(model%query, model%c_matrix(at_p), model%c_matrix(at_df), error)
-      call give_matrix(model, at_p, p)
-      call give_matrix(model, at_df, df)
+      call query_null_space(model%query, model%matrix(at_p), model%matrix(at_df), error)
+      call put_matrix(model%matrix(at_p), p)
+      call put_matrix(model%matrix(at_df), df)
       call handle_pass(model, error, emcon_null_space_c)
    end function emcon_null_space_c
 

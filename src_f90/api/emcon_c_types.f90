@@ -33,13 +33,13 @@ module emcon_c_types
    end type constraint_report_c
 
    abstract interface
-      function progress_interface(user, increment, fraction) result(stop) bind(c)
+      function progress_interface(user, increment, fraction) result(answer) bind(c)
          import :: c_double, c_int, c_ptr, increment_c
          implicit none
          type(c_ptr), value :: user
          type(increment_c), intent(in) :: increment
          real(c_double), value :: fraction
-         integer(c_int) :: stop
+         integer(c_int) :: answer
       end function progress_interface
 
       subroutine log_interface(user, line) bind(c)

@@ -6,7 +6,7 @@
 module emcon_flat
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_dgrad10, only : dg_t
-   use emcon_errors, only : err_input, err_none, error_t
+   use emcon_errors, only : err_none, error_t
    use emcon_handle, only : handle_build, handle_find, handle_fits, handle_free, handle_new, &
       handle_read, model_t
    use emcon_kinds, only : wp
@@ -26,8 +26,9 @@ contains
       integer(c_int64_t), intent(in) :: handle
       character(len=8192), intent(out) :: text
       type(model_t), pointer :: model
+      integer(c_int) :: ierr
 
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       text = "the model is closed"
       if (associated(model)) text = model%message
    end subroutine last_error
@@ -75,10 +76,8 @@ contains
       type(model_t), pointer :: model
 
       n = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       associate (system => model%stepper%march%system)
          n = [system%solid%n_node, system%solid%n_element, &
             system%n_constraint - system%linear%n, system%n_body, &
@@ -98,8 +97,7 @@ contains
 
       x = 0.0_c_double
       label = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       if (.not. handle_fits(model, n_node, model%stepper%march%system%solid%n_node, ierr)) return
       x = real(model%stepper%scene%x, c_double)
@@ -114,10 +112,8 @@ contains
       type(model_t), pointer :: model
 
       n = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       n = size(model%stepper%diagnostic) + model%stepper%notes%n
    end subroutine count_notes
 
@@ -131,10 +127,8 @@ contains
       integer :: n
 
       text = " "
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       n = size(model%stepper%diagnostic)
       if (i <= n) text = model%stepper%diagnostic(i)%text
       if (i > n) text = model%stepper%notes%item(i - n)%text

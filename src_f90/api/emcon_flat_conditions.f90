@@ -1,7 +1,7 @@
 !> Flat interface, as emcon_flat: loads and boundary values of the present step of the deck.
 module emcon_flat_conditions
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
-   use emcon_errors, only : err_input, error_t
+   use emcon_errors, only : error_t
    use emcon_handle, only : handle_find, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_stepper, only : stepper_t
@@ -27,8 +27,7 @@ contains
       type(error_t), allocatable :: error
       integer :: i, load(n)
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       do i = 1, n
          call stepper_find_load(model%stepper, int(kind), int(label(i)), int(place(i)), load(i), &
@@ -52,8 +51,7 @@ contains
       type(error_t), allocatable :: error
       !f2py threadsafe
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_check_open(model%stepper, error)
       if (.not. allocated(error)) then
@@ -87,8 +85,7 @@ contains
       type(error_t), allocatable :: error
       !f2py threadsafe
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_remove_prescribed(model%stepper, int(label), int(dof), error)
       call handle_pass(model, error, ierr)

@@ -4,7 +4,7 @@ module emcon_flat_given
    use, intrinsic :: iso_c_binding, only : c_double, c_funptr, c_int, c_int64_t, c_null_funptr
    use emcon_callbacks, only : give_force_callback, give_law_callback, give_potential_callback
    use emcon_csr, only : csr_t
-   use emcon_errors, only : err_input, err_none, error_t
+   use emcon_errors, only : err_input, error_t
    use emcon_handle, only : handle_fail, handle_find, handle_fits, handle_pass, model_t
    use emcon_kinds, only : dp
    use emcon_stepper_given, only : stepper_give_mass
@@ -23,10 +23,8 @@ contains
       type(model_t), pointer :: model
 
       n = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       n = size(model%stepper%scene%x, 2)
    end subroutine count_nodes
 
@@ -42,8 +40,7 @@ contains
 
       label = 0
       is_in = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       if (.not. handle_fits(model, n, size(model%stepper%scene%x, 2), ierr)) return
       associate (scene => model%stepper%scene)
@@ -67,8 +64,7 @@ contains
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call give_law_callback(model%stepper, name, transfer(address, c_null_funptr), error)
       call handle_pass(model, error, ierr)
@@ -85,8 +81,7 @@ contains
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call give_potential_callback(model%stepper, name, node + 1, &
          transfer(address, c_null_funptr), error)
@@ -105,8 +100,7 @@ contains
       type(csr_t) :: pattern
       type(error_t), allocatable :: error
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call fill(pattern, n_row, row_start, column)
       call give_force_callback(model%stepper, name, pattern, transfer(address, c_null_funptr), &
@@ -125,8 +119,7 @@ contains
       type(csr_t) :: mass
       type(error_t), allocatable :: error
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call fill(mass, n_row, row_start, column)
       mass%value = real(value, dp)

@@ -5,8 +5,9 @@
 module emcon_flat_query
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_csr, only : csr_t
-   use emcon_errors, only : err_input, error_t
-   use emcon_handle, only : handle_find, handle_fits, handle_pass, model_t
+   use emcon_errors, only : error_t
+   use emcon_handle, only : at_df, at_links, at_mass, at_p, handle_find, handle_fits, &
+      handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_stepper_constraints, only : query_constraints, query_curvature_times, query_links, &
       query_multipliers, query_null_space
@@ -14,8 +15,9 @@ module emcon_flat_query
       query_residual, query_tangent, query_unknowns
    implicit none
    private
-   public :: guess, evaluate, get_residual, get_unknowns, get_momenta, get_multipliers
-   public :: make_tangent, make_mass, make_links, make_null_space, get_csr
+   public :: guess, evaluate, get_residual, get_unknown_residual, get_unknowns, get_momenta, &
+      get_multipliers
+   public :: make_matrix, make_null_space, get_csr
    public :: constraints, get_constraints, curvature_times
 
 contains
@@ -32,8 +34,7 @@ contains
       real(wp), allocatable :: field(:, :)
 
       u1 = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       allocate(field(2, n_node))
       call query_guess(model%query, model%stepper, real(h, wp), field, error)
@@ -58,8 +59,7 @@ contains
       integer :: before
       !f2py threadsafe
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       before = model%stepper%march%system%linear%n   ! ties and equations stand before contact
       if (n_lam > 0) new_lam = [model%stepper%march%state%lam(:before), real(lam, wp)]
@@ -69,31 +69,47 @@ contains
       call handle_pass(model, error, ierr)
    end subroutine evaluate
 
-   !> Residual of the last evaluation: at the nodes, and on the unknowns.
-   subroutine get_residual(handle, with_contact, n_node, n_unknown, nodal, unknown, ierr)
+   !> Residual of the last evaluation at the nodes.
+   subroutine get_residual(handle, with_contact, n_node, nodal, ierr)
       integer(c_int64_t), intent(in) :: handle
       integer(c_int), intent(in) :: with_contact
-      integer(c_int), intent(in) :: n_node, n_unknown
+      integer(c_int), intent(in) :: n_node
       real(c_double), intent(out) :: nodal(2, n_node)
-      real(c_double), intent(out) :: unknown(n_unknown)
       integer(c_int), intent(out) :: ierr
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
       real(wp), allocatable :: at_node(:, :), on_unknown(:)
 
       nodal = 0.0_c_double
-      unknown = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call query_residual(model%query, with_contact /= 0, at_node, on_unknown, error)
       call handle_pass(model, error, ierr)
       if (allocated(error)) return
       if (.not. handle_fits(model, n_node, size(at_node, 2), ierr)) return
-      if (.not. handle_fits(model, n_unknown, size(on_unknown), ierr)) return
       nodal = real(at_node, c_double)
-      unknown = real(on_unknown, c_double)
    end subroutine get_residual
+
+   !> The same on the unknowns.
+   subroutine get_unknown_residual(handle, with_contact, n_unknown, unknown, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      integer(c_int), intent(in) :: with_contact
+      integer(c_int), intent(in) :: n_unknown
+      real(c_double), intent(out) :: unknown(n_unknown)
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+      real(wp), allocatable :: at_node(:, :), on_unknown(:)
+
+      unknown = 0.0_c_double
+      call handle_find(handle, model, ierr)
+      if (.not. associated(model)) return
+      call query_residual(model%query, with_contact /= 0, at_node, on_unknown, error)
+      call handle_pass(model, error, ierr)
+      if (allocated(error)) return
+      if (.not. handle_fits(model, n_unknown, size(on_unknown), ierr)) return
+      unknown = real(on_unknown, c_double)
+   end subroutine get_unknown_residual
 
    !> Unknown of each degree of freedom, from 1; 0: none.
    subroutine get_unknowns(handle, n_node, unknown, ierr)
@@ -106,8 +122,7 @@ contains
       integer, allocatable :: number(:, :)
 
       unknown = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call query_unknowns(model%stepper, number, error)
       call handle_pass(model, error, ierr)
@@ -126,8 +141,7 @@ contains
       real(wp), allocatable :: of_body(:, :)
 
       momenta = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call query_momenta(model%query, model%stepper, of_body, error)
       call handle_pass(model, error, ierr)
@@ -147,8 +161,7 @@ contains
       integer :: before
 
       lam = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       associate (system => model%stepper%march%system)
          before = system%linear%n
@@ -160,59 +173,35 @@ contains
       lam = real(all_of(before + 1:), c_double)
    end subroutine get_multipliers
 
-   !> Tangent of the last evaluation, which has to be one with tangent.
-   subroutine make_tangent(handle, with_contact, sizes, ierr)
+   !> Make the matrix of one of the places `at_`, which the model keeps: the mass between nodes, all
+   !> displacements from the unknowns, or the tangent of the last evaluation.
+   subroutine make_matrix(handle, place, with_contact, sizes, ierr)
       integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(in) :: with_contact
+      integer(c_int), intent(in) :: place
+      integer(c_int), intent(in) :: with_contact     !! of the tangent
       integer(c_int), intent(out) :: sizes(3)
       integer(c_int), intent(out) :: ierr
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
 
       sizes = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      call query_tangent(model%query, with_contact /= 0, model%matrix, error)
-      call handle_pass(model, error, ierr)
-      if (.not. allocated(error)) sizes = sizes_of(model%matrix)
-   end subroutine make_tangent
+      associate (matrix => model%matrix(place))
+         select case (place)
+         case (at_mass)
+            call query_mass(model%stepper, matrix, error)
+         case (at_links)
+            call query_links(model%stepper, matrix, error)
+         case default
+            call query_tangent(model%query, with_contact /= 0, matrix, error)
+         end select
+         call handle_pass(model, error, ierr)
+         if (.not. allocated(error)) sizes = sizes_of(matrix)
+      end associate
+   end subroutine make_matrix
 
-   !> The mass between nodes.
-   subroutine make_mass(handle, sizes, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(out) :: sizes(3)
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-      type(error_t), allocatable :: error
-
-      sizes = 0
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      call query_mass(model%stepper, model%matrix, error)
-      call handle_pass(model, error, ierr)
-      if (.not. allocated(error)) sizes = sizes_of(model%matrix)
-   end subroutine make_mass
-
-   !> All displacements from the unknowns.
-   subroutine make_links(handle, sizes, ierr)
-      integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(out) :: sizes(3)
-      integer(c_int), intent(out) :: ierr
-      type(model_t), pointer :: model
-      type(error_t), allocatable :: error
-
-      sizes = 0
-      ierr = err_input
-      call handle_find(handle, model)
-      if (.not. associated(model)) return
-      call query_links(model%stepper, model%matrix, error)
-      call handle_pass(model, error, ierr)
-      if (.not. allocated(error)) sizes = sizes_of(model%matrix)
-   end subroutine make_links
-
-   !> P and DF of the last evaluation: matrices 1 and 2.
+   !> P and DF of the last evaluation.
    subroutine make_null_space(handle, sizes, ierr)
       integer(c_int64_t), intent(in) :: handle
       integer(c_int), intent(out) :: sizes(3, 2)
@@ -222,14 +211,13 @@ contains
       !f2py threadsafe
 
       sizes = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      call query_null_space(model%query, model%matrix, model%twin, error)
+      call query_null_space(model%query, model%matrix(at_p), model%matrix(at_df), error)
       call handle_pass(model, error, ierr)
       if (allocated(error)) return
-      sizes(:, 1) = sizes_of(model%matrix)
-      sizes(:, 2) = sizes_of(model%twin)
+      sizes(:, 1) = sizes_of(model%matrix(at_p))
+      sizes(:, 2) = sizes_of(model%matrix(at_df))
    end subroutine make_null_space
 
    pure function sizes_of(matrix) result(sizes)
@@ -240,11 +228,11 @@ contains
       if (allocated(matrix%value)) sizes(3) = size(matrix%value)
    end function sizes_of
 
-   !> Copy out what was made last: 1 the matrix, 2 its twin; of the last report of constraints 3
-   !> the discrete gradients, 4 the gradients at the end.
-   subroutine get_csr(handle, number, n_row, n_entry, row_start, column, value, ierr)
+   !> Copy out what was made last at one of the places `at_`; at the next two, the discrete
+   !> gradients of the last report of constraints, and the gradients at the end.
+   subroutine get_csr(handle, place, n_row, n_entry, row_start, column, value, ierr)
       integer(c_int64_t), intent(in) :: handle
-      integer(c_int), intent(in) :: number
+      integer(c_int), intent(in) :: place
       integer(c_int), intent(in) :: n_row, n_entry
       integer(c_int), intent(out) :: row_start(n_row + 1)
       integer(c_int), intent(out) :: column(n_entry)
@@ -255,18 +243,15 @@ contains
       row_start = 0
       column = 0
       value = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      select case (number)
+      select case (place - size(model%matrix))
       case (1)
-         call copy_csr(model, model%matrix, row_start, column, value, ierr)
-      case (2)
-         call copy_csr(model, model%twin, row_start, column, value, ierr)
-      case (3)
          call copy_csr(model, model%report%discrete_gradient, row_start, column, value, ierr)
-      case default
+      case (2)
          call copy_csr(model, model%report%end_gradient, row_start, column, value, ierr)
+      case default
+         call copy_csr(model, model%matrix(place), row_start, column, value, ierr)
       end select
    end subroutine get_csr
 
@@ -299,8 +284,7 @@ contains
       !f2py threadsafe
 
       sizes = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call query_constraints(model%query, model%stepper, real(u0, wp), real(u1, wp), &
          keeps_gap /= 0, model%report, error)
@@ -322,8 +306,7 @@ contains
 
       place = 0
       values = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       associate (report => model%report)
          if (.not. handle_fits(model, n, report%n, ierr) .or. n == 0) return
@@ -351,8 +334,7 @@ contains
       real(wp), allocatable :: sums(:, :)
 
       product = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       allocate(sums(2, n_node))
       call query_curvature_times(model%query, real(factor, wp), real(direction, wp), sums, error)

@@ -2,7 +2,7 @@
 module emcon_flat_state
    use, intrinsic :: iso_c_binding, only : c_double, c_f_pointer, c_int, c_int64_t, c_loc, &
       c_null_ptr, c_ptr
-   use emcon_errors, only : err_input, err_none, error_t, raise
+   use emcon_errors, only : err_input, error_t, raise
    use emcon_handle, only : handle_fail, handle_find, handle_fits, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
@@ -33,10 +33,8 @@ contains
 
       counts = 0
       times = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       if (stepper_is_done(model%stepper)) then
          call handle_fail(model, "the analysis is at its end", err_input, ierr)
          return
@@ -61,8 +59,7 @@ contains
 
       counts = 0
       times = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_step(model%stepper, real(h, wp), increment, error)
       call handle_pass(model, error, ierr)
@@ -78,8 +75,7 @@ contains
       type(error_t), allocatable :: error
       !f2py threadsafe
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_next_step(model%stepper, error)
       call handle_pass(model, error, ierr)
@@ -93,10 +89,8 @@ contains
       type(model_t), pointer :: model
 
       done = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       if (stepper_is_done(model%stepper)) done = 1
    end subroutine is_done
 
@@ -110,10 +104,8 @@ contains
 
       time = 0.0_c_double
       counts = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       associate (march => model%stepper%march)
          time = real(march%state%time, c_double)
          counts = [march%state%i_step, march%state%increment, march%system%numbering%n_unknown]
@@ -130,8 +122,7 @@ contains
       type(model_t), pointer :: model
 
       field = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       if (.not. handle_fits(model, n_node, model%stepper%march%system%solid%n_node, ierr)) return
       if (number == 1) then
@@ -160,8 +151,7 @@ contains
       logical, allocatable :: new_active(:)
       integer :: before
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       before = model%stepper%march%system%linear%n   ! ties and equations stand before contact
       if (n_u > 0) new_u = real(u, wp)
@@ -187,10 +177,8 @@ contains
       lam = 0.0_c_double
       active = 0
       label = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       associate (system => model%stepper%march%system, &
             state => model%stepper%march%state, scene => model%stepper%scene)
          before = system%linear%n
@@ -217,8 +205,7 @@ contains
       integer :: before
 
       values = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       before = model%stepper%march%system%linear%n   ! ties and equations stand before contact
       if (.not. handle_fits(model, n_constraint, model%stepper%march%system%n_constraint - before, &
@@ -240,10 +227,8 @@ contains
 
       total = 0.0_c_double
       active = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       associate (pair => model%stepper%march%state%pairs%total)
          if (.not. handle_fits(model, n_pair, size(pair), ierr)) return
          do k = 1, n_pair
@@ -263,10 +248,8 @@ contains
       type(model_t), pointer :: model
 
       values = 0.0_c_double
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
-      ierr = err_none
       associate (ledger => model%stepper%march%ledger)
          values(:6) = [real(ledger%kinetic, c_double), real(ledger%strain, c_double), &
             real(ledger%potential, c_double), real(ledger%external_work, c_double), &
@@ -285,8 +268,7 @@ contains
       type(error_t), allocatable :: error
 
       snapshot = 0
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_check_open(model%stepper, error)
       call handle_pass(model, error, ierr)
@@ -306,8 +288,7 @@ contains
       type(error_t), allocatable :: error
       !f2py threadsafe
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call find_snapshot(snapshot, kept)
       if (associated(kept)) then
@@ -349,8 +330,7 @@ contains
       type(error_t), allocatable :: error
       !f2py threadsafe
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       if (.not. allocated(model%stepper%source%line)) then
          call handle_fail(model, "a restart file holds the deck, and this model has none", &
@@ -373,8 +353,7 @@ contains
       type(error_t), allocatable :: error
       !f2py threadsafe
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call restart_read(restart, trim(path), error)
       if (.not. allocated(error)) call stepper_load(model%stepper, restart, error)

@@ -12,23 +12,24 @@ module emcon_handle
    use emcon_stepper, only : stepper_build, stepper_close, stepper_read, stepper_read_text, &
       stepper_t
    use emcon_stepper_constraints, only : contact_report_t
-   use emcon_stepper_free, only : snapshot_t
    use emcon_stepper_query, only : query_free, query_t
    use emcon_text, only : string_t
    implicit none
    private
    public :: model_t, handle_new, handle_free, handle_find, handle_fail, handle_pass
    public :: handle_read, handle_read_text, handle_read_passages, handle_build, handle_fits
+   public :: at_mass, at_tangent, at_links, at_p, at_df
+
+   !> Places of the matrices that a model was asked for.
+   integer, parameter :: at_mass = 1, at_tangent = 2, at_links = 3, at_p = 4, at_df = 5
 
    type :: model_t
       type(stepper_t) :: stepper
       type(query_t) :: query
-      type(csr_t) :: matrix, twin                !! asked for last; `twin` has the same pattern
+      type(csr_t) :: matrix(5)                   !! asked for last, each kind in its place
       type(contact_report_t) :: report           !! of the constraints asked for last
-      type(snapshot_t), allocatable :: snapshot(:)   !! states to come back to
       character(len=:), allocatable :: message   !! of the last failure
       character(kind=c_char), allocatable :: c_text(:)   !! the same as C was given it
-      type(csr_t) :: c_matrix(5)                 !! that C was given, each kind in its place
       integer(c_int), allocatable :: c_place(:, :)       !! the numbers in `report`, from 0
       real(c_double), allocatable :: c_gap(:, :)         !! the gaps in it
    end type model_t
@@ -54,8 +55,7 @@ contains
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_read(model%stepper, trim(path), lines_of(parameters), is_lenient, error)
       call handle_pass(model, error, ierr)
@@ -82,8 +82,7 @@ contains
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_read_text(model%stepper, text, passage, lines_of(names), &
          lines_of(parameters), is_lenient, error)
@@ -113,8 +112,7 @@ contains
       type(model_t), pointer :: model
       type(error_t), allocatable :: error
 
-      ierr = err_input
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_build(model%stepper, error)
       call handle_pass(model, error, ierr)
@@ -142,24 +140,28 @@ contains
    subroutine handle_free(handle)
       integer(c_int64_t), intent(in) :: handle
       type(model_t), pointer :: model
+      integer(c_int) :: ierr
 
-      call handle_find(handle, model)
+      call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call query_free(model%query)
       call stepper_close(model%stepper)
       deallocate(model)
    end subroutine handle_free
 
-   !> The model of a handle; null for 0.
-   subroutine handle_find(handle, model)
+   !> The model of a handle; null, and an error code, for 0.
+   subroutine handle_find(handle, model, ierr)
       integer(c_int64_t), intent(in) :: handle
       type(model_t), pointer, intent(out) :: model
+      integer(c_int), intent(out) :: ierr
       type(c_ptr) :: address
 
       model => null()
+      ierr = err_input
       if (handle == 0) return
       address = transfer(handle, c_null_ptr)
       call c_f_pointer(address, model)
+      ierr = err_none
    end subroutine handle_find
 
    !> Keep the text of a failure and hand on its code.

@@ -34,9 +34,6 @@ module emcon_interface
       interface_add_tie, interface_prepare, interface_tie_matrices, interface_links, &
       interface_follow, interface_gather
 
-   !> Corners of master surfaces are rounded over this fraction of an edge, as in decks.
-   real(wp), parameter :: dynamic_rounding = 1.0e-6_wp, static_rounding = 1.0e-4_wp
-
    !> Read it freely; what is to be set by the host is named as such.
    type :: interface_t
       integer :: n_node = 0
@@ -272,8 +269,7 @@ contains
             call new_contact(scene, scene%pair(i), system%contact(i)%contact, error)
             if (allocated(error)) return
             associate (contact => system%contact(i)%contact)
-               contact%meets_statics = self%is_end
-               contact%rounding = merge(static_rounding, dynamic_rounding, self%is_end)
+               call contact%suit_steps(self%is_end)
                call contact%configure(scene%x, self%options(i))
                system%n_constraint = system%n_constraint + contact%n_constraint
             end associate

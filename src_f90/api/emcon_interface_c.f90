@@ -3,8 +3,9 @@
 module emcon_interface_c
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_int64_t, &
       c_loc, c_null_ptr, c_ptr
-   use emcon_c_arrays, only : check_range, put_matrix, take_field, take_flags, take_integers
-   use emcon_c_border, only : c_string, f_text, put_field, put_numbers, put_values
+   use emcon_c_arrays, only : check_range, take_field, take_flags, take_integers
+   use emcon_c_border, only : c_string, f_text, put_field, put_matrix, &
+      put_numbers, put_values
    use emcon_errors, only : err_input, error_t
    use emcon_interface, only : interface_add_pair, interface_add_surface, interface_add_tie, &
       interface_follow, interface_gather, interface_init, interface_links, interface_prepare, &

@@ -3,9 +3,10 @@
 module emcon_interface_step_c
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, &
       c_null_ptr, c_ptr
-   use emcon_c_arrays, only : check_ascending, check_range, put_flags, put_matrix, take_field, &
+   use emcon_c_arrays, only : check_ascending, check_range, put_flags, take_field, &
       take_flags, take_integers, take_list
-   use emcon_c_border, only : put_field, put_numbers, put_values, show_matrix
+   use emcon_c_border, only : put_field, put_matrix, put_numbers, put_values, &
+      show_matrix
    use emcon_c_types, only : csr_c
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t

@@ -148,6 +148,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: lam(:)       !! (n_constraint) [M L/T^2]
       logical, intent(in), optional :: is_active(:)  !! (n_constraint)
+      logical :: is_finite
 
       self%is_evaluated = .false.
       self%has_null_space = .false.
@@ -170,7 +171,12 @@ contains
          end associate
          call constraints_rows(march%active%set, system%numbering)
          call constraints_force(march%active%set, 1, self%contact)
+         is_finite = all(ieee_is_finite(system%residual))
+         if (with_tangent) is_finite = is_finite .and. all(ieee_is_finite(system%matrix%value))
+         if (.not. is_finite) call raise(error, err_analysis, "the step of the size " // &
+            to_text(h) // " to u1 has a residual or a tangent that is not finite")
       end associate
+      if (allocated(error)) return
       self%is_evaluated = .true.
       self%has_tangent = with_tangent
    end subroutine query_evaluate

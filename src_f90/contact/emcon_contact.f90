@@ -9,6 +9,10 @@ module emcon_contact
    private
    public :: contact_t, contact_box_t, constraint_t, constraint_resize, gap_state_t
 
+   !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
+   !> static step among those to come.
+   real(wp), parameter :: static_rounding = 1.0e-4_wp, dynamic_rounding = 1.0e-6_wp
+
    !> One constraint over a step, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: constraint_t
       integer :: n_node = 0
@@ -53,6 +57,7 @@ module emcon_contact
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
       type(gap_state_t), allocatable :: state(:)      !! (n_constraint) as last measured
    contains
+      procedure :: suit_steps
       procedure(configure_interface), deferred :: configure
       procedure(begin_interface), deferred :: begin_step
       procedure(measure_interface), deferred :: measure
@@ -112,6 +117,15 @@ module emcon_contact
    end interface
 
 contains
+
+   !> Set up for steps some of which are static, or none; before `configure`.
+   pure subroutine suit_steps(self, meets_statics)
+      class(contact_t), intent(inout) :: self
+      logical, intent(in) :: meets_statics
+
+      self%meets_statics = meets_statics
+      self%rounding = merge(static_rounding, dynamic_rounding, meets_statics)
+   end subroutine suit_steps
 
    !> Make room for `n` nodes and count them.
    pure subroutine constraint_resize(self, n)

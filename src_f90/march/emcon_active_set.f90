@@ -20,11 +20,11 @@ module emcon_active_set
    private
    public :: active_set_t, active_set_init, active_set_solve
    public :: active_set_begin, active_set_select, active_set_advance, active_set_drop
-   public :: step_done, step_inverted, step_diverged, step_singular, step_cycling, step_too_far, &
+   public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off
 
    !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
-   integer, parameter :: step_done = 0, step_inverted = 1, step_diverged = 2, step_singular = 3, &
+   integer, parameter :: step_done = 0, step_refused = 1, step_diverged = 2, step_singular = 3, &
       step_cycling = 5, step_too_far = 6, step_stands_off = 7
 
    !> Penetration and tension below these multiples of epsilon are round-off.

@@ -33,9 +33,6 @@ module emcon_march
    integer, parameter :: default_levels = 12, most_levels = 24
    !> Increments without a cut after which an automatic increment is doubled.
    integer, parameter :: easy_increments = 5
-   !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
-   !> static step in the deck.
-   real(wp), parameter :: static_rounding = 1.0e-4_wp, dynamic_rounding = 1.0e-6_wp
    !> Closer than this a step's duration counts as a whole number of increments.
    real(wp), parameter :: whole = 1.0e3_wp*epsilon(1.0_wp)
    !> Fields in a deck are rounded by less than this part of their largest value.
@@ -204,8 +201,7 @@ contains
          self%active%gap_tolerance = step%gap_tolerance
          do i = 1, size(self%system%contact)
             associate (contact => self%system%contact(i)%contact)
-               contact%meets_statics = any(scene%step%procedure == procedure_static)
-               contact%rounding = merge(static_rounding, dynamic_rounding, contact%meets_statics)
+               call contact%suit_steps(any(scene%step%procedure == procedure_static))
                call contact%configure(scene%x, step%contact)
             end associate
          end do

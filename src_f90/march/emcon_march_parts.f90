@@ -1,6 +1,6 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
-   use emcon_active_set, only : step_cycling, step_diverged, step_done, step_inverted, &
+   use emcon_active_set, only : step_cycling, step_diverged, step_done, step_refused, &
       step_singular, step_stands_off, step_too_far
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
@@ -62,7 +62,7 @@ contains
       character(len=:), allocatable :: text
 
       select case (status)
-      case (step_inverted)
+      case (step_refused)
          text = self%system%refusal
       case (step_diverged)
          text = "Newton's method does not converge (relative residual " // &

@@ -2,7 +2,7 @@
 !>
 !> `march_t` holds all that a march through time needs; how it cuts and counts: emcon_march.
 module emcon_march_step
-   use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_inverted
+   use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_refused
    use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
@@ -76,7 +76,7 @@ contains
             self%scheme%pose(start, h), self%state, self%offset, self%du, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
-         if (status /= step_inverted .or. self%active%n_newton > 0) exit
+         if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
       if (any(self%active%comes_and_goes)) call note_add(increment%notes, &

@@ -17,10 +17,11 @@ module emcon_newton
    implicit none
    private
    public :: newton_t, newton_init, newton_solve
-   public :: newton_converged, newton_inverted, newton_diverged, newton_singular, newton_redundant
+   public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant
 
-   !> How a solve ended; redundant: some constraints depend on others, see `correction%redundant`.
-   integer, parameter :: newton_converged = 0, newton_inverted = 1, newton_diverged = 2, &
+   !> How a solve ended. Refused: there are no forces at the displacements, see `system%refusal`;
+   !> redundant: some constraints depend on others, see `correction%redundant`.
+   integer, parameter :: newton_converged = 0, newton_refused = 1, newton_diverged = 2, &
       newton_singular = 3, newton_redundant = 4
 
    !> A residual below this multiple of epsilon is round-off: of what its contributions are, and of
@@ -49,7 +50,6 @@ module emcon_newton
       integer :: n_solve = 0                     !! linear systems solved in the last solve
       integer :: n_history = 0
       real(wp), allocatable :: history(:)        !! relative residuals of the last solve
-      integer :: inverted_element = 0
       real(wp), allocatable :: residual(:), scale(:), correction(:)   !! (n_unknown)
       real(wp), allocatable :: dlam(:)
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
@@ -239,7 +239,7 @@ contains
       du = du + self%driven
    end subroutine start_driven
 
-   !> Residual at `du`; the last correction is halved as long as an element is inverted.
+   !> Residual at `du`; the last correction is halved as long as there is none.
    subroutine evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, du, &
       norm, defect, is_rounding, status, error)
       type(newton_t), intent(inout) :: self
@@ -256,14 +256,13 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
-      status = newton_inverted
+      status = newton_refused
       is_rounding = .false.
       norm = huge(norm)
       defect = huge(defect)
       do i = 0, most_halvings
          call system_respond(system, scene, pose, u0, v0, du, offset, &
             with_tangent=.not. self%is_polish)
-         self%inverted_element = system%response%inverted_element
          if (allocated(system%failure)) allocate(error, source=system%failure)
          if (allocated(error)) return
          if (.not. allocated(system%refusal)) exit

@@ -871,8 +871,12 @@ def test_functions_live_as_long_as_the_stepper() -> None:
 
     with make() as stepper:
         gc.collect()
+        before = stepper.energies()
         for _ in range(3):
             stepper.step()
+        after = stepper.energies()
+        assert after["potential"] != before["potential"]
+        assert abs(after["total"] - before["total"]) <= 1e-12*before["total"]
 
 
 def test_everything_goes_with_the_stepper_at_once() -> None:

@@ -24,7 +24,8 @@ RING = ROOT/"input_decks"/"ring.inp"
 PROJECT = tomllib.loads((PACKAGE/"pyproject.toml").read_text(encoding="utf-8"))["project"]
 VERSION = PROJECT["version"]
 BESIDE = {"emcon/py.typed", "emcon/_core.pyi"}
-COMPILED = {f"emcon/_core{sysconfig.get_config_var('EXT_SUFFIX')}", "emcon/libemcon.so.0"}
+LIBRARY = f"libemcon.so.{'.'.join(VERSION.split('.')[:2 if VERSION.startswith('0.') else 1])}"
+COMPILED = {f"emcon/_core{sysconfig.get_config_var('EXT_SUFFIX')}", f"emcon/{LIBRARY}"}
 NO_PATH = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 ONE_INCREMENT = """
 import importlib.metadata, json, sys
@@ -46,8 +47,8 @@ pywrap:
 	test -z "$(PY_READY)$(THEIRS)"
 	$(PY) -c 'import numpy'
 	echo made > $(PACKAGE)/_core$(EXT_SUFFIX)
-	echo made > $(PACKAGE)/libemcon.so.0
-"""
+	echo made > $(PACKAGE)/LIBRARY
+""".replace("LIBRARY", LIBRARY)
 
 
 def pip_wheel(package: Path, into: Path, **env: str) -> subprocess.CompletedProcess[str]:

@@ -6,7 +6,7 @@ module test_newton
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_loads, only : instant_t
-   use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_inverted, &
+   use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_refused, &
       newton_singular, newton_solve, newton_t
    use emcon_scene, only : load_point, load_t, method_null_space, method_saddle_point, scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
@@ -238,7 +238,7 @@ contains
       if (allocated(error)) return
       call check_true(error, trial%status /= newton_converged, "no solution is claimed")
       call check_true(error, any(trial%status == [newton_singular, newton_diverged, &
-         newton_inverted]), "status")
+         newton_refused]), "status")
       call correction_free(trial%correction)
    end subroutine test_singular
 
@@ -255,8 +255,8 @@ contains
       trial%du(1, [3, 7]) = 1.5_wp
       call solve(trial, scene, error)
       if (allocated(error)) return
-      call check_equal(error, trial%status, newton_inverted, "status")
-      call check_equal(error, trial%newton%inverted_element, 3, "element")
+      call check_equal(error, trial%status, newton_refused, "status")
+      call check_equal(error, trial%system%response%inverted_element, 3, "element")
       call correction_free(trial%correction)
    end subroutine test_inverted
 
