@@ -261,6 +261,13 @@ def test_evaluation_without_tangent(contact: Contact) -> None:
         plain.residual()
 
 
+def test_evaluation_that_is_not_finite_says_so(contact: Contact) -> None:
+    for h in (1e-170, 5e-324):              # 1/h^2 overflows
+        with pytest.raises(AnalysisError, match="not finite"):
+            contact.stepper.evaluate(contact.u1, h)
+    assert np.isfinite(contact.stepper.residual(contact.u1, H)).all()
+
+
 # --- sums and matrices -------------------------------------------------------------------------
 
 def test_mass_and_momenta() -> None:
