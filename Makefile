@@ -27,7 +27,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench docs install status clean help
+.PHONY: run test lib app pywrap kernels benches lint bench soak docs install status clean help
 
 # ---- set-up -------------------------------------------------------------------------------------
 
@@ -94,18 +94,19 @@ CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(CFLAGS)
 LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(LAPACK_LIBS)
 
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
+# Read by cat: $(file <...) of GNU make 4.3 loses text when its buffer has to grow.
 ifdef COMPILER
 $(shell mkdir -p $(O) $(BUILD)/mod)
 FLAGS := $(strip $(COMPILER) $(FCOMPILE) $(CCOMPILE) $(LIBS))
-ifneq ($(file <$(BUILD)/flags.txt),$(FLAGS))
+ifneq ($(shell cat $(BUILD)/flags.txt 2> /dev/null),$(FLAGS))
 $(file >$(BUILD)/flags.txt,$(FLAGS))
 endif
-ifneq ($(file <$(BUILD)/sources.txt),$(strip $(SRC) $(INC)))
+ifneq ($(shell cat $(BUILD)/sources.txt 2> /dev/null),$(strip $(SRC) $(INC)))
 $(file >$(BUILD)/sources.txt,$(strip $(SRC) $(INC)))
 endif
 
 $(BUILD)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(BUILD)/sources.txt
-	@$(PYTHON) $< $(O) $(SRC) > $@.$$$$ && mv $@.$$$$ $@
+	@$(PYTHON) $< $(O) $(BUILD)/mod $(SRC) > $@.$$$$ && mv $@.$$$$ $@
 include $(BUILD)/order.mk
 -include $(wildcard $(O)/*.d)
 endif
@@ -142,7 +143,8 @@ $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 	$(Q)$(FC) -o $@ $^ $(LIBS)
 
 # Optimising tests that hold whole models takes minutes and gigabytes, and gains nothing.
-$(call objects,$(KERNEL_SRC)): FFLAGS_release := -O0
+# `private`: the library, made on the way, keeps its own flags.
+$(call objects,$(KERNEL_SRC)): private FFLAGS_release := -O0
 
 $(BUILD)/kernels: $(call objects,$(KERNEL_SRC)) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
@@ -214,7 +216,7 @@ run:  ## set up, build, run the ring impact, draw build/run/ring.png
 test:  ## set up, build, run all tests
 	$(BUILDING) MODE=release WP=real64 app lib pywrap kernels .venv/test.stamp
 	$(BUILDING) MODE=debug WP=real64 kernels
-	@$(PY) -m pytest tests
+	@$(PY) -m pytest -n $(shell nproc) tests
 
 lint: .venv/lint.stamp  ## check the Fortran sources against the written rules
 	.venv/bin/fortitude check src_f90 tests/kernels tests/bench
@@ -224,6 +226,11 @@ bench:  ## print the timed scenes of tests/bench
 	$(BUILDING) app lib pywrap $(BENCHES)
 	@set -e; for program in $(filter %/bench_%,$(BENCHES)); do $$program; done
 	@set -e; for script in tests/bench/*.py; do $(PY) $$script; done
+
+SECONDS ?= 600
+soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: bad decks, damaged files, calls, kills
+	$(BUILDING) app lib
+	@$(PY) tests/soak/soak.py --seconds $(SECONDS)
 
 docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
 	.venv/bin/python -m ford --quiet .ci/ford.md

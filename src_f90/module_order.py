@@ -1,7 +1,11 @@
-"""Print make rules 'object: objects of the modules it uses and the files it includes'.
+"""Print make rules 'object: module files that it uses and the files it includes'.
 
-Usage: module_order.py OBJECT_FOLDER SOURCE...
+Usage: module_order.py OBJECT_FOLDER MODULE_FOLDER SOURCE...
 gfortran's own -M needs the .mod files first, so it cannot order the first build.
+
+gfortran leaves a module file alone whose interface has not changed. The rule of such a file does
+nothing, after which make looks at its time: an edit of a body compiles one file. Only where the
+module file is gone, the object is made again.
 """
 
 import pathlib
@@ -35,19 +39,22 @@ def included(path):
     return found
 
 
-def rules(folder, sources):
-    """The rules, one line for each source that needs any."""
+def rules(folder, module_folder, sources):
+    """The rules: one line for each source that needs any, one for each module."""
     files = {s: [s, *included(s)] for s in sources}
     text = {s: "\n".join(f.read_text() for f in files[s]) for s in sources}
     objects = {s: f"{folder}/{s.stem}.o" for s in sources}
     home = {m: s for s in sources for m in defined(text[s])}
     for s in sources:
-        needed = {objects[home[m]] for m in used(text[s]) if home.get(m, s) != s}
+        needed = {f"{module_folder}/{m}.mod" for m in used(text[s]) if home.get(m, s) != s}
         needed |= {f.as_posix() for f in files[s][1:]}
         if needed:
             yield f"{objects[s]}: {' '.join(sorted(needed))}"
+    for m in sorted(home):
+        yield (f"{module_folder}/{m}.mod: {objects[home[m]]} ; "
+               "@test -f $@ || { rm -f $<; $(MAKE) --no-print-directory $<; }")
 
 
 if __name__ == "__main__":
-    for rule in rules(sys.argv[1], [pathlib.Path(name) for name in sys.argv[2:]]):
+    for rule in rules(sys.argv[1], sys.argv[2], [pathlib.Path(name) for name in sys.argv[3:]]):
         print(rule)

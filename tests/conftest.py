@@ -1,6 +1,10 @@
 """Fixtures for all tests. Helpers to import are in scene_tools.py, beside this file."""
 
 import concurrent.futures
+import functools
+import os
+import pathlib
+import re
 import signal
 
 import pytest
@@ -25,11 +29,32 @@ RING_RUNS = [
 ]
 
 
+@functools.cache
+def runs_of(path):
+    """Name of the runs that the tests of a file share; None if each makes its own."""
+    text = (pathlib.Path(__file__).parent / path).read_text()
+    if re.search(r"^def test_\w+\([^)]*\bring\b", text, re.M) and "def ring(" not in text:
+        return "ring"
+    return path if 'scope="module"' in text else None
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """One worker gets all tests that look at the same runs: those are made once."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Scheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            return runs_of(nodeid.split("::")[0]) or nodeid
+
+    return Scheduling(config, log)
+
+
 @pytest.fixture(scope="session")
 def ring(tmp_path_factory):
     """`ring(initiation, h)` is the finished run; each is made once, two at a time."""
     folder = tmp_path_factory.mktemp("ring")
-    pool = concurrent.futures.ThreadPoolExecutor(2)
+    pool = concurrent.futures.ThreadPoolExecutor(1 if "PYTEST_XDIST_WORKER" in os.environ else 2)
     waiting = {}
 
     def run(initiation, h):

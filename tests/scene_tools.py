@@ -2,10 +2,14 @@
 
 import dataclasses
 import functools
+import json
+import json
 import os
 import pathlib
 import re
+import signal
 import subprocess
+import time
 
 import h5py
 import numpy as np
@@ -44,20 +48,62 @@ def assert_no_crash(code, text):
     assert not CRASH.search(text), text
 
 
+def start(*arguments, ignored=(), **options):
+    """Run the program in the background; it ignores the signals `ignored` and no others."""
+
+    def set_signals():
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE):
+            signal.signal(number, signal.SIG_IGN if number in ignored else signal.SIG_DFL)
+
+    return subprocess.Popen(
+        [PROGRAM, *map(str, arguments)],
+        text=True,
+        preexec_fn=set_signals,
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options},
+    )
+
+
+def wait_for(path, process, seconds=60):
+    """Until `path` is there; the process must not have ended before."""
+    end = time.monotonic() + seconds
+    while not path.exists():
+        assert process.poll() is None and time.monotonic() < end, f"no {path}"
+        time.sleep(0.002)
+
+
 def overrides(parameters):
     """`--set` options for parameters of a deck."""
     return [f"--set={name}={value}" for name, value in parameters.items()]
 
 
-def run_deck(deck, folder, code=0, options=(), **parameters):
-    """Run `deck`, a path or a `Deck`, with results in `folder`; the exit code must be `code`."""
+def attempt(deck, folder, options, parameters):
+    """Run `deck`, a path or a `Deck`, with results in `folder`: what the call gave, and the run."""
     folder = pathlib.Path(folder)
     if isinstance(deck, Deck):
         folder.mkdir(parents=True, exist_ok=True)
         deck = deck.write(folder / f"{deck.name}.inp")
     done = emcon(deck, "--quiet", "--output", folder, *options, *overrides(parameters))
+    return done, Run(folder / deck.stem, done.stderr)
+
+
+def run_deck(deck, folder, code=0, options=(), **parameters):
+    """Run `deck`, a path or a `Deck`, with results in `folder`; the exit code must be `code`."""
+    done, run = attempt(deck, folder, options, parameters)
     assert done.returncode == code, f"exit code {done.returncode}\n{done.stderr}"
-    return Run(folder / deck.stem, done.stderr)
+    return run
+
+
+def run_one_sided(deck, folder, **parameters):
+    """`run_deck` for contact that holds the nodes of one side: those of the other may go in.
+
+    The exit code is then 3, and the overlap must be all that the verdict blames.
+    """
+    done, run = attempt(deck, folder, (), parameters)
+    if done.returncode != 0:
+        verdict = json.loads(run.file(".json").read_text())
+        assert (done.returncode, verdict["verdict"]) == (3, "bad"), done.stderr
+        assert all(reason.startswith("bodies overlap") for reason in verdict["reasons"]), verdict
+    return run
 
 
 # ---- results ------------------------------------------------------------------------------------
@@ -76,6 +122,12 @@ class Run:
     @functools.cached_property
     def log(self):
         return self.file(".log").read_text()
+
+    @functools.cached_property
+    def verdict(self):
+        """NAME.json: one object in one line."""
+        (line,) = self.file(".json").read_text().splitlines()
+        return json.loads(line)
 
     @functools.cached_property
     def history(self):

@@ -161,6 +161,10 @@ class Cards:
         """`*NSET`: a set of nodes (k,), or of nodes and sets; it adds to an earlier one."""
         return self._set("NSET", name, nodes, self._nodes)
 
+    def nodes_of(self: _Cards, name: str, elements: str) -> _Cards:
+        """`*NSET, ELSET=`: the node set `name` of all nodes of the element set `elements`."""
+        return self._card("NSET", {"NSET": name, "ELSET": elements})
+
     def element_set(self: _Cards, name: str, elements: Where) -> _Cards:
         """`*ELSET`: a set of elements (k,), or of elements and sets; it adds to an earlier one."""
         return self._set("ELSET", name, elements, self._elements)
@@ -206,7 +210,7 @@ class Cards:
     def boundary(self: _Cards, where: Where, dof: Dof = (1, 2), value: Number | ArrayLike = 0.0, *,
                  amplitude: str | None = None, fixed: bool = False,
                  op: Literal["MOD", "NEW"] | None = None) -> _Cards:
-        """`*BOUNDARY`: prescribe displacements [L]; before the first step only 0.
+        """`*BOUNDARY`: prescribe displacements [L]; before the first step as in it.
 
         dof        1, 2 or (1, 2)
         value      one for all, (n_dof,), or (k, n_dof) for k nodes

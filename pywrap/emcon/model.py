@@ -85,7 +85,8 @@ class Model(Cards):
                   **parameters: object) -> Model:
         """The model of the deck at `path`; parameters of the deck as keywords.
 
-        The deck is read when a `Stepper` is made. With `lenient` unknown keywords are passed over.
+        The deck is read when a `Stepper` is made. With `lenient` output that is not
+        supported is left out.
         Further steps may be added by calls. Raises `InputError` for a parameter that is no number
         and no line of text.
         """
@@ -337,11 +338,13 @@ class Model(Cards):
         return self
 
     def contact_pair(self, slave: str, master: str, *, interaction: str | None = None,
-                     type: str = "NODE TO SURFACE", adjust: Number | None = None) -> Model:
+                     type: str = "NODE TO SURFACE", sides: str | None = None,
+                     adjust: Number | None = None) -> Model:
         """`*CONTACT PAIR` of two surfaces, or of one with itself.
 
         interaction   default one of its own, frictionless
         type          NODE TO SURFACE, SEGMENT or MORTAR
+        sides         ONE (default): nodes of the slave are held; BOTH: of the master too
         adjust        distance [L] up to which slave nodes are moved onto the master, or a node set
         """
         if interaction is None:
@@ -350,7 +353,22 @@ class Model(Cards):
                 self.interaction(interaction)
                 self._has_frictionless = True
         return self._card("CONTACT PAIR", {"INTERACTION": interaction, "TYPE": type,
-                                           "ADJUST": adjust}, [(slave, master)])
+                                           "SIDES": sides, "ADJUST": adjust}, [(slave, master)])
+
+    def contact(self, *surfaces: str | tuple[str, str],
+                interaction: str | None = None) -> Model:
+        """`*CONTACT`: all free faces of the model with all, or what `surfaces` names.
+
+        surfaces      names of surfaces, each in contact with itself, or pairs of names
+        interaction   of all of them; default frictionless
+        """
+        rows = [(s, s) if isinstance(s, str) else tuple(s) for s in surfaces]
+        everything = {} if rows else {"ALL EXTERIOR": True}
+        self._card("CONTACT", {})
+        self._card("CONTACT INCLUSIONS", everything, rows)
+        if interaction is not None:
+            self._card("CONTACT PROPERTY ASSIGNMENT", {}, [("GLOBAL", "GLOBAL", interaction)])
+        return self
 
     def tie(self, name: str, slave: str, master: str, *,
             position_tolerance: Number | None = None, multiplier: str | None = None) -> Model:

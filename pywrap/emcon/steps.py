@@ -52,6 +52,8 @@ class Step(Cards):
                  op: Op | None = None) -> Step:
         """`*DLOAD`: pressure [M/(L T^2)], positive inwards, on face 1..4 of elements.
 
+        Loads of one step on the same place add up; those of a later step replace them.
+
         where   element set, element, or (k,) of them
         op      NEW: all pressures and gravity of earlier steps go
         """
@@ -85,6 +87,13 @@ class Step(Cards):
         gap_tolerance   largest new stand-off as a fraction of an edge, for PERSISTENT
         """
         return self._card("CONTACT INITIATION", {"TYPE": type, "GAP TOLERANCE": gap_tolerance})
+
+    def contact_interference(self) -> Step:
+        """`*CONTACT INTERFERENCE, SHRINK`: overlaps at the start are pushed apart over the step.
+
+        The step has to be the first one and static.
+        """
+        return self._card("CONTACT INTERFERENCE", {"SHRINK": True})
 
     def mortar(self, *, integration: str | None = None, points: int | str | None = None,
                multiplier: str | None = None, normal: str | None = None,

@@ -2,10 +2,10 @@
 module emcon_blas
    use, intrinsic :: ieee_exceptions, only : ieee_all, ieee_get_status, ieee_set_halting_mode, &
       ieee_set_status, ieee_status_type
-   use, intrinsic :: iso_c_binding, only : c_int
+   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
    implicit none
    private
-   public :: blas_single_thread, blas_enter, blas_leave, ieee_status_type
+   public :: blas_single_thread, blas_name, blas_enter, blas_leave, ieee_status_type
 
    interface
       function emcon_blas_set_threads(n) result(done) bind(c)
@@ -14,6 +14,13 @@ module emcon_blas
          integer(c_int), value :: n
          integer(c_int) :: done
       end function emcon_blas_set_threads
+
+      subroutine emcon_blas_name(n, name) bind(c)
+         import :: c_char, c_int
+         implicit none
+         integer(c_int), value :: n
+         character(kind=c_char), intent(out) :: name(*)
+      end subroutine emcon_blas_name
    end interface
 
 contains
@@ -26,6 +33,16 @@ contains
 
       done = emcon_blas_set_threads(1_c_int) == 1_c_int
    end subroutine blas_single_thread
+
+   !> What the library says of itself, the kernels that it chose for this processor among it; "" if
+   !> it says nothing.
+   subroutine blas_name(name)
+      character(len=:), allocatable, intent(out) :: name
+      character(kind=c_char, len=256) :: buffer
+
+      call emcon_blas_name(len(buffer), buffer)
+      name = buffer(:index(buffer, c_null_char) - 1)
+   end subroutine blas_name
 
    !> Before a call: no halting. Vector kernels of OpenBLAS raise exceptions in unused lanes, which
    !> under `-ffpe-trap` would end the program although all results are right.

@@ -30,7 +30,7 @@
 !> `query_guess` for displacements u1, `query_evaluate`, then of that evaluation `query_residual`,
 !> `query_tangent`, `query_null_space`, `query_multipliers`. At any time `query_mass`,
 !> `query_momenta`, `query_unknowns`, `query_links`, and `query_constraints` with
-!> `query_curvature_times`. Last `query_free`.
+!> `query_curvature_times`. After a change of conditions `query_follow`; last `query_free`.
 !>
 !> **Contact and ties for a program that has its own solids.** `interface_init`,
 !> `interface_add_surface`, `interface_add_pair` (options: `contact_options_t`),
@@ -82,8 +82,8 @@ module emcon_api
       stepper_set_state, stepper_snapshot, stepper_step
    use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_mass, &
       stepper_give_potential
-   use emcon_stepper_query, only : query_evaluate, query_free, query_guess, query_mass, &
-      query_momenta, query_residual, query_t, query_tangent, query_unknowns
+   use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
+      query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_text, only : string_t
    use emcon_version, only : version
    implicit none

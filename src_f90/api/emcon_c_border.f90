@@ -5,7 +5,7 @@
 !> and the Fortran side then has an array that is not allocated.
 module emcon_c_border
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, c_int, &
-      c_int64_t, c_loc, c_null_char, c_ptr
+      c_int64_t, c_loc, c_null_char, c_ptr, c_size_t
    use emcon_c_types, only : csr_c, increment_c
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, err_none, error_t, raise
@@ -18,6 +18,13 @@ module emcon_c_border
    public :: find_model, find_read, find_built, address_of, check_count, check_given
    public :: take_field, take_values, take_flags, put_field, put_values, put_numbers, put_number
    public :: put_increment, as_increment, show_matrix, put_matrix, f_text, c_string
+
+   interface
+      pure integer(c_size_t) function c_strlen(text) bind(c, name="strlen")
+         import :: c_ptr, c_size_t
+         type(c_ptr), intent(in), value :: text
+      end function c_strlen
+   end interface
 
 contains
 
@@ -229,23 +236,23 @@ contains
    !> The text of C up to its end; "" for NULL.
    function f_text(text) result(copy)
       type(c_ptr), intent(in) :: text
-      character(len=:), allocatable :: copy
+      character(len=text_length(text)) :: copy
       character(kind=c_char), pointer :: from(:)
-      integer :: i, n
+      integer :: i
 
-      copy = ""
-      if (.not. c_associated(text)) return
-      call c_f_pointer(text, from, [huge(1)])
-      n = 0
-      do while (from(n + 1) /= c_null_char)
-         n = n + 1
-      end do
-      deallocate(copy)
-      allocate(character(len=n) :: copy)
-      do i = 1, n
+      if (len(copy) == 0) return
+      call c_f_pointer(text, from, [len(copy)])
+      do i = 1, len(copy)
          copy(i:i) = from(i)
       end do
    end function f_text
+
+   pure integer function text_length(text)
+      type(c_ptr), intent(in) :: text
+
+      text_length = 0
+      if (c_associated(text)) text_length = int(c_strlen(text))
+   end function text_length
 
    !> The same the other way round.
    pure function c_string(text) result(copy)

@@ -8,8 +8,8 @@ module emcon_c_query
    use emcon_errors, only : err_none, error_t
    use emcon_handle, only : at_df, at_links, at_mass, at_p, at_tangent, handle_pass, model_t
    use emcon_kinds, only : wp
-   use emcon_stepper_constraints, only : query_constraints, query_curvature_times, query_links, &
-      query_multipliers, query_null_space
+   use emcon_stepper_constraints, only : query_check_factors, query_constraints, &
+      query_curvature_times, query_links, query_multipliers, query_null_space
    use emcon_stepper_query, only : query_evaluate, query_guess, query_mass, query_residual, &
       query_tangent, query_unknowns
    implicit none
@@ -199,7 +199,8 @@ contains
       if (emcon_curvature_times /= err_none) return
       call check_given("factor", factor, error)
       call check_given("direction", direction, error)
-      call take_values("n", factor, n, max(int(n), 0), weight, error)
+      if (.not. allocated(error)) call query_check_factors(model%query, int(n), error)
+      call take_values("n", factor, n, int(n), weight, error)
       call take_field(direction, n_node, n_nodes(model), along, error)
       if (.not. allocated(error)) then
          allocate(sum_of(2, n_nodes(model)))

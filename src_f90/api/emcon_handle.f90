@@ -12,7 +12,7 @@ module emcon_handle
    use emcon_stepper, only : stepper_build, stepper_close, stepper_read, stepper_read_text, &
       stepper_t
    use emcon_stepper_constraints, only : contact_report_t
-   use emcon_stepper_query, only : query_free, query_t
+   use emcon_stepper_query, only : query_follow, query_free, query_t
    use emcon_text, only : string_t
    implicit none
    private
@@ -149,7 +149,8 @@ contains
       deallocate(model)
    end subroutine handle_free
 
-   !> The model of a handle; null, and an error code, for 0.
+   !> The model of a handle, with no answers to what was asked of other unknowns; null, and an
+   !> error code, for 0.
    subroutine handle_find(handle, model, ierr)
       integer(c_int64_t), intent(in) :: handle
       type(model_t), pointer, intent(out) :: model
@@ -161,6 +162,7 @@ contains
       if (handle == 0) return
       address = transfer(handle, c_null_ptr)
       call c_f_pointer(address, model)
+      call query_follow(model%query, model%stepper)
       ierr = err_none
    end subroutine handle_find
 

@@ -33,12 +33,15 @@ contains
       character(len=*), intent(in) :: place, name
       real(wp), intent(in) :: field(:, :)
       integer, intent(in) :: n_node              !! < 0: any
+      character(len=:), allocatable :: needed
       integer :: a, i
 
       if (allocated(error)) return
       if (size(field, 1) /= 2 .or. (size(field, 2) /= n_node .and. n_node >= 0)) then
+         needed = "n_node"
+         if (n_node >= 0) needed = to_text(n_node)
          call refuse(error, place, name // " has the shape (" // to_text(size(field, 1)) // ", " &
-            // to_text(size(field, 2)) // "), not (2, " // count_text() // ")")
+            // to_text(size(field, 2)) // "), not (2, " // needed // ")")
          return
       end if
       do i = 1, size(field, 2)
@@ -49,15 +52,6 @@ contains
             return
          end do
       end do
-
-   contains
-
-      pure function count_text() result(text)
-         character(len=:), allocatable :: text
-
-         text = "n_node"
-         if (n_node >= 0) text = to_text(n_node)
-      end function count_text
 
    end subroutine check_field
 
@@ -173,7 +167,7 @@ contains
    !> A number that may not be one.
    pure function number_text(value) result(text)
       real(wp), intent(in) :: value
-      character(len=:), allocatable :: text
+      character(len=number_length(value)) :: text
 
       if (ieee_is_nan(value)) then
          text = "NaN"
@@ -183,6 +177,18 @@ contains
          text = "infinite"
       end if
    end function number_text
+
+   pure integer function number_length(value) result(n)
+      real(wp), intent(in) :: value
+
+      if (ieee_is_nan(value)) then
+         n = len("NaN")
+      else if (ieee_is_finite(value)) then
+         n = len(to_text(value))
+      else
+         n = len("infinite")
+      end if
+   end function number_length
 
    !> Both surfaces exist.
    pure subroutine check_surfaces(error, place, n_surface, slave, master)

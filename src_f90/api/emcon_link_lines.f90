@@ -21,27 +21,30 @@ contains
       type(system_t), intent(in) :: system
       type(notes_t), intent(inout) :: notes
       integer, allocatable :: node(:), place(:)
+      character(len=:), allocatable :: text
       integer :: k, n_place
 
       if (system%linear%n == 0) return
       call find_crosspoints(scene, node, place, n_place)
+      call elimination_text(system, text)
       call note_add(notes, to_text(system%n_body) // " subdomains, " // &
          to_text(size(scene%tie)) // " ties, " // to_text(n_place) // " crosspoints, " // &
-         to_text(size(scene%equation)) // " equations; " // elimination_text(system))
+         to_text(size(scene%equation)) // " equations; " // text)
       if (size(scene%tie) > 0) call add_subdomains(scene, system, notes)
       do k = 1, size(scene%tie)
-         call note_add(notes, "tie " // tie_text(scene, scene%tie(k)))
+         call tie_text(scene, scene%tie(k), text)
+         call note_add(notes, "tie " // text)
       end do
       do k = 1, n_place
-         call note_add(notes, "crosspoint " // to_text(k) // ": nodes " // &
-            labels_text(scene, pack(node, place == k)))
+         call labels_text(scene, pack(node, place == k), text)
+         call note_add(notes, "crosspoint " // to_text(k) // ": nodes " // text)
       end do
    end subroutine add_link_lines
 
    !> Unknowns without linear constraints, and with them.
-   function elimination_text(system) result(text)
+   subroutine elimination_text(system, text)
       type(system_t), intent(in) :: system
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       associate (numbering => system%numbering)
          if (system%is_reduced) then
@@ -52,7 +55,7 @@ contains
                to_text(count(system%linear%is_used)) // " multipliers"
          end if
       end associate
-   end function elimination_text
+   end subroutine elimination_text
 
    !> One line for each connected mesh.
    subroutine add_subdomains(scene, system, notes)
@@ -82,10 +85,10 @@ contains
    end subroutine add_subdomains
 
    !> Name, surfaces and multipliers of a tie.
-   function tie_text(scene, tie) result(text)
+   subroutine tie_text(scene, tie, text)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       integer, allocatable :: slave(:, :), master(:, :)
 
       call surface_edges(scene, scene%surface(tie%slave), slave)
@@ -96,12 +99,12 @@ contains
          to_text(size(master, 2)) // " edges), " // &
          to_text(size(tie%rows%slave)) // " " // &
          trim(merge("dual    ", "standard", tie%multiplier == multiplier_dual)) // " multipliers"
-   end function tie_text
+   end subroutine tie_text
 
-   function labels_text(scene, node) result(text)
+   subroutine labels_text(scene, node, text)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: node(:)
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       type(string_t) :: label(size(node))
       integer :: i
 
@@ -109,6 +112,6 @@ contains
          label(i)%text = to_text(scene%node_label(node(i)))
       end do
       text = joined(label, ", ", most_nodes)
-   end function labels_text
+   end subroutine labels_text
 
 end module emcon_link_lines

@@ -25,9 +25,9 @@ module emcon_recorder
    !> Frames of a deck that asks for no field output.
    integer, parameter :: default_frames = 100
 
-   character(len=13), parameter :: column_names(15) = [character(len=13) :: "increment", "time", &
+   character(len=13), parameter :: column_names(17) = [character(len=13) :: "increment", "time", &
       "h", "kinetic", "strain", "external_work", "contact_work", "total", "px", "py", "lz", &
-      "active", "newton", "cuts", "cpu"]
+      "active", "newton", "cuts", "penetration", "stand_off", "cpu"]
 
    type :: recorder_t
       type(vtkhdf_t) :: fields
@@ -201,7 +201,8 @@ contains
             real(ledger%strain, dp), real(ledger%external_work, dp), &
             real(ledger%contact_work, dp), real(ledger%total, dp), real(ledger%momentum, dp), &
             real(ledger%angular, dp), real(increment%n_active, dp), real(increment%n_newton, dp), &
-            real(increment%n_cut, dp), cpu], error)
+            real(increment%n_cut, dp), real(increment%overlap%depth, dp), &
+            real(increment%stand_off%largest, dp), cpu], error)
          if (allocated(error)) return
          self%n_row = self%n_row + 1
          call body_momenta(stepper%march%system, stepper%scene%x, state, momenta)
@@ -296,14 +297,15 @@ contains
       if (.not. allocated(error)) call history_publish(self%history, is_forced, error)
    end subroutine recorder_publish
 
-   !> Note the wall time of the run, and the CPU time that contact took.
-   subroutine recorder_finish(self, wall, contact, error)
+   !> Note the wall time of the run, and the CPU times that contact and the judge took.
+   subroutine recorder_finish(self, wall, contact, judge, error)
       type(recorder_t), intent(inout) :: self
-      real(dp), intent(in) :: wall, contact      !! [s]
+      real(dp), intent(in) :: wall, contact, judge   !! [s]
       type(error_t), allocatable, intent(out) :: error
 
       call put("WALL_SECONDS", wall)
       if (.not. allocated(error)) call put("CONTACT_CPU_SECONDS", contact)
+      if (.not. allocated(error)) call put("JUDGE_CPU_SECONDS", judge)
 
    contains
 

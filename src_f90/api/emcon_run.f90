@@ -1,22 +1,26 @@
 !> A batch run: deck in, files out, from the first increment or from a restart file.
 module emcon_run
    use emcon_blas, only : blas_single_thread
-   use emcon_errors, only : err_file, err_input, err_interrupt, error_t, raise
+   use emcon_build, only : build_differences, build_list
+   use emcon_errors, only : err_analysis, err_file, err_input, err_interrupt, error_t, raise
    use emcon_files, only : file_exists, file_remove, make_directory, survive_file_size_limit
    use emcon_heap, only : heap_keep
    use emcon_kinds, only : dp, wp
    use emcon_log, only : log_close, log_line, log_open, log_t
-   use emcon_march, only : increment_t
+   use emcon_march, only : increment_t, march_watch
+   use emcon_newton, only : interrupt_interface
    use emcon_progress, only : progress_end, progress_show, progress_start, progress_t
    use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
       recorder_resume, recorder_t, recorder_write
-   use emcon_restart, only : restart_get, restart_put, restart_read, restart_size, restart_t, &
-      restart_write
-   use emcon_run_log, only : balance_t, closing_lines, log_increment, log_start, model_lines
+   use emcon_restart, only : restart_get, restart_put, restart_read, restart_t, restart_write
+   use emcon_run_log, only : log_increment, log_start, model_lines
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_contact_seconds, &
       stepper_fraction, stepper_is_done, stepper_load, stepper_open, stepper_save, stepper_t
-   use emcon_text, only : string_t, to_text
+   use emcon_text, only : notes_t, string_t, to_text
    use emcon_timer, only : cpu_seconds, wall_seconds
+   use emcon_verdict, only : verdict_balance_lines, verdict_end, verdict_is_failure, &
+      verdict_is_good, verdict_line, verdict_start, verdict_t, verdict_update
+   use emcon_verdict_file, only : verdict_load, verdict_save, verdict_write
    implicit none
    private
    public :: run_options_t, run_report_t, interrupt_interface
@@ -28,6 +32,7 @@ module emcon_run
       character(len=:), allocatable :: folder    !! of the results; empty: beside the deck
       logical :: is_lenient = .false.
       logical :: is_quiet = .false.
+      logical :: is_strict = .false.             !! a bad verdict is an error
    end type run_options_t
 
    !> What a run has to tell at its end.
@@ -35,13 +40,9 @@ module emcon_run
       type(string_t), allocatable :: diagnostic(:)   !! of the deck
       character(len=:), allocatable :: base          !! of the result files
       type(string_t), allocatable :: closing(:)      !! lines of the closing balance
+      type(notes_t) :: warnings                      !! of the run, in any case to be told
+      logical :: is_bad = .false.                    !! the last line of `closing` says why
    end type run_report_t
-
-   abstract interface
-      !> Has the user asked to stop?
-      logical function interrupt_interface()
-      end function interrupt_interface
-   end interface
 
    !> All that a run in progress holds.
    type :: run_t
@@ -51,7 +52,7 @@ module emcon_run
       type(progress_t) :: progress
       character(len=:), allocatable :: base
       real(dp) :: wall_start = 0.0_dp
-      type(balance_t) :: balance
+      type(verdict_t) :: verdict
    end type run_t
 
 contains
@@ -96,7 +97,7 @@ contains
       call stepper_open(run%stepper, path, options%override, options%is_lenient, error)
       call move_diagnostics(run, report)
       if (allocated(error)) return
-      run%base = result_base(path, options)
+      call result_base(path, options, run%base)
       report%base = run%base
       if (is_result(path, run%base)) then
          call raise(error, err_input, path // ": the results would overwrite the deck; choose " // &
@@ -110,6 +111,7 @@ contains
       call recorder_open(run%recorder, run%stepper, run%base, error)
       ! The state of an earlier run does not belong to the results that begin here.
       if (.not. allocated(error)) call file_remove(run%base // ".rst.h5", error)
+      if (.not. allocated(error)) call file_remove(run%base // ".json", error)
       if (.not. allocated(error)) then
          call log_start(run%log, run%stepper, report%diagnostic, path)
          call recorder_write(run%recorder, run%stepper, nothing, cpu_seconds(), error)
@@ -126,6 +128,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(run_t), allocatable :: run
       type(restart_t) :: restart
+      type(string_t), allocatable :: build(:)
       integer :: counts(2), i
 
       allocate(run)
@@ -146,12 +149,14 @@ contains
       call restart_read(restart, path, error)
       if (.not. allocated(error)) call restart_get(restart, "counts", counts, error)
       if (.not. allocated(error)) call stepper_load(run%stepper, restart, error)
-      if (.not. allocated(error)) call load_balance(run, restart, error)
+      if (.not. allocated(error)) call verdict_load(run%verdict, restart, error)
+      if (.not. allocated(error)) call restart_get(restart, "build", build, error)
       if (allocated(error)) then
          if (error%code /= err_file) error%code = err_input
          return
       end if
       call move_diagnostics(run, report)
+      call warn_of_build(run, build, path, report)
       call recorder_resume(run%recorder, run%stepper, run%base, counts(1), counts(2), error)
       if (allocated(error)) return
       call log_line(run%log, "resumed after increment " // &
@@ -159,6 +164,24 @@ contains
          to_text(run%stepper%march%state%time, 9))
       call march_on(run, options, is_interrupted, report, error)
    end subroutine run_restart
+
+   !> Tell, also the log, in what this program is not the one that wrote the restart file at `path`.
+   subroutine warn_of_build(run, build, path, report)
+      type(run_t), intent(inout) :: run
+      type(string_t), intent(in) :: build(:)         !! what that program said of itself
+      character(len=*), intent(in) :: path
+      type(run_report_t), intent(inout) :: report
+      type(notes_t) :: differences
+      type(string_t) :: line
+      integer :: i
+
+      call build_differences(build, differences)
+      do i = 1, differences%n
+         line%text = path // ": warning: " // differences%item(i)%text
+         call log_line(run%log, line%text)
+         report%diagnostic = [report%diagnostic, line]
+      end do
+   end subroutine warn_of_build
 
    subroutine move_diagnostics(run, report)
       type(run_t), intent(inout) :: run
@@ -175,8 +198,8 @@ contains
    !> Is `path` the name of one of the results of `base`?
    pure logical function is_result(path, base)
       character(len=*), intent(in) :: path, base
-      character(len=7), parameter :: suffix(5) = [character(len=7) :: ".csv", ".h5", ".log", &
-         ".vtkhdf", ".rst.h5"]
+      character(len=7), parameter :: suffix(6) = [character(len=7) :: ".csv", ".h5", ".log", &
+         ".json", ".vtkhdf", ".rst.h5"]
       integer :: i
 
       is_result = .false.
@@ -186,10 +209,10 @@ contains
    end function is_result
 
    !> Path of the results without extension: the deck's own, or its name in the folder asked for.
-   function result_base(path, options) result(base)
+   subroutine result_base(path, options, base)
       character(len=*), intent(in) :: path
       type(run_options_t), intent(in) :: options
-      character(len=:), allocatable :: base
+      character(len=:), allocatable, intent(out) :: base
       integer :: slash, point
 
       slash = index(path, "/", back=.true.)
@@ -197,7 +220,7 @@ contains
       base = path
       if (point > slash + 1) base = path(:point - 1)
       if (len(options%folder) > 0) base = options%folder // "/" // base(slash + 1:)
-   end function result_base
+   end subroutine result_base
 
    !> The increments, from the present state to the end.
    subroutine march_on(run, options, is_interrupted, report, error)
@@ -210,15 +233,17 @@ contains
       logical :: has_stopped
 
       has_stopped = .false.
-      associate (march => run%stepper%march)
-         if (march%state%increment == 0) run%balance%total0 = march%ledger%total
-      end associate
+      if (run%stepper%march%state%increment == 0) call verdict_start(run%verdict, run%stepper)
+      call march_watch(run%stepper%march, is_interrupted)
       call progress_start(run%progress, real(stepper_fraction(run%stepper), dp), options%is_quiet)
       do while (.not. allocated(error) .and. .not. stepper_is_done(run%stepper))
          has_stopped = is_interrupted()
          if (has_stopped) exit
          call stepper_advance(run%stepper, increment, error)
-         call log_increment(run%log, run%stepper, increment, run%balance)
+         if (allocated(error)) has_stopped = error%code == err_interrupt
+         if (has_stopped) exit
+         call log_increment(run%log, run%stepper, increment)
+         call verdict_update(run%verdict, run%stepper, increment)
          if (allocated(error)) exit
          call recorder_write(run%recorder, run%stepper, increment, cpu_seconds(), error)
          if (.not. allocated(error)) call save_if_due(run, error)
@@ -235,32 +260,61 @@ contains
             "interrupted after increment " // to_text(run%stepper%march%state%increment) // &
             "; go on with: emcon restart " // run%base // ".rst.h5")
       end if
-      call finish(run, report, error)
+      call finish(run, options%is_strict, report, error)
    end subroutine march_on
 
-   !> Close the files, whatever happened; the first error stands.
-   subroutine finish(run, report, error)
+   !> Close the files and pass the verdict, whatever happened; the first error stands.
+   subroutine finish(run, is_strict, report, error)
       type(run_t), intent(inout) :: run
+      logical, intent(in) :: is_strict
       type(run_report_t), intent(inout) :: report
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: second
+      type(notes_t) :: lines
       integer :: i
 
       if (.not. allocated(error)) then
          call recorder_finish(run%recorder, wall_seconds() - run%wall_start, &
-            stepper_contact_seconds(run%stepper), error)
+            stepper_contact_seconds(run%stepper), run%stepper%march%judge_clock%seconds, error)
       end if
       call recorder_close(run%recorder, second)
       if (.not. allocated(error)) call move_alloc(second, error)
       if (allocated(error)) call log_line(run%log, error%message)
-      report%closing = closing_lines(run%stepper, run%balance)
-      do i = 1, size(report%closing)
-         call log_line(run%log, report%closing(i)%text)
+      call pass_verdict(run, is_strict, report, lines, error)
+      do i = 1, lines%n
+         call log_line(run%log, lines%item(i)%text)
       end do
+      report%closing = lines%item(:lines%n)
+      call verdict_write(run%verdict, run%stepper, run%base // ".json", second)
+      if (.not. allocated(error)) call move_alloc(second, error)
       call stepper_close(run%stepper)
       call log_close(run%log, second)
       if (.not. allocated(error)) call move_alloc(second, error)
    end subroutine finish
+
+   !> Judge the run that has ended, by `error` if that is allocated; it may become an error here.
+   subroutine pass_verdict(run, is_strict, report, lines, error)
+      type(run_t), intent(inout) :: run
+      logical, intent(in) :: is_strict
+      type(run_report_t), intent(inout) :: report
+      type(notes_t), intent(out) :: lines
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+
+      associate (verdict => run%verdict)
+         if (allocated(error)) then
+            call verdict_end(verdict, error%message)
+         else
+            call verdict_end(verdict)
+         end if
+         call verdict_balance_lines(verdict, run%stepper, lines)
+         report%warnings = verdict%warnings
+         report%is_bad = .not. verdict_is_good(verdict)
+         if (allocated(error) .or. .not. verdict_is_failure(verdict, is_strict)) return
+         call verdict_line(verdict, text)
+         call raise(error, err_analysis, text // "; the results are complete")
+      end associate
+   end subroutine pass_verdict
 
    !> Write the restart file where *RESTART asks for it.
    subroutine save_if_due(run, error)
@@ -282,42 +336,16 @@ contains
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(out) :: error
       type(restart_t) :: restart
+      type(string_t) :: build(5)
 
       call recorder_publish(run%recorder, .true., error)
       if (allocated(error)) return
       call stepper_save(run%stepper, restart)
       call restart_put(restart, "counts", [run%recorder%n_row, run%recorder%fields%n_frame])
-      associate (balance => run%balance)
-         call restart_put(restart, "balance", [balance%total0, balance%largest_drift, &
-            balance%largest_energy, balance%deepest])
-         call restart_put(restart, "effort", [balance%n_newton, balance%n_cut])
-         if (allocated(balance%largest_force)) then
-            call restart_put(restart, "pair_largest", balance%largest_force)
-         end if
-      end associate
+      call verdict_save(run%verdict, restart)
+      call build_list(build)
+      call restart_put(restart, "build", build)
       call restart_write(restart, run%base // ".rst.h5", error)
    end subroutine save
-
-   subroutine load_balance(run, restart, error)
-      type(run_t), intent(inout) :: run
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-      real(wp) :: balance(4)
-      integer :: effort(2), n
-
-      call restart_get(restart, "balance", balance, error)
-      if (.not. allocated(error)) call restart_get(restart, "effort", effort, error)
-      if (allocated(error)) return
-      run%balance%total0 = balance(1)
-      run%balance%largest_drift = balance(2)
-      run%balance%largest_energy = balance(3)
-      run%balance%deepest = balance(4)
-      run%balance%n_newton = effort(1)
-      run%balance%n_cut = effort(2)
-      n = restart_size(restart, "pair_largest")
-      if (n < 0) return
-      allocate(run%balance%largest_force(n))
-      call restart_get(restart, "pair_largest", run%balance%largest_force, error)
-   end subroutine load_balance
 
 end module emcon_run

@@ -12,7 +12,7 @@ module emcon_stepper
    use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
-   use emcon_ledger, only : ledger_measure
+   use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_resume, march_t
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
@@ -237,7 +237,11 @@ contains
          call restart_put(restart, "progress", [state%i_step, state%n_grid, state%grid_stride, &
             state%n_easy, state%increment, state%n_before])
          call restart_put(restart, "time", [state%start_time, state%time])
-         call restart_put(restart, "work", [ledger%external_work, ledger%contact_work])
+         call restart_put(restart, "ledger", [ledger%kinetic, ledger%strain, ledger%potential, &
+            ledger%external_work, ledger%contact_work, ledger%total, ledger%momentum, &
+            ledger%angular])
+         call restart_put(restart, "energy", state%energy)
+         call restart_put(restart, "potential", [state%potential])
          call restart_put(restart, "u", state%u)
          call restart_put(restart, "v", state%v)
          call restart_put(restart, "u_start", state%u_start)
@@ -276,7 +280,7 @@ contains
       type(diagnostics_t) :: diagnostics
       integer :: flag(1), progress(6)
       integer, allocatable :: active(:)
-      real(wp) :: time(2), work(2)
+      real(wp) :: time(2)
 
       call check_given(self, restart, error)
       if (.not. allocated(error)) call load_source(self, restart, error)
@@ -290,7 +294,6 @@ contains
       if (allocated(error)) return
       call restart_get(restart, "progress", progress, error)
       if (.not. allocated(error)) call restart_get(restart, "time", time, error)
-      if (.not. allocated(error)) call restart_get(restart, "work", work, error)
       if (.not. allocated(error)) call load_fields(self, restart, error)
       if (.not. allocated(error)) call load_pairs(self, restart, error)
       if (allocated(error)) return
@@ -308,38 +311,55 @@ contains
          state%start_time = time(1)
          state%time = time(2)
       end associate
-      self%march%ledger%external_work = work(1)
-      self%march%ledger%contact_work = work(2)
       call march_resume(self%march, self%scene, error)
-      if (allocated(error)) return
-      call restart_get(restart, "internal", self%march%state%internal, error)
+      if (.not. allocated(error)) call load_measured(self, restart, error)
    end subroutine stepper_load
+
+   !> What the last increment has measured: measured anew it would differ by roundings.
+   subroutine load_measured(self, restart, error)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(in) :: restart
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: value(9), potential(1)
+
+      associate (state => self%march%state)
+         call restart_get(restart, "internal", state%internal, error)
+         if (.not. allocated(error)) call restart_get(restart, "energy", state%energy, error)
+      end associate
+      if (.not. allocated(error)) call restart_get(restart, "potential", potential, error)
+      if (.not. allocated(error)) call restart_get(restart, "ledger", value, error)
+      if (allocated(error)) return
+      self%march%state%potential = potential(1)
+      self%march%ledger = ledger_t(kinetic=value(1), strain=value(2), potential=value(3), &
+         external_work=value(4), contact_work=value(5), total=value(6), momentum=value(7:8), &
+         angular=value(9))
+   end subroutine load_measured
 
    !> What the model of the file was given, `self` has been given too.
    subroutine check_given(self, restart, error)
       type(stepper_t), intent(in) :: self
       type(restart_t), intent(in) :: restart
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: stored, own
       integer :: n(2)
 
       n = 0
       if (restart_size(restart, "given") > 0) call restart_get(restart, "given", n, error)
       if (allocated(error)) return
-      if (any(n /= given_count(self%given))) call raise(error, err_input, &
-         "the restart file is of a model with " // count_text(n) // ", not with " // &
-         count_text(given_count(self%given)) // ": they are not in the file, read the deck " // &
+      if (all(n == given_count(self%given))) return
+      call count_text(n, stored)
+      call count_text(given_count(self%given), own)
+      call raise(error, err_input, "the restart file is of a model with " // stored // &
+         ", not with " // own // ": they are not in the file, read the deck " // &
          "and give them again before the restart file is loaded")
-
-   contains
-
-      pure function count_text(n) result(text)
-         integer, intent(in) :: n(2)
-         character(len=:), allocatable :: text
-
-         text = to_text(n(1)) // " given forces and " // to_text(n(2)) // " masses"
-      end function count_text
-
    end subroutine check_given
+
+   pure subroutine count_text(n, text)
+      integer, intent(in) :: n(2)
+      character(len=:), allocatable, intent(out) :: text
+
+      text = to_text(n(1)) // " given forces and " // to_text(n(2)) // " masses"
+   end subroutine count_text
 
    subroutine load_source(self, restart, error)
       type(stepper_t), intent(inout) :: self

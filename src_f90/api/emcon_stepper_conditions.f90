@@ -99,7 +99,7 @@ contains
       if (.not. allocated(error)) call check_value(value, error)
       if (allocated(error)) return
       if (k == 0) then
-         call raise(error, err_input, freedom_text(label, dof) // " is not prescribed")
+         call refuse_freedom(error, label, dof, "is not prescribed")
          return
       end if
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
@@ -129,7 +129,7 @@ contains
       if (.not. allocated(error)) call check_value(value, error)
       if (allocated(error)) return
       if (k > 0) then
-         call raise(error, err_input, freedom_text(label, dof) // " is prescribed already")
+         call refuse_freedom(error, label, dof, "is prescribed already")
          return
       end if
       added%node = node
@@ -158,7 +158,7 @@ contains
       call find_prescribed(self, label, dof, node, k, error)
       if (allocated(error)) return
       if (k == 0) then
-         call raise(error, err_input, freedom_text(label, dof) // " is not prescribed")
+         call refuse_freedom(error, label, dof, "is not prescribed")
          return
       end if
       associate (all_of => self%scene%step(self%march%state%i_step)%prescribed)
@@ -303,11 +303,14 @@ contains
       if (.not. ieee_is_finite(value)) call raise(error, err_input, "the value is not finite")
    end subroutine check_value
 
-   pure function freedom_text(label, dof) result(text)
+   !> An input error: "degree of freedom 1 of node 7 is not prescribed", or what else it is.
+   pure subroutine refuse_freedom(error, label, dof, what)
+      type(error_t), allocatable, intent(out) :: error
       integer, intent(in) :: label, dof
-      character(len=:), allocatable :: text
+      character(len=*), intent(in) :: what
 
-      text = "degree of freedom " // to_text(dof) // " of node " // to_text(label)
-   end function freedom_text
+      call raise(error, err_input, "degree of freedom " // to_text(dof) // " of node " &
+         // to_text(label) // " " // what)
+   end subroutine refuse_freedom
 
 end module emcon_stepper_conditions

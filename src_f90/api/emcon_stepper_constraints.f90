@@ -18,7 +18,7 @@ module emcon_stepper_constraints
    use emcon_text, only : to_text
    implicit none
    private
-   public :: contact_report_t, query_constraints, query_curvature_times
+   public :: contact_report_t, query_constraints, query_check_factors, query_curvature_times
    public :: query_null_space, query_multipliers, query_links
 
    !> Contact constraints near each other's surfaces, ascending by their numbers. The gaps of a
@@ -154,6 +154,20 @@ contains
       allocate(matrix%value, source=rows%value(:n))
    end subroutine take_filled
 
+   !> There is a report, of `n` constraints.
+   subroutine query_check_factors(self, n, error)
+      type(query_t), intent(in) :: self
+      integer, intent(in) :: n
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. allocated(self%near%item)) then
+         call raise(error, err_input, "no constraints were asked for yet")
+      else if (n /= self%near%n) then
+         call raise(error, err_input, to_text(self%near%n) // " factors are needed, not " // &
+            to_text(n))
+      end if
+   end subroutine query_check_factors
+
    !> Sum over the constraints of the last report of `factor` times the derivative of the discrete
    !> gradient by u1 times `direction`.
    subroutine query_curvature_times(self, factor, direction, product, error)
@@ -165,12 +179,9 @@ contains
       integer :: k, i, j
 
       product = 0.0_wp
-      if (.not. allocated(self%near%item)) then
-         call raise(error, err_input, "no constraints were asked for yet")
-      else if (size(factor) /= self%near%n) then
-         call raise(error, err_input, to_text(self%near%n) // " factors are needed, not " // &
-            to_text(size(factor)))
-      else if (any(shape(direction) /= shape(self%contact)) &
+      call query_check_factors(self, size(factor), error)
+      if (allocated(error)) return
+      if (any(shape(direction) /= shape(self%contact)) &
          .or. any(shape(product) /= shape(self%contact))) then
          call raise(error, err_input, "direction and product are to have 2 components at each " // &
             "of " // to_text(size(self%contact, 2)) // " nodes")

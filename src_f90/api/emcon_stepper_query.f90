@@ -23,7 +23,7 @@ module emcon_stepper_query
    use emcon_text, only : to_text
    implicit none
    private
-   public :: query_t, query_free, query_sync, query_check_field
+   public :: query_t, query_free, query_sync, query_follow, query_check_field
    public :: query_guess, query_evaluate, query_residual, query_tangent, query_unknowns, &
       query_mass, query_momenta
 
@@ -79,6 +79,16 @@ contains
       end if
       self%march%system%loads%load = stepper%march%system%loads%load
    end subroutine query_sync
+
+   !> Forget the last evaluation if the unknowns of the model have been numbered anew since.
+   pure subroutine query_follow(self, stepper)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+
+      if (self%revision == stepper%march%revision) return
+      self%is_evaluated = .false.
+      self%has_null_space = .false.
+   end subroutine query_follow
 
    !> A nodal field called `name` has the right shape and is finite.
    subroutine query_check_field(stepper, field, name, error)

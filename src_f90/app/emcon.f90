@@ -17,11 +17,11 @@ program emcon
       end subroutine c_exit
    end interface
 
-   integer :: code
+   integer :: code, ignored
 
    call execute(code)
-   flush(output_unit)
-   flush(error_unit)
+   flush(output_unit, iostat=ignored)
+   flush(error_unit, iostat=ignored)
    call c_exit(int(code, c_int))
 
 contains
@@ -63,7 +63,7 @@ contains
       call tell(report, error, command%options%is_quiet, code)
    end subroutine execute
 
-   !> Print what there is to tell; `code` is the exit code.
+   !> Print what there is to tell, unless nobody reads it; `code` is the exit code.
    subroutine tell(report, error, is_quiet, code)
       type(run_report_t), intent(in) :: report
       type(error_t), intent(in), allocatable :: error
@@ -76,18 +76,24 @@ contains
       is_told = .false.
       if (allocated(report%diagnostic)) then
          do i = 1, size(report%diagnostic)
-            write(error_unit, "(a)") report%diagnostic(i)%text
+            write(error_unit, "(a)", iostat=ignored) report%diagnostic(i)%text
             if (allocated(error)) is_told = is_told .or. error%message == report%diagnostic(i)%text
          end do
       end if
+      do i = 1, report%warnings%n
+         write(error_unit, "(a)", iostat=ignored) "emcon: warning: " // report%warnings%item(i)%text
+      end do
       if (allocated(report%closing) .and. .not. is_quiet) then
          do i = 1, size(report%closing)
-            write(output_unit, "(a)") report%closing(i)%text
+            write(output_unit, "(a)", iostat=ignored) report%closing(i)%text
          end do
+      else if (report%is_bad .and. .not. allocated(error)) then
+         write(error_unit, "(a)", iostat=ignored) "emcon: " // &
+            report%closing(size(report%closing))%text
       end if
       if (.not. allocated(error)) return
       code = error%code
-      if (.not. is_told) write(error_unit, "(a)") "emcon: " // error%message
+      if (.not. is_told) write(error_unit, "(a)", iostat=ignored) "emcon: " // error%message
    end subroutine tell
 
 end program emcon

@@ -31,7 +31,7 @@ contains
       if (command_argument_count() == 0) self%verb = "help"
       do while (i < command_argument_count() .and. len(self%fault) == 0)
          i = i + 1
-         word = argument(i)
+         call argument(i, word)
          if (len(word) > 1 .and. word(1:1) == "-") then
             call take_option(self, word, i)
          else
@@ -43,7 +43,7 @@ contains
       if (len(self%path) == 0) self%fault = "no file is named"
       if (self%verb == "restart" .and. (size(self%options%override) > 0 .or. &
          len(self%options%folder) > 0 .or. self%options%is_lenient)) then
-         self%fault = "a restart goes on as it was: it takes --quiet only"
+         self%fault = "a restart goes on as it was: it takes --quiet and --strict only"
       end if
    end subroutine command_read
 
@@ -66,7 +66,7 @@ contains
       type(command_t), intent(inout) :: self
       character(len=*), intent(in) :: word
       integer, intent(inout) :: i                !! number of the argument, moved past a value
-      character(len=:), allocatable :: name, value
+      character(len=:), allocatable :: name, value, near
       type(string_t) :: override(1)
       integer :: equals
 
@@ -86,14 +86,16 @@ contains
          self%options%is_lenient = .true.
       case ("--quiet", "-q")
          self%options%is_quiet = .true.
+      case ("--strict")
+         self%options%is_strict = .true.
       case ("--output", "--set")
          if (equals == 0) then
             i = i + 1
-            if (i <= command_argument_count()) value = argument(i)
+            if (i <= command_argument_count()) call argument(i, value)
          end if
          if (len(value) == 0) self%fault = name // " needs a value"
          if (name == "--output") then
-            self%options%folder = without_slash(value)
+            call without_slash(value, self%options%folder)
          else
             if (index(value, "=") < 2) self%fault = "--set takes NAME=VALUE, not '" // value // "'"
             override(1)%text = value
@@ -101,15 +103,15 @@ contains
          end if
       case default
          self%fault = "unknown option " // name
-         if (len(near_option(name)) > 0) self%fault = self%fault // "; did you mean " // &
-            near_option(name) // "?"
+         call near_option(name, near)
+         if (len(near) > 0) self%fault = self%fault // "; did you mean " // near // "?"
       end select
    end subroutine take_option
 
-   function near_option(name) result(near)
+   subroutine near_option(name, near)
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: near
-      type(string_t) :: known(6)
+      character(len=:), allocatable, intent(out) :: near
+      type(string_t) :: known(7)
 
       known(1)%text = "--output"
       known(2)%text = "--set"
@@ -117,33 +119,34 @@ contains
       known(4)%text = "--quiet"
       known(5)%text = "--help"
       known(6)%text = "--version"
-      near = nearest_word(name, known)
-   end function near_option
+      known(7)%text = "--strict"
+      call nearest_word(name, known, near)
+   end subroutine near_option
 
-   pure function without_slash(path) result(folder)
+   pure subroutine without_slash(path, folder)
       character(len=*), intent(in) :: path
-      character(len=:), allocatable :: folder
+      character(len=:), allocatable, intent(out) :: folder
 
       folder = path
       do while (len(folder) > 1)
          if (folder(len(folder):) /= "/") exit
          folder = folder(:len(folder) - 1)
       end do
-   end function without_slash
+   end subroutine without_slash
 
-   function argument(i) result(word)
+   subroutine argument(i, word)
       integer, intent(in) :: i
-      character(len=:), allocatable :: word
+      character(len=:), allocatable, intent(out) :: word
       integer :: length
 
       call get_command_argument(i, length=length)
       allocate(character(len=length) :: word)
       call get_command_argument(i, word)
-   end function argument
+   end subroutine argument
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(17)
+      character(len=72) :: line(18)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
@@ -153,12 +156,13 @@ contains
          "options:", &
          "  --output DIR       write the results into DIR, not beside the deck", &
          "  --set NAME=VALUE   set a *PARAMETER of the deck; may be repeated", &
-         "  --lenient          unknown keywords are warnings, not errors", &
-         "  --quiet            no progress on standard output", &
+         "  --lenient          unsupported output is left out, with warnings", &
+         "  --quiet            nothing but errors, warnings and a bad verdict", &
+         "  --strict           a bad verdict is exit code 3", &
          "  --version, --help", &
          "", &
          "results:  NAME.vtkhdf fields for ParaView, NAME.csv and NAME.h5 history,", &
-         "          NAME.log, NAME.rst.h5 for a restart", &
+         "          NAME.log, NAME.json verdict, NAME.rst.h5 for a restart", &
          "exit:     0 done, 2 error in the deck or on the command line,", &
          "          3 the analysis failed (results up to there are kept),", &
          "          4 cannot write, 130 interrupted", &

@@ -1,11 +1,14 @@
 !> Text: numbers to and from words, upper case, nearest words.
+!>
+!> Functions have results of explicit length, found by a function beside them: gfortran keeps the
+!> length of a deferred-length result in a static variable, which threads would share.
 module emcon_text
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_kinds, only : int64, wp
    implicit none
    private
    public :: string_t, notes_t, note_add, notes_append
-   public :: to_upper, squeezed, to_text, read_integer, read_real, nearest_word, joined
+   public :: to_upper, squeezed, stripped, to_text, read_integer, read_real, nearest_word, joined
 
    !> A text of its own length, for lists of texts.
    type :: string_t
@@ -40,8 +43,9 @@ module emcon_text
 
    !> Shortest text of a number: integers as they are, reals with `digits` significant digits (6).
    interface to_text
-      module procedure text_of_integer, text_of_real
+      module procedure text_of_integer, text_of_real, text_of_digits
    end interface to_text
+   integer, parameter :: default_digits = 6, real_width = 48
 
 contains
 
@@ -88,66 +92,103 @@ contains
    !> `text` in upper case without any blank or tab.
    pure function squeezed(text) result(word)
       character(len=*), intent(in) :: text
-      character(len=:), allocatable :: word
-      character(len=len(text)) :: buffer
+      character(len=squeezed_length(text)) :: word
       integer :: i, n
 
       n = 0
       do i = 1, len(text)
          if (text(i:i) == " " .or. text(i:i) == achar(9)) cycle
          n = n + 1
-         buffer(n:n) = text(i:i)
+         word(n:n) = to_upper(text(i:i))
       end do
-      word = to_upper(buffer(:n))
    end function squeezed
+
+   pure integer function squeezed_length(text) result(n)
+      character(len=*), intent(in) :: text
+      integer :: i
+
+      n = 0
+      do i = 1, len(text)
+         if (text(i:i) /= " " .and. text(i:i) /= achar(9)) n = n + 1
+      end do
+   end function squeezed_length
+
+   !> `text` without the characters of `blanks` around it.
+   pure function stripped(text, blanks) result(core)
+      character(len=*), intent(in) :: text, blanks
+      character(len=verify(text, blanks, back=.true.) - max(verify(text, blanks), 1) + 1) :: core
+
+      if (len(core) > 0) core = text(verify(text, blanks):)
+   end function stripped
 
    pure function text_of_integer(value) result(text)
       integer, intent(in) :: value
-      character(len=:), allocatable :: text
+      character(len=integer_length(value)) :: text
+
+      write(text, "(i0)") value
+   end function text_of_integer
+
+   pure integer function integer_length(value) result(n)
+      integer, intent(in) :: value
       character(len=16) :: buffer
 
       write(buffer, "(i0)") value
-      text = trim(buffer)
-   end function text_of_integer
+      n = len_trim(buffer)
+   end function integer_length
 
-   pure function text_of_real(value, digits) result(text)
+   pure function text_of_real(value) result(text)
       real(wp), intent(in) :: value
-      integer, intent(in), optional :: digits
-      character(len=:), allocatable :: text
-      character(len=48) :: buffer
-      character(len=16) :: form
-      integer :: n, i_exponent, last
+      character(len=real_length(value, default_digits)) :: text
 
-      n = 6
-      if (present(digits)) n = digits
-      write(form, "('(g0.', i0, ')')") n
-      if (value == 0.0_wp) then
-         text = "0"
-         return
-      end if
-      if (abs(value) >= 1.0e-3_wp .and. abs(value) < 10.0_wp**min(n, 15)) then
-         write(form, "('(f0.', i0, ')')") max(0, n - 1 - floor(log10(abs(value))))
+      text = real_word(value, default_digits)
+   end function text_of_real
+
+   pure function text_of_digits(value, digits) result(text)
+      real(wp), intent(in) :: value
+      integer, intent(in) :: digits
+      character(len=real_length(value, digits)) :: text
+
+      text = real_word(value, digits)
+   end function text_of_digits
+
+   pure integer function real_length(value, digits) result(n)
+      real(wp), intent(in) :: value
+      integer, intent(in) :: digits
+
+      n = len_trim(real_word(value, digits))
+   end function real_length
+
+   !> `value` without zeros that say nothing, blanks behind.
+   pure function real_word(value, digits) result(word)
+      real(wp), intent(in) :: value
+      integer, intent(in) :: digits
+      character(len=real_width) :: word
+      character(len=16) :: form
+      integer :: i_exponent, last
+
+      word = "0"
+      if (value == 0.0_wp) return
+      if (abs(value) >= 1.0e-3_wp .and. abs(value) < 10.0_wp**min(digits, 15)) then
+         write(form, "('(f0.', i0, ')')") max(0, digits - 1 - floor(log10(abs(value))))
       else
-         write(form, "('(es48.', i0, 'e4)')") n - 1
+         write(form, "('(es48.', i0, 'e4)')") digits - 1
       end if
-      write(buffer, form) value
-      text = trim(adjustl(buffer))
-      i_exponent = scan(text, "E")
+      write(word, form) value
+      word = adjustl(word)
+      i_exponent = scan(word, "E")
       if (i_exponent > 0) then
-         do while (len(text) > i_exponent + 3 .and. text(i_exponent + 2:i_exponent + 2) == "0")
-            text = text(:i_exponent + 1) // text(i_exponent + 3:)
+         do while (len_trim(word) > i_exponent + 3 .and. word(i_exponent + 2:i_exponent + 2) == "0")
+            word = word(:i_exponent + 1) // word(i_exponent + 3:)
          end do
       end if
-      if (i_exponent == 0 .and. index(text, ".") > 0) then
-         last = verify(text, "0", back=.true.)
-         text = text(:last)
-         if (text(last:last) == ".") text = text(:last - 1)
+      if (i_exponent == 0 .and. index(word, ".") > 0) then
+         last = verify(trim(word), "0", back=.true.)
+         if (word(last:last) == ".") last = last - 1
+         word = word(:last)
       end if
-      if (text(1:1) == ".") text = "0" // text
-      if (len(text) > 1) then
-         if (text(:2) == "-.") text = "-0" // text(2:)
-      end if
-   end function text_of_real
+      if (word(1:1) == ".") word = "0" // word(:real_width - 1)
+      if (word(:2) == "-.") word = "-0" // word(2:real_width - 1)
+   end function real_word
 
    !> Read a whole number of at most 2^31 - 1 in size; `ok` tells whether all of `word` was one.
    pure subroutine read_integer(word, value, ok)
@@ -256,10 +297,10 @@ contains
    end subroutine scan_decimal
 
    !> The entry of `list` that takes the fewest edits to reach from `word`; empty if none is near.
-   pure function nearest_word(word, list) result(nearest)
+   pure subroutine nearest_word(word, list, nearest)
       character(len=*), intent(in) :: word
       type(string_t), intent(in) :: list(:)
-      character(len=:), allocatable :: nearest
+      character(len=:), allocatable, intent(out) :: nearest
       integer :: i, distance, best
 
       nearest = ""
@@ -271,7 +312,7 @@ contains
             nearest = list(i)%text
          end if
       end do
-   end function nearest_word
+   end subroutine nearest_word
 
    !> Levenshtein distance of `a` and `b`.
    pure integer function edit_distance(a, b)
@@ -296,15 +337,45 @@ contains
       type(string_t), intent(in) :: list(:)
       character(len=*), intent(in) :: separator
       integer, intent(in) :: most
-      character(len=:), allocatable :: text
+      character(len=joined_length(list, separator, most)) :: text
+      integer :: i, n
+
+      n = 0
+      do i = 1, min(size(list), most)
+         if (i > 1) call append(text, n, separator)
+         call append(text, n, list(i)%text)
+      end do
+      if (size(list) > most) call append(text, n, and_more(size(list) - most))
+   end function joined
+
+   !> Put `more` behind the first `n` characters of `text`.
+   pure subroutine append(text, n, more)
+      character(len=*), intent(inout) :: text
+      integer, intent(inout) :: n
+      character(len=*), intent(in) :: more
+
+      text(n + 1:n + len(more)) = more
+      n = n + len(more)
+   end subroutine append
+
+   pure integer function joined_length(list, separator, most) result(n)
+      type(string_t), intent(in) :: list(:)
+      character(len=*), intent(in) :: separator
+      integer, intent(in) :: most
       integer :: i
 
-      text = ""
+      n = len(separator)*max(0, min(size(list), most) - 1)
       do i = 1, min(size(list), most)
-         if (i > 1) text = text // separator
-         text = text // list(i)%text
+         n = n + len(list(i)%text)
       end do
-      if (size(list) > most) text = text // " and " // to_text(size(list) - most) // " more"
-   end function joined
+      if (size(list) > most) n = n + len(and_more(size(list) - most))
+   end function joined_length
+
+   pure function and_more(n) result(text)
+      integer, intent(in) :: n
+      character(len=10 + integer_length(n)) :: text
+
+      text = " and " // text_of_integer(n) // " more"
+   end function and_more
 
 end module emcon_text

@@ -8,10 +8,15 @@ module emcon_contact
    implicit none
    private
    public :: contact_t, contact_box_t, constraint_t, constraint_resize, gap_state_t
+   public :: deepest_arrival
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
    !> static step among those to come.
    real(wp), parameter :: static_rounding = 1.0e-4_wp, dynamic_rounding = 1.0e-6_wp
+
+   !> So far, per edge, a contact may close in the step in which it slides onto its surface: corners
+   !> dip into edges; beyond, a body flies through.
+   real(wp), parameter :: deepest_arrival = 0.05_wp
 
    !> One constraint over a step, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: constraint_t
@@ -33,6 +38,7 @@ module emcon_contact
       logical :: is_near = .false.                    !! false: no surface within reach
       logical :: is_over = .false.                    !! over the surface (not past its end)
       logical :: is_arriving = .false.                !! too little is covered at the start
+      logical :: was_open = .true.                    !! arriving: the start is seen from the front
       logical :: is_leaving = .false.                 !! too little is covered at the end
       logical :: is_covered = .true.                  !! the stencil still holds at the end
       real(wp) :: gap0 = 0.0_wp                       !! mean gap Phi/W [L]

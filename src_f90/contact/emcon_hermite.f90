@@ -294,7 +294,7 @@ contains
       real(wp) :: a, b, l
       integer :: i
 
-      z = dg_clip(eta)
+      z = dg_clip(eta, 0.0_wp)
       square = z*z
       cube = square*z
       chord = z - square

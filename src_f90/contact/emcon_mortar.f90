@@ -14,9 +14,9 @@ module emcon_mortar
    use emcon_kinds, only : wp
    use emcon_mortar_choice, only : pair_append, pair_comes_near, pair_cut_corners, pair_is_meant, &
       pairs_drop_far, pairs_seen
-   use emcon_mortar_frame, only : frame_init, frame_moments, frame_point, frame_t, moment_area, &
-      moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, n_place, pair_stencil_t, &
-      place_after, place_before, place_master
+   use emcon_mortar_frame, only : frame_hit, frame_init, frame_moments, frame_point, frame_t, &
+      moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, n_place, &
+      pair_stencil_t, place_after, place_before, place_master
    use emcon_mortar_pair2, only : segment_moments2 => segment_moments
    use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
    use emcon_mortar_stencil, only : stencil_gather, stencil_master, stencil_slave
@@ -136,7 +136,7 @@ contains
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)
-            if (.not. pair_comes_near(self%near%depth, local, local + dlocal)) cycle
+            if (.not. pair_comes_near(self%slave%length(e), local, local + dlocal)) cycle
             if (.not. pair_is_meant(stencil, frame, self%deepest_start)) cycle
             if (is_wide .and. .not. stencil%is_smooth) call pair_cut_corners(stencil, frame(0))
             call pair_append(self%pair, n, stencil)
@@ -148,28 +148,42 @@ contains
    pure subroutine mortar_measure_edges(self, x, u0, du)
       class(mortar_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      type(frame_t) :: frame
-      real(wp) :: local(2, n_place), dlocal(2, n_place)
+      type(frame_t) :: frame(0:1)
+      real(wp) :: local(2, n_place), dlocal(2, n_place), part(n_moment, 0:1)
       integer :: e, k, i
 
       do e = 1, self%slave%n_edge
-         associate (value => self%form(e)%value)
+         self%form(e)%ahead = 0.0_wp
+         associate (value => self%form(e)%value, ahead => self%form(e)%ahead)
             value = 0.0_wp
             do k = self%start(e), self%start(e + 1) - 1
                call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
                do i = 0, 1
-                  call frame_init(frame, self%pair(k), local + i*dlocal)
+                  call frame_init(frame(i), self%pair(k), local + i*dlocal)
                   if (self%options%integration == integration_elements) then
-                     value(:, i) = value(:, i) + point_moments(self, e, k, frame)
+                     part(:, i) = point_moments(self, e, k, frame(i))
                   else
-                     value(:, i) = value(:, i) + frame_moments(frame, self%pair(k), self%point, &
-                        self%weight)
+                     part(:, i) = frame_moments(frame(i), self%pair(k), self%point, self%weight)
                   end if
                end do
+               value = value + part
+               if (part(moment_cover, 0) > 0.0_wp .or. .not. part(moment_cover, 1) > 0.0_wp) cycle
+               ahead = min(ahead, gap_ahead(frame(0), self%pair(k), &
+                  part(moment_area_xi, 1)/part(moment_area, 1)))
             end do
          end associate
       end do
    end subroutine mortar_measure_edges
+
+   !> The gap of slave point `xi` over the line of the master edge.
+   pure real(wp) function gap_ahead(frame, stencil, xi)
+      type(frame_t), intent(in) :: frame
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: xi
+      real(wp) :: eta
+
+      call frame_hit(frame, stencil, xi, eta, gap_ahead)
+   end function gap_ahead
 
    !> Moments of the Gauss points of edge `e` that look at pair `k`.
    pure function point_moments(self, e, k, frame) result(moment)

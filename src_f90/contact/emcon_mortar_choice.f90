@@ -70,6 +70,7 @@ contains
       pair_is_meant = .false.
       do k = 0, 1
          if (.not. (frame_faces(frame(k), 1, 2) .and. minval(frame(k)%edge_along) > 0.0_wp)) return
+         if (.not. is_before_focus(frame(k))) return
          low(k) = frame_project(frame(k), 2)
          high(k) = frame_project(frame(k), 1)
       end do
@@ -81,6 +82,16 @@ contains
       call frame_hit(frame(0), stencil, 0.5_wp*(low(0) + high(0)), eta, gap)
       pair_is_meant = gap > -deepest*frame(0)%length
    end function pair_is_meant
+
+   !> Do both master nodes project from one place only: does (15f) fall over the whole slave edge?
+   !> Beyond the point where its normals cross it does not, and rounding would choose a root.
+   pure logical function is_before_focus(frame)
+      type(frame_t), intent(in) :: frame
+
+      associate (bend => frame%along(2, :2) - frame%along(1, :2), q => frame%edge_along)
+         is_before_focus = all(bend < q(1)) .and. all(bend < 2.0_wp*q(2) - q(1))
+      end associate
+   end function is_before_focus
 
    !> Leave out neighbours of the master edge that the slave edge does not face.
    pure subroutine pair_cut_corners(stencil, frame)

@@ -5,13 +5,14 @@
 !> height (y - x) x t over the point. Source: docs/theory.md, section 4.
 module emcon_mortar_frame
    use emcon_kinds, only : wp
+   use emcon_rounded, only : rounded_clip, rounded_clip_slope
    implicit none
    private
-   public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_hit, frame_point, &
-      frame_moments
+   public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_meet, frame_hit, &
+      frame_point, frame_moments
    public :: place_first, place_last, place_before, place_after, place_master
    public :: moment_gap, moment_gap_xi, moment_area, moment_area_xi, moment_cover, n_moment
-   public :: n_place
+   public :: n_place, end_rounding
 
    !> Local numbers of the nodes: slave edge, master edge, neighbours of either.
    integer, parameter :: n_place = 8, place_first = 1, place_last = 2, place_before = 5, &
@@ -45,6 +46,10 @@ module emcon_mortar_frame
       real(wp) :: length = 0.0_wp                !! |a|
    end type frame_t
 
+   !> The ends of segments are held within the slave edge by bounds with corners rounded over this
+   !> fraction of it: wide enough for Newton's method to see the bend, and the integrals over the
+   !> strip that changes hands differ by its square only.
+   real(wp), parameter :: end_rounding = 1.0e-4_wp
    integer, parameter :: most_iterations = 50
 
 contains
@@ -94,6 +99,34 @@ contains
          end if
       end associate
    end function frame_project
+
+   !> Where master node `k` ends a segment: as `frame_project`, but that the field bends over
+   !> `end_rounding` into that of the ends of the edge.
+   pure real(wp) function frame_meet(self, k)
+      type(frame_t), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp) :: low, high, value, slope, last, z, dz
+      integer :: i
+
+      frame_meet = frame_project(self, k)
+      associate (p => self%along(:, k), q => self%edge_along)
+         low = merge(0.0_wp, 1.0_wp - end_rounding, frame_meet < 0.5_wp)
+         high = low + end_rounding
+         if (.not. (frame_meet > low .and. frame_meet < high)) return
+         do i = 1, most_iterations
+            last = frame_meet
+            z = rounded_clip(last, end_rounding)
+            dz = rounded_clip_slope(last, end_rounding)
+            value = (p(1) - last*q(1)) + z*((p(2) - p(1)) - last*(q(2) - q(1)))
+            slope = dz*((p(2) - p(1)) - last*(q(2) - q(1))) - (q(1) + z*(q(2) - q(1)))
+            if (value > 0.0_wp) low = last
+            if (value < 0.0_wp) high = last
+            frame_meet = last - value/slope
+            if (.not. (frame_meet >= low .and. frame_meet <= high)) frame_meet = 0.5_wp*(low + high)
+            if (.not. abs(frame_meet - last) > epsilon(last)) exit
+         end do
+      end associate
+   end function frame_meet
 
    !> The master nodes as the slave point `xi` sees them, and the length of its t.
    pure subroutine look(self, xi, along, above, norm)
@@ -214,8 +247,8 @@ contains
       integer :: i
 
       moment = 0.0_wp
-      low = max(0.0_wp, min(1.0_wp, frame_project(self, 2)))
-      high = max(0.0_wp, min(1.0_wp, frame_project(self, 1)))
+      low = rounded_clip(frame_meet(self, 2), end_rounding)
+      high = rounded_clip(frame_meet(self, 1), end_rounding)
       if (.not. high > low) return
       area = (high - low)*self%length
       do i = 1, size(point)

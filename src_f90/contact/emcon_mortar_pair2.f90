@@ -4,9 +4,10 @@ module emcon_mortar_pair2
       dg_sqrt, dg_t, dg_variable, difference, difference_t, operator(*), operator(+), &
       operator(-), operator(/)
    use emcon_kinds, only : wp
-   use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, moment_area, &
-      moment_area_xi, moment_cover, moment_gap, moment_gap_xi, pair_stencil_t, place_first, &
-      place_last, place_master
+   use emcon_mortar_frame, only : end_rounding, frame_hit, frame_init, frame_meet, frame_t, &
+      moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, pair_stencil_t, &
+      place_first, place_last, place_master
+   use emcon_rounded, only : rounded_clip
    implicit none
    private
 

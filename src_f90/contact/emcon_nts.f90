@@ -17,7 +17,8 @@ module emcon_nts
       smooth_stencil_t, stencil_gather, stencil_length
    use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite, &
       smoothing_none
-   use emcon_self_contact, only : self_contact_is_apart, self_contact_may_touch
+   use emcon_self_contact, only : self_contact_is_apart
+   use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_sees, touch_rule_t
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
@@ -33,9 +34,12 @@ module emcon_nts
       type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
       integer :: smoothing = smoothing_none
+      type(touch_rule_t) :: rule                      !! only of such a surface
       integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
+      integer, allocatable :: class(:)                !! (n_constraint) of bodies that it looks at
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
       type(near_list_t) :: near
+      integer, allocatable :: near_item(:)            !! (n_constraint) its place in that list
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
                                                       !! first node
       type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
@@ -69,9 +73,14 @@ contains
       call chain_join(self%slave, scene)
       call chain_join(self%master, scene)
       self%is_self = pair%slave == pair%master
-      self%node = self%slave%node
-      self%twin = self%slave%twin
-      self%chain_node = [(i, i = 1, size(self%node))]
+      if (self%is_self) call touch_rule_init(self%rule, self%slave, scene, &
+         pair%both_sides)
+      associate (n => size(self%slave%node))
+         self%chain_node = [(1 + mod(i, n), i = 0, n*self%rule%n_class - 1)]
+         self%class = [(1 + i/n, i = 0, n*self%rule%n_class - 1)]
+      end associate
+      self%node = self%slave%node(self%chain_node)
+      self%twin = self%slave%twin(self%chain_node)
       if (present(has_twins)) then
          if (has_twins) call add_twins(self)
       end if
@@ -81,8 +90,11 @@ contains
       self%deepest_start = touch_tol
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
       self%thickness = self%thickness(self%chain_node)
-      call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), self%master%edge, &
-         scene%u0, 0.0_wp)
+      associate (n => self%n_constraint/self%rule%n_class)
+         self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
+         call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%edge, &
+            scene%u0, 0.0_wp)
+      end associate
    end subroutine nts_init
 
    !> Append the twins to the nodes.
@@ -92,6 +104,7 @@ contains
       associate (twin => self%slave%twin)
          self%node = [self%node, pack(twin, twin > 0)]
          self%chain_node = [self%chain_node, pack(self%chain_node, twin > 0)]
+         self%class = [self%class, pack(self%class, twin > 0)]
       end associate
       deallocate(self%twin)
       allocate(self%twin(size(self%node)), source=0)
@@ -122,9 +135,11 @@ contains
       do i = 1, self%n_constraint
          self%edge(i) = 0
          best = huge(best)
-         do k = self%near%candidates%start(i), self%near%candidates%start(i + 1) - 1
-            call choose_nearer(self, i, self%near%candidates%edge(k), x, u0, best)
-         end do
+         associate (near => self%near%candidates, item => self%near_item(i))
+            do k = near%start(item), near%start(item + 1) - 1
+               call choose_nearer(self, i, near%edge(k), x, u0, best)
+            end do
+         end associate
          call settle(self, i, x, u0)
       end do
    end subroutine nts_begin_step
@@ -137,10 +152,11 @@ contains
       real(wp), intent(inout) :: best
       real(wp) :: distance
 
+      if (.not. touch_rule_sees(self%rule, self%class(i), e)) return
       distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
       if (.not. distance < best) return
       if (self%is_self) then
-         if (.not. self_contact_may_touch(self%slave, self%chain_node(i), e, x, u)) return
+         if (.not. touch_rule_allows(self%rule, self%slave, self%chain_node(i), e, x, u)) return
       end if
       best = distance
       self%edge(i) = e
@@ -388,9 +404,11 @@ contains
       class(nts_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       real(wp), intent(out) :: area(:), length(:)
+      real(wp) :: at_node(size(self%slave%node))
 
-      length = 0.0_wp
-      if (self%slave%n_edge > 0) call chain_tributary(self%slave, x, u, length)
+      at_node = 0.0_wp
+      if (self%slave%n_edge > 0) call chain_tributary(self%slave, x, u, at_node)
+      length = at_node(self%chain_node)
       area = length*self%thickness
    end subroutine nts_area
 

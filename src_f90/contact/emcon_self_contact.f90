@@ -1,6 +1,6 @@
 !> Which edges a slave node may touch where a surface may be in contact with itself.
 !>
-!> Of two edges that meet, the one that comes first along the surface is the slave.
+!> Of two edges that meet, the one that comes first along the surface is the slave, or both are.
 !> Source: docs/theory.md, section 4.
 module emcon_self_contact
    use emcon_chain, only : chain_distance, chain_t
@@ -19,11 +19,13 @@ module emcon_self_contact
 contains
 
    !> May node `k` of the chain touch edge `e` at x + u? That must be no neighbour, come later along
-   !> the surface, and face the node; unless they touch, each must lie above the other.
-   pure logical function self_contact_may_touch(chain, k, e, x, u) result(may_touch)
+   !> the surface unless `both_sides` are held, and face the node; unless they touch, each must lie
+   !> above the other.
+   pure logical function self_contact_may_touch(chain, k, e, both_sides, x, u) result(may_touch)
       type(chain_t), intent(in) :: chain
       integer, intent(in) :: k                   !! index into the nodes of `chain`
       integer, intent(in) :: e
+      logical, intent(in) :: both_sides
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
       real(wp) :: a(2), b(2), mean(2), length, distance
       integer :: own, first, n, side
@@ -40,7 +42,7 @@ contains
          length = length + norm2(way(x, u, chain%edge(:, own)))
          n = n + 1
       end do
-      may_touch = chain%place(e) > first
+      may_touch = both_sides .or. chain%place(e) > first
       if (may_touch) may_touch = chain_faces(chain, k, chain%edge(:, e), x, u)
       if (.not. may_touch) return
       a = way(x, u, chain%edge(:, e))

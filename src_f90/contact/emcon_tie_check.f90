@@ -17,6 +17,7 @@ module emcon_tie_check
    integer, parameter :: most_measured = 10000
    character(len=*), parameter :: advice = "swap slave and master, leave the faces without " // &
       "partner out of the slave surface, or raise POSITION TOLERANCE"
+   character(len=*), parameter :: default_text = "a tenth of the longer of two facing edges"
 
 contains
 
@@ -183,18 +184,32 @@ contains
    pure function tie_text(scene, tie) result(text)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
-      character(len=:), allocatable :: text
+      character(len=tie_length(scene, tie)) :: text
 
       text = where_text(scene, tie%origin) // ": error: tie " // tie%name // ": "
    end function tie_text
 
+   pure integer function tie_length(scene, tie)
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: tie
+
+      tie_length = len(where_text(scene, tie%origin)) + len(": error: tie : ") + len(tie%name)
+   end function tie_length
+
    pure function tolerance_text(tie) result(text)
       type(tie_t), intent(in) :: tie
-      character(len=:), allocatable :: text
+      character(len=tolerance_length(tie)) :: text
 
-      text = "a tenth of the longer of two facing edges"
+      text = default_text
       if (tie%tolerance >= 0.0_wp) text = to_text(tie%tolerance)
    end function tolerance_text
+
+   pure integer function tolerance_length(tie)
+      type(tie_t), intent(in) :: tie
+
+      tolerance_length = len(default_text)
+      if (tie%tolerance >= 0.0_wp) tolerance_length = len(to_text(tie%tolerance))
+   end function tolerance_length
 
    !> The same list, but of a long one the first `most_measured` entries are spread over all of it,
    !> after those that are named.

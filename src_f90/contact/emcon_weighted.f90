@@ -5,7 +5,7 @@
 !> edge. Source: docs/theory.md, section 4, weighted gaps.
 module emcon_weighted
    use emcon_chain, only : chain_init, chain_t, chain_thickness
-   use emcon_contact, only : constraint_t, contact_t
+   use emcon_contact, only : constraint_t, contact_t, deepest_arrival
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_form, only : edge_form_t, form_constraint, form_share
    use emcon_errors, only : error_t
@@ -104,8 +104,7 @@ contains
       self%scale = self%whole
    end subroutine weighted_init
 
-   !> Mean gaps at both ends of the step. At the start of a contact that just slides onto the
-   !> surface there is none yet: it counts as 0.
+   !> Mean gaps at both ends of the step; 0 where nothing is covered.
    pure subroutine weighted_measure(self, x, u0, du)
       class(weighted_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
@@ -132,13 +131,29 @@ contains
             state%is_arriving = area(0) < least
             state%gap0 = 0.0_wp
             state%gap1 = 0.0_wp
-            if (.not. state%is_arriving) state%gap0 = gap(0)/area(0)
+            state%was_open = .true.
+            if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0)
+            if (state%is_arriving) state%was_open = is_open(self, i)
             if (state%is_over) state%gap1 = gap(1)/area(1)
             self%scale(i) = max(area(0), least)
             self%cover(i) = area(1)
          end associate
       end do
    end subroutine weighted_measure
+
+   !> Are the parts that come to be covered in the step seen from the front at its start?
+   pure logical function is_open(self, i)
+      class(weighted_t), intent(in) :: self
+      integer, intent(in) :: i
+      integer :: k
+
+      is_open = .true.
+      do k = 1, 2
+         if (self%node_edge(k, i) == 0) cycle
+         is_open = is_open .and. self%form(self%node_edge(k, i))%ahead &
+            >= -deepest_arrival*self%state(i)%size
+      end do
+   end function is_open
 
    pure subroutine weighted_evaluate(self, wanted, x, u0, du, target, item)
       class(weighted_t), intent(inout) :: self

@@ -9,12 +9,14 @@ module emcon_deck
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
+   use emcon_deck_general_contact, only : read_general_contact
    use emcon_deck_equations, only : read_equations
    use emcon_deck_given, only : read_given
    use emcon_deck_geometry, only : check_shapes
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
-   use emcon_deck_fields, only : data_open, data_t, next_line
+   use emcon_deck_fields, only : data_open, data_t, next_line, refuse_lines
+   use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_reader, only : reader_t
    use emcon_deck_sets, only : read_sets
    use emcon_deck_source, only : deck_open, deck_source_t
@@ -64,6 +66,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
 
+      call check_data(reader)
       call read_heading(reader, scene)
       call read_nodes(reader, scene)
       call read_elements(reader, scene)
@@ -78,6 +81,7 @@ contains
       call read_interactions(reader)
       call read_pairs(reader, scene)
       call read_ties(reader, scene)
+      call read_general_contact(reader, scene)
       call read_equations(reader, scene)
       call read_steps(reader, scene)
       call check_shapes(reader, scene)
@@ -87,6 +91,18 @@ contains
       call check_pairs(reader, scene)
       call check_ties(reader, scene)
    end subroutine read_scene
+
+   !> Keywords without data lines are followed by none.
+   subroutine check_data(reader)
+      type(reader_t), intent(inout) :: reader
+      integer :: i, k
+
+      do i = 1, size(reader%card)
+         k = find_keyword(reader%card(i)%name)
+         if (k == 0) cycle
+         if (.not. keywords(k)%has_data) call refuse_lines(reader, reader%card(i))
+      end do
+   end subroutine check_data
 
    !> The lines of *HEADING, with line ends between them.
    subroutine read_heading(reader, scene)

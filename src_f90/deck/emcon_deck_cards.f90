@@ -1,15 +1,15 @@
 !> From lines to cards: keywords and parameters, held against the registry.
 module emcon_deck_cards
-   use emcon_deck_keywords, only : find_keyword, in_model, in_step, keyword_names, keyword_t, &
-      keywords, mark_flag, mark_none, mark_unsupported, mark_value, &
+   use emcon_deck_keywords, only : find_keyword, in_model, in_step, is_neutral, keyword_names, &
+      keyword_t, keywords, mark_flag, mark_none, mark_unsupported, mark_value, &
       mark_without_effect, parameter_mark, parameter_names, parameter_reason
    use emcon_deck_laws, only : law_variants
    use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
       substitute_parameters, unused_override
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, option_t, reader_t
-   use emcon_diagnostics, only : add_error, add_warning, quoted, suggestion
+   use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_scene, only : origin_t
-   use emcon_text, only : squeezed, string_t, to_text
+   use emcon_text, only : squeezed, string_t, stripped, to_text
    implicit none
    private
    public :: read_cards
@@ -49,7 +49,7 @@ contains
       if (place%in_step) call add_error(reader%log, place%step_origin, &
          "*STEP: *END STEP is missing: the deck ends inside this step")
       do i = 1, size(overrides)
-         fault = unused_override(parameters, i)
+         call unused_override(parameters, i, fault)
          if (fault /= "") call add_error(reader%log, origin_t(), fault)
       end do
       if (place%n_card == 0 .and. reader%log%n_errors == 0) then
@@ -172,7 +172,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
       integer :: next, first
 
-      text = bare(reader%line(i)%text)
+      text = stripped(reader%line(i)%text, blanks)
       do while (text(len(text):) == ",")
          next = i + 1
          do while (next <= size(reader%line))
@@ -182,21 +182,10 @@ contains
          if (next > size(reader%line)) exit
          first = verify(reader%line(next)%text, blanks)
          if (scan(reader%line(next)%text(first:first), "*+-.0123456789,") == 1) exit
-         text = text // bare(reader%line(next)%text)
+         text = text // stripped(reader%line(next)%text, blanks)
          i = next
       end do
    end subroutine gather_card
-
-   !> `line` without the blanks around it.
-   pure function bare(line) result(text)
-      character(len=*), intent(in) :: line
-      character(len=:), allocatable :: text
-      integer :: first
-
-      first = verify(line, blanks)
-      text = ""
-      if (first > 0) text = line(first:verify(line, blanks, back=.true.))
-   end function bare
 
    !> Make a card of `text`. It gets no name if nothing may be read from it.
    subroutine read_card(reader, place, text, i_line, card)
@@ -205,6 +194,7 @@ contains
       character(len=*), intent(in) :: text
       integer, intent(in) :: i_line
       type(card_t), intent(out) :: card
+      character(len=:), allocatable :: variants
       integer :: i_comma, i
 
       card%origin = line_origin(reader, i_line)
@@ -220,27 +210,23 @@ contains
       else if (keywords(i)%reason /= "") then
          call refuse_unsupported(reader, card, keywords(i))
       else
-         call check_options(reader, card, trim(keywords(i)%parameters) // law_variants(card%name))
+         call law_variants(card%name, variants)
+         call check_options(reader, card, trim(keywords(i)%parameters) // variants)
          call check_place(reader, place, card, keywords(i))
       end if
    end subroutine read_card
 
-   !> An unknown keyword. What it would have defined may be missing further on.
+   !> An unknown keyword. What it would have defined may be missing further on; what it would have
+   !> changed nobody knows, so that --lenient does not leave it out.
    subroutine refuse_keyword(reader, card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(inout) :: card
-      character(len=:), allocatable :: text
 
-      text = "unknown keyword " // quoted(card%title) &
-         // suggestion("*" // card%name, keyword_names())
-      if (reader%is_lenient) then
-         call add_warning(reader%log, card%origin, text // " (left out)")
-      else
-         call add_error(reader%log, card%origin, text)
-         reader%doubt_nodes = .true.
-         reader%doubt_elements = .true.
-         reader%doubt_names = .true.
-      end if
+      call add_error(reader%log, card%origin, "unknown keyword " // quoted(card%title) &
+         // suggestion("*" // card%name, keyword_names()))
+      reader%doubt_nodes = .true.
+      reader%doubt_elements = .true.
+      reader%doubt_names = .true.
       card%name = ""
    end subroutine refuse_keyword
 
@@ -287,7 +273,7 @@ contains
             end if
             if (text(i:i) /= ",") cycle
          end if
-         part = bare(text(first:i - 1))
+         part = stripped(text(first:i - 1), blanks)
          first = i + 1
          if (part == "") cycle
          n = n + 1
@@ -295,7 +281,7 @@ contains
          option(n)%has_value = i_equal > 0
          if (i_equal == 0) i_equal = len(part) + 1
          option(n)%name = squeezed(part(:i_equal - 1))
-         option(n)%value = bare(part(i_equal + 1:))
+         option(n)%value = stripped(part(i_equal + 1:), blanks)
       end do
       option = option(:n)
    end subroutine split_options
@@ -305,20 +291,21 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: parameters
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable :: fault, reason
       integer :: i, mark
 
       do i = 1, size(card%option)
          associate (option => card%option(i))
             fault = ""
             mark = parameter_mark(parameters, option%name)
+            if (is_neutral(parameters, option%name, option%value)) cycle
             if (mark == mark_none) then
                fault = "unknown parameter " // quoted(option%name) &
                   // suggestion(option%name, parameter_names(parameters))
                reader%doubt_names = .true.
             else if (mark == mark_unsupported) then
-               fault = "parameter " // option%name // " is known but not supported" &
-                  // parameter_reason(option%name)
+               call parameter_reason(option%name, reason)
+               fault = "parameter " // option%name // " is known but not supported" // reason
             else if (mark == mark_value .and. option%value == "") then
                fault = "parameter " // option%name // " needs a value"
                reader%doubt_names = .true.

@@ -28,6 +28,7 @@ contains
       if (reader%doubt_shapes) return
       do i = 1, size(scene%pair)
          if (scene%pair(i)%slave == 0 .or. scene%pair(i)%master == 0) cycle
+         if (scene%pair(i)%is_reverse) cycle
          call check_common_nodes(reader, scene, scene%pair(i), has_common)
          call check_freedom(reader, scene, scene%pair(i))
          if (.not. (has_common .or. has_reverse(scene%pair, i))) then
@@ -68,7 +69,9 @@ contains
       end associate
    end subroutine check_common_nodes
 
-   !> Some node of each constraint must be free to fulfil it.
+   !> Some node of each constraint must be free to fulfil it. With both sides a node that is held
+   !> need not: where its master is free that one gives way, and where it is not the nodes of the
+   !> master are slaves too.
    subroutine check_freedom(reader, scene, pair)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
@@ -77,7 +80,7 @@ contains
       integer, allocatable :: n_free(:)
       integer :: i
 
-      if (pair%formulation == 0) return
+      if (pair%formulation == 0 .or. pair%both_sides) return
       allocate(is_slave(size(scene%node_label)), is_held(size(scene%node_label)), &
          is_guided(size(scene%node_label)), source=.false.)
       call mark_nodes(scene, scene%surface(pair%slave), is_slave)

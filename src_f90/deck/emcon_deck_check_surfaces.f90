@@ -1,7 +1,7 @@
 !> The surfaces of contact pairs and ties: chains of free faces.
 module emcon_deck_check_surfaces
+   use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_reader, only : reader_t
-   use emcon_deck_surfaces, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_diagnostics, only : add_error, label_list
    use emcon_scene, only : scene_t, surface_t
    use emcon_surface_edges, only : surface_edges

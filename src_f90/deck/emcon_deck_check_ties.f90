@@ -123,10 +123,18 @@ contains
    pure function title(scene, tie) result(text)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
-      character(len=:), allocatable :: text
+      character(len=title_length(scene, tie)) :: text
 
       text = "*TIE: slave surface " // scene%surface(tie%slave)%name // " and master surface " &
          // scene%surface(tie%master)%name // " of tie " // tie%name
    end function title
+
+   pure integer function title_length(scene, tie)
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: tie
+
+      title_length = len("*TIE: slave surface  and master surface  of tie ") + len(tie%name) &
+         + len(scene%surface(tie%slave)%name) + len(scene%surface(tie%master)%name)
+   end function title_length
 
 end module emcon_deck_check_ties

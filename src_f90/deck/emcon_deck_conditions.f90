@@ -1,8 +1,9 @@
 !> What is prescribed and what loads act in a step, and how they carry over from step to step.
 !>
-!> One rule for all: what is given again for the same place (node and degree of freedom; element
-!> and face; gravity of an element) replaces what was given before, in an earlier step, card or
-!> line; two loads on one place do not add up. OP=NEW drops what earlier steps gave.
+!> What a step gives for a place (node and degree of freedom; element and face; gravity of an
+!> element) replaces what earlier steps gave there. Within a step loads on one place add up, each
+!> with its own amplitude; of two prescribed displacements the last one holds. OP=NEW drops what
+!> earlier steps gave.
 !>
 !> What carries over keeps its value. An amplitude over step time has ended with its step: its
 !> last value stays. A load dropped in a static step runs to zero over that step.
@@ -17,7 +18,8 @@ module emcon_deck_conditions
    public :: put_prescribed, drop_prescribed, put_load, drop_loads
 
    !> What holds in the step that is being read. A slot is the index of the entry at a place, 0:
-   !> none. Gravity has the slot of face 0.
+   !> none. Gravity has the slot of face 0. The loads at a place are a list: the slot is its head,
+   !> `load_next` leads on; all of them were given in one step.
    type :: conditions_t
       integer :: step = 0                          !! number of the step, 0: before the first
       integer :: n_prescribed = 0, n_load = 0
@@ -25,10 +27,10 @@ module emcon_deck_conditions
       type(load_t), allocatable :: load(:)
       integer, allocatable :: prescribed_step(:), load_step(:)         !! the step that gave it
       logical, allocatable :: prescribed_dropped(:), load_dropped(:)
+      integer, allocatable :: load_next(:)
       integer, allocatable :: prescribed_slot(:, :)                    !! (n_dim, n_node)
       integer, allocatable :: point_slot(:, :)                         !! (n_dim, n_node)
       integer, allocatable :: element_slot(:, :)                       !! (0:n_face, n_element)
-      logical :: is_third_told = .false.
    end type conditions_t
 
 contains
@@ -38,7 +40,7 @@ contains
       type(scene_t), intent(in) :: scene
 
       allocate(self%prescribed(16), self%prescribed_step(16), self%prescribed_dropped(16))
-      allocate(self%load(16), self%load_step(16), self%load_dropped(16))
+      allocate(self%load(16), self%load_step(16), self%load_dropped(16), self%load_next(16))
       allocate(self%prescribed_slot(scene%n_dim, size(scene%node_label)), source=0)
       allocate(self%point_slot(scene%n_dim, size(scene%node_label)), source=0)
       allocate(self%element_slot(0:maxval(element_kinds%n_face), size(scene%element_label)), &
@@ -65,8 +67,9 @@ contains
          self%prescribed_dropped(n) = .false.
          associate (entry_n => self%prescribed(n))
             self%prescribed_slot(entry_n%dof, entry_n%node) = n
-            call end_amplitude(amplitude, last%duration, time, entry_n%amplitude, entry_n%value, &
-               value_end)
+            ! What stands before the first step has not begun.
+            if (self%step > 1) call end_amplitude(amplitude, last%duration, time, &
+               entry_n%amplitude, entry_n%value, value_end)
          end associate
       end do
       self%n_prescribed = n
@@ -80,6 +83,7 @@ contains
          self%load_step(n) = self%load_step(i)
          self%load_dropped(n) = .false.
          associate (load => self%load(n))
+            self%load_next(n) = load_slot(self, load)
             call set_load_slot(self, load, n)
             call end_amplitude(amplitude, last%duration, time, load%amplitude, load%value, &
                load%value_start)
@@ -147,15 +151,20 @@ contains
       step%load = pack(self%load(:self%n_load), holds)
    end subroutine conditions_store
 
-   !> Set a prescribed degree of freedom, in the place of an earlier one.
-   subroutine put_prescribed(self, new)
+   !> Set a prescribed degree of freedom, in the place of an earlier one; `is_other`: the same step
+   !> has said otherwise before.
+   subroutine put_prescribed(self, new, is_other)
       type(conditions_t), intent(inout) :: self
       type(prescribed_t), intent(in) :: new
+      logical, intent(out) :: is_other
       type(prescribed_t), allocatable :: grown(:)
       integer :: i, n
 
       i = self%prescribed_slot(new%dof, new%node)
-      if (i == 0) then
+      is_other = .false.
+      if (i > 0) then
+         if (self%prescribed_step(i) == self%step) is_other = differ(self%prescribed(i), new)
+      else
          n = self%n_prescribed
          if (n == size(self%prescribed)) then
             allocate(grown(2*n))
@@ -172,35 +181,87 @@ contains
       self%prescribed_dropped(i) = .false.
    end subroutine put_prescribed
 
-   !> Set a load, in the place of an earlier one.
+   !> Whether two entries prescribe different displacements. Amplitudes do not change zero.
+   pure logical function differ(one, other)
+      type(prescribed_t), intent(in) :: one, other
+
+      differ = one%value /= other%value .or. (one%is_frozen .neqv. other%is_frozen) &
+         .or. (one%amplitude /= other%amplitude .and. one%value /= 0.0_wp)
+   end function differ
+
+   !> Add a load to what this step gives for its place, or put it in the place of what earlier
+   !> steps gave there.
    subroutine put_load(self, new)
       type(conditions_t), intent(inout) :: self
       type(load_t), intent(in) :: new
-      type(load_t), allocatable :: grown(:)
-      integer :: i, n
+      integer :: i, head
       real(wp) :: value_start
 
-      i = load_slot(self, new)
+      head = load_slot(self, new)
+      i = 0
       value_start = 0.0_wp
-      if (i == 0) then
-         n = self%n_load
-         if (n == size(self%load)) then
-            allocate(grown(2*n))
-            grown(:n) = self%load
-            call move_alloc(grown, self%load)
-            call grow_marks(self%load_step, self%load_dropped)
+      if (head > 0) then
+         if (self%load_step(head) /= self%step) then
+            call replace_loads(self, new, head, i, value_start)
+            head = 0
          end if
-         i = n + 1
-         self%n_load = i
-         call set_load_slot(self, new, i)
-      else if (all(self%load(i)%direction == new%direction)) then
-         value_start = self%load(i)%value_start
       end if
+      if (i == 0) then
+         if (self%n_load == size(self%load)) call grow_loads(self)
+         self%n_load = self%n_load + 1
+         i = self%n_load
+      end if
+      call set_load_slot(self, new, i)
       self%load(i) = new
       self%load(i)%value_start = value_start
       self%load_step(i) = self%step
       self%load_dropped(i) = .false.
+      self%load_next(i) = head
    end subroutine put_load
+
+   !> Drop the list of loads from `head` on. `new` goes on from the sum of those that act as it
+   !> does, in the place `i` of one of them (0: there is none); gravity in another direction runs
+   !> to zero.
+   pure subroutine replace_loads(self, new, head, i, value_start)
+      type(conditions_t), intent(inout) :: self
+      type(load_t), intent(in) :: new
+      integer, intent(in) :: head
+      integer, intent(out) :: i
+      real(wp), intent(out) :: value_start
+      integer :: k
+
+      i = 0
+      value_start = 0.0_wp
+      k = head
+      do while (k > 0)
+         associate (old => self%load(k))
+            old%value = 0.0_wp
+            old%amplitude = 0
+            if (all(old%direction == new%direction)) then
+               value_start = value_start + old%value_start
+               old%value_start = 0.0_wp
+               i = k
+            end if
+         end associate
+         self%load_dropped(k) = .true.
+         k = self%load_next(k)
+      end do
+   end subroutine replace_loads
+
+   subroutine grow_loads(self)
+      type(conditions_t), intent(inout) :: self
+      type(load_t), allocatable :: grown(:)
+      integer, allocatable :: grown_next(:)
+      integer :: n
+
+      n = size(self%load)
+      allocate(grown(2*n), grown_next(2*n))
+      grown(:n) = self%load
+      grown_next(:n) = self%load_next
+      call move_alloc(grown, self%load)
+      call move_alloc(grown_next, self%load_next)
+      call grow_marks(self%load_step, self%load_dropped)
+   end subroutine grow_loads
 
    subroutine grow_marks(step, dropped)
       integer, allocatable, intent(inout) :: step(:)

@@ -1,6 +1,7 @@
 !> *SURFACE INTERACTION, *SURFACE BEHAVIOR, *FRICTION and *CONTACT PAIR.
 module emcon_deck_contact
-   use emcon_deck_fields, only : data_error, data_open, data_t, get_real, next_line
+   use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, drop_zeros, &
+      get_real, next_line, refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_sets, only : find_set, set_names
@@ -51,7 +52,7 @@ contains
 
       select case (option_name(card, "PRESSURE-OVERCLOSURE"))
       case ("", "HARD")
-         continue
+         call refuse_lines(reader, card)
       case ("TIED")
          call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", &
             "surfaces are tied by *TIE")
@@ -74,6 +75,9 @@ contains
       do while (next_line(reader, data))
          coefficient = 0.0_wp
          call get_real(reader, data, 1, "friction coefficient", coefficient)
+         call drop_zeros(data, 1)
+         if (data%n > 1) call data_warning(reader, data, "what stands behind the coefficient has " &
+            // "no effect without friction")
          if (coefficient /= 0.0_wp) call data_error(reader, data, "friction is known but not " &
             // "supported; the coefficient must be 0, not " // to_text(coefficient))
       end do
@@ -87,6 +91,7 @@ contains
       type(origin_t), allocatable :: line(:)       !! of each pair
       type(data_t) :: data
       integer :: formulation, i, n, n_before, most
+      logical :: both_sides
 
       most = 0
       do i = 1, size(reader%card)
@@ -94,21 +99,28 @@ contains
             most = most + reader%card(i)%last - reader%card(i)%first + 1
          end if
       end do
-      allocate(pair(most), line(most))
+      allocate(pair(2*most), line(2*most))
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "CONTACTPAIR") cycle
          n_before = n
          call read_formulation(reader, reader%card(i), formulation)
+         call read_sides(reader, reader%card(i), formulation, both_sides)
          call data_open(data, reader%card(i))
          do while (next_line(reader, data))
             n = n + 1
             line(n) = line_origin(reader, data%i_line)
             pair(n)%origin = reader%card(i)%origin
             pair(n)%formulation = formulation
+            pair(n)%both_sides = both_sides
             call get_surfaces(reader, data, scene, pair(n)%slave, pair(n)%master)
             call check_nodal(reader, data, scene, pair(n))
             call check_repeated(reader, data, scene, pair(:n), line)
+            if (.not. both_sides .or. pair(n)%slave == pair(n)%master) cycle
+            n = n + 1
+            line(n) = line(n - 1)
+            pair(n) = reversed(pair(n - 1))
+            if (pair(n - 1)%master > 0) call check_repeated(reader, data, scene, pair(:n), line)
          end do
          call read_pair_options(reader, reader%card(i), scene, pair(n_before + 1:n))
       end do
@@ -137,6 +149,40 @@ contains
       end select
    end subroutine read_formulation
 
+   !> SIDES of a card: are the nodes of both surfaces held? Integrated gaps of both would hold the
+   !> same covered lengths twice.
+   subroutine read_sides(reader, card, formulation, both_sides)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      integer, intent(in) :: formulation
+      logical, intent(out) :: both_sides
+
+      both_sides = .false.
+      select case (option_name(card, "SIDES"))
+      case ("", "ONE")
+         continue
+      case ("BOTH")
+         both_sides = formulation == formulation_nts
+         if (any(formulation == [formulation_segment, formulation_mortar])) then
+            call refuse_option(reader, card, "SIDES", "ONE", "SEGMENT and MORTAR hold what lies " &
+               // "between the surfaces once; use TYPE=NODE TO SURFACE")
+         end if
+      case default
+         call refuse_option(reader, card, "SIDES", "ONE, BOTH", "")
+      end select
+   end subroutine read_sides
+
+   !> The other half of a pair with both sides.
+   pure function reversed(pair) result(other)
+      type(contact_pair_t), intent(in) :: pair
+      type(contact_pair_t) :: other
+
+      other = pair
+      other%slave = pair%master
+      other%master = pair%slave
+      other%is_reverse = .true.
+   end function reversed
+
    !> A surface of nodes has no edges: it may only be the slave of another one, node to surface.
    !> A master that is refused becomes 0.
    subroutine check_nodal(reader, data, scene, pair)
@@ -159,10 +205,14 @@ contains
          if (is_integrated .and. slave%is_nodal) call data_error(reader, data, &
             "the slave surface " // quoted(slave%name) // " has TYPE=NODE, but SEGMENT and MORTAR" &
             // " integrate over edges; " // advice // ", or use TYPE=NODE TO SURFACE")
+         if (pair%both_sides .and. slave%is_nodal) call data_error(reader, data, "the slave " &
+            // "surface " // quoted(slave%name) // " has TYPE=NODE, but under SIDES=BOTH its " &
+            // "edges are needed too; " // advice)
          if (master%is_nodal) call data_error(reader, data, "the master surface " &
             // quoted(master%name) // " has TYPE=NODE; only the slave surface may, and " &
             // "only under NODE TO SURFACE; " // advice)
-         if ((is_integrated .and. slave%is_nodal) .or. master%is_nodal) pair%master = 0
+         if (master%is_nodal .or. ((is_integrated .or. pair%both_sides) .and. slave%is_nodal)) &
+            pair%master = 0
       end associate
    end subroutine check_nodal
 

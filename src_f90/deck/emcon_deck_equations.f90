@@ -202,7 +202,7 @@ contains
       logical :: is_kept(draft%n)
       integer :: i, k
 
-      fault = set_fault(reader, draft%term(:draft%n))
+      call set_fault(reader, draft%term(:draft%n), fault)
       is_kept = abs(draft%term(:draft%n)%coefficient) > 0.0_wp
       if (fault == "" .and. .not. any(is_kept)) then
          fault = "all coefficients are 0"
@@ -219,7 +219,7 @@ contains
          do k = 1, draft%n
             new%node(k) = draft%term(k)%item(min(i, size(draft%term(k)%item)))
          end do
-         fault = repeated_fault(scene, new)
+         call repeated_fault(scene, new, fault)
          if (fault == "") call append(list, new, is_kept)
       end do
       if (fault /= "") call add_error(reader%log, draft%origin, "*EQUATION: " // fault)
@@ -228,10 +228,10 @@ contains
    !> What is wrong with the numbers of nodes of the terms: empty if nothing is.
    !>
    !> The nodes of sets are paired; a single node stands in each of the equations.
-   function set_fault(reader, term) result(fault)
+   subroutine set_fault(reader, term, fault)
       type(reader_t), intent(in) :: reader
       type(term_t), intent(in) :: term(:)
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable, intent(out) :: fault
       integer :: k, n, n_paired
 
       fault = ""
@@ -251,7 +251,7 @@ contains
             // "the order of their labels; name them one by one"
          return
       end do
-   end function set_fault
+   end subroutine set_fault
 
    !> Whether a card of the node set `name` says that the order of its nodes matters.
    pure logical function is_unsorted(reader, name)
@@ -269,10 +269,10 @@ contains
    end function is_unsorted
 
    !> Names a degree of freedom that stands twice in an equation; empty if none does.
-   pure function repeated_fault(scene, equation) result(fault)
+   pure subroutine repeated_fault(scene, equation, fault)
       type(scene_t), intent(in) :: scene
       type(equation_t), intent(in) :: equation
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable, intent(out) :: fault
       integer :: freedom(size(equation%node)), order(size(equation%node)), i
 
       fault = ""
@@ -284,7 +284,7 @@ contains
             // to_text(scene%node_label(equation%node(order(i)))) // " stands in it twice"
          return
       end do
-   end function repeated_fault
+   end subroutine repeated_fault
 
    !> Add the terms of `new` that are kept.
    pure subroutine append(list, new, is_kept)

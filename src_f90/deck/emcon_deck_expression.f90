@@ -91,7 +91,7 @@ contains
       real(wp), intent(out) :: value
       character(len=:), allocatable, intent(out) :: fault
       type(expression_t) :: expression
-      character(len=:), allocatable :: mark
+      character(len=2) :: mark
 
       expression%text = detabbed(text)
       expression%fault = ""
@@ -108,7 +108,7 @@ contains
       type(parameter_table_t), intent(in) :: self
       type(expression_t), intent(inout) :: expression
       real(wp), intent(out) :: value
-      character(len=:), allocatable :: mark
+      character(len=2) :: mark
       real(wp) :: right
 
       call read_product(self, expression, value)
@@ -130,7 +130,7 @@ contains
       type(parameter_table_t), intent(in) :: self
       type(expression_t), intent(inout) :: expression
       real(wp), intent(out) :: value
-      character(len=:), allocatable :: mark
+      character(len=2) :: mark
       real(wp) :: right
 
       call read_factor(self, expression, value)
@@ -161,7 +161,7 @@ contains
       type(parameter_table_t), intent(in) :: self
       type(expression_t), intent(inout) :: expression
       real(wp), intent(out) :: value
-      character(len=:), allocatable :: mark
+      character(len=2) :: mark
       real(wp) :: power
 
       value = 0.0_wp
@@ -221,7 +221,8 @@ contains
       type(parameter_table_t), intent(in) :: self
       type(expression_t), intent(inout) :: expression
       real(wp), intent(out) :: value
-      character(len=:), allocatable :: mark, word
+      character(len=:), allocatable :: word
+      character(len=2) :: mark
 
       value = 0.0_wp
       mark = next_mark(expression)
@@ -232,7 +233,7 @@ contains
       else if (scan(mark, digit // ".") == 1) then
          call read_number(expression, value)
       else if (scan(mark, letter) == 1) then
-         word = next_word(expression)
+         call next_word(expression, word)
          if (next_mark(expression) == "(") then
             call read_parentheses(self, expression, value)
             if (expression%fault == "") call apply_function(word, value, expression%fault)
@@ -339,7 +340,7 @@ contains
    !> The next character that is not blank, or `**`, without taking it; empty at the end.
    function next_mark(expression) result(mark)
       type(expression_t), intent(inout) :: expression
-      character(len=:), allocatable :: mark
+      character(len=2) :: mark
       integer :: n
 
       associate (text => expression%text, i => expression%i)
@@ -356,9 +357,9 @@ contains
    end function next_mark
 
    !> Take a name; upper case.
-   function next_word(expression) result(word)
+   subroutine next_word(expression, word)
       type(expression_t), intent(inout) :: expression
-      character(len=:), allocatable :: word
+      character(len=:), allocatable, intent(out) :: word
       integer :: n
 
       associate (text => expression%text, i => expression%i)
@@ -367,7 +368,7 @@ contains
          word = to_upper(text(i:i + n - 1))
          i = i + n
       end associate
-   end function next_word
+   end subroutine next_word
 
    !> `line` with blanks for tabs.
    pure function detabbed(line) result(text)

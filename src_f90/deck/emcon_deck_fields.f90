@@ -6,6 +6,7 @@ module emcon_deck_fields
    use emcon_text, only : read_integer, read_real, to_text, to_upper
    implicit none
    private
+   public :: drop_zeros, refuse_lines
    public :: data_t, data_open, next_line, data_error, data_warning
    public :: check_count, is_blank, is_label, get_integer, get_real, get_name
 
@@ -147,6 +148,37 @@ contains
       if (is_label) is_label = verify(data%text(data%from(k):data%to(k)), "+-0123456789") == 0
    end function is_label
 
+   !> Zeros behind the first `most` fields say nothing: they are not counted.
+   subroutine drop_zeros(data, most)
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: most
+      real(wp) :: number
+      logical :: is_number
+
+      do while (data%n > most)
+         if (.not. is_blank(data, data%n)) then
+            call read_real(data%text(data%from(data%n):data%to(data%n)), number, is_number)
+            if (.not. is_number .or. abs(number) > 0.0_wp) return
+         end if
+         data%n = data%n - 1
+      end do
+   end subroutine drop_zeros
+
+   !> Refuse the data lines of a card that has none, once; zeros say nothing.
+   subroutine refuse_lines(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(data_t) :: data
+
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call drop_zeros(data, 0)
+         if (data%n == 0) cycle
+         call data_error(reader, data, "has no data lines, but " // quoted(data%text) // " follows")
+         return
+      end do
+   end subroutine refuse_lines
+
    !> Refuse a line with fewer than `least` or more than `most` fields; `what` names them.
    subroutine check_count(reader, data, least, most, what)
       type(reader_t), intent(inout) :: reader
@@ -154,6 +186,7 @@ contains
       integer, intent(in) :: least, most
       character(len=*), intent(in) :: what
 
+      call drop_zeros(data, most)
       if (data%n < least) then
          call data_error(reader, data, "expected " // what // ", found only " &
             // to_text(data%n) // merge(" value ", " values", data%n == 1))
@@ -197,6 +230,7 @@ contains
       integer, intent(in) :: k
       character(len=*), intent(in) :: what
       real(wp), intent(inout) :: value
+      character(len=:), allocatable :: fault
       real(wp) :: number
       logical :: ok
 
@@ -206,16 +240,16 @@ contains
          if (ok) then
             value = number
          else
-            call data_error(reader, data, "the " // what // " " // quoted(word) &
-               // real_fault(word))
+            call real_fault(word, fault)
+            call data_error(reader, data, "the " // what // " " // quoted(word) // fault)
          end if
       end associate
    end subroutine get_real
 
    !> Why a word is not a real: " is not ...".
-   pure function real_fault(word) result(fault)
+   pure subroutine real_fault(word, fault)
       character(len=*), intent(in) :: word
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable, intent(out) :: fault
       real(wp) :: mantissa
       integer :: n
       logical :: ok
@@ -237,7 +271,7 @@ contains
       if (.not. ok) return
       if (verify(word(n + 1:), "+0123456789") == 0 .and. scan(word, "0123456789", back=.true.) &
          == len(word)) fault = " is too large"
-   end function real_fault
+   end subroutine real_fault
 
    !> Read field `k` as a name: upper case, no blanks, no quotes.
    subroutine get_name(reader, data, k, what, name)

@@ -1,6 +1,5 @@
 !> *GIVEN FORCES: nodes whose forces and mass come from the program that reads the deck.
 module emcon_deck_given
-   use emcon_deck_fields, only : data_error, data_open, data_t, next_line
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_deck_sets, only : find_set, set_names
    use emcon_diagnostics, only : quoted, suggestion
@@ -18,7 +17,6 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
       integer, allocatable :: list(:)
-      type(data_t) :: data
       integer :: i
 
       do i = 1, size(reader%card)
@@ -27,8 +25,6 @@ contains
             allocate(scene%given_node(0))
             scene%given_origin = reader%card(i)%origin
          end if
-         call data_open(data, reader%card(i))
-         if (next_line(reader, data)) call data_error(reader, data, "has no data lines")
          call find_nodes(reader, reader%card(i), scene, list)
          list = [scene%given_node, list]
          scene%given_node = unique_sorted(list)

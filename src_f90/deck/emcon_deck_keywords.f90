@@ -1,10 +1,11 @@
 !> The keyword registry: what the deck language knows. One row per keyword.
 module emcon_deck_keywords
-   use emcon_text, only : squeezed, string_t
+   use emcon_kinds, only : wp
+   use emcon_text, only : read_real, squeezed, string_t
    implicit none
    private
    public :: keyword_t, keywords, find_keyword, keyword_names
-   public :: parameter_mark, parameter_names, parameter_reason
+   public :: parameter_mark, parameter_names, parameter_reason, is_neutral
    public :: in_model, in_step, in_both
    public :: mark_none, mark_flag, mark_value, mark_either, mark_unsupported, mark_without_effect
 
@@ -17,70 +18,87 @@ module emcon_deck_keywords
       mark_unsupported = 4, mark_without_effect = 5
 
    !> One keyword. `parameters` lists them with commas, without blanks inside: `NAME=` takes a
-   !> value, `NAME` none, `NAME?` may; `!NAME` is known but not supported, `~NAME` has no effect.
+   !> value, `NAME` none, `NAME?` may; `!NAME` is known but not supported, `~NAME` has no effect;
+   !> `!NAME:VALUE` and `~NAME:VALUE` are accepted with the value that changes nothing.
    !> A `reason` says why a known keyword is not supported; empty: it is.
    type :: keyword_t
-      character(len=22) :: name = ""
+      character(len=27) :: name = ""
       integer :: place = in_both
-      character(len=160) :: parameters = ""
+      character(len=192) :: parameters = ""
       character(len=64) :: reason = ""
       logical :: is_output = .false.         !! --lenient reads on if it is not supported
+      logical :: has_data = .true.           !! data lines may follow
    end type keyword_t
 
    character(len=*), parameter :: no_rods = "only plane strain solids are read", &
       no_thermal = "there is no temperature", no_couple = "linear couplings go by *EQUATION"
    character(len=*), parameter :: no_export = "results go by *NODE FILE, *EL FILE and *... PRINT"
-   character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL"
-   character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT,!POSITION,!USER"
+   character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL:YES"
+   character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT:2D,!POSITION,!USER"
 
    type(keyword_t), parameter :: keywords(*) = [ &
       keyword_t("HEADING", in_both), &
-      keyword_t("PREPRINT", in_both, "~ECHO,~MODEL,~HISTORY,~CONTACT"), &
+      keyword_t("PREPRINT", in_both, "~ECHO:NO,~MODEL:NO,~HISTORY:NO,~CONTACT:NO", &
+         has_data=.false.), &
       keyword_t("PARAMETER", in_both), &
       keyword_t("INCLUDE", in_both, "INPUT="), &
-      keyword_t("NODE", in_model, "NSET=,!SYSTEM,!INPUT"), &
-      keyword_t("ELEMENT", in_model, "TYPE=,ELSET=,!INPUT,!OFFSET"), &
-      keyword_t("NSET", in_both, "NSET=,GENERATE,!ELSET,~INTERNAL,~UNSORTED,!INSTANCE"), &
+      keyword_t("NODE", in_model, "NSET=,!SYSTEM:R,!INPUT"), &
+      keyword_t("ELEMENT", in_model, "TYPE=,ELSET=,!INPUT,!OFFSET:0"), &
+      keyword_t("NSET", in_both, "NSET=,GENERATE,ELSET=,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM"), &
-      keyword_t("GIVEN FORCES", in_model, "NSET="), &
-      keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,!ORIENTATION,!OFFSET,!CONTROLS"), &
-      keyword_t("MATERIAL", in_model, "NAME="), &
-      keyword_t("DENSITY", in_model), &
-      keyword_t("ELASTIC", in_model, "TYPE="), &
-      keyword_t("HYPERELASTIC", in_model, "!OGDEN,!MOONEY-RIVLIN,!YEOH,!POLYNOMIAL,!N"), &
-      keyword_t("USER MATERIAL", in_model, "CONSTANTS=,~UNSYMM,!TYPE,!HYBRIDFORMULATION"), &
+      keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
+      keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,!ORIENTATION,!OFFSET:0,!CONTROLS"), &
+      keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
+      keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
+      keyword_t("ELASTIC", in_model, "TYPE=,~MODULI,!DEPENDENCIES:0"), &
+      keyword_t("HYPERELASTIC", in_model, "!OGDEN,!MOONEY-RIVLIN,!YEOH,!POLYNOMIAL,!N:1," &
+         // "~MODULI,!DEPENDENCIES:0"), &
+      keyword_t("USER MATERIAL", in_model, "CONSTANTS=,~UNSYMM,!TYPE:MECHANICAL," &
+         // "!HYBRIDFORMULATION"), &
       keyword_t("INITIAL CONDITIONS", in_model, "TYPE=,!USER"), &
-      keyword_t("AMPLITUDE", in_both, "NAME=,TIME=,DEFINITION=,!USER,!VALUE,!SMOOTH"), &
+      keyword_t("AMPLITUDE", in_both, "NAME=,TIME=,DEFINITION=,!USER,!VALUE:RELATIVE,!SMOOTH:0"), &
       keyword_t("TIME POINTS", in_both, "NAME=,GENERATE"), &
-      keyword_t("SURFACE INTERACTION", in_model, "NAME="), &
-      keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,!NOSEPARATION,!PENALTY"), &
-      keyword_t("FRICTION", in_model, "~SLIPTOLERANCE,!ROUGH,!LAGRANGE"), &
-      keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,ADJUST=,!SMALLSLIDING,!TIED"), &
+      keyword_t("SURFACE INTERACTION", in_model, "NAME=", has_data=.false.), &
+      keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,DIRECT,!NOSEPARATION," &
+         // "!PENALTY,!AUGMENTEDLAGRANGE"), &
+      keyword_t("FRICTION", in_model, "~SLIPTOLERANCE,!ROUGH,!LAGRANGE,!DEPENDENCIES:0"), &
+      keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,SIDES=,ADJUST=," &
+         // "!SMALLSLIDING,!TIED"), &
+      keyword_t("CONTACT", in_model, has_data=.false.), &
+      keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR"), &
+      keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
          // "~NOROTATION,~NOTHICKNESS,!CYCLICSYMMETRY,!MULTISTAGE,!TIEDNSET,!CONSTRAINTRATIO"), &
       keyword_t("EQUATION", in_both, "!REMOVE,!REMOVEALL,!INPUT"), &
-      keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,!TIMEDELAY,!USER,!SUBMODEL"), &
-      keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,!PERTURBATION"), &
-      keyword_t("STATIC", in_step, "DIRECT,~SOLVER,!STABILIZE,!RIKS,!EXPLICIT"), &
-      keyword_t("DYNAMIC", in_step, "DIRECT,~SOLVER,!ALPHA,!EXPLICIT,!APPLICATION,!INITIAL"), &
-      keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY,!USER,!FOLLOWER,!SECTOR"), &
-      keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY,!USER"), &
-      keyword_t("CONSTRAINT METHOD", in_step, "TYPE="), &
-      keyword_t("CONTACT INITIATION", in_step, "TYPE=,GAPTOLERANCE="), &
-      keyword_t("MORTAR", in_step, "INTEGRATION=,POINTS=,MULTIPLIER=,NORMAL=,FEATUREANGLE="), &
-      keyword_t("SURFACE SMOOTHING", in_step, "TYPE=,FEATUREANGLE="), &
-      keyword_t("NEWTON", in_step, "TYPE=,TOLERANCE=,MAXIMUM="), &
-      keyword_t("TIME INTEGRATION", in_step, "SCHEME=,!TOLERANCE"), &
+      keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,!AMPLITUDE,!OP,!TYPE", &
+         has_data=.false.), &
+      keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,!TIMEDELAY:0,!LOADCASE:1," &
+         // "!USER,!SUBMODEL"), &
+      keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,~UNSYMM:NO," &
+         // "~EXTRAPOLATION,~CONVERTSDI,!PERTURBATION"), &
+      keyword_t("STATIC", in_step, "DIRECT,~SOLVER,!STABILIZE:0,!RIKS,!EXPLICIT"), &
+      keyword_t("DYNAMIC", in_step, "DIRECT,~SOLVER,!ALPHA:0,!EXPLICIT:0,!APPLICATION,!INITIAL," &
+         // "~NOHAF,~HAFTOL,~HALFINCSCALEFACTOR"), &
+      keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER,!FOLLOWER," &
+         // "!SECTOR"), &
+      keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER"), &
+      keyword_t("CONSTRAINT METHOD", in_step, "TYPE=", has_data=.false.), &
+      keyword_t("CONTACT INITIATION", in_step, "TYPE=,GAPTOLERANCE=", has_data=.false.), &
+      keyword_t("MORTAR", in_step, "INTEGRATION=,POINTS=,MULTIPLIER=,NORMAL=,FEATUREANGLE=", &
+         has_data=.false.), &
+      keyword_t("SURFACE SMOOTHING", in_step, "TYPE=,FEATUREANGLE=", has_data=.false.), &
+      keyword_t("NEWTON", in_step, "TYPE=,TOLERANCE=,MAXIMUM=", has_data=.false.), &
+      keyword_t("TIME INTEGRATION", in_step, "SCHEME=,!TOLERANCE", has_data=.false.), &
       keyword_t("NODE FILE", in_step, "NSET=," // filed), &
       keyword_t("EL FILE", in_step, "ELSET=," // filed), &
       keyword_t("CONTACT FILE", in_step, filed), &
       keyword_t("NODE PRINT", in_step, "NSET=," // printed), &
       keyword_t("EL PRINT", in_step, "ELSET=," // printed), &
       keyword_t("CONTACT PRINT", in_step, "~NSET,~SET," // printed), &
-      keyword_t("ENERGY PRINT", in_step, "~ELSET,FREQUENCY=,TIMEPOINTS="), &
-      keyword_t("RESTART", in_step, "WRITE,FREQUENCY=,~OVERLAY,!READ"), &
-      keyword_t("END STEP", in_step), &
+      keyword_t("ENERGY PRINT", in_step, "~ELSET,~FREQUENCY:1,~TIMEPOINTS"), &
+      keyword_t("RESTART", in_step, "WRITE,FREQUENCY=,~OVERLAY,!READ", has_data=.false.), &
+      keyword_t("END STEP", in_step, has_data=.false.), &
       keyword_t("MPC", in_model, "", no_couple), &
       keyword_t("COUPLING", in_model, "", no_couple), &
       keyword_t("KINEMATIC", in_model, "", no_couple), &
@@ -125,7 +143,8 @@ module emcon_deck_keywords
       keyword_t("DASHPOT", in_model, "", no_rods), &
       keyword_t("MASS", in_model, "", no_rods), &
       keyword_t("GAP", in_model, "", "use *CONTACT PAIR"), &
-      keyword_t("CONTACT", in_both, "", "name the two surfaces by *CONTACT PAIR"), &
+      keyword_t("CONTACT EXCLUSIONS", in_both, "", "list what touches by *CONTACT INCLUSIONS"), &
+      keyword_t("CONTACT FORMULATION", in_both, "", "all with all holds the nodes of both sides"), &
       keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
       keyword_t("CONTACT DAMPING", in_model, "", "contact is enforced exactly, without damping"), &
       keyword_t("CONTACT CONTROLS", in_both, "", "contact is enforced exactly"), &
@@ -149,6 +168,11 @@ module emcon_deck_keywords
       keyword_t("SECTION FILE", in_step, "", no_export, .true.), &
       keyword_t("FILE FORMAT", in_both, "", no_export, .true.), &
       keyword_t("MONITOR", in_step, "", no_export, .true.), &
+      keyword_t("INTEGRATED OUTPUT", in_step, "", no_export, .true.), &
+      keyword_t("INTEGRATED OUTPUT SECTION", in_model, "", no_export, .true.), &
+      keyword_t("INCREMENTATION OUTPUT", in_step, "", no_export, .true.), &
+      keyword_t("FILTER", in_model, "", no_export, .true.), &
+      keyword_t("DIAGNOSTICS", in_both, "", "diagnostics are in the log", .true.), &
       keyword_t("PRINT", in_step, "", no_export, .true.)]
 
 contains
@@ -210,10 +234,28 @@ contains
       end do
    end function parameter_mark
 
+   !> Whether `value` is the one with which the parameter `name` changes nothing.
+   pure logical function is_neutral(parameters, name, value)
+      character(len=*), intent(in) :: parameters, name, value
+      real(wp) :: number, neutral
+      integer :: first, last
+      logical :: is_number
+
+      first = max(index(parameters, "!" // name // ":"), index(parameters, "~" // name // ":"))
+      is_neutral = first > 0
+      if (.not. is_neutral) return
+      first = first + len(name) + 2
+      last = first + scan(trim(parameters(first:)) // ",", ",") - 2
+      is_neutral = squeezed(value) == parameters(first:last)
+      call read_real(parameters(first:last), neutral, is_number)
+      if (is_number) call read_real(value, number, is_number)
+      if (is_number) is_neutral = abs(number - neutral) <= 0.0_wp
+   end function is_neutral
+
    !> Why a known parameter is not supported: " (...)", or nothing where the name says it.
-   pure function parameter_reason(name) result(reason)
+   pure subroutine parameter_reason(name, reason)
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: reason
+      character(len=:), allocatable, intent(out) :: reason
 
       select case (name)
       case ("ALPHA")
@@ -241,7 +283,7 @@ contains
       case default
          reason = ""
       end select
-   end function parameter_reason
+   end subroutine parameter_reason
 
    !> The supported parameters of a list, for suggestions.
    pure function parameter_names(parameters) result(list)
@@ -266,11 +308,9 @@ contains
 
    pure function bare_name(entry_text) result(name)
       character(len=*), intent(in) :: entry_text
-      character(len=:), allocatable :: name
+      character(len=scan(entry_text // ":", ":=?") - 1 - min(1, scan(entry_text(:1), "!~"))) :: name
 
-      name = entry_text
-      if (scan(name(1:1), "!~") == 1) name = name(2:)
-      if (scan(name(len(name):), "=?") == 1) name = name(:len(name) - 1)
+      name = entry_text(1 + min(1, scan(entry_text(:1), "!~")):)
    end function bare_name
 
 end module emcon_deck_keywords

@@ -24,9 +24,9 @@ module emcon_deck_laws
 contains
 
    !> The parameters that choose among the laws of a keyword: ",A,B", ready for its list.
-   pure function law_variants(keyword) result(list)
+   pure subroutine law_variants(keyword, list)
       character(len=*), intent(in) :: keyword
-      character(len=:), allocatable :: list
+      character(len=:), allocatable, intent(out) :: list
       integer :: i
 
       list = ""
@@ -35,13 +35,13 @@ contains
             list = list // "," // trim(law_rows(i)%variant)
          end if
       end do
-   end function law_variants
+   end subroutine law_variants
 
    !> What is wrong with the value of the constant `name`; empty: nothing.
-   pure function constant_fault(name, value) result(fault)
+   pure subroutine constant_fault(name, value, fault)
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: value
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable, intent(out) :: fault
 
       fault = ""
       select case (name)
@@ -52,6 +52,6 @@ contains
       case ("nu")
          if (value <= -1.0_wp .or. value >= 0.5_wp) fault = "must lie between -1 and 0.5"
       end select
-   end function constant_fault
+   end subroutine constant_fault
 
 end module emcon_deck_laws

@@ -17,6 +17,25 @@ module emcon_deck_loads
    private
    public :: read_boundary, read_cload, read_dload
 
+   !> Degrees of freedom are numbered up to this one: 3 is out of the plane, 4 to 6 are rotations.
+   integer, parameter :: last_freedom = 6
+
+   !> A support that is called by its name.
+   type :: support_t
+      character(len=8) :: name
+      logical :: is_held(3)                        !! displacements along x, y, z
+   end type support_t
+
+   type(support_t), parameter :: supports(*) = [ &
+      support_t("ENCASTRE", [.true., .true., .true.]), &
+      support_t("PINNED", [.true., .true., .true.]), &
+      support_t("XSYMM", [.true., .false., .false.]), &
+      support_t("YSYMM", [.false., .true., .false.]), &
+      support_t("ZSYMM", [.false., .false., .true.]), &
+      support_t("XASYMM", [.false., .true., .true.]), &
+      support_t("YASYMM", [.true., .false., .true.]), &
+      support_t("ZASYMM", [.true., .true., .false.])]
+
 contains
 
    !> Index of the amplitude that a card names; 0 if it names none, or an unknown one.
@@ -48,7 +67,7 @@ contains
       end select
    end function is_new
 
-   !> *BOUNDARY: node or set, first dof, last dof, value.
+   !> *BOUNDARY: node or set, first dof, last dof, value; or node or set, name of a support.
    subroutine read_boundary(reader, card, scene, self)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -57,7 +76,9 @@ contains
       type(data_t) :: data
       type(prescribed_t) :: new
       integer, allocatable :: item(:)
-      integer :: first, last, dof, i
+      logical, allocatable :: is_other(:)
+      logical :: is_held(last_freedom), is_again
+      integer :: dof, i
 
       if (is_new(reader, card)) call drop_prescribed(self)
       call check_boundary_options(reader, card)
@@ -66,23 +87,24 @@ contains
       new%is_frozen = has_option(card, "FIXED")
       call data_open(data, card)
       do while (next_line(reader, data))
-         call read_boundary_line(reader, data, first, last, new%value)
+         call read_boundary_line(reader, data, is_held, new%value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
+         if (data%ok) call check_value(reader, data, is_held(scene%n_dim + 1:), new)
          if (.not. data%ok) cycle
-         if (card%step == 0 .and. new%value /= 0.0_wp) then
-            call data_error(reader, data, "before the first step only 0 can be prescribed, not " &
-               // to_text(new%value) // "; move it into a step")
-            cycle
-         end if
-         call tell_third(reader, data, last, new%value, self)
-         if (.not. data%ok) cycle
+         allocate(is_other(size(item)), source=.false.)
          do i = 1, size(item)
             new%node = item(i)
-            do dof = first, min(last, scene%n_dim)
+            do dof = 1, scene%n_dim
+               if (.not. is_held(dof)) cycle
                new%dof = dof
-               call put_prescribed(self, new)
+               call put_prescribed(self, new, is_again)
+               is_other(i) = is_other(i) .or. is_again
             end do
          end do
+         if (any(is_other)) call data_warning(reader, data, "node " // &
+            label_list(pack(scene%node_label(item), is_other)) // " was prescribed otherwise " &
+            // "before, in this step too; the last one holds")
+         deallocate(is_other)
       end do
    end subroutine read_boundary
 
@@ -106,15 +128,21 @@ contains
       end select
    end subroutine check_boundary_options
 
-   subroutine read_boundary_line(reader, data, first, last, value)
+   !> Which degrees of freedom a line prescribes, and the value.
+   subroutine read_boundary_line(reader, data, is_held, value)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
-      integer, intent(out) :: first, last
+      logical, intent(out) :: is_held(last_freedom)
       real(wp), intent(out) :: value
+      integer :: first, last
+      logical :: is_named
 
       value = 0.0_wp
+      is_held = .false.
       call check_count(reader, data, 2, 4, "node or node set, first dof, last dof, value")
       if (.not. data%ok) return
+      call read_support(reader, data, is_held, is_named)
+      if (is_named) return
       call get_integer(reader, data, 2, "degree of freedom", first)
       last = first
       if (data%ok .and. .not. is_blank(data, 3)) then
@@ -125,29 +153,56 @@ contains
       if (last < first) then
          call data_error(reader, data, "the last degree of freedom, " // to_text(last) &
             // ", is below the first, " // to_text(first))
-      else if (last > 3) then
+      else if (last > last_freedom) then
          call data_error(reader, data, "degree of freedom " // to_text(last) &
             // " does not exist; known: 1, 2")
+      else
+         is_held(first:last) = .true.
       end if
    end subroutine read_boundary_line
 
-   !> The third displacement is zero in plane strain: that it is to be is said once.
-   subroutine tell_third(reader, data, last, value, self)
+   !> The displacements that a support called by its name holds, if field 2 is a name.
+   subroutine read_support(reader, data, is_held, is_named)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
-      integer, intent(in) :: last
-      real(wp), intent(in) :: value
-      type(conditions_t), intent(inout) :: self
+      logical, intent(inout) :: is_held(:)
+      logical, intent(out) :: is_named
+      character(len=:), allocatable :: name, known
+      integer :: i
 
-      if (last < 3) return
-      if (value /= 0.0_wp) then
-         call data_error(reader, data, "the model is plane: degree of freedom 3 does not exist")
-      else if (.not. self%is_third_told) then
-         call data_warning(reader, data, "the model is plane: degree of freedom 3 is left out " &
-            // "(told once)")
-         self%is_third_told = .true.
+      is_named = .not. is_blank(data, 2)
+      if (is_named) is_named = scan(data%text(data%from(2):data%from(2)), "+-.0123456789<") == 0
+      if (.not. is_named) return
+      call get_name(reader, data, 2, "degree of freedom or support", name)
+      known = "1, 2"
+      do i = 1, size(supports)
+         if (supports(i)%name == name) then
+            is_held(:3) = supports(i)%is_held
+            call check_count(reader, data, 2, 2, "node or node set, " // name)
+            return
+         end if
+         known = known // ", " // trim(supports(i)%name)
+      end do
+      if (data%ok) call data_error(reader, data, "unknown degree of freedom or support " &
+         // quoted(name) // "; known: " // known)
+   end subroutine read_support
+
+   !> Out of the plane every displacement is 0; where FIXED holds a node, a value says nothing.
+   subroutine check_value(reader, data, is_out, new)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      logical, intent(in) :: is_out(:)             !! degrees of freedom out of the plane
+      type(prescribed_t), intent(in) :: new
+
+      if (new%value == 0.0_wp) return
+      if (any(is_out)) then
+         call data_error(reader, data, "the model is plane: degrees of freedom 3 to 6 are 0, not " &
+            // to_text(new%value))
+      else if (new%is_frozen) then
+         call data_warning(reader, data, "FIXED holds nodes where the step finds them: the value " &
+            // to_text(new%value) // " has no effect")
       end if
-   end subroutine tell_third
+   end subroutine check_value
 
    !> *CLOAD: node or set, dof, force.
    subroutine read_cload(reader, card, scene, self)
@@ -171,10 +226,11 @@ contains
          call get_integer(reader, data, 2, "degree of freedom", new%place)
          new%value = 0.0_wp
          call get_real(reader, data, 3, "force", new%value)
-         if (data%ok .and. new%place > scene%n_dim) call data_error(reader, data, &
-            "degree of freedom " // to_text(new%place) // " does not exist; known: 1, 2")
+         if (data%ok .and. new%place > merge(scene%n_dim, last_freedom, new%value /= 0.0_wp)) &
+            call data_error(reader, data, "degree of freedom " // to_text(new%place) &
+            // " does not exist; known: 1, 2")
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
-         if (.not. data%ok) cycle
+         if (.not. data%ok .or. new%place > scene%n_dim) cycle
          do i = 1, size(item)
             new%target = item(i)
             call put_load(self, new)

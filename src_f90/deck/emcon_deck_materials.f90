@@ -5,7 +5,7 @@ module emcon_deck_materials
       get_real, is_blank, next_line
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
       option_count, option_name, reader_t, refuse_option
-   use emcon_deck_sets, only : find_set, set_names
+   use emcon_deck_sets, only : find_set, hint_at_set, set_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : law_given, law_neo_hooke, material_t, scene_t, where_text
@@ -119,7 +119,7 @@ contains
          call read_constants(reader, card, row%constant(:row%n_constant), value, ok)
          if (.not. ok) return
          do i = 1, row%n_constant
-            fault = constant_fault(trim(row%constant(i)), value(i))
+            call constant_fault(trim(row%constant(i)), value(i), fault)
             if (fault /= "") call card_error(reader, card, trim(row%constant(i)) // " = " &
                // to_text(value(i)) // " " // fault)
          end do
@@ -218,7 +218,8 @@ contains
       temperature = 0.0_wp
       call get_real(reader, data, n + 1, "temperature", temperature)
       ok = data%ok
-      if (ok .and. data%n > n) call data_warning(reader, data, "the temperature has no effect")
+      if (ok .and. abs(temperature) > 0.0_wp) call data_warning(reader, data, &
+         "the temperature has no effect")
       if (next_line(reader, data)) call data_error(reader, data, &
          "only one data line is read: constants do not depend on temperature")
    end subroutine read_constants
@@ -247,7 +248,7 @@ contains
       type(card_t), intent(in) :: card
       type(scene_t), intent(inout) :: scene
       integer, intent(in) :: i_section
-      character(len=:), allocatable :: name, set_name
+      character(len=:), allocatable :: name, set_name, hint
       type(string_t), allocatable :: known(:)
       type(data_t) :: data
       integer :: i
@@ -272,16 +273,20 @@ contains
             if (data%ok .and. section%thickness <= 0.0_wp) call data_error(reader, data, &
                "the thickness " // to_text(section%thickness) // " is not positive")
             call check_count(reader, data, 0, 1, "thickness")
+            if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
          end if
       end associate
       i = find_set(scene%element_set, set_name)
       if (i > 0) then
          call assign_section(reader, card, scene, scene%element_set(i)%item, i_section)
       else if (set_name /= "" .and. .not. reader%doubt_names) then
-         call card_error(reader, card, "unknown element set " // quoted(set_name) &
-            // suggestion(set_name, set_names(scene%element_set)))
+         call hint_at_set(reader, "element set", set_name, set_names(scene%element_set), hint)
+         call card_error(reader, card, "unknown element set " // quoted(set_name) // hint)
          reader%doubt_names = .true.
       end if
+      if (i > 0 .and. find_set(reader%line_set, set_name) > 0) call card_error(reader, card, &
+         "element set " // quoted(set_name) // " holds lines too, which have no stiffness; give " &
+         // "the section a set without them")
    end subroutine read_section
 
    subroutine assign_section(reader, card, scene, item, i_section)

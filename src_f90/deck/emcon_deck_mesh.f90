@@ -2,8 +2,9 @@
 module emcon_deck_mesh
    use emcon_deck_labels, only : find_label, label_map_init
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
-      get_integer, get_real, next_line
-   use emcon_deck_reader, only : card_error, card_t, line_origin, need_name, reader_t
+      drop_zeros, get_integer, get_real, next_line
+   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, need_name, &
+      option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
    use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
    use emcon_kinds, only : wp
@@ -15,13 +16,25 @@ module emcon_deck_mesh
 
    !> Element types of Abaqus and CalculiX that are not read.
    character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
-      "CPE4R", "CPE4H", "CPE4RH", "CPE4I", "CPE3H", "CPE6", "CPE6M", "CPE8", "CPE8R", "CPS3", &
-      "CPS4", "CPS4R", "CPS4I", "CPS6", "CPS8", "CPS8R", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
+      "CPE4R", "CPE4H", "CPE4RH", "CPE4I", "CPE3H", "CPE6", "CPE6M", "CPE8", "CPE8R", &
+      "CPS4R", "CPS4I", "CPS6", "CPS8", "CPS8R", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
       "CAX8R", "C3D4", "C3D4H", "C3D6", "C3D8", "C3D8R", "C3D8I", "C3D8H", "C3D10", "C3D10M", &
       "C3D15", "C3D20", "C3D20R", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
-      "T2D2", "T3D2", "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
+      "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
       "DASHPTA", "GAPUNI", "DCOUP3D", "U1"]
+
+   !> Elements that stand for something else, as mesh generators write them.
+   type :: substitute_t
+      character(len=4) :: name
+      character(len=4) :: kind                     !! of `element_kinds`; empty: a line
+   end type substitute_t
+
+   type(substitute_t), parameter :: substitutes(*) = [ &
+      substitute_t("CPS3", "CPE3"), substitute_t("CPS4", "CPE4"), &
+      substitute_t("T2D2", ""), substitute_t("T3D2", "")]
+   !> A line is no element of the scene: an edge between two nodes that surfaces may name.
+   integer, parameter :: kind_line = -1
 
 contains
 
@@ -120,39 +133,58 @@ contains
          // " is defined twice; first at " // where_text(scene, first))
    end subroutine tell_repeated
 
-   !> All *ELEMENT cards.
+   !> All *ELEMENT cards: elements of the scene, and lines.
    subroutine read_elements(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
-      integer, allocatable :: repeated(:)
-      integer :: i, n, most
+      type(origin_t), allocatable :: line_origin_of(:)
+      integer :: i, n, n_line, most
 
       most = count_lines(reader, "ELEMENT")
       allocate(scene%element_label(most), scene%element_origin(most), scene%element_kind(most), &
          scene%element_node(max_element_nodes, most))
+      allocate(reader%line_label(most), reader%line_node(2, most), line_origin_of(most))
       n = 0
+      n_line = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "ELEMENT") cycle
-         reader%card(i)%first_item = n + 1
-         call read_element_card(reader, reader%card(i), scene, n)
-         reader%card(i)%last_item = n
+         call read_element_card(reader, i, scene, line_origin_of, n, n_line)
       end do
       scene%element_label = scene%element_label(:n)
       scene%element_origin = scene%element_origin(:n)
       scene%element_kind = scene%element_kind(:n)
       scene%element_node = scene%element_node(:, :n)
       allocate(scene%element_section(n), source=0)
-      call label_map_init(reader%element_map, scene%element_label, repeated)
-      reader%doubt_shapes = size(repeated) > 0
-      do i = 1, size(repeated)
-         call tell_repeated(reader, scene, "element", scene%element_label(repeated(i)), &
-            scene%element_origin(repeated(i)), scene%element_origin( &
-            find_label(reader%element_map, scene%element_label(repeated(i)))))
-      end do
+      reader%line_label = reader%line_label(:n_line)
+      reader%line_node = reader%line_node(:, :n_line)
+      call map_elements(reader, scene, line_origin_of(:n_line))
+      reader%doubt_shapes = reader%doubt_shapes .or. reader%doubt_elements
       if (n == 0 .and. .not. (reader%doubt_elements .or. is_given(reader))) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no element")
       end if
    end subroutine read_elements
+
+   !> Labels of elements and lines: none may be there twice.
+   subroutine map_elements(reader, scene, line_origin_of)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(origin_t), intent(in) :: line_origin_of(:)    !! (n_line)
+      integer, allocatable :: label(:), repeated(:)
+      type(origin_t), allocatable :: origin(:)
+      integer :: i
+
+      allocate(label, source=[scene%element_label, reader%line_label])
+      allocate(origin, source=[scene%element_origin, line_origin_of])
+      call label_map_init(reader%element_map, label, repeated)
+      reader%doubt_shapes = size(repeated) > 0
+      do i = 1, size(repeated)
+         call tell_repeated(reader, scene, "element", label(repeated(i)), origin(repeated(i)), &
+            origin(find_label(reader%element_map, label(repeated(i)))))
+      end do
+      associate (n => size(scene%element_label), index => reader%element_map%index)
+         where (index > n) index = n - index
+      end associate
+   end subroutine map_elements
 
    !> Does the deck say that forces come from elsewhere?
    pure logical function is_given(reader)
@@ -165,26 +197,23 @@ contains
       end do
    end function is_given
 
-   subroutine read_element_card(reader, card, scene, n)
+   !> One card; the items that it defines count from 1 for elements, below 0 for lines.
+   subroutine read_element_card(reader, i_card, scene, line_origin_of, n, n_line)
       type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
+      integer, intent(in) :: i_card
       type(scene_t), intent(inout) :: scene
-      integer, intent(inout) :: n                  !! elements so far
+      type(origin_t), intent(inout) :: line_origin_of(:)
+      integer, intent(inout) :: n, n_line          !! elements and lines so far
       type(data_t) :: data
-      integer :: kind, n_node, label
-      integer :: node(max_element_nodes)
-      character(len=:), allocatable :: type_name
+      type(card_t) :: card
+      integer :: kind, n_node, label, node(max_element_nodes), before(2)
 
-      call need_name(reader, card, "TYPE", type_name)
-      kind = 0
-      if (type_name /= "") kind = find_element_kind(type_name)
-      if (kind == 0) then
-         if (type_name /= "") call refuse_type(reader, card, type_name)
-         reader%doubt_elements = .true.
-         reader%doubt_names = .true.
-         return
-      end if
-      n_node = element_kinds(kind)%n_node
+      card = reader%card(i_card)
+      call find_type(reader, i_card, kind)
+      if (kind == 0) return
+      n_node = 2
+      if (kind > 0) n_node = element_kinds(kind)%n_node
+      before = [n, n_line]
       call data_open(data, card)
       do while (next_line(reader, data))
          call get_integer(reader, data, 1, "element label", label)
@@ -193,13 +222,70 @@ contains
             cycle
          end if
          call read_connectivity(reader, data, label, n_node, node)
-         n = n + 1
-         scene%element_label(n) = label
-         scene%element_origin(n) = line_origin(reader, data%i_line)
-         scene%element_kind(n) = kind
-         scene%element_node(:, n) = node
+         if (kind == kind_line) then
+            n_line = n_line + 1
+            reader%line_label(n_line) = label
+            reader%line_node(:, n_line) = node(:2)
+            line_origin_of(n_line) = line_origin(reader, data%i_line)
+         else
+            n = n + 1
+            scene%element_label(n) = label
+            scene%element_origin(n) = line_origin(reader, data%i_line)
+            scene%element_kind(n) = kind
+            scene%element_node(:, n) = node
+         end if
       end do
+      reader%card(i_card)%first_item = merge(-n_line, before(1) + 1, kind == kind_line)
+      reader%card(i_card)%last_item = merge(-before(2) - 1, n, kind == kind_line)
    end subroutine read_element_card
+
+   !> What the type of a card stands for: an element kind, or lines; 0 if it is refused. Each type
+   !> is told once.
+   subroutine find_type(reader, i_card, kind)
+      type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: i_card
+      integer, intent(out) :: kind
+      character(len=:), allocatable :: type_name
+      integer :: i
+      logical :: is_first
+
+      kind = 0
+      associate (card => reader%card(i_card))
+         call need_name(reader, card, "TYPE", type_name)
+         if (type_name /= "") kind = find_element_kind(type_name)
+         if (kind > 0) return
+         is_first = .true.
+         do i = 1, i_card - 1
+            if (reader%card(i)%name == "ELEMENT") is_first = is_first .and. &
+               option_name(reader%card(i), "TYPE") /= type_name
+         end do
+         do i = 1, size(substitutes)
+            if (substitutes(i)%name /= type_name) cycle
+            kind = kind_line
+            if (substitutes(i)%kind /= "") kind = find_element_kind(substitutes(i)%kind)
+            if (is_first) call tell_substitute(reader, card, substitutes(i))
+            return
+         end do
+         if (type_name /= "" .and. is_first) call refuse_type(reader, card, type_name)
+      end associate
+      reader%doubt_elements = .true.
+      reader%doubt_names = .true.
+   end subroutine find_type
+
+   subroutine tell_substitute(reader, card, substitute)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(substitute_t), intent(in) :: substitute
+
+      if (substitute%kind == "") then
+         call card_warning(reader, card, "elements of type " // trim(substitute%name) &
+            // " are lines that surfaces may name; they have no stiffness (told once)")
+      else
+         call card_warning(reader, card, "element type " // trim(substitute%name) &
+            // " is read as " // substitute%kind // ": the model is plane strain, not plane " &
+            // "stress (told once)")
+      end if
+   end subroutine tell_substitute
 
    subroutine refuse_type(reader, card, type_name)
       type(reader_t), intent(inout) :: reader
@@ -249,6 +335,7 @@ contains
          k = k + 1
       end do
       if (.not. data%ok) return
+      call drop_zeros(data, k - 1)
       if (n_read < n_node) then
          call data_error(reader, data, "element " // to_text(label) // " needs " &
             // to_text(n_node) // " nodes, found " // to_text(n_read))

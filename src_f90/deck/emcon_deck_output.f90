@@ -5,7 +5,7 @@ module emcon_deck_output
    use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, get_name, next_line
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, reader_t, refuse_option
-   use emcon_deck_sets, only : find_set, set_names
+   use emcon_deck_sets, only : find_set, hint_at_set, set_names
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_scene, only : named_set_t, output_contact_file, output_contact_print, &
@@ -87,6 +87,7 @@ contains
       case default
          call refuse_option(reader, card, "TOTALS", "YES, ONLY, NO", "")
       end select
+      call check_contact(reader, card, scene, new)
       kept = pack([(i, i = 1, size(self%step))], &
          self%output%kind /= new%kind .or. self%step == card%step)
       n = size(kept)
@@ -98,6 +99,23 @@ contains
       self%step = [self%step(kept), card%step]
       call move_alloc(grown, self%output)
    end subroutine read_output
+
+   !> Contact output needs contact, and totals of pairs are totals of forces.
+   subroutine check_contact(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(output_t), intent(in) :: new
+      integer :: i
+
+      if (all(new%kind /= [output_contact_file, output_contact_print])) return
+      if (size(scene%pair) == 0 .and. .not. reader%doubt_names) then
+         call card_warning(reader, card, "there is no *CONTACT PAIR: nothing will be written")
+      else if (new%totals .and. all([(new%variable(i)%text /= "CF", &
+         i = 1, size(new%variable))])) then
+         call card_warning(reader, card, "TOTALS has no effect without CF")
+      end if
+   end subroutine check_contact
 
    !> The variables on the data lines, in their short forms.
    subroutine read_variables(reader, card, row, new)
@@ -176,23 +194,25 @@ contains
 
       select case (new%kind)
       case (output_node_file, output_node_print)
-         call look_up("NSET", scene%node_set)
+         call look_up("NSET", "node set", scene%node_set)
       case (output_element_file, output_element_print)
-         call look_up("ELSET", scene%element_set)
+         call look_up("ELSET", "element set", scene%element_set)
       end select
 
    contains
 
-      subroutine look_up(option, set)
-         character(len=*), intent(in) :: option
+      subroutine look_up(option, what, set)
+         character(len=*), intent(in) :: option, what
          type(named_set_t), intent(in) :: set(:)
-         character(len=:), allocatable :: name
+         character(len=:), allocatable :: name, hint
 
          name = option_name(card, option)
          if (name == "") return
          new%set = find_set(set, name)
-         if (new%set == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
-            "unknown set " // option // "=" // quoted(name) // suggestion(name, set_names(set)))
+         if (new%set == 0 .and. .not. reader%doubt_names) then
+            call hint_at_set(reader, what, name, set_names(set), hint)
+            call card_error(reader, card, "unknown set " // option // "=" // quoted(name) // hint)
+         end if
          if (any(new%kind == [output_node_file, output_element_file])) then
             call card_warning(reader, card, option &
                // "= does not narrow it: the field file holds all nodes and elements")

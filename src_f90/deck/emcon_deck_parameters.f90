@@ -108,13 +108,13 @@ contains
          call evaluate_expression(self%table, text, new%value, fault)
       end if
       new%text = text
-      if (new%is_number) new%text = number_text(new%value)
+      if (new%is_number) call number_text(new%value, new%text)
    end subroutine evaluate_text
 
    !> A whole number without point, so that it may stand for a label or a count.
-   pure function number_text(value) result(text)
+   pure subroutine number_text(value, text)
       real(wp), intent(in) :: value
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       if (abs(value) < real(huge(1), wp)) then
          if (value == anint(value)) then
@@ -123,19 +123,19 @@ contains
          end if
       end if
       text = to_text(value, round_trip_digits)
-   end function number_text
+   end subroutine number_text
 
    !> What is wrong with the overrides once all is read: one that sets nothing; empty: nothing.
-   pure function unused_override(self, i) result(fault)
+   pure subroutine unused_override(self, i, fault)
       type(parameters_t), intent(in) :: self
       integer, intent(in) :: i                     !! 1..size(override)
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable, intent(out) :: fault
 
       fault = ""
       if (self%override(i)%is_used) return
       fault = "the deck has no parameter " // quoted(self%override(i)%name) &
          // suggestion(self%override(i)%name, parameter_list(self%table))
-   end function unused_override
+   end subroutine unused_override
 
    !> Put the values of parameters in the place of `<name>`. `fault` is empty on success.
    subroutine substitute_parameters(self, line, text, fault)

@@ -3,7 +3,7 @@ module emcon_deck_reader
    use emcon_deck_labels, only : label_map_t
    use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted, suggestion
    use emcon_kinds, only : wp
-   use emcon_scene, only : amplitude_t, origin_t
+   use emcon_scene, only : amplitude_t, named_set_t, origin_t
    use emcon_text, only : read_integer, read_real, squeezed, string_t, to_text
    implicit none
    private
@@ -48,7 +48,11 @@ module emcon_deck_reader
       logical :: doubt_positions = .false.               !! some node is not where it should be
       logical :: doubt_shapes = .false.                  !! some element is not what it should be
       logical :: doubt_equations = .false.               !! some equation is missing after an error
-      type(label_map_t) :: node_map, element_map
+      type(label_map_t) :: node_map
+      type(label_map_t) :: element_map                   !! also of lines, these below 0
+      integer, allocatable :: line_label(:)              !! (n_line) elements that are edges only
+      integer, allocatable :: line_node(:, :)            !! (2, n_line), 0: it had errors
+      type(named_set_t), allocatable :: line_set(:)      !! the lines of element sets that have some
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
@@ -117,13 +121,22 @@ contains
    pure function option_name(card, name) result(value)
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: value
+      character(len=option_length(card, name)) :: value
       integer :: i
 
-      value = ""
       i = find_option(card, name)
       if (i > 0) value = bare_name(card%option(i)%value)
    end function option_name
+
+   pure integer function option_length(card, name)
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      option_length = 0
+      i = find_option(card, name)
+      if (i > 0) option_length = bare_length(card%option(i)%value)
+   end function option_length
 
    !> The name that a card must give by `option`. Empty, with an error, if it does not.
    subroutine need_name(reader, card, option, name)
@@ -255,14 +268,24 @@ contains
    !> A name as it is compared: upper case, no blanks, no quotes around it.
    pure function bare_name(text) result(name)
       character(len=*), intent(in) :: text
-      character(len=:), allocatable :: name
-      integer :: n
+      character(len=bare_length(text)) :: name
+      character(len=len(text)) :: word
 
-      name = squeezed(text)
-      n = len(name)
-      if (n > 1) then
-         if (scan(name(1:1), "'""") == 1 .and. name(1:1) == name(n:n)) name = name(2:n - 1)
-      end if
+      word = squeezed(text)
+      name = word
+      if (len(name) < len_trim(word)) name = word(2:)
    end function bare_name
+
+   !> Quotes around a name do not count.
+   pure integer function bare_length(text) result(n)
+      character(len=*), intent(in) :: text
+      character(len=len(text)) :: word
+
+      word = squeezed(text)
+      n = len_trim(word)
+      if (n > 1) then
+         if (scan(word(1:1), "'""") == 1 .and. word(1:1) == word(n:n)) n = n - 2
+      end if
+   end function bare_length
 
 end module emcon_deck_reader

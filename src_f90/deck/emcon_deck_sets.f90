@@ -3,14 +3,15 @@ module emcon_deck_sets
    use emcon_deck_labels, only : find_label, label_map_t, label_range
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_label, next_line
-   use emcon_deck_reader, only : card_t, has_option, need_name, reader_t
+   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
+   use emcon_element_kinds, only : element_kinds
    use emcon_scene, only : named_set_t, scene_t
    use emcon_sort, only : unique_sorted
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_sets, find_set, set_names, get_nodes, get_elements
+   public :: read_sets, find_set, set_names, hint_at_set, get_nodes, get_elements, get_lines
 
    !> A list that grows by doubling.
    type :: growing_t
@@ -29,28 +30,56 @@ module emcon_deck_sets
 
 contains
 
-   !> All node sets and element sets, in the order of the deck.
+   !> All element sets and node sets, in the order of the deck.
    subroutine read_sets(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
       type(builder_t) :: nodes, elements
+      type(named_set_t), allocatable :: set(:)
 
-      nodes%what = "node"
-      nodes%keyword = "NSET"
-      call build_sets(reader, nodes, "NODE", reader%node_map, reader%doubt_nodes)
-      call finish(nodes, scene%node_set)
       elements%what = "element"
       elements%keyword = "ELSET"
-      call build_sets(reader, elements, "ELEMENT", reader%element_map, reader%doubt_elements)
-      call finish(elements, scene%element_set)
+      call build_sets(reader, elements, "ELEMENT", reader%element_map, reader%doubt_elements, scene)
+      call finish(elements, set)
+      call part_lines(set, scene%element_set, reader%line_set)
+      nodes%what = "node"
+      nodes%keyword = "NSET"
+      call build_sets(reader, nodes, "NODE", reader%node_map, reader%doubt_nodes, scene)
+      call finish(nodes, scene%node_set)
    end subroutine read_sets
 
-   subroutine build_sets(reader, builder, maker, map, is_doubted)
+   !> Lines count below 0: sets of elements keep what is above. A set of lines only is none of
+   !> elements.
+   subroutine part_lines(set, element_set, line_set)
+      type(named_set_t), intent(in) :: set(:)
+      type(named_set_t), allocatable, intent(out) :: element_set(:), line_set(:)
+      integer :: i, n(2)
+
+      allocate(element_set(size(set)), line_set(size(set)))
+      n = 0
+      do i = 1, size(set)
+         if (any(set(i)%item < 0)) then
+            n(2) = n(2) + 1
+            line_set(n(2)) = set(i)
+            line_set(n(2))%item = -pack(set(i)%item, set(i)%item < 0)
+         end if
+         if (any(set(i)%item > 0) .or. size(set(i)%item) == 0) then
+            n(1) = n(1) + 1
+            element_set(n(1)) = set(i)
+            element_set(n(1))%item = pack(set(i)%item, set(i)%item > 0)
+         end if
+      end do
+      element_set = element_set(:n(1))
+      line_set = line_set(:n(2))
+   end subroutine part_lines
+
+   subroutine build_sets(reader, builder, maker, map, is_doubted, scene)
       type(reader_t), intent(inout) :: reader
       type(builder_t), intent(inout) :: builder
       character(len=*), intent(in) :: maker        !! the keyword that defines the items
       type(label_map_t), intent(in) :: map
       logical, intent(in) :: is_doubted            !! labels may be missing after other errors
+      type(scene_t), intent(in) :: scene
       character(len=:), allocatable :: name
       integer :: i, k, i_set
       type(card_t) :: card
@@ -70,6 +99,8 @@ contains
             do k = card%first_item, card%last_item
                call append(builder%list(i_set), k)
             end do
+         else if (card%name == "NSET" .and. has_option(card, "ELSET")) then
+            call append_nodes_of(reader, card, scene, builder%list(i_set))
          else if (has_option(card, "GENERATE")) then
             call read_generated(reader, card, builder, i_set, map)
          else
@@ -77,6 +108,46 @@ contains
          end if
       end do
    end subroutine build_sets
+
+   !> *NSET, ELSET=: the nodes of the elements and lines of a set.
+   subroutine append_nodes_of(reader, card, scene, list)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(growing_t), intent(inout) :: list
+      character(len=:), allocatable :: name
+      integer :: i, k, i_set, i_lines
+
+      call need_name(reader, card, "ELSET", name)
+      if (has_option(card, "GENERATE")) call card_error(reader, card, &
+         "ELSET and GENERATE exclude each other")
+      i_set = find_set(scene%element_set, name)
+      if (i_set > 0) then
+         associate (item => scene%element_set(i_set)%item)
+            do i = 1, size(item)
+               do k = 1, element_kinds(scene%element_kind(item(i)))%n_node
+                  if (scene%element_node(k, item(i)) > 0) then
+                     call append(list, scene%element_node(k, item(i)))
+                  end if
+               end do
+            end do
+         end associate
+      end if
+      i_lines = find_set(reader%line_set, name)
+      if (i_lines > 0) then
+         associate (item => reader%line_set(i_lines)%item)
+            do i = 1, size(item)
+               do k = 1, 2
+                  if (reader%line_node(k, item(i)) > 0) call append(list, &
+                     reader%line_node(k, item(i)))
+               end do
+            end do
+         end associate
+      end if
+      if (i_set + i_lines > 0 .or. name == "" .or. reader%doubt_names) return
+      call card_error(reader, card, "unknown element set " // quoted(name) &
+         // suggestion(name, set_names(scene%element_set)))
+   end subroutine append_nodes_of
 
    subroutine find_or_add(builder, name, card, i_set)
       type(builder_t), intent(inout) :: builder
@@ -154,7 +225,7 @@ contains
                call get_integer(reader, data, k, trim(builder%what) // " label", label)
                if (.not. data%ok) cycle
                item = find_label(map, label)
-               if (item > 0) then
+               if (item /= 0) then
                   call append(builder%list(i_set), item)
                else if (.not. is_doubted) then
                   call data_error(reader, data, trim(builder%what) // " " // to_text(label) &
@@ -261,17 +332,32 @@ contains
       end do
    end function set_names
 
+   !> What a message says of the unknown name of a set: it holds lines, or another is near to it.
+   subroutine hint_at_set(reader, what, name, known, hint)
+      type(reader_t), intent(in) :: reader
+      character(len=*), intent(in) :: what         !! "node set" or "element set"
+      character(len=*), intent(in) :: name
+      type(string_t), intent(in) :: known(:)
+      character(len=:), allocatable, intent(out) :: hint
+
+      hint = suggestion(name, known)
+      if (what /= "element set") return
+      if (find_set(reader%line_set, name) > 0) hint = &
+         ": it holds lines, which have no stiffness; only *SURFACE and *NSET may name it"
+   end subroutine hint_at_set
+
    subroutine refuse_name(reader, data, what, name, known)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
       character(len=*), intent(in) :: what, name
       type(string_t), intent(in) :: known(:)
+      character(len=:), allocatable :: hint
 
       if (reader%doubt_names) then
          data%ok = .false.
       else
-         call data_error(reader, data, "unknown " // what // " " // quoted(name) &
-            // suggestion(name, known))
+         call hint_at_set(reader, what, name, known, hint)
+         call data_error(reader, data, "unknown " // what // " " // quoted(name) // hint)
       end if
    end subroutine refuse_name
 
@@ -297,6 +383,27 @@ contains
       call get_items(reader, data, k, "element", scene%element_set, item)
    end subroutine get_elements
 
+   !> The lines that field `k` names by label or set; none if it names none.
+   subroutine get_lines(reader, data, k, line)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: k
+      integer, allocatable, intent(out) :: line(:)
+      character(len=:), allocatable :: name
+      integer :: i
+
+      allocate(line(0))
+      if (is_label(data, k)) then
+         call get_integer(reader, data, k, "element label", i)
+         i = find_label(reader%element_map, i)
+         if (i < 0) line = [-i]
+      else
+         call get_name(reader, data, k, "element label or set", name)
+         i = find_set(reader%line_set, name)
+         if (i > 0) line = reader%line_set(i)%item
+      end if
+   end subroutine get_lines
+
    subroutine get_items(reader, data, k, what, set, item)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
@@ -321,6 +428,9 @@ contains
          end if
          if (i > 0) then
             item = [i]
+         else if (i < 0) then
+            call data_error(reader, data, "element " // to_text(label) // " is a line: it bounds " &
+               // "surfaces and has no stiffness")
          else if (is_doubted) then
             data%ok = .false.
          else

@@ -1,11 +1,10 @@
 !> The text of a deck, from a file or from memory, with all the files it includes: one list of lines
 !> that know their origin.
 module emcon_deck_source
-   use, intrinsic :: iso_fortran_env, only : iostat_end
    use emcon_diagnostics, only : add_error, diagnostics_t, quoted
-   use emcon_kinds, only : int64
    use emcon_scene, only : origin_t
-   use emcon_text, only : squeezed, string_t, to_text
+   use emcon_text, only : squeezed, string_t, stripped, to_text
+   use emcon_text_file, only : text_file_read
    implicit none
    private
    public :: deck_source_t, passage_t, deck_open, deck_open_text
@@ -73,7 +72,7 @@ contains
       do i = 1, size(file_name)
          call add_file_name(builder, file_name(i)%text)
       end do
-      fault = binary_fault(text)
+      call binary_fault(text, fault)
       if (size(passage) == 0 .or. size(file_name) == 0) then
          fault = "a deck in memory has passages and file names"
       else if (any(passage%file < 1) .or. any(passage%file > size(file_name))) then
@@ -125,8 +124,9 @@ contains
       character(len=:), allocatable :: text, fault
       type(origin_t) :: here
 
-      fault = include_fault(builder, path)
-      if (fault == "") call load_text(path, text, fault)
+      call include_fault(builder, path, fault)
+      if (fault == "") call text_file_read(path, text, fault)
+      if (fault == "") call binary_fault(text, fault)
       here = origin
       if (fault == "" .or. origin%file == 0) then
          call add_file_name(builder, path)
@@ -145,10 +145,10 @@ contains
    end subroutine append_file
 
    !> Why `path` may not be included here; empty if it may.
-   function include_fault(builder, path) result(fault)
+   subroutine include_fault(builder, path, fault)
       type(builder_t), intent(inout) :: builder
       character(len=*), intent(in) :: path
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable, intent(out) :: fault
       integer :: i
 
       fault = ""
@@ -164,56 +164,12 @@ contains
          fault = "more than " // to_text(max_includes) // " files are included"
          builder%is_full = .true.
       end if
-   end function include_fault
-
-   !> The bytes of a text file, or the reason why there are none.
-   subroutine load_text(path, text, fault)
-      character(len=*), intent(in) :: path
-      character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable, intent(out) :: fault
-      integer(int64) :: n_byte
-      integer :: unit, stat
-      logical :: exists
-      character(len=256) :: message
-
-      fault = ""
-      inquire(file=path, exist=exists, size=n_byte)
-      if (len_trim(path) == 0) then
-         fault = "no file is named"
-      else if (.not. exists) then
-         fault = "no such file"
-      else if (n_byte > int(huge(1), int64)) then
-         fault = "the file is larger than 2 GB; split it by *INCLUDE"
-      end if
-      if (fault /= "") return
-      ! A file without size may be a pipe: opening it would wait for ever.
-      if (n_byte <= 0) then
-         text = ""
-         fault = "the file is empty (or not a regular file)"
-         return
-      end if
-      open(newunit=unit, file=path, access="stream", form="unformatted", action="read", &
-         status="old", iostat=stat, iomsg=message)
-      if (stat == 0) then
-         allocate(character(len=n_byte) :: text)
-         read(unit, iostat=stat, iomsg=message) text
-         if (stat == iostat_end) message = "the file ended while it was read"
-         close(unit)
-      end if
-      if (stat /= 0) then
-         fault = "cannot be read: " // trim(message)
-         if (index(message, "directory") > 0 .and. index(message, "Is a") > 0) then
-            fault = "is a directory, not a deck"
-         end if
-      else
-         fault = binary_fault(text)
-      end if
-   end subroutine load_text
+   end subroutine include_fault
 
    !> Says so if `text` holds bytes that no text has.
-   pure function binary_fault(text) result(fault)
+   pure subroutine binary_fault(text, fault)
       character(len=*), intent(in) :: text
-      character(len=:), allocatable :: fault
+      character(len=:), allocatable, intent(out) :: fault
       integer :: i, code
 
       fault = ""
@@ -226,7 +182,7 @@ contains
          fault = "not a text file: byte " // to_text(i) // " has code " // to_text(code)
          return
       end do
-   end function binary_fault
+   end subroutine binary_fault
 
    !> Append the lines of `text`; line ends are LF, CR LF or CR.
    recursive subroutine append_text(builder, text, passage)
@@ -259,7 +215,7 @@ contains
          if (last > len(text)) last = len(text) + 1
          if (include_card == "") origin = here
          if (include_card /= "" .or. is_include(text(i:last - 1))) then
-            include_card = include_card // clean(text(i:last - 1))
+            include_card = include_card // stripped(text(i:last - 1), blanks)
             if (include_card(len(include_card):) == "," .and. first <= len(text)) cycle
             call append_included(builder, include_card, origin)
             include_card = ""
@@ -310,20 +266,6 @@ contains
       is_include = word == "*INCLUDE" .or. index(word, "*INCLUDE,") == 1
    end function is_include
 
-   !> `line` without the blanks and tabs around it.
-   pure function clean(line) result(text)
-      character(len=*), intent(in) :: line
-      character(len=:), allocatable :: text
-      integer :: first
-
-      first = verify(line, blanks)
-      if (first == 0) then
-         text = ""
-      else
-         text = line(first:verify(line, blanks, back=.true.))
-      end if
-   end function clean
-
    !> Follow `*INCLUDE, INPUT=file`; the file is sought beside the file that names it, from a text
    !> in memory in the working directory.
    recursive subroutine append_included(builder, card, origin)
@@ -337,10 +279,12 @@ contains
       i_equal = index(card, "=")
       name = ""
       if (i_comma > 0 .and. i_equal > i_comma) then
-         if (squeezed(card(i_comma + 1:i_equal - 1)) == "INPUT") name = clean(card(i_equal + 1:))
+         if (squeezed(card(i_comma + 1:i_equal - 1)) == "INPUT") then
+            name = stripped(card(i_equal + 1:), blanks)
+         end if
       end if
       if (len(name) > 0) then
-         if (name(len(name):) == ",") name = clean(name(:len(name) - 1))
+         if (name(len(name):) == ",") name = stripped(name(:len(name) - 1), blanks)
       end if
       if (len(name) > 1) then
          if (scan(name(1:1), """'") == 1 .and. name(1:1) == name(len(name):)) then

@@ -101,6 +101,8 @@ contains
                call read_constraint_method(reader, card, step)
             case ("CONTACTINITIATION")
                call read_initiation(reader, card, step)
+            case ("CONTACTINTERFERENCE")
+               call read_interference(reader, card, pair, step)
             case ("MORTAR")
                call read_mortar(reader, card, pair, step%contact)
             case ("SURFACESMOOTHING")
@@ -115,6 +117,9 @@ contains
          end associate
       end do
       call read_step_card(reader, reader%card(i_first), step)
+      if (step%resolves_overclosure .and. step%procedure == procedure_dynamic) call card_error( &
+         reader, reader%card(i_first), "*CONTACT INTERFERENCE is for *STATIC steps: in dynamics " &
+         // "pushing bodies apart would make energy")
       if (step%procedure /= 0 .or. reader%doubt_names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
          "the step has no procedure: *STATIC or *DYNAMIC")
@@ -254,7 +259,25 @@ contains
          call refuse_option(reader, card, "TYPE", "PERSISTENT, ADMISSIBLE, VELOCITY UPDATE", "")
       end select
       call option_real(reader, card, "GAP TOLERANCE", step%gap_tolerance)
+      if (has_option(card, "GAPTOLERANCE") .and. step%initiation /= initiation_persistent) &
+         call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
    end subroutine read_initiation
+
+   !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
+   subroutine read_interference(reader, card, pair, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(step_t), intent(inout) :: step
+
+      if (.not. has_option(card, "SHRINK")) call card_error(reader, card, "SHRINK is missing: " &
+         // "only the overclosure that is there at the start can be resolved")
+      if (card%step > 1) call card_error(reader, card, "it belongs into the first step: later " &
+         // "ones begin without overclosure")
+      if (size(pair) == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+         "there is no *CONTACT PAIR")
+      step%resolves_overclosure = .true.
+   end subroutine read_interference
 
    subroutine read_newton(reader, card, step)
       type(reader_t), intent(inout) :: reader

@@ -1,11 +1,12 @@
 !> *SURFACE, and the faces that elements share.
 module emcon_deck_surfaces
-   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
-      get_name, is_blank, next_line
+   use emcon_deck_adjacency, only : adjacency_init, adjacency_t, find_face, n_neighbours
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
+      get_integer, get_name, is_blank, next_line
    use emcon_deck_labels, only : find_label
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
-   use emcon_deck_sets, only : get_elements, get_nodes
+   use emcon_deck_sets, only : get_elements, get_lines, get_nodes
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
@@ -13,14 +14,7 @@ module emcon_deck_surfaces
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_surfaces, get_surfaces
-   public :: adjacency_t, adjacency_init, n_neighbours
-
-   !> The elements at each node: element(first(i):first(i + 1) - 1).
-   type :: adjacency_t
-      integer, allocatable :: first(:)
-      integer, allocatable :: element(:)
-   end type adjacency_t
+   public :: read_surfaces, get_surfaces, find_surface, surface_names
 
    !> Faces of a surface while it grows.
    type :: faces_t
@@ -106,46 +100,66 @@ contains
       end if
    end subroutine read_surface
 
-   !> Edges between nodes: their first and last node, the body to the left.
+   !> Edges between nodes: their first and last node, the body to the left; or lines.
    subroutine read_edges(reader, card, scene, surface)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(inout) :: surface
       type(data_t) :: data
-      integer :: label(2), node(2), k, n
+      integer, allocatable :: edge(:, :), new(:, :)
+      integer :: n
 
+      allocate(edge(2, 16))
       n = 0
       call data_open(data, card)
       do while (next_line(reader, data))
-         n = n + 1
-      end do
-      allocate(surface%edge(2, n))
-      n = 0
-      call data_open(data, card)
-      do while (next_line(reader, data))
-         call check_count(reader, data, 2, 2, "first node, last node")
-         do k = 1, 2
-            if (data%ok) call get_integer(reader, data, k, "node label", label(k))
-            if (.not. data%ok) exit
-            node(k) = find_label(reader%node_map, label(k))
-            if (node(k) > 0) cycle
-            if (.not. reader%doubt_nodes) call data_error(reader, data, "node " &
-               // to_text(label(k)) // " does not exist")
-            data%ok = .false.
-         end do
+         call check_count(reader, data, 1, 2, "first node, last node")
+         if (data%ok) call get_edges(reader, data, scene, new)
          if (.not. data%ok) cycle
-         if (all(abs(scene%x(:, node(1)) - scene%x(:, node(2))) <= 0.0_wp) .and. &
-            .not. reader%doubt_positions) then
-            call data_error(reader, data, "the edge from node " // to_text(label(1)) &
-               // " to node " // to_text(label(2)) // " has no length")
-            cycle
+         if (n + size(new, 2) > size(edge, 2)) then
+            edge = reshape([edge(:, :n), new], [2, 2*(n + size(new, 2))], pad=[0])
+         else
+            edge(:, n + 1:n + size(new, 2)) = new
          end if
-         n = n + 1
-         surface%edge(:, n) = node
+         n = n + size(new, 2)
       end do
-      surface%edge = surface%edge(:, :n)
+      surface%edge = edge(:, :n)
    end subroutine read_edges
+
+   !> The edges of a data line: from node to node, or those of a line or of a set of lines.
+   subroutine get_edges(reader, data, scene, edge)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: edge(:, :)
+      integer, allocatable :: line(:)
+      integer :: label(2), node(2), k
+
+      if (is_blank(data, 2)) then
+         call get_lines(reader, data, 1, line)
+         if (data%ok .and. size(line) == 0) call data_error(reader, data, &
+            "expected first node, last node, or a line or set of lines (T3D2), not " &
+            // quoted(data%text(data%from(1):data%to(1))))
+         edge = reader%line_node(:, line)
+         data%ok = data%ok .and. all(edge > 0)
+         return
+      end if
+      do k = 1, 2
+         call get_integer(reader, data, k, "node label", label(k))
+         if (.not. data%ok) return
+         node(k) = find_label(reader%node_map, label(k))
+         if (node(k) > 0) cycle
+         if (.not. reader%doubt_nodes) call data_error(reader, data, "node " &
+            // to_text(label(k)) // " does not exist")
+         data%ok = .false.
+         return
+      end do
+      edge = reshape(node, [2, 1])
+      if (all(abs(scene%x(:, node(1)) - scene%x(:, node(2))) <= 0.0_wp) .and. &
+         .not. reader%doubt_positions) call data_error(reader, data, "the edge from node " &
+         // to_text(label(1)) // " to node " // to_text(label(2)) // " has no length")
+   end subroutine get_edges
 
    !> Nodes of a surface in the order of the deck, each once.
    subroutine read_nodes(reader, card, scene, surface)
@@ -156,15 +170,20 @@ contains
       type(data_t) :: data
       integer, allocatable :: item(:), list(:)
       logical, allocatable :: is_in(:)
+      logical :: is_area_told
       integer :: i, n
 
+      is_area_told = .false.
       allocate(is_in(size(scene%node_label)), source=.false.)
       allocate(list(size(scene%node_label)))
       n = 0
       call data_open(data, card)
       do while (next_line(reader, data))
-         ! A second value, the area of the node in Abaqus, is not needed.
-         call check_count(reader, data, 1, 2, "node or node set")
+         call check_count(reader, data, 1, 2, "node or node set, area")
+         if (data%n > 1 .and. .not. is_area_told) call data_warning(reader, data, "the area " &
+            // "has no effect: contact is exact, and pressure at a surface of nodes is not known " &
+            // "(told once)")
+         is_area_told = is_area_told .or. data%n > 1
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (.not. data%ok) cycle
          do i = 1, size(item)
@@ -185,13 +204,19 @@ contains
       type(surface_t), intent(inout) :: surface
       type(data_t) :: data
       type(faces_t) :: faces
-      integer, allocatable :: item(:)
+      integer, allocatable :: item(:), line(:)
       integer :: i, face, n_repeated
 
       allocate(faces%element(16), faces%face(16))
       call data_open(data, card)
       do while (next_line(reader, data))
          call check_count(reader, data, 1, 2, "element or element set, face")
+         if (.not. data%ok) cycle
+         call get_lines(reader, data, 1, line)
+         if (size(line) > 0) then
+            call append_edges_of(reader, data, scene, adjacency, line, faces)
+            cycle
+         end if
          if (data%ok) call get_elements(reader, data, 1, scene, item)
          if (.not. data%ok) cycle
          if (is_blank(data, 2)) then
@@ -212,6 +237,38 @@ contains
       surface%element = faces%element(:faces%n)
       surface%face = faces%face(:faces%n)
    end subroutine read_faces
+
+   !> The faces that lie on lines: each line is the edge of one element, which is to its left or
+   !> right.
+   subroutine append_edges_of(reader, data, scene, adjacency, line, faces)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t), intent(in) :: adjacency
+      integer, intent(in) :: line(:)
+      type(faces_t), intent(inout) :: faces
+      integer :: n_element(size(line))             !! at each line; 1 where it had errors
+      integer :: i, element, face
+
+      if (.not. is_blank(data, 2)) then
+         call data_error(reader, data, "a line has no faces; leave out " &
+            // quoted(data%text(data%from(2):data%to(2))))
+         return
+      end if
+      n_element = 1
+      do i = 1, size(line)
+         if (any(reader%line_node(:, line(i)) == 0)) cycle
+         call find_face(scene, adjacency, reader%line_node(:, line(i)), n_element(i), element, face)
+         if (n_element(i) == 1) call append_face(faces, element, face)
+      end do
+      if (reader%doubt_elements) return
+      if (any(n_element == 0)) call data_error(reader, data, "line " &
+         // label_list(pack(reader%line_label(line), n_element == 0)) &
+         // " is no edge of an element")
+      if (any(n_element > 1)) call data_error(reader, data, "line " &
+         // label_list(pack(reader%line_label(line), n_element > 1)) &
+         // " lies inside the body, between elements")
+   end subroutine append_edges_of
 
    !> Read a face `S1`, `S2`, ... that all elements of `item` must have.
    subroutine get_face(reader, data, scene, item, face)
@@ -290,65 +347,6 @@ contains
       n_repeated = faces%n - n
       faces%n = n
    end subroutine drop_repeated
-
-   !> Elements without nodes (they had errors) are left out.
-   pure subroutine adjacency_init(self, scene)
-      type(adjacency_t), intent(out) :: self
-      type(scene_t), intent(in) :: scene
-      integer, allocatable :: next(:)
-      integer :: e, k, node, n_node
-
-      n_node = size(scene%node_label)
-      allocate(self%first(n_node + 1), source=0)
-      do e = 1, size(scene%element_label)
-         do k = 1, element_kinds(scene%element_kind(e))%n_node
-            node = scene%element_node(k, e)
-            if (node > 0) self%first(node) = self%first(node) + 1
-         end do
-      end do
-      k = 1
-      do node = 1, n_node + 1
-         e = self%first(node)
-         self%first(node) = k
-         k = k + e
-      end do
-      next = self%first
-      allocate(self%element(k - 1))
-      do e = 1, size(scene%element_label)
-         do k = 1, element_kinds(scene%element_kind(e))%n_node
-            node = scene%element_node(k, e)
-            if (node == 0) cycle
-            self%element(next(node)) = e
-            next(node) = next(node) + 1
-         end do
-      end do
-   end subroutine adjacency_init
-
-   !> Number of other elements with all nodes of this face.
-   pure integer function n_neighbours(scene, adjacency, element, face)
-      type(scene_t), intent(in) :: scene
-      type(adjacency_t), intent(in) :: adjacency
-      integer, intent(in) :: element, face
-      integer :: i, k, other, n_face_node, node
-      logical :: has_all
-
-      n_neighbours = 0
-      associate (kind => element_kinds(scene%element_kind(element)))
-         n_face_node = kind%n_face_node
-         node = scene%element_node(kind%face_node(1, face), element)
-         if (node == 0) return
-         do i = adjacency%first(node), adjacency%first(node + 1) - 1
-            other = adjacency%element(i)
-            if (other == element) cycle
-            has_all = .true.
-            do k = 2, n_face_node
-               has_all = has_all .and. any(scene%element_node(:, other) &
-                  == scene%element_node(kind%face_node(k, face), element))
-            end do
-            if (has_all) n_neighbours = n_neighbours + 1
-         end do
-      end associate
-   end function n_neighbours
 
    !> Index of the surface called `name`, 0 if there is none.
    pure integer function find_surface(surface, name)

@@ -3,7 +3,7 @@ module emcon_diagnostics
    use emcon_kinds, only : dp
    use emcon_scene, only : origin_t
    use emcon_sort, only : sort_order
-   use emcon_text, only : nearest_word, string_t, to_text
+   use emcon_text, only : joined, nearest_word, string_t, to_text
    implicit none
    private
    public :: diagnostics_t, add_error, add_warning, diagnostics_texts
@@ -91,7 +91,7 @@ contains
          told(k) = told(k) + 1
          if (told(k) > max_told) cycle
          n_text = n_text + 1
-         text(n_text)%text = line_text(self, self%item(order(i)))
+         call line_text(self, self%item(order(i)), text(n_text)%text)
       end do
       if (told(1) > max_told) then
          n_text = n_text + 1
@@ -104,10 +104,10 @@ contains
       text = text(:n_text)
    end function diagnostics_texts
 
-   pure function line_text(self, item) result(text)
+   pure subroutine line_text(self, item, text)
       type(diagnostics_t), intent(in) :: self
       type(diagnostic_t), intent(in) :: item
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       text = ""
       if (item%origin%file > 0) then
@@ -120,48 +120,75 @@ contains
       else
          text = text // "warning: " // item%text
       end if
-   end function line_text
+   end subroutine line_text
 
    !> `word` in quotes, for a message: cut if long, without what would upset a terminal.
    pure function quoted(word) result(text)
       character(len=*), intent(in) :: word
-      character(len=:), allocatable :: text
+      character(len=quoted_length(word)) :: text
       integer :: i
 
-      text = trim(adjustl(word))
-      if (len(text) > max_word) text = text(:max_word) // "..."
+      text = adjustl(word)
+      if (len_trim(adjustl(word)) > max_word) text(max_word + 1:) = "..."
       do i = 1, len(text)
          if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127) text(i:i) = "?"
       end do
-      text = "'" // text // "'"
+      text = "'" // text(:len(text) - 2) // "'"
    end function quoted
+
+   pure integer function quoted_length(word) result(n)
+      character(len=*), intent(in) :: word
+
+      n = len_trim(adjustl(word))
+      if (n > max_word) n = max_word + 3
+      n = n + 2
+   end function quoted_length
 
    !> "; did you mean X?" if an entry of `known` is near to `word` (both upper case), else nothing.
    pure function suggestion(word, known) result(text)
       character(len=*), intent(in) :: word
       type(string_t), intent(in) :: known(:)
-      character(len=:), allocatable :: text
+      character(len=suggestion_length(word, known)) :: text
+      character(len=:), allocatable :: near
 
-      text = ""
-      if (len(word) > max_word) return
-      text = nearest_word(word, known)
-      if (text /= "") text = "; did you mean " // text // "?"
+      if (len(text) == 0) return
+      call nearest_word(word, known, near)
+      text = "; did you mean " // near // "?"
    end function suggestion
+
+   pure integer function suggestion_length(word, known) result(n)
+      character(len=*), intent(in) :: word
+      type(string_t), intent(in) :: known(:)
+      character(len=:), allocatable :: near
+
+      n = 0
+      if (len(word) > max_word) return
+      call nearest_word(word, known, near)
+      if (near /= "") n = len("; did you mean ?") + len(near)
+   end function suggestion_length
 
    !> "5, 7, 12 and 4 more"
    pure function label_list(label) result(text)
       integer, intent(in) :: label(:)
-      character(len=:), allocatable :: text
+      character(len=label_length(label)) :: text
+
+      text = joined(label_words(label), ", ", max_labels)
+   end function label_list
+
+   pure integer function label_length(label)
+      integer, intent(in) :: label(:)
+
+      label_length = len(joined(label_words(label), ", ", max_labels))
+   end function label_length
+
+   pure function label_words(label) result(word)
+      integer, intent(in) :: label(:)
+      type(string_t) :: word(size(label))
       integer :: i
 
-      text = ""
       do i = 1, min(size(label), max_labels)
-         if (i > 1) text = text // ", "
-         text = text // to_text(label(i))
+         word(i)%text = to_text(label(i))
       end do
-      if (size(label) > max_labels) then
-         text = text // " and " // to_text(size(label) - max_labels) // " more"
-      end if
-   end function label_list
+   end function label_words
 
 end module emcon_diagnostics

@@ -7,9 +7,10 @@
 !> are not eliminated act always.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
-   use emcon_contact, only : gap_state_t
+   use emcon_contact, only : deepest_arrival, gap_state_t
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
+   use emcon_holding, only : holding_complete, holding_find_free, holding_t
    use emcon_kinds, only : wp
    use emcon_newton, only : newton_converged, newton_redundant, newton_solve, newton_t
    use emcon_scene, only : scene_t
@@ -19,13 +20,14 @@ module emcon_active_set
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_solve
-   public :: active_set_begin, active_set_select, active_set_advance, active_set_drop
+   public :: active_set_overclosure, active_set_begin, active_set_select, active_set_advance, &
+      active_set_drop
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
-      step_stands_off
+      step_stands_off, step_not_held
 
    !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
    integer, parameter :: step_done = 0, step_refused = 1, step_diverged = 2, step_singular = 3, &
-      step_cycling = 5, step_too_far = 6, step_stands_off = 7
+      step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -47,13 +49,17 @@ module emcon_active_set
       logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
       integer :: n_tried = 0
       integer :: n_newton = 0                    !! iterations over all sets of the last step
-      real(wp) :: deepest = 0.0_wp               !! smallest gap per edge at the end, 0 if all open
       logical :: is_stale = .false.              !! stencils were chosen for another motion
       integer :: n_stale = 0                     !! so often in this step
       logical :: only_adds = .false.             !! nothing is let go any more in this step
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
+      !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
+      !> else 0; and the parts of it that are left at the start and the end of the increment.
+      real(wp), allocatable :: overclosure(:)
+      real(wp) :: left(0:1) = 0.0_wp
+      type(holding_t) :: holding                 !! bodies that contact alone holds, in statics
    end type active_set_t
 
 contains
@@ -64,7 +70,8 @@ contains
       type(system_t), intent(in) :: system
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
-         self%comes_and_goes, self%is_dropped)
+         self%comes_and_goes, self%is_dropped, self%overclosure)
+      allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%comes_and_goes(system%n_constraint), source=.false.)
       allocate(self%is_dropped(system%n_constraint), source=.false.)
@@ -72,6 +79,31 @@ contains
       allocate(self%tried(system%n_constraint, most_sets), source=.false.)
       call constraints_select(self%set, [integer ::])
    end subroutine active_set_init
+
+   !> With `is_meant` the gaps at `u` that are closed are what the step resolves, else nothing.
+   subroutine active_set_overclosure(self, system, scene, u, is_meant)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: u(:, :)        !! (2, n_node)
+      logical, intent(in) :: is_meant
+      integer :: pair
+
+      self%overclosure = 0.0_wp
+      if (.not. is_meant) return
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact, &
+               first => system%first_constraint(pair) + 1, &
+               last => system%first_constraint(pair + 1))
+            contact%reach = 0.0_wp
+            call contact%begin_step(scene%x, u, system%zero)
+            call contact%measure(scene%x, u, system%zero)
+            where (contact%state%is_near .and. contact%state%is_over)
+               self%overclosure(first:last) = min(0.0_wp, contact%state%gap0)
+            end where
+         end associate
+      end do
+   end subroutine active_set_overclosure
 
    !> Solve the step from `state`; `du` is the first guess and the result.
    subroutine active_set_solve(self, system, scene, newton, correction, pose, state, offset, du, &
@@ -94,8 +126,11 @@ contains
       call stopwatch_stop(system%contact_clock)
       do
          call stopwatch_start(system%contact_clock)
+         if (self%holding%is_needed) call hold(self, system, scene, pose, state%u, newton%driven, &
+            du, status)
          call active_set_select(self, system, scene, state%u, du)
          call stopwatch_stop(system%contact_clock)
+         if (allocated(self%holding%text)) return
          call newton_solve(newton, system, scene, correction, self%set, pose, state%u, state%v, &
             offset, du, status, error)
          if (allocated(error)) return
@@ -109,10 +144,36 @@ contains
          if (status /= newton_converged .or. size(system%contact) == 0) return
          call stopwatch_start(system%contact_clock)
          call active_set_advance(self, system, scene, state, du, is_done, status)
+         if (is_done .and. status == step_done .and. self%holding%is_needed) then
+            call holding_find_free(self%holding, system, scene, pose, state%u, du, self%is_active)
+            if (allocated(self%holding%text)) status = step_not_held
+         end if
          call stopwatch_stop(system%contact_clock)
          if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> Take in what holds the bodies that would be free with the present set. The prescribed motion
+   !> `driven` in `du`, which the first correction of Newton's method meets, is left out on the way.
+   subroutine hold(self, system, scene, pose, u0, driven, du, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), driven(:, :)     !! (2, n_node)
+      real(wp), intent(inout), contiguous :: du(:, :)                !! (2, n_node)
+      integer, intent(out) :: status
+      logical :: is_held
+      integer :: pair
+
+      du = du - driven
+      call holding_complete(self%holding, system, scene, pose, u0, du, self%is_active, is_held)
+      du = du + driven
+      status = merge(step_done, step_not_held, is_held)
+      do pair = 1, size(system%contact)
+         call system%contact(pair)%contact%begin_step(scene%x, u0, du)
+      end do
+   end subroutine hold
 
    !> Begin a step from `state` with the expected motion `du`: stencils, and the first set.
    subroutine active_set_begin(self, system, scene, state, du)
@@ -205,6 +266,7 @@ contains
          call constraint_place(system, self%set%id(k), pair, i)
          self%set%is_kept(k) = .true.
          if (pair == 0) cycle
+         self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k))
          associate (gap => system%contact(pair)%contact%state(i))
             ! What is closed too far is never pushed out: that would make energy.
             self%set%is_kept(k) = self%holds_gap .or. &
@@ -225,12 +287,11 @@ contains
       integer, intent(out) :: status
       type(gap_state_t) :: gap
       integer :: pair, i, id, k
-      real(wp) :: noise
+      real(wp) :: noise, allowed(0:1)
 
       status = step_done
       has_changed = .false.
       self%is_stale = .false.
-      self%deepest = 0.0_wp
       k = count(self%is_active(:system%linear%n))
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
@@ -240,9 +301,9 @@ contains
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                gap = contact%state(i)
+               allowed = self%left*self%overclosure(id)
                if (self%is_active(id)) then
                   k = k + 1
-                  self%deepest = min(self%deepest, gap%gap1/gap%size)
                   if (.not. gap%is_covered) status = step_too_far
                   if (self%holds_gap .and. .not. state%is_active(id)) then
                      if (stands_off(gap)) status = step_stands_off
@@ -258,12 +319,19 @@ contains
                      if (goes_through(gap)) status = step_too_far
                      cycle
                   end if
-                  ! With nothing to hold at its start, a contact begins with the next step.
-                  if (gap%is_arriving .and. self%has_inertia) cycle
-                  if (gap%gap0 < -contact%deepest_start*gap%size .and. &
+                  if (gap%is_arriving .and. self%has_inertia) then
+                     ! With nothing to hold at its start, a contact begins with the next step, or in
+                     ! a smaller one; in the smallest it begins at once.
+                     if (.not. gap%was_open) cycle
+                     if (gap%gap1 >= -deepest_arrival*gap%size) cycle
+                     if (self%may_cut) then
+                        status = step_too_far
+                        cycle
+                     end if
+                  end if
+                  if (gap%gap0 - allowed(0) < -contact%deepest_start*gap%size .and. &
                      .not. state%is_active(id)) cycle
-                  self%deepest = min(self%deepest, gap%gap1/gap%size)
-                  if (gap%gap1 >= -gap_noise*gap%size) cycle
+                  if (gap%gap1 - allowed(1) >= -gap_noise*gap%size) cycle
                   if (.not. gap%is_covered .or. (self%has_inertia .and. &
                      gap%gap0 > contact%farthest_start)) status = step_too_far
                   self%is_active(id) = .true.

@@ -2,15 +2,17 @@
 !>
 !> Times are counted in integers: grid increments of h, and dyadic fractions of one when it is cut.
 module emcon_march
-   use emcon_active_set, only : active_set_init
+   use emcon_active_set, only : active_set_init, active_set_overclosure
    use emcon_correction, only : correction_free, correction_reset
-   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_errors, only : err_analysis, err_input, err_interrupt, error_t, raise
    use emcon_given, only : given_t
+   use emcon_holding, only : holding_begin, holding_t
+   use emcon_judge, only : judge_init
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_parts, only : march_in_parts
    use emcon_march_step, only : increment_t, march_t
-   use emcon_newton, only : newton_init
+   use emcon_newton, only : interrupt_interface, newton_init
    use emcon_numbering, only : spread_dependent
    use emcon_pair_record, only : pair_record_init
    use emcon_rigid_motion, only : free_motion_text
@@ -27,7 +29,7 @@ module emcon_march
    implicit none
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
-      march_resume, march_renumber, march_free, march_free_increment, march_set_time
+      march_resume, march_renumber, march_free, march_free_increment, march_set_time, march_watch
 
    !> An increment is halved so often at most, unless the deck gives h_min.
    integer, parameter :: default_levels = 12, most_levels = 24
@@ -63,6 +65,7 @@ contains
       end associate
       call pair_record_init(self%state%pairs, self%system)
       call active_set_init(self%active, self%system)
+      call judge_init(self%judge, scene)
    end subroutine march_init
 
    !> Free what the solvers hold; the rest goes with the object.
@@ -72,6 +75,15 @@ contains
       call correction_free(self%correction)
       call velocity_update_free(self%velocity_update)
    end subroutine march_free
+
+   !> From now on `is_interrupted` is asked before each iteration of Newton's method.
+   subroutine march_watch(self, is_interrupted)
+      type(march_t), intent(inout) :: self
+      procedure(interrupt_interface) :: is_interrupted
+
+      self%is_interrupted => is_interrupted
+      self%newton%is_interrupted => is_interrupted
+   end subroutine march_watch
 
    !> Begin step `i_step` of the deck from the present state.
    subroutine march_begin_step(self, scene, i_step, error)
@@ -108,7 +120,7 @@ contains
 
       associate (step => scene%step(self%state%i_step))
          if (step%procedure /= procedure_static) return
-         text = free_motion_text(self%system, scene, step%prescribed)
+         call free_motion_text(self%system, scene, step%prescribed, text)
          if (len(text) > 0) call raise(error, err_analysis, "the static problem is singular: " &
             // text)
       end associate
@@ -192,6 +204,7 @@ contains
          end if
          call newton_init(self%newton, self%system%numbering%n_unknown, &
             self%system%solid%n_node, step%newton_tolerance, step%newton_maximum)
+         self%newton%is_interrupted => self%is_interrupted
          call correction_reset(self%correction, merge(step%constraint_method, &
             method_saddle_point, self%system%is_reduced))
          call velocity_update_reset(self%velocity_update)
@@ -199,12 +212,17 @@ contains
             .and. self%scheme%has_inertia
          self%active%has_inertia = self%scheme%has_inertia
          self%active%gap_tolerance = step%gap_tolerance
+         self%active%holding = holding_t()
+         if (.not. self%scheme%has_inertia) call holding_begin(self%active%holding, self%system, &
+            scene, state%u)
          do i = 1, size(self%system%contact)
             associate (contact => self%system%contact(i)%contact)
                call contact%suit_steps(any(scene%step%procedure == procedure_static))
                call contact%configure(scene%x, step%contact)
             end associate
          end do
+         call active_set_overclosure(self%active, self%system, scene, state%u_start, &
+            step%resolves_overclosure)
          call count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = grid_time(self, step, state%n_grid)
          self%du = 0.0_wp
@@ -262,14 +280,21 @@ contains
       if (n >= self%n_grid) grid_time = step%duration
    end function grid_time
 
-   !> Advance by one increment; on failure the state is that of the last part that succeeded.
+   !> Advance by one increment; on failure the state is that of the last part that succeeded, after
+   !> an interrupt that before the increment.
    subroutine march_increment(self, scene, increment, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(increment_t), intent(out) :: increment
       type(error_t), allocatable, intent(out) :: error
+      type(state_t) :: before
+      type(ledger_t) :: ledger_before
       integer :: stride
 
+      if (associated(self%is_interrupted)) then
+         before = self%state
+         ledger_before = self%ledger
+      end if
       associate (state => self%state, step => scene%step(self%state%i_step))
          if (step%max_increments > 0 .and. &
             state%increment - state%n_before >= step%max_increments) then
@@ -286,6 +311,11 @@ contains
          stride = min(state%grid_stride, self%n_grid - state%n_grid)
          call cross_grid(self, scene, state%n_grid + stride, increment, error)
          if (allocated(error)) then
+            if (error%code == err_interrupt) then
+               state = before
+               self%ledger = ledger_before
+               return
+            end if
             if (increment%done > 0.0_wp) call march_set_time(self, scene, state%step_time &
                + increment%done)
             call ledger_measure(self%ledger, self%system, scene%x, self%state)

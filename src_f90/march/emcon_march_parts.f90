@@ -1,7 +1,7 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
-   use emcon_active_set, only : step_cycling, step_diverged, step_done, step_refused, &
-      step_singular, step_stands_off, step_too_far
+   use emcon_active_set, only : step_cycling, step_diverged, step_done, step_not_held, &
+      step_refused, step_singular, step_stands_off, step_too_far
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_loads, only : instant_t
@@ -25,6 +25,7 @@ contains
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
       type(instant_t) :: start
+      character(len=:), allocatable :: reason
       real(wp) :: h
       integer :: level, place, status
 
@@ -42,24 +43,25 @@ contains
             if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
             cycle
          end if
+         call reason_text(self, scene, status, reason)
          call note_add(increment%notes, "increment cut at time " // &
-            to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // &
-            reason_text(self, scene, status))
+            to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // reason)
          increment%n_cut = increment%n_cut + 1
          level = level + 1
          if (level > self%n_level) then
-            call raise(error, err_analysis, failure_text(self, scene, start, h, status))
+            call failure_text(self, scene, start, h, reason)
+            call raise(error, err_analysis, reason)
             return
          end if
       end do
    end subroutine march_in_parts
 
    !> Why a step failed.
-   function reason_text(self, scene, status) result(text)
+   subroutine reason_text(self, scene, status, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: status
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       select case (status)
       case (step_refused)
@@ -71,35 +73,38 @@ contains
       case (step_singular)
          text = "the system is singular"
       case (step_cycling)
-         text = cycling_text(self, scene)
+         call cycling_text(self, scene, text)
       case (step_too_far)
          text = "a contact slides farther than its stencil was chosen for"
       case (step_stands_off)
          text = "a contact would close over more than the gap tolerance"
+      case (step_not_held)
+         text = "nothing holds what moves without resistance: " // self%active%holding%text // &
+            "; add *BOUNDARY conditions"
       case default
          text = "reason " // to_text(status)
       end select
-   end function reason_text
+   end subroutine reason_text
 
-   !> Text of the error that ends an analysis.
-   function failure_text(self, scene, start, h, status) result(text)
+   !> Text of the error that ends an analysis, made of the reason why its last step failed.
+   subroutine failure_text(self, scene, start, h, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h
-      integer, intent(in) :: status
-      character(len=:), allocatable :: text, motion
+      character(len=:), allocatable, intent(inout) :: text
+      character(len=:), allocatable :: motion
 
       text = "the analysis stops at time " // to_text(start%total_time, 9) // ": with h = " // &
-         to_text(h) // ", the smallest allowed, " // reason_text(self, scene, status)
-      if (.not. self%scheme%has_inertia) then
-         motion = free_motion_text(self%system, scene, &
-            scene%step(self%state%i_step)%prescribed, with_contact=.true.)
+         to_text(h) // ", the smallest allowed, " // text
+      if (.not. self%scheme%has_inertia .and. .not. allocated(self%active%holding%text)) then
+         call free_motion_text(self%system, scene, &
+            scene%step(self%state%i_step)%prescribed, motion, with_contact=.true.)
          if (len(motion) == 0) return
          text = text // "; without contact "
          if (self%system%given%is_any) text = text // "and given forces "
          text = text // motion
       end if
-   end function failure_text
+   end subroutine failure_text
 
 end module emcon_march_parts

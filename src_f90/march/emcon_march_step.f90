@@ -6,17 +6,20 @@ module emcon_march_step
    use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
+   use emcon_judge, only : judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_loads, only : instant_t, prescribed_motion
-   use emcon_newton, only : newton_t
+   use emcon_newton, only : interrupt_interface, newton_t
    use emcon_numbering, only : gather_dependent, spread_dependent
    use emcon_pair_record, only : pair_record_measure
    use emcon_scene, only : initiation_velocity_update, scene_t
    use emcon_scheme, only : scheme_t
+   use emcon_stand_off, only : stand_off_add, stand_off_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
    implicit none
    private
@@ -32,9 +35,13 @@ module emcon_march_step
       integer :: n_newton = 0                    !! iterations, over all cuts and active sets
       integer :: n_cut = 0
       integer :: n_active = 0
-      real(wp) :: deepest = 0.0_wp               !! smallest gap per master edge, 0 if all open
+      type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge
+      type(stand_off_t) :: stand_off             !! air across which contact forces act
       real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
-      type(notes_t) :: notes
+      !> Largest relative residual above Newton's tolerance that was accepted; 0: there is none.
+      real(wp) :: unconverged = 0.0_wp
+      type(notes_t) :: notes                     !! for the log
+      type(notes_t) :: warnings                  !! for the log, the user and the verdict
    end type increment_t
 
    type :: march_t
@@ -46,11 +53,15 @@ module emcon_march_step
       type(active_set_t) :: active
       type(correction_t) :: correction
       type(velocity_update_t) :: velocity_update
+      type(judge_t) :: judge
+      type(stopwatch_t) :: judge_clock
       integer :: n_grid = 0                      !! grid increments in the step
       integer :: most_stride = 1                 !! largest increment, in grid increments
       integer :: n_level = 0                     !! halvings allowed
       integer :: revision = 0                    !! changes with the numbering of the unknowns
       real(wp), allocatable :: du(:, :), v1(:, :), offset(:, :)   !! (2, n_node)
+      !> Asked before each iteration, if there is one.
+      procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
    end type march_t
 
 contains
@@ -65,11 +76,15 @@ contains
       type(increment_t), intent(inout) :: increment
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
+      type(overlap_t) :: overlap
+      character(len=:), allocatable :: text
       integer :: attempt
 
       self%active%may_cut = may_cut
       self%active%gap_tolerance = 0.0_wp
       if (may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
+      self%active%left = 1.0_wp - [start%step_time, start%step_time + h] &
+         /scene%step(self%state%i_step)%duration
       do attempt = 1, 2
          call march_guess(self, scene, start, h, is_at_rest=attempt == 2)
          call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
@@ -79,30 +94,38 @@ contains
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
-      if (any(self%active%comes_and_goes)) call note_add(increment%notes, &
-         cycling_text(self, scene) // ": held closed in this step")
-      if (any(self%active%is_dropped)) call note_add(increment%notes, "contact is left out, " &
-         // "as it follows from that of other nodes or has lost its surface, at slave nodes " // &
-         nodes_text(self, scene, self%active%is_dropped))
+      call stopwatch_start(self%judge_clock)
+      call judge_step(self%judge, scene%x, self%state%u, self%du, overlap)
+      call stopwatch_stop(self%judge_clock)
+      if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
+      if (any(self%active%comes_and_goes)) then
+         call cycling_text(self, scene, text)
+         call note_add(increment%notes, text // ": held closed in this step")
+      end if
+      if (any(self%active%is_dropped)) then
+         call nodes_text(self, scene, self%active%is_dropped, text)
+         call note_add(increment%notes, "contact is left out, as it follows from that of other " &
+            // "nodes or has lost its surface, at slave nodes " // text)
+      end if
       call commit(self, scene, h, increment, error)
    end subroutine march_step
 
    !> The contacts of the last step that opened and closed in turn, by their slave nodes.
-   function cycling_text(self, scene) result(text)
+   subroutine cycling_text(self, scene, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
-      text = "contact opens and closes in turn at slave nodes " // &
-         nodes_text(self, scene, self%active%comes_and_goes)
-   end function cycling_text
+      call nodes_text(self, scene, self%active%comes_and_goes, text)
+      text = "contact opens and closes in turn at slave nodes " // text
+   end subroutine cycling_text
 
    !> The slave nodes of the constraints that `is_meant` marks.
-   function nodes_text(self, scene, is_meant) result(text)
+   subroutine nodes_text(self, scene, is_meant, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_meant(:)         !! (n_constraint)
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       type(string_t) :: found(size(is_meant))
       integer :: id, n, pair, i
 
@@ -115,7 +138,7 @@ contains
          found(n)%text = to_text(scene%node_label(self%system%contact(pair)%contact%node(i)))
       end do
       text = joined(found(:n), ", ", most_named)
-   end function nodes_text
+   end subroutine nodes_text
 
    !> First guess of the motion, and the motion and velocity of prescribed freedoms.
    subroutine march_guess(self, scene, start, h, is_at_rest)
@@ -210,9 +233,14 @@ contains
          state%energy = system%response%energy
          state%potential = system%potential
          if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
-            correction_reason(self%correction) // ": solved as a saddle point")
+            trim(correction_reason(self%correction)) // ": solved as a saddle point")
+         call stand_off_add(increment%stand_off, system, set, h)
          increment%residual = self%newton%history(:self%newton%n_history)
-         increment%deepest = min(increment%deepest, self%active%deepest)
+         if (self%newton%last > self%newton%tolerance .and. .not. self%newton%is_idle) then
+            increment%unconverged = max(increment%unconverged, self%newton%last)
+            call note_add(increment%notes, "a relative residual of " // &
+               to_text(self%newton%last, 3) // " is accepted as round-off")
+         end if
          state%is_active = .false.
          state%lam = 0.0_wp
          do k = 1, set%n

@@ -8,7 +8,7 @@ module emcon_newton
       constraints_rows
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_kinds, only : wp
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
    use emcon_scene, only : scene_t
@@ -16,7 +16,7 @@ module emcon_newton
    use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
-   public :: newton_t, newton_init, newton_solve
+   public :: newton_t, newton_init, newton_solve, interrupt_interface
    public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant
 
    !> How a solve ended. Refused: there are no forces at the displacements, see `system%refusal`;
@@ -27,6 +27,11 @@ module emcon_newton
    !> A residual below this multiple of epsilon is round-off: of what its contributions are, and of
    !> what the forces' own evaluation rounds.
    real(wp), parameter :: floor = 4.0_wp*epsilon(1.0_wp)
+   !> However much the forces' own evaluation rounds, a residual above this part of them is none.
+   real(wp), parameter :: most_rounding = 1.0e-3_wp
+   !> A correction larger than so many diagonals of the scene comes from a pivot of round-off: in
+   !> statics, where nothing else moves a body as far.
+   real(wp), parameter :: farthest = 1.0e4_wp
    !> Corrections with an old factorisation at most, and the factor each has to gain.
    integer, parameter :: most_polish = 3
    real(wp), parameter :: polish_gain = 0.5_wp
@@ -42,6 +47,12 @@ module emcon_newton
    !> What follows an evaluation.
    integer, parameter :: next_done = 0, next_tangent = 1, next_old_tangent = 2, next_give_up = 3
 
+   abstract interface
+      !> Has the user asked to stop?
+      logical function interrupt_interface()
+      end function interrupt_interface
+   end interface
+
    !> Settings, work space and report of the solver.
    type :: newton_t
       real(wp) :: tolerance = 0.0_wp             !! relative
@@ -55,12 +66,14 @@ module emcon_newton
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
       !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
+      procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
       ! how the present solve goes:
       real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far
       real(wp) :: best = 0.0_wp
       integer :: n_stall = 0                     !! iterations since the best one
       integer :: n_polish = 0                    !! corrections with the old tangent
       logical :: is_polish = .false.             !! within tolerance: down to round-off from here
+      logical :: is_idle = .false.               !! no load: all forces are round-off
    end type newton_t
 
 contains
@@ -101,6 +114,8 @@ contains
       is_driven = any(abs(self%driven) > 0.0_wp) .and. size(self%residual) > 0
       if (is_driven) du = du - self%driven
       do
+         call check_interrupt(self, status, error)
+         if (allocated(error)) return
          call evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, du, &
             norm, defect, is_rounding, status, error)
          if (correction%n_redundant > 0 .and. status == newton_converged) then
@@ -127,8 +142,33 @@ contains
          end select
          call correct(self, system, correction, set, du, error)
          if (allocated(error)) return
+         if (pose%is_end .and. is_too_far(self, scene%x)) then
+            status = newton_singular
+            return
+         end if
       end do
    end subroutine newton_solve
+
+   !> An error if the user has asked to stop: an increment may take thousands of iterations.
+   subroutine check_interrupt(self, status, error)
+      type(newton_t), intent(in) :: self
+      integer, intent(out) :: status
+      type(error_t), allocatable, intent(out) :: error
+
+      status = newton_diverged
+      if (.not. associated(self%is_interrupted)) return
+      if (self%is_interrupted()) call raise(error, err_interrupt, "interrupted in an increment")
+   end subroutine check_interrupt
+
+   !> Has the last correction moved something out of all proportion?
+   pure logical function is_too_far(self, x)
+      type(newton_t), intent(in) :: self
+      real(wp), intent(in) :: x(:, :)            !! (2, n_node) [L]
+
+      is_too_far = .false.
+      if (size(self%correction) > 0) is_too_far = maxval(abs(self%correction)) &
+         > farthest*norm2(maxval(x, 2) - minval(x, 2))
+   end function is_too_far
 
    !> Clear the record of the last solve.
    pure subroutine begin(self, n_constraint)
@@ -162,7 +202,10 @@ contains
       self%last = size
       next = next_done
       if (size <= floor) return
-      if (self%is_polish .and. (self%n_polish == most_polish .or. .not. has_gained)) return
+      if (self%is_polish .and. (self%n_polish == most_polish .or. .not. has_gained)) then
+         if (size > max(self%tolerance, most_rounding) .and. .not. is_rounding) next = next_give_up
+         return
+      end if
       self%is_polish = self%is_polish .or. size <= self%tolerance .or. is_rounding
       if (self%is_polish) then
          next = next_tangent                     ! the first guess was good enough
@@ -308,7 +351,17 @@ contains
       end do
       call pick_magnitudes(system%numbering, system%response%rounding, self%scale)
       is_rounding = relative_size(self%residual, self%scale) <= floor .and. defect <= floor
+      ! A body that moves as a rigid one has no forces to compare its round-off with.
+      self%is_idle = is_rounding .and. .not. has_load(system)
+      if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
+
+   !> Is there any force but those of elements and contact?
+   pure logical function has_load(system)
+      type(system_t), intent(in) :: system
+
+      has_load = any(abs(system%external) > 0.0_wp) .or. any(abs(system%inertia) > 0.0_wp)
+   end function has_load
 
    !> |v| / |scale|, 0 where v vanishes, huge where it is not finite; without overflow on the way.
    pure real(wp) function relative_size(v, scale)

@@ -107,7 +107,10 @@ contains
          end do
          do i = 1, size(node)
             self%force(:, first + i) = force(:, node(i))
-            if (twin(i) > 0) self%force(:, first + i) = self%force(:, first + i) + force(:, twin(i))
+            force(:, node(i)) = 0.0_wp                    ! of several constraints the first has it
+            if (twin(i) == 0) cycle
+            self%force(:, first + i) = self%force(:, first + i) + force(:, twin(i))
+            force(:, twin(i)) = 0.0_wp
          end do
       end associate
    end subroutine measure_nodes

@@ -1,18 +1,20 @@
 !> Files with the guarantees that Fortran's own input and output does not give: one system call per
 !> text, every failure reported (a full disk too), atomic replacement, locks.
 module emcon_files
-   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_int64_t, &
+   use, intrinsic :: iso_c_binding, only : c_associated, c_int, c_int64_t, &
       c_intptr_t, c_null_char, c_null_ptr, c_ptr, c_size_t
    use emcon_errors, only : error_t, raise, err_file
-   use emcon_posix, only : c_access, c_close, c_dup2, c_errno, c_fclose, c_fileno, c_flock, &
+   use emcon_posix, only : c_access, c_close, c_dup2, c_fclose, c_fileno, c_flock, &
       c_fopen, c_fsync, c_ftruncate, c_isatty, c_lseek, c_memfd_create, c_mkdir, c_read, &
-      c_rename, c_signal, c_strerror, c_strlen, c_unlink, c_write, &
+      c_rename, c_signal, c_unlink, c_write, &
       lock_exclusive, lock_no_wait, errno_exists, errno_missing, errno_again, signal_file_size
+   use emcon_text_file, only : system_errno, system_reason
    implicit none
    private
-   public :: file_t, file_open, file_lock, file_put, file_sync, file_truncate, file_close
+   public :: file_t, file_open, file_lock, file_put, file_put_at_start, file_get, file_sync, &
+      file_truncate, file_close
    public :: file_exists, file_rename, file_remove, file_copy, file_discard, make_directory
-   public :: is_terminal, survive_file_size_limit, clear_system_reason, system_reason
+   public :: is_terminal, survive_file_size_limit
 
    !> An open file. Nothing is buffered: what `file_put` has taken, a kill cannot lose.
    !>
@@ -28,7 +30,8 @@ module emcon_files
 
 contains
 
-   !> Open `path`: "r" to read, "w" to write anew, "a" to append (made if missing).
+   !> Open `path`: "r" to read, "r+" to change it, "w" to write anew, "a" to append (made if
+   !> missing).
    subroutine file_open(self, path, mode, error)
       type(file_t), intent(out) :: self
       character(len=*), intent(in) :: path
@@ -77,6 +80,38 @@ contains
          n_done = n_done + n
       end do
    end subroutine file_put
+
+   !> Write `text` over the first bytes of a file opened with "r+".
+   subroutine file_put_at_start(self, text, error)
+      type(file_t), intent(in) :: self
+      character(len=*), intent(in) :: text
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: fd
+
+      fd = c_fileno(self%stream)
+      if (c_lseek(fd, 0_c_int64_t, 0_c_int) == 0) then
+         if (c_write(fd, text, len(text, c_size_t)) == len(text)) return
+      end if
+      call raise_system(error, "write", self%path)
+   end subroutine file_put_at_start
+
+   !> The next bytes of a file opened to read: `n` of them, fewer than asked for only at its end.
+   subroutine file_get(self, text, n, error)
+      type(file_t), intent(in) :: self
+      character(len=*), intent(out) :: text          !! blank behind `n`
+      integer, intent(out) :: n
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_intptr_t) :: n_now
+
+      n = 0
+      do while (n < len(text))
+         n_now = c_read(c_fileno(self%stream), text(n + 1:), int(len(text) - n, c_size_t))
+         if (n_now < 0) call raise_system(error, "read", self%path)
+         if (n_now < 1) exit
+         n = n + int(n_now)
+      end do
+      text(n + 1:) = ""
+   end subroutine file_get
 
    !> Wait until all that was written is on the disk.
    subroutine file_sync(self, error)
@@ -212,44 +247,13 @@ contains
       old = c_signal(signal_file_size, ignore)
    end subroutine survive_file_size_limit
 
-   !> Forget the last failure of the system, so that `system_reason` tells of a later one.
-   subroutine clear_system_reason()
-      integer(c_int), pointer :: errno
-
-      call c_f_pointer(c_errno(), errno)
-      errno = 0
-   end subroutine clear_system_reason
-
-   !> The system's words for its last failure, for instance "No space left on device"; or "".
-   function system_reason() result(text)
-      character(len=:), allocatable :: text
-      character(kind=c_char), pointer :: letter(:)
-      type(c_ptr) :: words
-      integer :: i
-      integer(c_int) :: number
-
-      number = system_errno()
-      text = ""
-      if (number == 0) return
-      words = c_strerror(number)
-      call c_f_pointer(words, letter, [c_strlen(words)])
-      do i = 1, size(letter)
-         text = text // letter(i)
-      end do
-   end function system_reason
-
-   integer(c_int) function system_errno()
-      integer(c_int), pointer :: errno
-
-      call c_f_pointer(c_errno(), errno)
-      system_errno = errno
-   end function system_errno
-
    subroutine raise_system(error, action, path)
       type(error_t), allocatable, intent(out) :: error
       character(len=*), intent(in) :: action, path
+      character(len=:), allocatable :: reason
 
-      call raise(error, err_file, "cannot " // action // " " // path // ": " // system_reason())
+      call system_reason(reason)
+      call raise(error, err_file, "cannot " // action // " " // path // ": " // reason)
    end subroutine raise_system
 
 end module emcon_files

@@ -7,10 +7,13 @@ module emcon_hdf5
    use, intrinsic :: iso_c_binding, only : c_associated, c_bool, c_f_pointer, c_float, c_int, &
       c_int64_t, c_null_ptr, c_ptr
    use emcon_errors, only : error_t, raise, err_file
-   use emcon_files, only : clear_system_reason, file_discard, file_exists, system_reason
-   use hdf5, only : hid_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5fcreate_f, &
+   use emcon_files, only : file_discard, file_exists
+   use emcon_sealed_file, only : seal_size
+   use emcon_text_file, only : clear_system_reason, system_reason
+   use hdf5, only : hid_t, hsize_t, size_t, h5dont_atexit_f, h5open_f, h5eset_auto_f, h5fcreate_f, &
       h5fopen_f, h5fclose_f, h5fflush_f, h5gcreate_f, h5gclose_f, h5lexists_f, h5pcreate_f, &
       h5pclose_f, h5pset_fclose_degree_f, h5pset_cache_f, h5pset_libver_bounds_f, &
+      h5pset_userblock_f, &
       H5F_ACC_TRUNC_F, H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, H5F_CLOSE_STRONG_F, &
       H5F_LIBVER_LATEST_F, H5F_SCOPE_GLOBAL_F, H5P_FILE_ACCESS_F, H5P_FILE_CREATE_F, &
       H5P_GROUP_CREATE_F, H5P_DEFAULT_F
@@ -66,6 +69,7 @@ contains
          call h5pset_libver_bounds_f(access, H5F_LIBVER_LATEST_F, H5F_LIBVER_LATEST_F, e)
       end if
       call hdf5_plan_object(H5P_FILE_CREATE_F, plan)
+      call h5pset_userblock_f(plan, int(seal_size, hsize_t), e)
       call clear_system_reason()
       call h5fcreate_f(path, H5F_ACC_TRUNC_F, self%id, e, plan, access)
       if (e < 0) then
@@ -82,6 +86,7 @@ contains
       character(len=*), intent(in) :: path
       logical, intent(in) :: is_writable
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: reason
       integer(hid_t) :: access
       integer :: e
 
@@ -95,7 +100,8 @@ contains
       call h5fopen_f(path, merge(H5F_ACC_RDWR_F, H5F_ACC_RDONLY_F, is_writable), self%id, e, access)
       if (e < 0) then
          self%id = -1_hid_t
-         if (system_reason() == "") then
+         call system_reason(reason)
+         if (reason == "") then
             call raise(error, err_file, path // " is not an HDF5 file, or is damaged")
          else
             call hdf5_fail(self, "open", "", error)
@@ -166,7 +172,7 @@ contains
       self%has_failed = .true.
       text = "cannot " // action // " " // self%path
       if (name /= "") text = text // " (data set " // name // ")"
-      reason = system_reason()
+      call system_reason(reason)
       if (reason == "") reason = "refused by the HDF5 library"
       call raise(error, err_file, text // ": " // reason)
    end subroutine hdf5_fail

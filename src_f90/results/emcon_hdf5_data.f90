@@ -3,10 +3,10 @@
 module emcon_hdf5_data
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_char, c_ptr
    use emcon_errors, only : error_t, raise, err_file
-   use emcon_files, only : clear_system_reason
    use emcon_hdf5, only : hdf5_fail, hdf5_file_t, hdf5_plan_object
    use emcon_kinds, only : dp, wp
    use emcon_text, only : string_t
+   use emcon_text_file, only : clear_system_reason
    use hdf5, only : hid_t, hsize_t, size_t, h5kind_to_type, &
       h5pclose_f, h5pset_chunk_f, h5pset_shuffle_f, h5pset_deflate_f, &
       h5pset_fletcher32_f, h5screate_simple_f, h5screate_f, h5sclose_f, &

@@ -2,10 +2,10 @@
 module emcon_hdf5_series
    use, intrinsic :: iso_c_binding, only : c_loc
    use emcon_errors, only : error_t, raise, err_file
-   use emcon_files, only : clear_system_reason
    use emcon_hdf5, only : hdf5_fail, hdf5_file_t, hdf5_has
    use emcon_hdf5_data, only : hdf5_plan
    use emcon_kinds, only : dp, int64
+   use emcon_text_file, only : clear_system_reason
    use hdf5, only : hid_t, hsize_t, h5screate_simple_f, h5sclose_f, h5sselect_hyperslab_f, &
       h5sget_simple_extent_ndims_f, h5sget_simple_extent_dims_f, h5dcreate_f, h5dopen_f, &
       h5dget_space_f, h5dset_extent_f, h5dwrite_f, h5pclose_f, H5S_SELECT_SET_F, &

@@ -119,7 +119,7 @@ contains
 
    pure function column_path(column) result(path)
       type(column_t), intent(in) :: column
-      character(len=:), allocatable :: path
+      character(len=len("/history/") + len_trim(column%name)) :: path
 
       path = "/history/" // trim(column%name)
    end function column_path
@@ -131,7 +131,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: ignored
       real(dp), allocatable :: kept(:, :), values(:)
-      character(len=:), allocatable :: header
+      character(len=:), allocatable :: header, line
       integer :: i
 
       header = trim(self%column(1)%name)
@@ -153,7 +153,8 @@ contains
       if (.not. allocated(error)) call file_put(self%csv, header // line_end, error)
       do i = 1, self%n_row
          if (allocated(error)) exit
-         call file_put(self%csv, csv_row(self%column, kept(i, :)), error)
+         call csv_row(self%column, kept(i, :), line)
+         call file_put(self%csv, line, error)
       end do
       if (.not. allocated(error)) call file_rename(base // ".csv.tmp", base // ".csv", error)
       if (.not. allocated(error)) return
@@ -162,10 +163,10 @@ contains
    end subroutine begin_csv
 
    !> A line of NAME.csv: reals that read back to the same bits, integers as such.
-   function csv_row(column, values) result(line)
+   subroutine csv_row(column, values, line)
       type(column_t), intent(in) :: column(:)
       real(dp), intent(in) :: values(:)
-      character(len=:), allocatable :: line
+      character(len=:), allocatable, intent(out) :: line
       character(len=(number_width + 1)*size(values)) :: buffer
       character(len=number_width) :: word
       integer :: i, n
@@ -182,19 +183,21 @@ contains
          n = n + len_trim(word) + 1
       end do
       line = buffer(:n - 1) // line_end
-   end function csv_row
+   end subroutine csv_row
 
    !> Append a row; it is in NAME.csv when this returns.
    subroutine history_append(self, values, error)
       type(history_t), intent(inout) :: self
       real(dp), intent(in) :: values(:)              !! (n_column); whole numbers where integer
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: line
 
       if (size(values) /= size(self%column)) then
          call raise(error, err_internal, "history_append: wrong number of values")
          return
       end if
-      call file_put(self%csv, csv_row(self%column, values), error)
+      call csv_row(self%column, values, line)
+      call file_put(self%csv, line, error)
       if (allocated(error)) return
       if (self%n_waiting == n_wait) call write_waiting(self, error)
       if (allocated(error)) return

@@ -54,8 +54,8 @@ contains
       if (now - self%time_shown < merge(terminal_interval, plain_interval, self%is_terminal)) return
       self%time_shown = now
       write(line, "(f5.1, '%  t = ', a, '  h = ', a, '  Newton ', i0, '  active ', i0, a)") &
-         100.0_dp*fraction, short(time), short(h), n_newton, n_active, &
-         time_left(self, now, fraction)
+         100.0_dp*fraction, trim(short(time)), trim(short(h)), n_newton, n_active, &
+         trim(time_left(self, now, fraction))
       if (self%is_terminal) then
          ! Blanks wipe what a longer line left.
          call put(self, achar(13) // line(:max(len_trim(line), self%n_shown)))
@@ -70,7 +70,7 @@ contains
       type(progress_t), intent(in) :: self
       real(dp), intent(in) :: now                    !! wall clock [s]
       real(dp), intent(in) :: fraction
-      character(len=:), allocatable :: text
+      character(len=31) :: text
       character(len=24) :: buffer
       real(dp) :: seconds, done
       integer :: n
@@ -92,11 +92,9 @@ contains
    !> `value` with five significant digits.
    function short(value) result(text)
       real(dp), intent(in) :: value
-      character(len=:), allocatable :: text
-      character(len=24) :: buffer
+      character(len=24) :: text
 
-      write(buffer, "(g0.5)") value
-      text = trim(buffer)
+      write(text, "(g0.5)") value
    end function short
 
    !> Wipe the line on the terminal: what comes next begins on a fresh one.

@@ -1,13 +1,15 @@
 !> An HDF5 result file that readers can open at any moment, even after the run was killed.
 !>
 !> The run writes to a working copy, NAME.part. From time to time this is completed, copied and the
-!> copy renamed to NAME: NAME is always whole. The last publication renames the working copy.
+!> copy renamed to NAME: NAME is always whole. The last publication renames the working copy. What
+!> is published is sealed.
 module emcon_published
    use emcon_errors, only : error_t, raise, err_file
    use emcon_files, only : file_close, file_copy, file_exists, file_open, file_remove, &
       file_rename, file_sync, file_t
    use emcon_hdf5, only : hdf5_close, hdf5_create, hdf5_file_t, hdf5_flush, hdf5_open
    use emcon_kinds, only : dp
+   use emcon_sealed_file, only : seal_check, seal_put
    use emcon_timer, only : wall_seconds
    implicit none
    private
@@ -58,7 +60,8 @@ contains
          call raise(error, err_file, path // " does not exist: the run cannot be continued there")
          return
       end if
-      call remove_stale(self, error)
+      call seal_check(path, error)
+      if (.not. allocated(error)) call remove_stale(self, error)
       if (.not. allocated(error)) call file_copy(path, path // ".part", error)
       if (.not. allocated(error)) call hdf5_open(self%file, path // ".part", .true., error)
       if (allocated(error)) call file_remove(path // ".part", ignored)
@@ -95,6 +98,7 @@ contains
 
       start = wall_seconds()
       call hdf5_flush(self%file, error)
+      if (.not. allocated(error)) call seal_put(self%path // ".part", error)
       if (.not. allocated(error)) then
          call file_copy(self%path // ".part", self%path // ".tmp", error)
          if (.not. allocated(error)) call file_rename(self%path // ".tmp", self%path, error)
@@ -117,7 +121,8 @@ contains
       if (self%file%id < 0) return
       call hdf5_close(self%file, error)
       if (.not. allocated(error) .and. .not. self%file%has_failed) then
-         call file_open(part, self%path // ".part", "r", error)
+         call seal_put(self%path // ".part", error)
+         if (.not. allocated(error)) call file_open(part, self%path // ".part", "r", error)
          if (.not. allocated(error)) call file_sync(part, error)
          call file_close(part, ignored)
          if (.not. allocated(error)) call file_rename(self%path // ".part", self%path, error)

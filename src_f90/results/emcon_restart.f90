@@ -8,6 +8,7 @@ module emcon_restart
    use emcon_hdf5_data, only : hdf5_read_integers, hdf5_read_state, hdf5_read_texts, &
       hdf5_write_integers, hdf5_write_state, hdf5_write_texts
    use emcon_kinds, only : wp
+   use emcon_sealed_file, only : seal_check, seal_put
    use emcon_text, only : string_t, to_text
    implicit none
    private
@@ -229,6 +230,7 @@ contains
       if (.not. allocated(error)) call write_entries(self, file, error)
       call hdf5_close(file, close_error)
       if (.not. allocated(error)) call move_alloc(close_error, error)
+      if (.not. allocated(error)) call seal_put(path // ".tmp", error)
       if (.not. allocated(error)) call file_open(written, path // ".tmp", "r", error)
       if (.not. allocated(error)) call file_sync(written, error)
       call file_close(written, close_error)
@@ -243,7 +245,7 @@ contains
       type(string_t) :: name(self%n_entry), format(1)
       integer :: i, k, n
 
-      format(1)%text = format_text()
+      call format_text(format(1)%text)
       call hdf5_write_texts(file, "/format", format, error)
       do k = 1, size(group)
          if (allocated(error)) return
@@ -262,11 +264,11 @@ contains
    end subroutine write_entries
 
    !> Version of the layout, and the kind of the state: neither can be mixed.
-   pure function format_text() result(text)
-      character(len=:), allocatable :: text
+   pure subroutine format_text(text)
+      character(len=:), allocatable, intent(out) :: text
 
-      text = "emcon restart 2, reals of " // to_text(storage_size(1.0_wp)) // " bits"
-   end function format_text
+      text = "emcon restart 3, reals of " // to_text(storage_size(1.0_wp)) // " bits"
+   end subroutine format_text
 
    !> Index into `group`.
    pure integer function entry_kind(entry)
@@ -300,16 +302,19 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(hdf5_file_t) :: file
       type(string_t), allocatable :: found(:)
+      character(len=:), allocatable :: needed
       type(error_t), allocatable :: ignored
 
-      call hdf5_open(file, path, .false., error)
+      call seal_check(path, error)
+      if (.not. allocated(error)) call hdf5_open(file, path, .false., error)
       if (.not. allocated(error)) call hdf5_read_texts(file, "/format", found, error)
       if (.not. allocated(error)) then
+         call format_text(needed)
          if (size(found) /= 1) then
             call raise(error, err_file, path // " is not a restart file")
-         else if (found(1)%text /= format_text()) then
+         else if (found(1)%text /= needed) then
             call raise(error, err_file, path // " is a restart file of another build of the " &
-               // "program: it says '" // found(1)%text // "', needed is '" // format_text() // "'")
+               // "program: it says '" // found(1)%text // "', needed is '" // needed // "'")
          end if
       end if
       if (.not. allocated(error)) call read_entries(self, file, error)

@@ -124,11 +124,13 @@ contains
       type(hdf5_file_t), intent(inout) :: file
       integer, intent(in) :: n_frame
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: path
       real(dp), allocatable :: offset(:)
 
       call series_truncate(self%offset, file, int(n_frame, int64), error)
       if (.not. allocated(error)) then
-         call hdf5_read_reals(file, offset_path(self%field), offset, error)
+         call offset_path(self%field, path)
+         call hdf5_read_reals(file, path, offset, error)
       end if
       if (allocated(error)) return
       self%n_written = 0
@@ -225,6 +227,7 @@ contains
       type(field_t), intent(in) :: field
       integer, intent(in) :: n_item(2)
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: path
       integer :: row_shape(1)
 
       if (scan(field%name, "/.") > 0 .or. field%name == "") then
@@ -234,10 +237,12 @@ contains
       self%field = field
       self%n_item = n_item(merge(2, 1, field%is_cell))
       row_shape = stored_components(field)
-      call series_begin(self%values, file, values_path(field), &
+      call values_path(field, path)
+      call series_begin(self%values, file, path, &
          row_shape(:merge(0, 1, field%n_component == 1)), self%n_item, .false., error)
       if (allocated(error)) return
-      call series_begin(self%offset, file, offset_path(field), one(:0), step_chunk, .true., error)
+      call offset_path(field, path)
+      call series_begin(self%offset, file, path, one(:0), step_chunk, .true., error)
    end subroutine begin_field
 
    pure integer function stored_components(field)
@@ -246,21 +251,21 @@ contains
       stored_components = merge(3, field%n_component, field%n_component == 2)
    end function stored_components
 
-   pure function values_path(field) result(path)
+   pure subroutine values_path(field, path)
       type(field_t), intent(in) :: field
-      character(len=:), allocatable :: path
+      character(len=:), allocatable, intent(out) :: path
 
       path = "/VTKHDF/" // trim(merge("CellData ", "PointData", field%is_cell)) // "/" &
          // trim(field%name)
-   end function values_path
+   end subroutine values_path
 
-   pure function offset_path(field) result(path)
+   pure subroutine offset_path(field, path)
       type(field_t), intent(in) :: field
-      character(len=:), allocatable :: path
+      character(len=:), allocatable, intent(out) :: path
 
       path = steps // "/" // trim(merge("CellDataOffsets ", "PointDataOffsets", field%is_cell)) &
          // "/" // trim(field%name)
-   end function offset_path
+   end subroutine offset_path
 
    !> Begin the frame of `time`.
    subroutine vtkhdf_begin_frame(self, time)

@@ -94,6 +94,8 @@ module emcon_scene
       integer :: slave = 0                           !! index into `scene_t%surface`
       integer :: master = 0
       integer :: formulation = formulation_nts
+      logical :: both_sides = .false.                !! nodes of both surfaces are held
+      logical :: is_reverse = .false.                !! the second half of a pair with both sides
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
    end type contact_pair_t
@@ -192,6 +194,7 @@ module emcon_scene
       integer :: initiation = initiation_persistent
       real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
       type(contact_options_t) :: contact
+      logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
       real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
       integer :: newton_maximum = 20
       integer :: restart_frequency = 0               !! 0: no restart file
@@ -234,11 +237,20 @@ contains
    pure function where_text(scene, origin) result(text)
       type(scene_t), intent(in) :: scene
       type(origin_t), intent(in) :: origin
-      character(len=:), allocatable :: text
+      character(len=where_length(scene, origin)) :: text
 
       text = "(no deck)"
       if (origin%file > 0) text = scene%file(origin%file)%text // ":" // to_text(origin%line)
    end function where_text
+
+   pure integer function where_length(scene, origin)
+      type(scene_t), intent(in) :: scene
+      type(origin_t), intent(in) :: origin
+
+      where_length = len("(no deck)")
+      if (origin%file > 0) where_length = len(scene%file(origin%file)%text) + 1 &
+         + len(to_text(origin%line))
+   end function where_length
 
    !> Value and slope of an amplitude at `time`; at a kink the slope to the left.
    pure subroutine find_amplitude_value(amplitude, time, value, slope)

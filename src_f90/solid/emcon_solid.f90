@@ -208,8 +208,9 @@ contains
    end subroutine reference_gradient
 
    !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
-   !> to the matrix entries `value` (slot > 0) and `side` (slot < 0). Where `u0` was computed as a
-   !> change of `before`, it is rounded with that too.
+   !> to the matrix entries `value` (slot > 0) and `side` (slot < 0). What a displacement is rounded
+   !> by, a force is too: `u0` is exact, as what the step starts from, unless it was computed as a
+   !> change of `before`.
    subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side, before)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
@@ -240,7 +241,8 @@ contains
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
-         if (present(before)) largest = max(largest, maxval(abs(before(:, self%node(:n, e)))))
+         if (present(before)) largest = max(largest, maxval(abs(u0(:, self%node(:n, e)))), &
+            maxval(abs(before(:, self%node(:n, e)))))
          call respond_element(self, e, response%given, local0, dlocal, nlgeom, with_tangent, part)
          if (part%is_inverted) then
             response%inverted_element = e
@@ -344,11 +346,11 @@ contains
    end subroutine gather_strains
 
    !> Why `response` is none: an element is inverted, `by` what, or a given law does not answer.
-   function obstacle_text(scene, response, by) result(text)
+   subroutine obstacle_text(scene, response, by, text)
       type(scene_t), intent(in) :: scene
       type(solid_response_t), intent(in) :: response
       character(len=*), intent(in) :: by
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       if (response%given%material == 0) then
          text = "element " // to_text(scene%element_label(max(1, response%inverted_element))) // &
@@ -361,10 +363,11 @@ contains
       else
          text = text // " has no finite value at a strain that is met"
       end if
-   end function obstacle_text
+   end subroutine obstacle_text
 
    !> Displacements of the nodes of an element relative to its first node, which does not round them
-   !> with the distance that a body has flown, and the largest displacement at the end.
+   !> with the distance that a body has flown, and the largest of them and of the entries of `du`:
+   !> what the differences are rounded by.
    pure subroutine gather(node, u0, du, local0, dlocal, largest)
       integer, intent(in) :: node(:)
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
@@ -376,7 +379,8 @@ contains
       do i = 1, size(node)
          local0(:, i) = u0(:, node(i)) - u0(:, node(1))
          dlocal(:, i) = du(:, node(i)) - du(:, node(1))
-         largest = max(largest, maxval(abs(u0(:, node(i)) + du(:, node(i)))))
+         largest = max(largest, maxval(abs(local0(:, i) + dlocal(:, i))), &
+            maxval(abs(du(:, node(i)))))
       end do
    end subroutine gather
 

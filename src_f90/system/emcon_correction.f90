@@ -214,7 +214,7 @@ contains
    !> Why the last factorisation is of the saddle point although the null space was asked for.
    pure function correction_reason(self) result(text)
       type(correction_t), intent(in) :: self
-      character(len=:), allocatable :: text
+      character(len=80) :: text
 
       select case (self%obstacle)
       case (obstacle_pivot)

@@ -20,11 +20,18 @@ contains
    !> "the given force NAME"
    pure function given_name(force) result(text)
       class(given_force_t), intent(in) :: force
-      character(len=:), allocatable :: text
+      character(len=given_length(force)) :: text
 
       text = "the given force"
-      if (allocated(force%name)) text = text // " " // force%name
+      if (allocated(force%name)) text = "the given force " // force%name
    end function given_name
+
+   pure integer function given_length(force)
+      class(given_force_t), intent(in) :: force
+
+      given_length = len("the given force")
+      if (allocated(force%name)) given_length = given_length + 1 + len(force%name)
+   end function given_length
 
    !> The pattern of `force` is one over the freedoms of `n_node` nodes.
    subroutine given_check_force(force, n_node, error)

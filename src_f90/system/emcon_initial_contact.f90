@@ -43,9 +43,14 @@ contains
       type(contact_options_t) :: options
       type(nts_t) :: contact
       logical :: is_checked(size(scene%surface))
+      logical :: is_meant                        !! overclosure is
       integer :: i
 
-      if (size(scene%step) > 0) options = scene%step(1)%contact
+      is_meant = .false.
+      if (size(scene%step) > 0) then
+         options = scene%step(1)%contact
+         is_meant = scene%step(1)%resolves_overclosure
+      end if
       is_checked = .false.
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
@@ -63,6 +68,7 @@ contains
             call adjust_pair(scene, pair, contact, notes)
             if (contact%is_self) call check_crossing(scene, pair%slave, contact%slave, &
                is_checked, error)
+            if (is_meant .and. .not. allocated(error)) cycle
             if (.not. allocated(error)) call check_penetration(scene, pair, contact, error)
             if (.not. allocated(error)) call check_corners(scene, pair, options, error)
             if (allocated(error)) return
@@ -77,6 +83,7 @@ contains
       type(chain_t), intent(in) :: chain
       logical, intent(inout) :: is_checked(:)    !! (n_surface)
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: one, other
       integer :: first, second
 
       if (is_checked(number) .or. chain%n_edge == 0) return
@@ -84,28 +91,28 @@ contains
       call chain_crossing(chain, scene%x, scene%u0, first, second)
       if (first == 0) return
       associate (surface => scene%surface(number))
+         call face_text(scene, surface, chain, first, one)
+         call face_text(scene, surface, chain, second, other)
          call raise(error, err_input, where_text(scene, surface%origin) // ": error: contact " // &
-            "surface " // surface%name // " crosses itself: " // &
-            face_text(scene, surface, chain, first) // " and " // &
-            face_text(scene, surface, chain, second))
+            "surface " // surface%name // " crosses itself: " // one // " and " // other)
       end associate
    end subroutine check_crossing
 
    !> "face S1 of element 7 (nodes 1, 2)" for edge `e` of the chain of `surface`, or of a surface of
    !> edges "the edge (nodes 1, 2)".
-   function face_text(scene, surface, chain, e) result(text)
+   subroutine face_text(scene, surface, chain, e, text)
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       type(chain_t), intent(in) :: chain
       integer, intent(in) :: e
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       text = "the edge"
       if (.not. allocated(surface%edge)) text = "face S" // to_text(surface%face(e)) // &
          " of element " // to_text(scene%element_label(surface%element(e)))
       text = text // " (nodes " // to_text(scene%node_label(chain%edge(1, e))) // ", " // &
          to_text(scene%node_label(chain%edge(2, e))) // ")"
-   end function face_text
+   end subroutine face_text
 
    !> The same pair with slave and master exchanged.
    pure function reversed(pair) result(other)
@@ -236,7 +243,7 @@ contains
       if (contact%is_self) then
          associate (chain => contact%slave, state => contact%state)
             do i = 1, contact%n_constraint
-               own = maxval(chain%node_edge(:, i))
+               own = maxval(chain%node_edge(:, contact%chain_node(i)))
                if (contact%edge(i) == 0) cycle
                if (chain%part(own) /= chain%part(contact%edge(i))) cycle
                ! Without a crossing this is the other side of a thin strip.

@@ -12,6 +12,7 @@
 !> coordinates, and that of z, which is the round-off of earlier rows over what they prevented.
 module emcon_rigid_bodies
    use emcon_bodies, only : bodies_find
+   use emcon_contact, only : constraint_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : prescribed_t, scene_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
@@ -20,7 +21,7 @@ module emcon_rigid_bodies
    implicit none
    private
    public :: rigid_bodies_t, rigid_rows_t, rigid_bodies_find, rigid_rows_find, find_assemblies
-   public :: find_free_motions, motions_as_one
+   public :: find_free_motions, motions_as_one, rigid_rows_append, rigid_force, rigid_field
 
    !> Round-off of an entry of a row of weights with sum 1 over coordinates of size 1: weights of
    !> ties are sums of some ten products, coordinates of slave nodes likewise.
@@ -47,7 +48,12 @@ module emcon_rigid_bodies
       integer, allocatable :: dof(:)                 !! places in an (n_dim, n_node) array
       real(wp), allocatable :: weight(:)
       integer, allocatable :: low(:), high(:)        !! (n) first and last body; 0: none is free
+      real(dp) :: noise = 0.0_dp                     !! what prevents less prevents nothing
    end type rigid_rows_t
+
+   !> A normal that prevents less of a motion than this, per unit of it, does not hold it: normals
+   !> are as exact as displacements that Newton's method has converged to.
+   real(dp), parameter :: contact_noise = sqrt(epsilon(1.0_dp))
 
 contains
 
@@ -82,13 +88,41 @@ contains
       end do
    end subroutine rigid_rows_find
 
-   !> Bodies, where they are, and which of their motions need to be prevented. Those of bodies that
-   !> contact or a given force may hold need not (`contact_holds`).
-   subroutine rigid_bodies_find(system, scene, rows, contact_holds, bodies)
+   !> Append the rows of contact: the gradients of gaps at the end.
+   subroutine rigid_rows_append(rows, item)
+      type(rigid_rows_t), intent(inout) :: rows
+      type(constraint_t), intent(in) :: item(:)
+      integer :: k, i, a, n
+      real(wp) :: total
+
+      if (size(item) == 0) return
+      rows%noise = contact_noise
+      n = rows%start(rows%n + 1)
+      rows%start = [rows%start, (n + 2*sum(item(:k)%n_node), k = 1, size(item))]
+      rows%dof = [rows%dof, spread(0, 1, 2*sum(item%n_node))]
+      rows%weight = [rows%weight, spread(0.0_wp, 1, 2*sum(item%n_node))]
+      rows%n = rows%n + size(item)
+      do k = 1, size(item)
+         total = sum(abs(item(k)%c(:, :item(k)%n_node)))
+         if (.not. total > 0.0_wp) total = 1.0_wp
+         do i = 1, item(k)%n_node
+            do a = 1, 2
+               n = n + 1
+               rows%dof(n) = 2*(item(k)%node(i) - 1) + a
+               rows%weight(n) = item(k)%c(a, i)/total
+            end do
+         end do
+      end do
+   end subroutine rigid_rows_append
+
+   !> Bodies at `x`, and which of their motions need to be prevented. Those of bodies that contact
+   !> (`contact_holds`) or a given force (`given_holds`) may hold need not.
+   subroutine rigid_bodies_find(system, scene, x, rows, contact_holds, given_holds, bodies)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: x(:, :)                !! (2, n_node) [L]
       type(rigid_rows_t), intent(in) :: rows
-      logical, intent(in) :: contact_holds
+      logical, intent(in) :: contact_holds, given_holds
       type(rigid_bodies_t), intent(out) :: bodies
       logical :: is_in_row(2, size(scene%x, 2)), touches(system%n_body)
       integer :: i, k, b
@@ -98,7 +132,7 @@ contains
          is_in_row(2 - mod(rows%dof(k), 2), (rows%dof(k) + 1)/2) = .true.
       end do
       allocate(bodies%of_node, source=system%body)
-      allocate(bodies%x, source=scene%x)
+      allocate(bodies%x, source=x)
       bodies%n_mesh = system%n_body
       bodies%n = system%n_body
       do i = 1, size(bodies%of_node)
@@ -111,7 +145,9 @@ contains
          do k = 1, size(system%contact)
             call mark_contact_bodies(system, scene, k, touches)
          end do
-         if (system%given%is_any) touches(pack(system%body, system%given%has_force)) = .true.
+      end if
+      if (given_holds .and. system%given%is_any) then
+         touches(pack(system%body, system%given%has_force)) = .true.
       end if
       allocate(bodies%is_free(3, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh
@@ -254,7 +290,7 @@ contains
             basis(3*(i - 1) + j, n) = 1.0_dp
          end do
       end do
-      noise = rounding
+      noise = max(rounding, rows%noise)
       last = 0
       do while (last < size(list) .and. n > 0)
          first = last + 1
@@ -311,6 +347,49 @@ contains
       noise = rounding*(1.0_dp + real(maxval(bodies%reach(joined_body)), dp)) &
          *sqrt(real(size(a), dp))
    end subroutine find_entries
+
+   !> What forces on the nodes do over the motions of an assembly, and the sum of their sizes.
+   pure subroutine rigid_force(bodies, member, force, total, magnitude)
+      type(rigid_bodies_t), intent(in) :: bodies
+      integer, intent(in) :: member(:)
+      real(wp), intent(in) :: force(:, :)                !! (2, n_node)
+      real(dp), intent(out) :: total(:)                  !! (3*members)
+      real(dp), intent(out) :: magnitude
+      integer :: i, a, m
+
+      total = 0.0_dp
+      magnitude = 0.0_dp
+      do i = 1, size(bodies%of_node)
+         if (bodies%of_node(i) == 0) cycle
+         m = findloc(member, bodies%of_node(i), 1)
+         if (m == 0) cycle
+         do a = 1, 2
+            total(3*m - 2:3*m) = total(3*m - 2:3*m) &
+               + real(entry(bodies, member(m), 2*(i - 1) + a)*force(a, i), dp)
+         end do
+         magnitude = magnitude + real(sum(abs(force(:, i))), dp)
+      end do
+   end subroutine rigid_force
+
+   !> How the motion `z` of an assembly moves the nodes; those of others stay.
+   pure subroutine rigid_field(bodies, member, z, field)
+      type(rigid_bodies_t), intent(in) :: bodies
+      integer, intent(in) :: member(:)
+      real(dp), intent(in) :: z(:)                       !! (3*members)
+      real(wp), intent(out) :: field(:, :)               !! (2, n_node)
+      integer :: i, a, m
+
+      field = 0.0_wp
+      do i = 1, size(bodies%of_node)
+         if (bodies%of_node(i) == 0) cycle
+         m = findloc(member, bodies%of_node(i), 1)
+         if (m == 0) cycle
+         do a = 1, 2
+            field(a, i) = dot_product(entry(bodies, member(m), 2*(i - 1) + a), &
+               real(z(3*m - 2:3*m), wp))
+         end do
+      end do
+   end subroutine rigid_field
 
    !> What the three motions of body `b` do to a degree of freedom.
    pure function entry(bodies, b, dof)

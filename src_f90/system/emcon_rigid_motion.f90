@@ -11,7 +11,7 @@ module emcon_rigid_motion
    use emcon_text, only : joined, string_t, to_text
    implicit none
    private
-   public :: free_motion_text
+   public :: free_motion_text, describe_motion
 
    !> Bodies of an assembly that are named.
    integer, parameter :: most_named = 10
@@ -21,12 +21,12 @@ contains
    !> Names the first body that can move as a rigid one, and how, or the first assembly of bodies
    !> tied to each other; empty if none can. Bodies in a contact pair are looked at only
    !> `with_contact`: contact may hold them. `system%linear` holds the rows of the step.
-   function free_motion_text(system, scene, prescribed, with_contact) result(text)
+   subroutine free_motion_text(system, scene, prescribed, text, with_contact)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       type(prescribed_t), intent(in) :: prescribed(:)
+      character(len=:), allocatable, intent(out) :: text
       logical, intent(in), optional :: with_contact
-      character(len=:), allocatable :: text
       type(rigid_bodies_t) :: bodies
       type(rigid_rows_t) :: rows
       integer, allocatable :: assembly(:), order(:), member(:)
@@ -38,7 +38,7 @@ contains
       contact_holds = .true.
       if (present(with_contact)) contact_holds = .not. with_contact
       call rigid_rows_find(system, prescribed, rows)
-      call rigid_bodies_find(system, scene, rows, contact_holds, bodies)
+      call rigid_bodies_find(system, scene, scene%x, rows, contact_holds, contact_holds, bodies)
       call find_assemblies(bodies, rows, assembly, n_assembly, order)
       text = ""
       last = 0
@@ -51,12 +51,29 @@ contains
          member = pack([(n, n = 1, bodies%n)], assembly == i)
          call find_free_motions(bodies, rows, order(first:last), member, z, noise)
          if (size(z, 2) == 0) cycle
-         call keep_moving_together(member, z, sqrt(noise))
-         text = name_text(bodies, system, scene, member) // " free to " &
-            // motion_text(bodies, member, z, sqrt(noise)) // "; add *BOUNDARY conditions"
+         call describe_motion(bodies, system, scene, noise, member, z, text)
+         text = text // "; add *BOUNDARY conditions"
          return
       end do
-   end function free_motion_text
+   end subroutine free_motion_text
+
+   !> "the body of element 3 is free to rotate": of an assembly, the bodies that move together with
+   !> the first one that can, and how.
+   subroutine describe_motion(bodies, system, scene, noise, member, z, text)
+      type(rigid_bodies_t), intent(in) :: bodies
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      real(dp), intent(in) :: noise                      !! size of the round-off in `z`
+      integer, allocatable, intent(inout) :: member(:)   !! bodies; on return those named
+      real(dp), allocatable, intent(inout) :: z(:, :)    !! (3*members, n) free motions, likewise
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: name, motion
+
+      call keep_moving_together(member, z, sqrt(noise))
+      call name_text(bodies, system, scene, member, name)
+      call motion_text(bodies, member, z, sqrt(noise), motion)
+      text = name // " free to " // motion
+   end subroutine describe_motion
 
    !> Of an assembly keep the first body that moves and those that move with it: whose motions
    !> are correlated over the null space.
@@ -93,12 +110,12 @@ contains
 
    !> "the body of element 3 is", or all bodies and nodes of `member`. A body without elements is
    !> named by its first node.
-   function name_text(bodies, system, scene, member) result(text)
+   subroutine name_text(bodies, system, scene, member, text)
       type(rigid_bodies_t), intent(in) :: bodies
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: member(:)
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       integer :: label(bodies%n), i
       logical :: has_element(bodies%n)
 
@@ -128,19 +145,21 @@ contains
       subroutine add(one, more, is_meant)
          character(len=*), intent(in) :: one, more
          logical, intent(in) :: is_meant(:)      !! (members)
+         character(len=:), allocatable :: list
 
          if (.not. any(is_meant)) return
          if (len(text) > 0) text = text // " and "
-         text = text // list_text(one, more, label(pack(member, is_meant)))
+         call list_text(one, more, label(pack(member, is_meant)), list)
+         text = text // list
       end subroutine add
 
-   end function name_text
+   end subroutine name_text
 
    !> `one` or `more` and the labels; empty if there is none.
-   pure function list_text(one, more, label) result(text)
+   pure subroutine list_text(one, more, label, text)
       character(len=*), intent(in) :: one, more
       integer, intent(in) :: label(:)
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       type(string_t) :: word(size(label))
       integer :: i
 
@@ -150,16 +169,16 @@ contains
       text = ""
       if (size(label) == 1) text = one // word(1)%text
       if (size(label) > 1) text = more // joined(word, ", ", most_named)
-   end function list_text
+   end subroutine list_text
 
    !> How bodies that move together can move: as one, which are combinations g of two translations
    !> and a rotation, or against each other. Nodes follow.
-   function motion_text(bodies, member, z, tol) result(text)
+   subroutine motion_text(bodies, member, z, tol, text)
       type(rigid_bodies_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
       real(dp), intent(in) :: z(:, :)                    !! (3*members, n) their motions
       real(dp), intent(in) :: tol
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable :: error
       real(dp), allocatable :: a(:, :), both(:, :), held(:, :), g(:, :), shift(:, :)
       integer :: n
@@ -182,13 +201,13 @@ contains
       text = ""
       along = [norm2(held(1, :)) <= tol, norm2(held(2, :)) <= tol]
       if (along(1)) text = "move in x"
-      if (along(2)) text = join(text, "move in y")
+      if (along(2)) call join(text, "move in y")
       if (size(shift, 2) == 1 .and. .not. any(along)) then
-         text = direction_text(matmul(g(:2, :), shift(:, 1)))
+         text = trim(direction_text(matmul(g(:2, :), shift(:, 1))))
       end if
-      if (size(shift, 2) < size(g, 2)) text = join(text, "rotate")
-      if (size(both, 2) < size(z, 2)) text = join(text, "move against each other")
-   end function motion_text
+      if (size(shift, 2) < size(g, 2)) call join(text, "rotate")
+      if (size(both, 2) < size(z, 2)) call join(text, "move against each other")
+   end subroutine motion_text
 
    !> Columns z with a z = 0 up to singular values of `tol`, for a matrix of order one or of noise.
    subroutine find_null_space(a, tol, z, error)
@@ -203,7 +222,7 @@ contains
    !> "move along (1, -0.5)": one of the entries is 1.
    pure function direction_text(shift) result(text)
       real(dp), intent(in) :: shift(2)
-      character(len=:), allocatable :: text
+      character(len=64) :: text
       real(wp) :: along(2)
       integer :: i
 
@@ -212,12 +231,13 @@ contains
       text = "move along (" // to_text(along(1), 3) // ", " // to_text(along(2), 3) // ")"
    end function direction_text
 
-   pure function join(a, b) result(text)
-      character(len=*), intent(in) :: a, b
-      character(len=:), allocatable :: text
+   !> Add `more` to a list of motions.
+   pure subroutine join(text, more)
+      character(len=:), allocatable, intent(inout) :: text
+      character(len=*), intent(in) :: more
 
-      text = b
-      if (len(a) > 0) text = a // ", " // b
-   end function join
+      if (len(text) > 0) text = text // ", "
+      text = text // more
+   end subroutine join
 
 end module emcon_rigid_motion

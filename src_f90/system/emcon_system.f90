@@ -5,7 +5,7 @@
 module emcon_system
    use emcon_contact, only : contact_box_t
    use emcon_contact_registry, only : new_contact
-   use emcon_csr, only : csr_t
+   use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_given, only : given_t
    use emcon_given_sum, only : given_sum_add_tangent, given_sum_init, given_sum_is_symmetric, &
@@ -26,7 +26,11 @@ module emcon_system
    implicit none
    private
    public :: system_t, pose_t, system_init, system_begin_step, system_respond, &
-      system_check_response, system_tangent_times, mass_times
+      system_check_response, system_stiffen, system_tangent_times, mass_times
+
+   !> What is added to the tangent of a body that nothing holds, per stiffness of its elements: far
+   !> below what bends a body, far above the round-off of its rigid motions.
+   real(wp), parameter :: least_stiffness = sqrt(epsilon(1.0_wp))
 
    !> Where forces are evaluated and how inertia enters: all that a scheme decides.
    type :: pose_t
@@ -69,6 +73,10 @@ module emcon_system
       !> Why there is no response: what "the displacements" did to what. Not allocated: there is one
       character(len=:), allocatable :: refusal
       type(error_t), allocatable :: failure      !! with which a giver ends the analysis
+      logical :: is_stiffened = .false.          !! bodies that nothing holds are, in `matrix`
+      real(wp), allocatable :: stiffening(:, :)  !! (2, n_node) [M/T^2]
+      integer, allocatable :: stiff_slot(:)      !! where that enters `matrix`
+      real(dp), allocatable :: stiff_value(:)    !! and what
       real(wp), allocatable :: inertia(:, :)     !! (2, n_node) s M (b du - w v0)
       real(wp), allocatable :: external(:, :)    !! (2, n_node) loads
       real(wp), allocatable :: residual(:, :)    !! (2, n_node) without contact forces
@@ -140,6 +148,7 @@ contains
       logical :: is_too_full
 
       self%i_step = i_step
+      self%is_stiffened = .false.
       self%nlgeom = scene%step(i_step)%nlgeom
       call begin_linear(self, scene)
       self%is_reduced = scene%step(i_step)%constraint_method == method_null_space
@@ -226,13 +235,13 @@ contains
       if (with_tangent) self%matrix%value = real(pose%mass_scale*pose%rate, dp)*self%mass_value
       if (pose%is_end) then
          self%u_work = u0 + du
-         call respond_at(self%u_work, self%zero, 2.0_wp, 1.0_wp)
+         call respond_at(self%u_work, self%zero, 2.0_wp, 1.0_wp, before=u0)
       else
          self%u_work = u0 + 0.5_wp*du
          call respond_at(u0, du, 1.0_wp, 0.5_wp)
       end if
       if (self%response%inverted_element > 0) then
-         self%refusal = obstacle_text(scene, self%response, "")
+         call obstacle_text(scene, self%response, "", self%refusal)
          if (self%response%given%status == point_failed) call raise(self%failure, err_analysis, &
             self%refusal)
       end if
@@ -254,19 +263,22 @@ contains
    contains
 
       !> Internal forces from `start` by `step`, loads at `u_work`.
-      subroutine respond_at(start, step, solid_factor, load_factor)
+      subroutine respond_at(start, step, solid_factor, load_factor, before)
          real(wp), intent(in), contiguous :: start(:, :), step(:, :)
          real(wp), intent(in) :: solid_factor, load_factor
+         real(wp), intent(in), contiguous, optional :: before(:, :)  !! that `start` is a change of
 
          if (with_tangent) then
             call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
-               solid_factor, self%slot, self%matrix%value, self%reduction%side%value, before=u0)
+               solid_factor, self%slot, self%matrix%value, self%reduction%side%value, before=before)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external, load_factor, self%matrix%value, self%reduction%side%value)
             if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
             call reduction_add(self%reduction, self%matrix)
+            if (self%is_stiffened) call add_stiffening(self)
          else
-            call solid_respond(self%solid, start, step, self%nlgeom, self%response, before=u0)
+            call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
+               before=before)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external)
             if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
@@ -274,6 +286,61 @@ contains
       end subroutine respond_at
 
    end subroutine system_respond
+
+   !> Let Newton's method not move the bodies `is_loose` farther than the residual calls for: a
+   !> small stiffness of their nodes in the tangent alone, which changes no solution.
+   subroutine system_stiffen(self, is_loose)
+      type(system_t), intent(inout) :: self
+      logical, intent(in) :: is_loose(:)         !! (n_body)
+      integer :: e, i, d, s, t, n, pass
+
+      self%is_stiffened = any(is_loose)
+      if (.not. self%is_stiffened) return
+      if (.not. allocated(self%stiffening)) allocate(self%stiffening(2, self%solid%n_node))
+      self%stiffening = 0.0_wp
+      do e = 1, self%solid%n_element
+         if (.not. is_loose(self%body(self%solid%node(1, e)))) cycle
+         do i = 1, self%solid%geometry(e)%n_node
+            associate (node => self%solid%node(i, e))
+               self%stiffening(:, node) = self%stiffening(:, node) &
+                  + least_stiffness*self%solid%stiffness(i, e)
+            end associate
+         end do
+      end do
+      associate (numbering => self%numbering)
+         do pass = 1, 2                          ! count, then list
+            n = 0
+            do d = 1, 2*self%solid%n_node
+               if (.not. self%stiffening(2 - mod(d, 2), (d + 1)/2) > 0.0_wp) cycle
+               do t = numbering%start(d) + 1, numbering%start(d + 1)
+                  do s = numbering%start(d) + 1, numbering%start(d + 1)
+                     if (numbering%column(t) == 0 .or. numbering%column(s) == 0) cycle
+                     n = n + 1
+                     if (pass == 1) cycle
+                     self%stiff_slot(n) = csr_find(self%matrix, numbering%column(s), &
+                        numbering%column(t))
+                     self%stiff_value(n) = real(numbering%weight(s)*numbering%weight(t) &
+                        *self%stiffening(2 - mod(d, 2), (d + 1)/2), dp)
+                  end do
+               end do
+            end do
+            if (pass == 2) exit
+            if (allocated(self%stiff_slot)) deallocate(self%stiff_slot, self%stiff_value)
+            allocate(self%stiff_slot(n), self%stiff_value(n))
+         end do
+      end associate
+   end subroutine system_stiffen
+
+   pure subroutine add_stiffening(self)
+      type(system_t), intent(inout) :: self
+      integer :: k
+
+      do k = 1, size(self%stiff_slot)
+         associate (slot => self%stiff_slot(k))
+            if (slot > 0) self%matrix%value(slot) = self%matrix%value(slot) + self%stiff_value(k)
+         end associate
+      end do
+   end subroutine add_stiffening
 
    !> Add the given forces to what the elements respond.
    subroutine add_given(self, is_end, u0, du, with_tangent)

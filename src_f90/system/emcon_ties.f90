@@ -418,6 +418,7 @@ contains
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: move(:, :)                 !! (2, n_node)
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: tie
       real(wp) :: before, after
       integer :: e, i, n, k
 
@@ -430,7 +431,8 @@ contains
                after = corner_area(scene%x(:, node) + move(:, node), i)
                if (.not. before > 0.0_wp .or. after > least_area*before) cycle
                k = maxloc(abs(move(1, node)) + abs(move(2, node)), 1)
-               call raise(error, err_input, tie_text(scene, node(k)) // "element " // &
+               call tie_text(scene, node(k), tie)
+               call raise(error, err_input, tie // "element " // &
                   to_text(scene%element_label(e)) // " would be spoilt: the tie moves its " // &
                   "node " // to_text(scene%node_label(node(k))) // " by " // &
                   to_text(norm2(move(:, node(k)))) // " onto the master surface; let the " // &
@@ -442,10 +444,10 @@ contains
    end subroutine check_elements
 
    !> Which tie moves slave node `node`.
-   function tie_text(scene, node) result(text)
+   subroutine tie_text(scene, node, text)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: node
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       integer :: t
 
       text = ""
@@ -453,7 +455,7 @@ contains
          if (any(scene%tie(t)%rows%slave == node)) text = where_text(scene, scene%tie(t)%origin) &
             // ": error: tie " // scene%tie(t)%name // ": "
       end do
-   end function tie_text
+   end subroutine tie_text
 
    !> Twice the area of the triangle at corner `i` of a polygon.
    pure real(wp) function corner_area(x, i)

@@ -27,12 +27,14 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)            !! (2, n_node)
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: text
       integer :: k, t
 
       associate (unresolved => system%unresolved, linear => system%linear)
          do k = 1, size(unresolved)
             if (is_met(scene, system%i_step, u, unresolved(k))) cycle
-            call raise(error, err_input, contradiction_text(scene, linear, unresolved(k)))
+            call contradiction_text(scene, linear, unresolved(k), text)
+            call raise(error, err_input, text)
             return
          end do
          do t = 0, size(scene%tie)
@@ -74,23 +76,25 @@ contains
       is_met = all(abs(total) <= rounding*largest)
    end function is_met
 
-   function contradiction_text(scene, linear, item) result(text)
+   subroutine contradiction_text(scene, linear, item, text)
       type(scene_t), intent(in) :: scene
       type(linear_rows_t), intent(in) :: linear
       type(unresolved_t), intent(in) :: item
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: nodes
 
-      text = row_text(scene, linear, item%row) // " contradicts what is prescribed at " // &
-         nodes_text(scene, (item%dof + 1)/2) // &
+      call row_text(scene, linear, item%row, text)
+      call nodes_text(scene, (item%dof + 1)/2, nodes)
+      text = text // " contradicts what is prescribed at " // nodes // &
          ": the model is over-constrained; take *BOUNDARY off one side"
-   end function contradiction_text
+   end subroutine contradiction_text
 
    !> Which constraint a row is.
-   function row_text(scene, linear, row) result(text)
+   subroutine row_text(scene, linear, row, text)
       type(scene_t), intent(in) :: scene
       type(linear_rows_t), intent(in) :: linear
       integer, intent(in) :: row
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       associate (k => linear%place(row), t => linear%tie(row))
          if (t == 0) then
@@ -101,7 +105,7 @@ contains
                to_text(scene%node_label(scene%tie(t)%rows%slave(k)))
          end if
       end associate
-   end function row_text
+   end subroutine row_text
 
    pure character(len=1) function direction(dof)
       integer, intent(in) :: dof
@@ -109,10 +113,10 @@ contains
       direction = merge("x", "y", mod(dof, 2) == 1)
    end function direction
 
-   function nodes_text(scene, node) result(text)
+   subroutine nodes_text(scene, node, text)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: node(:)
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       type(string_t), allocatable :: label(:)
       integer, allocatable :: distinct(:)
       integer :: i
@@ -124,7 +128,7 @@ contains
       end do
       text = "node" // trim(merge("s", " ", size(distinct) /= 1)) // " " // &
          joined(label, ", ", most_named)
-   end function nodes_text
+   end subroutine nodes_text
 
    !> One note on the rows `row` of one tie, or of the equations.
    subroutine note_redundant(scene, linear, row, notes)
@@ -132,15 +136,17 @@ contains
       type(linear_rows_t), intent(in) :: linear
       integer, intent(in) :: row(:)
       type(notes_t), intent(inout) :: notes
+      character(len=:), allocatable :: text
       integer :: t
 
       t = linear%tie(row(1))
       if (t == 0) then
-         call note_add(notes, row_text(scene, linear, row(1)) // " follows from other " // &
+         call row_text(scene, linear, row(1), text)
+         call note_add(notes, text // " follows from other " // &
             "constraints: left out (such equations: " // to_text(size(row)) // ")")
       else
-         call note_add(notes, "*TIE " // scene%tie(t)%name // ": constraints at slave " // &
-            nodes_text(scene, (linear%own(row) + 1)/2) // &
+         call nodes_text(scene, (linear%own(row) + 1)/2, text)
+         call note_add(notes, "*TIE " // scene%tie(t)%name // ": constraints at slave " // text // &
             " follow from others or from *BOUNDARY: left out")
       end if
    end subroutine note_redundant

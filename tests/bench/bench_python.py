@@ -1,6 +1,7 @@
 """What Python costs: steps, opening, queries, models of arrays, functions of Python.
 
-Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_python.py`.
+Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_python.py`;
+with `--short` a few calls, to see that all of it runs.
 Ratios are medians of pairs that took turns, of CPU seconds; their spread is half the distance of
 the quartiles. Orientation: a loop over `step` within 1.03 of the program, opening within 1.1 of
 the library's own reading and building.
@@ -22,7 +23,8 @@ sys.path[:0] = [str(ROOT/"pywrap"), str(ROOT/"tests")]
 sys.path.append(str(ROOT/"tests"/"bench"))
 
 import numpy as np  # noqa: E402
-from bench_ring import DECKS, END, ENVIRONMENT, block_text, measure, table  # noqa: E402
+from bench_ring import (  # noqa: E402
+    DECKS, END, ENVIRONMENT, IS_SHORT, LENGTH, block_text, measure, overrides, table)  # fmt: skip
 
 RING = DECKS/"ring.inp"
 OUTPUT = ("*NODE FILE", "*EL FILE", "*CONTACT FILE", "*CONTACT PRINT", "*RESTART", "*TIME POINTS")
@@ -34,7 +36,7 @@ def run_steps(deck):
     """CPU seconds of the process so far, of opening, of the loop; page faults of the loop."""
     from emcon.stepper import Stepper
     start = time.process_time()
-    with Stepper(deck) as ring:
+    with Stepper(deck, **LENGTH) as ring:
         opened = time.process_time()
         faults = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
         while not ring.is_done:
@@ -45,7 +47,7 @@ def run_steps(deck):
 
 def in_python(name, *arguments):
     """CPU seconds of a process of Python, and what a function of this file returns in it."""
-    command = [sys.executable, __file__, name, *map(str, arguments)]
+    command = [sys.executable, __file__, name, *map(str, arguments)] + ["--short"]*IS_SHORT
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
     if done.returncode:
@@ -104,7 +106,7 @@ def bench_steps(folder, n=5):
         inner, starts, faults = [], [], []
 
         def program(deck=deck):
-            return measure(deck, "--quiet", "--output", folder/"out")[0]
+            return measure(deck, "--quiet", "--output", folder/"out", *overrides(LENGTH))[0]
 
         def loop(deck=deck, inner=inner, starts=starts, faults=faults):
             cpu, (start, *work, fault) = in_python("run_steps", deck)
@@ -166,9 +168,11 @@ def bench_queries(n=41):
     query, state = _core.emcon_flat_query, _core.emcon_flat_state
     with Stepper(RING) as ring:
         ring.run(1.0)
-        a, x, sizes = ring._handle.address, ring.n_node, (ring.n_node, ring.n_unknown)
+        a, n_node = ring._handle.address, ring.n_node
         u, u1 = ring.u, np.ascontiguousarray(ring.guess(0.01))
         none, flags = np.empty(0), np.empty(0, np.int32)
+
+        mass, tangent_place, gradient, jacobian = 1, 2, 6, 7    # where the library keeps them
 
         def csr(number, size):
             return query.get_csr(a, number, int(size[0]), int(size[2]))
@@ -176,22 +180,22 @@ def bench_queries(n=41):
         def constraints():
             found, _ = query.constraints(a, u.T, u1.T, 0)
             query.get_constraints(a, int(found[0, 0]))
-            csr(3, found[:, 0])
-            csr(4, found[:, 1])
+            csr(gradient, found[:, 0])
+            csr(jacobian, found[:, 1])
 
         def tangent():
             query.evaluate(a, 0.01, u1.T, none, flags, 1)
-            csr(1, query.make_tangent(a, 1)[0])
+            csr(tangent_place, query.make_matrix(a, tangent_place, 1)[0])
 
         def residual():
             query.evaluate(a, 0.01, u1.T, none, flags, 0)
-            query.get_residual(a, 1, *sizes)
+            query.get_residual(a, 1, n_node)
 
         calls = {
-            "u": (lambda: state.get_field(a, 1, x), lambda: ring.u),
+            "u": (lambda: state.get_field(a, 1, n_node), lambda: ring.u),
             "residual": (residual, lambda: ring.residual(u1, 0.01)),
             "tangent": (tangent, lambda: ring.tangent(u1, 0.01)),
-            "mass": (lambda: csr(1, query.make_mass(a)[0]), lambda: ring.mass),
+            "mass": (lambda: csr(mass, query.make_matrix(a, mass, 0)[0]), lambda: ring.mass),
             "constraint": (constraints, lambda: ring.constraint(u0=u, u1=u1)),
             "constraint q": (constraints, lambda: ring.constraint(ring.positions + u,
                                                                   ring.positions + u1)),
@@ -306,13 +310,15 @@ def bench_given(n=24, repeats=21):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        print(json.dumps(globals()[sys.argv[1]](*sys.argv[2:])))
+    words = [word for word in sys.argv[1:] if word != "--short"]
+    if words:
+        print(json.dumps(globals()[words[0]](*words[1:])))
         sys.exit()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    n = {"n": 2} if IS_SHORT else {}
     with tempfile.TemporaryDirectory() as name:
-        bench_steps(pathlib.Path(name))
-        bench_opening()
-        bench_queries()
-        bench_arrays(pathlib.Path(name))
-        bench_given()
+        bench_steps(pathlib.Path(name), **n)
+        bench_opening(**n)
+        bench_queries(**n)
+        bench_arrays(pathlib.Path(name), **({"n": 8, "repeats": 2} if IS_SHORT else {}))
+        bench_given(**({"n": 4, "repeats": 2} if IS_SHORT else {}))

@@ -1,6 +1,7 @@
 """What the ring scene costs on one thread, and what reading and contact search cost at size.
 
-Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_ring.py`.
+Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_ring.py`;
+with `--short` a few increments of small scenes, to see that all of it runs.
 Orientation: 12 s of CPU and 100 MB for the ring at h = 0.01; other codes took 24 to 46 s.
 """
 
@@ -20,6 +21,9 @@ from scene_tools import DECKS, PROGRAM, Deck, Run, number, overrides  # noqa: E4
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 TREATMENTS = ("PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE")
 METHODS = ("NULL SPACE", "SADDLE POINT")
+IS_SHORT = "--short" in sys.argv
+#: Of the runs of the ring.
+LENGTH = {"h": 0.1, "t_end": 0.5} if IS_SHORT else {}
 
 
 # Linux counts the memory of the caller as that of a child at first: a small caller, then.
@@ -65,7 +69,7 @@ def bench_ring(folder):
             out = folder / "ring"
             cpu, _, memory = measure(
                 DECKS / "ring.inp", "--quiet", "--output", out, "--set", f"method={method}",
-                "--set", f"initiation={treatment}",
+                "--set", f"initiation={treatment}", *overrides(LENGTH),
             )  # fmt: skip
             history = Run(out / "ring").history
             total = history["total"]
@@ -77,19 +81,20 @@ def bench_ring(folder):
 
 
 def bench_formulations(folder):
-    print("\nRing scene, formulations of contact; contact: search, gaps, null space")
+    print("\nRing scene, formulations of contact; contact: search, gaps, null space; judge: overlap")
     row = table("formulation                              ", "h", "CPU [s]", "contact [s]",
-                "share [%]", "Newton", "cuts", "MB")  # fmt: skip
+                "share [%]", "judge [%]", "Newton", "cuts", "MB")  # fmt: skip
     for name, choice in FORMULATIONS.items():
-        for h in (0.05, 0.01):
+        for h in (0.05, 0.01)[: 1 if IS_SHORT else 2]:
             out = folder / "ring"
-            parameters = overrides({"h": h, "frame": 1, **choice})
+            parameters = overrides({"h": h, "frame": 1, **choice, **LENGTH})
             cpu, _, memory = measure(DECKS / "ring.inp", "--quiet", "--output", out, *parameters)
             run = Run(out / "ring")
             with h5py.File(run.file(".h5"), "r") as file:
-                contact = float(file["sets/RUN/CONTACT_CPU_SECONDS"][()].item())
+                contact, judge = (float(file[f"sets/RUN/{name}_CPU_SECONDS"][()].item())
+                                  for name in ("CONTACT", "JUDGE"))
             history = run.history
-            row(name.replace("`", ""), h, cpu, contact, 100*contact/cpu,
+            row(name.replace("`", ""), h, cpu, contact, 100*contact/cpu, 100*judge/cpu,
                 int(history["newton"].sum()), int(history["cuts"].sum()), memory)  # fmt: skip
 
 
@@ -127,7 +132,7 @@ U
 def bench_reading(folder):
     print("\nReading and checking a deck of one block (`emcon check`)")
     row = table("nodes", "MB of text", "CPU [s]", "us/node", "MB")
-    for n in (50, 100, 200, 447):
+    for n in (5,) if IS_SHORT else (50, 100, 200, 447):
         text = "*HEADING\nBlock\n" + block_text(n, n, "BLOCK", 1, 1, (0, 0), (1, 1)) + "\n"
         text += END.format(
             sections="*SOLID SECTION, ELSET=BLOCK, MATERIAL=SOFT\n1.", h="0.01", t_end="0.01"
@@ -162,7 +167,7 @@ def bench_search(folder):
     print("\nContact search: two strips of n elements, 20 increments, with and without the pair")
     row = table("slave nodes", "gap", "with [s]", "without [s]", "us/(node increment)")
     for gap in (0.25, 100.0):
-        for n in (1000, 4000, 16000):
+        for n in (20,) if IS_SHORT else (1000, 4000, 16000):
             seconds = []
             for touching in (True, False):
                 deck = contact_deck(n, gap, touching).write(folder / "strips.inp")

@@ -1,6 +1,7 @@
 """What ties cost: 16 tied pieces against one mesh of the same size and against multipliers.
 
-Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_ties.py`.
+Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_ties.py`;
+with `--short` small pieces, to see that all of it runs.
 Orientation: by null space at most 1.15 times the mesh that matches, and not more than the saddle
 point, in time and in memory.
 """
@@ -10,13 +11,13 @@ import statistics
 import subprocess
 import tempfile
 
-from bench_ring import ENVIRONMENT, measure, table
+from bench_ring import ENVIRONMENT, IS_SHORT, measure, table
 from book.tied_grid import DYNAMIC, STATIC, Grid
 from scene_tools import PROGRAM, Run, overrides
 
-#: 2e5 unknowns each.
-PIECES = Grid(m=4, coarse=78, fine=80)
-ONE_MESH = Grid(m=1, coarse=316, fine=316)
+#: 2e5 unknowns each, unless short.
+PIECES = Grid(m=4, coarse=6, fine=8) if IS_SHORT else Grid(m=4, coarse=78, fine=80)
+ONE_MESH = Grid(m=1, coarse=28, fine=28) if IS_SHORT else Grid(m=1, coarse=316, fine=316)
 
 #: What is measured against what. Runs take turns, so that a load from elsewhere hits all alike.
 MATCHING = "matching mesh"
@@ -27,7 +28,7 @@ VARIANTS = {
     "saddle point, DUAL": {"method": "SADDLE POINT", "multiplier": "DUAL"},
     "saddle point, STANDARD": {"method": "SADDLE POINT", "multiplier": "STANDARD"},
 }
-N_TURN = 3
+N_TURN = 1 if IS_SHORT else 3
 #: The slowest one is measured in the first turn only.
 ONCE = "saddle point, STANDARD"
 
@@ -45,7 +46,7 @@ def decks(folder, law, step):
 
 
 def bench_scene(folder, name, law, step, parameters):
-    print(f"\nTies: {name}; 16 pieces of 78 x 78 and 80 x 80 elements, 24 ties, 2e5 unknowns")
+    print(f"\nTies: {name}; 16 pieces of {PIECES.coarse}^2 and {PIECES.fine}^2 elements, 24 ties")
     pieces, one = decks(folder, law, step)
     figures, newton = {variant: [] for variant in VARIANTS}, {}
     for turn in range(N_TURN):

@@ -40,9 +40,9 @@ contains
       integer :: i
 
       allocate(override(max(0, command_argument_count() - 1)))
-      path = argument(1)
+      call argument(1, path)
       do i = 1, size(override)
-         override(i)%text = argument(i + 1)
+         call argument(i + 1, override(i)%text)
       end do
       call stepper_open(stepper, path, override, .false., error)
       do while (.not. allocated(error))
@@ -51,15 +51,15 @@ contains
       end do
    end subroutine run_deck
 
-   function argument(i) result(text)
+   subroutine argument(i, text)
       integer, intent(in) :: i
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       integer :: length
 
       call get_command_argument(i, length=length)
       allocate(character(len=length) :: text)
       if (length > 0) call get_command_argument(i, text)
-   end function argument
+   end subroutine argument
 
    !> The matrix of the last increment.
    subroutine report()

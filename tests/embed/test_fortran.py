@@ -16,7 +16,7 @@ STANDS_FOR = ["emcon_stepper*", "emcon_interface*", "emcon_quantities", "emcon_v
 # For the other rooms of the library, not for programs.
 INNER_MODULES = {"emcon_interface_check", "emcon_interface_stage", "emcon_interface_handle"}
 INNER_NAMES = {"stepper_read_source", "stepper_check_open", "query_sync", "query_check_field",
-               "field_names", "pair_variables"}
+               "query_check_factors", "field_names", "pair_variables"}
 
 
 def statements(path: Path) -> list[str]:

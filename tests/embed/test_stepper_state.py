@@ -299,7 +299,7 @@ def test_restart_file_goes_on_to_the_same_bits(block: Path, tmp_path: Path) -> N
         a.step(0.09375)
         a.run()
         with Stepper.from_restart(tmp_path/"a.rst.h5") as b:
-            assert same(bits(b)[:5], before[:5])
+            assert same(bits(b), before)
             b.step(0.09375)
             b.run()
             assert same(bits(a), bits(b))
@@ -314,7 +314,7 @@ def test_restart_file_of_the_program(tmp_path: Path) -> None:
     assert done.returncode == 3 and "50 increments" in done.stderr
     with Stepper.from_restart(tmp_path/"ring.rst.h5") as ring, Stepper(RING, h=0.015) as alone:
         alone.run(until=0.75)
-        assert same(bits(ring)[:5], bits(alone)[:5])
+        assert same(bits(ring), bits(alone))
         ring.step(0.015)
         alone.step()
         assert ring.active.any() and same(bits(ring), bits(alone))

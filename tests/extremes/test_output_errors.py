@@ -83,7 +83,7 @@ def test_results_go_beside_the_deck(tmp_path):
     done = emcon("my.scene.inp", *SHORT, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert {p.name for p in tmp_path.iterdir()} == {
-        f"my.scene.{suffix}" for suffix in ("inp", "csv", "h5", "log", "vtkhdf", "rst.h5")
+        f"my.scene.{suffix}" for suffix in ("inp", "csv", "h5", "json", "log", "vtkhdf", "rst.h5")
     }
 
 

@@ -10,7 +10,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from scene_tools import DECKS, PROGRAM, Deck, Run, assert_no_crash, emcon, run_deck
+from scene_tools import DECKS, Deck, Run, assert_no_crash, emcon, run_deck, start, wait_for
 
 PARAMETERS = {"h": 0.02, "t_end": 2, "frame": 0.1}
 
@@ -28,21 +28,9 @@ def deck(tmp_path_factory):
 @pytest.fixture(scope="module")
 def whole(deck, tmp_path_factory):
     """The run that nobody disturbed, and the seconds it took."""
-    start = time.monotonic()
+    begin = time.monotonic()
     run = run_deck(deck, tmp_path_factory.mktemp("whole"))
-    return run, time.monotonic() - start
-
-
-def start(*arguments, **options):
-    """Run the program in the background; Ctrl-C reaches it even where this process ignores it."""
-    return subprocess.Popen(
-        [PROGRAM, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-        **options,
-    )
+    return run, time.monotonic() - begin
 
 
 def kill_after(seconds, *arguments):
@@ -55,14 +43,6 @@ def kill_after(seconds, *arguments):
     if process.returncode != -signal.SIGKILL:
         assert_no_crash(process.returncode, out + err)
     return process.returncode
-
-
-def wait_for(path, process, seconds=60):
-    """Until `path` is there; the process must not have ended before."""
-    end = time.monotonic() + seconds
-    while not path.exists():
-        assert process.poll() is None and time.monotonic() < end, f"no {path}"
-        time.sleep(0.002)
 
 
 def assert_files_open(run):
@@ -116,6 +96,7 @@ def contents(path):
 
 def assert_same_results(run, expected):
     assert run.digits() == expected.digits()
+    assert run.verdict == expected.verdict
     for suffix in (".vtkhdf", ".h5"):
         one, other = contents(run.file(suffix)), contents(expected.file(suffix))
         assert one.keys() == other.keys()
@@ -189,7 +170,7 @@ def test_restart_does_not_need_the_deck(deck, whole, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupt_stops_after_the_increment_in_hand(deck, whole, tmp_path, number):
+def test_interrupt_keeps_all_whole_increments(deck, whole, tmp_path, number):
     expected, _ = whole
     run = Run(tmp_path / "ring")
     process = start(deck, "--output", tmp_path)
@@ -312,6 +293,63 @@ def test_broken_restart_file(stopped, whole, damage):
     # The results are as they were.
     assert stopped.digits() == whole[0].digits()
     assert contents(stopped.file(".vtkhdf")).keys() == contents(whole[0].file(".vtkhdf")).keys()
+
+
+@pytest.mark.parametrize("suffix", [".rst.h5", ".h5", ".vtkhdf"])
+def test_one_wrong_byte_anywhere_is_found(stopped, suffix):
+    """Before the HDF5 library reads the file: some damages it never comes back from."""
+    path = stopped.file(suffix)
+    whole = path.read_bytes()
+    chance = random.Random(7)
+    # The seal, the first bytes of the library's, and any others.
+    for place in [3, 10, 512, 520, 560, len(whole) - 1, *chance.choices(range(len(whole)), k=6)]:
+        data = bytearray(whole)
+        data[place] ^= 1 << chance.randrange(8)
+        path.write_bytes(data)
+        done = emcon("restart", stopped.file(".rst.h5"), "--quiet", timeout=30)
+        assert done.returncode == 4, f"byte {place}: {done.stderr}"
+        assert path.name in done.stderr and "damaged" in done.stderr
+        assert path.read_bytes() == data, "the file was changed"
+    for data in (whole[:-1], whole + b"\0", whole[:600]):
+        path.write_bytes(data)
+        done = emcon("restart", stopped.file(".rst.h5"), "--quiet", timeout=30)
+        assert done.returncode == 4 and path.name in done.stderr
+    path.write_bytes(whole)
+    assert emcon("restart", stopped.file(".rst.h5"), "--quiet").returncode == 0
+
+
+def seal_of(rest):
+    """What stands before the bytes `rest` of a file: Fletcher's sums, in the integers of Python."""
+    words = np.frombuffer(rest + b" "*(-len(rest) % 4), "<u4").astype(object)
+    prime = 2**32 - 5
+    first = 1 + np.cumsum(words)
+    seal = f"EMCON\n{len(rest)} {int(first.sum()) % prime:08X}{int(first[-1]) % prime:08X}\n"
+    return seal.ljust(512).encode()
+
+
+@pytest.mark.parametrize("suffix", [".rst.h5", ".h5", ".vtkhdf"])
+def test_the_seal_is_the_sum_of_the_bytes(whole, suffix):
+    data = whole[0].file(suffix).read_bytes()
+    assert data[:512] == seal_of(data[512:])
+
+
+def test_another_build_is_told(stopped):
+    """The file says of itself that it is of another BLAS: a warning, on the screen and in the log."""
+    path = stopped.file(".rst.h5")
+    with h5py.File(path, "a") as file:
+        texts = file["texts/build"][...]
+        kind = file["texts/build"].dtype
+        assert len(texts[4]) > 0, "no BLAS is named"
+        del file["texts/build"]
+        before = texts[4]
+        texts[4] = b"OpenBLAS of another machine"[: kind.itemsize]
+        file.create_dataset("texts/build", data=texts, dtype=kind)
+    rest = path.read_bytes()[512:]
+    path.write_bytes(seal_of(rest) + rest)
+    done = emcon("restart", path, "--quiet")
+    assert done.returncode == 0, done.stderr
+    for text in (done.stderr, stopped.log):
+        assert "another BLAS: 'OpenBLAS of another machine'" in text and before.decode() in text
 
 
 def test_missing_restart_file(tmp_path):

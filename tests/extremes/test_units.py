@@ -25,6 +25,8 @@ DIMENSION = {
     "active": (0, 0, 0),
     "newton": (0, 0, 0),
     "cuts": (0, 0, 0),
+    "penetration": (0, 0, 0),
+    "stand_off": (0, 0, 0),
 }
 
 # Exponents of two of the units of length, mass and time; the thickness is a length too.

@@ -48,9 +48,11 @@ contains
       real(wp), intent(in) :: rel                  !! a named multiple of epsilon, or a known bound
       real(wp), intent(in) :: scale                !! >= 0, the size of what is compared
       character(len=*), intent(in) :: what
+      character(len=:), allocatable :: text
 
       if (is_near(actual, expected, rel, scale)) return
-      call fail(error, what // ": " // numbers(actual, expected, rel, scale))
+      call numbers(actual, expected, rel, scale, text)
+      call fail(error, what // ": " // text)
    end subroutine check_near_0
 
    subroutine check_near_1(error, actual, expected, rel, scale, what)
@@ -58,14 +60,15 @@ contains
       real(wp), intent(in) :: actual(:), expected(:)
       real(wp), intent(in) :: rel, scale
       character(len=*), intent(in) :: what
+      character(len=:), allocatable :: text
       integer :: i
 
       call check_equal_1(error, shape(actual), shape(expected), what // ", extent")
       if (size(actual) /= size(expected)) return
       do i = 1, size(actual)
          if (is_near(actual(i), expected(i), rel, scale)) cycle
-         call fail(error, what // "(" // to_text(i) // "): " &
-            // numbers(actual(i), expected(i), rel, scale))
+         call numbers(actual(i), expected(i), rel, scale, text)
+         call fail(error, what // "(" // to_text(i) // "): " // text)
          return
       end do
    end subroutine check_near_1
@@ -157,32 +160,29 @@ contains
       if (is_near) is_near = abs(actual - expected) <= rel*scale
    end function is_near
 
-   function numbers(actual, expected, rel, scale) result(text)
+   subroutine numbers(actual, expected, rel, scale, text)
       real(wp), intent(in) :: actual, expected, rel, scale
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
-      text = exact(actual) // ", expected " // exact(expected)
+      text = trim(exact(actual)) // ", expected " // trim(exact(expected))
       if (.not. (ieee_is_finite(actual) .and. ieee_is_finite(expected))) return
-      text = text // ", difference " // short(abs(actual - expected)) // " > " // short(rel) &
-         // "*" // short(scale)
-   end function numbers
+      text = text // ", difference " // trim(short(abs(actual - expected))) // " > " &
+         // trim(short(rel)) // "*" // trim(short(scale))
+   end subroutine numbers
 
    function exact(value) result(text)
       real(wp), intent(in) :: value
-      character(len=:), allocatable :: text
-      character(len=48) :: buffer
+      character(len=48) :: text
 
-      write(buffer, "(g0)") value
-      text = trim(buffer)
+      write(text, "(g0)") value
    end function exact
 
    function short(value) result(text)
       real(wp), intent(in) :: value
-      character(len=:), allocatable :: text
-      character(len=48) :: buffer
+      character(len=10) :: text
 
-      write(buffer, "(es10.3)") value
-      text = trim(adjustl(buffer))
+      write(text, "(es10.3)") value
+      text = adjustl(text)
    end function short
 
 end module check

@@ -31,6 +31,7 @@ program main
    use test_interface, only : collect_interface
    use test_joints, only : collect_joints
    use test_lapack, only : collect_lapack
+   use test_judge, only : collect_judge
    use test_law, only : collect_law
    use test_linear_rows, only : collect_linear_rows
    use test_links, only : collect_links
@@ -67,6 +68,7 @@ program main
    use test_ties, only : collect_ties
    use test_triple_product, only : collect_triple_product
    use test_umfpack, only : collect_umfpack
+   use test_verdict, only : collect_verdict
    use test_velocity_update, only : collect_velocity_update
    implicit none
 
@@ -102,6 +104,7 @@ program main
    call run("dgrad_wide", collect_dgrad_wide)
    call run("point_function", collect_point_function)
    call run("shape", collect_shape)
+   call run("judge", collect_judge)
    call run("law", collect_law)
    call run("element", collect_element)
    call run("solid", collect_solid)
@@ -136,6 +139,7 @@ program main
    call run("system", collect_system)
    call run("newton", collect_newton)
    call run("velocity_update", collect_velocity_update)
+   call run("verdict", collect_verdict)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("march", collect_march)

@@ -69,7 +69,7 @@ contains
       if (allocated(error)) return
       call check_true(error, .not. is_singular, "regular")
       call check_true(error, correction%fell_back .eqv. falls_back, "solved as a saddle point")
-      call check_true(error, len(correction_reason(correction)) > 0 .eqv. falls_back, "a reason")
+      call check_true(error, (correction_reason(correction) /= "") .eqv. falls_back, "a reason")
       if (allocated(error)) return
       call correction_reset(saddle, method_saddle_point)
       call correct(saddle, problem, expected, is_singular, error)

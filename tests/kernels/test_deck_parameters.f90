@@ -258,8 +258,10 @@ contains
       call parameter_define(parameters, "h = 0.1", fault)
       call parameter_define(parameters, "twice = 2*h", fault)
       call check_line(error, parameters, "<h>, <twice>", "0.25, 0.5")
-      call check_equal(error, unused_override(parameters, 1), "", "used")
-      call check_true(error, unused_override(parameters, 2) /= "", "not used")
+      call unused_override(parameters, 1, fault)
+      call check_equal(error, fault, "", "used")
+      call unused_override(parameters, 2, fault)
+      call check_true(error, fault /= "", "not used")
       call parameters_init(parameters, [string_t("h")], fault)
       call check_true(error, fault /= "", "no value")
    end subroutine test_overrides

@@ -15,13 +15,13 @@ module test_dgrad
 
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Operations under test; the last one chains most of the others.
-   integer, parameter :: n_operation = 15
+   integer, parameter :: n_operation = 16
    character(len=14), parameter :: name(n_operation) = [character(len=14) :: "a + b", "a + 1", &
       "-a", "a - b", "3 a", "a b", "a/b", "sqrt", "abs", "negative part", "rounded corner", &
-      "log1p", "excess, expm1", "clip", "composite"]
+      "log1p", "excess, expm1", "clip", "rounded clip", "composite"]
 
-   !> Of the rounded corner.
-   real(wp), parameter :: width = 0.25_wp
+   !> Of the rounded corner, and of the rounded clip: some of the places drawn are in its bands.
+   real(wp), parameter :: width = 0.25_wp, clip_width = 0.375_wp
 
 contains
 
@@ -37,6 +37,7 @@ contains
          test_case_t("second derivatives", test_second_derivatives), &
          test_case_t("second derivatives across a change of sign", test_second_across), &
          test_case_t("clip across its bounds", test_clip), &
+         test_case_t("clip with rounded corners across its bounds", test_rounded_clip), &
          test_case_t("root of a polynomial", test_root), &
          test_case_t("second derivatives of a root", test_second_root), &
          test_case_t("constants and zeros", test_constants), &
@@ -81,7 +82,9 @@ contains
       case (13)
          s = dg_excess(a) + 0.5_wp*dg_expm1(b)
       case (14)
-         s = dg_clip(a)
+         s = dg_clip(a, 0.0_wp)
+      case (15)
+         s = dg_clip(a, clip_width)
       case default
          s = dg_log1p(a*b)*dg_sqrt(b + c)/(a + dg_expm1(c)) + dg_excess(c)
       end select
@@ -123,10 +126,23 @@ contains
             f = a - log(1.0_qp + a) + 0.5_qp*(exp(b) - 1.0_qp)
          case (14)
             f = max(0.0_qp, min(1.0_qp, a))
+         case (15)
+            f = bent(a) + (1.0_qp - a) - bent(1.0_qp - a)
          case default
             f = log(1.0_qp + a*b)*sqrt(b + c)/(a + exp(c) - 1.0_qp) + c - log(1.0_qp + c)
          end select
       end associate
+
+   contains
+
+      !> max(a, 0), below the width of the rounded clip the cubic that touches it on both sides.
+      pure real(qp) function bent(a)
+         real(qp), intent(in) :: a
+
+         bent = max(0.0_qp, a)
+         if (bent < clip_width) bent = bent**2*(2.0_qp*clip_width - bent)/real(clip_width, qp)**2
+      end function bent
+
    end function expect
 
    !> Positive data of size 1, and an increment up to `largest` that keeps them so.
@@ -141,7 +157,7 @@ contains
    end subroutine draw
 
    !> What rounding may change of a sum with the terms g_i dx_i; a chained operation has up to
-   !> 20 roundings of a size that its values set. The rounded corner and the clip are
+   !> 20 roundings of a size that its values set. The rounded corner and the clips are
    !> differences in themselves.
    pure real(wp) function scale_of(which, s, dx)
       integer, intent(in) :: which
@@ -149,7 +165,7 @@ contains
       real(wp), intent(in) :: dx(3)
 
       scale_of = sum(abs(s%g*dx))
-      if (which == 11 .or. which == 14) scale_of = abs(dx(1))
+      if (which == 11 .or. which == 14 .or. which == 15) scale_of = abs(dx(1))
    end function scale_of
 
    subroutine test_identity(error)
@@ -208,7 +224,7 @@ contains
    end subroutine test_change_of_sign
 
    !> `df` stays relatively exact and g.dx equal to it down to the smallest numbers. All functions
-   !> rise with each of their increments but those of case 4, 7 and 15, where terms cancel.
+   !> rise with each of their increments but those of case 4, 7 and 16, where terms cancel.
    subroutine test_small_increments(error)
       type(error_t), allocatable, intent(out) :: error
       type(dg_t) :: s
@@ -337,7 +353,7 @@ contains
          do j = 1, 6
             x0 = [at(i), 1.0_wp, 1.0_wp]
             dx = [at(j) - at(i), 0.2_wp, 0.1_wp]
-            s = dg_clip(dg_variable(1, x0(1), dx(1)))
+            s = dg_clip(dg_variable(1, x0(1), dx(1)), 0.0_wp)
             call check_near(error, [s%f0, s%f1], [clipped(i), clipped(j)], 2.0_wp*eps, 1.0_wp, &
                "values")
             call check_near(error, s%df, clipped(j) - clipped(i), 4.0_wp*eps, 2.0_wp, "df")
@@ -351,6 +367,39 @@ contains
          end do
       end do
    end subroutine test_clip
+
+   !> Steps between all places before, in and beyond the bands of a clip with rounded corners; exact
+   !> outside of them, with one tangent at their ends.
+   subroutine test_rounded_clip(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: at(9) = [-0.7_wp, -0.3_wp, 0.1_wp, 0.3_wp, 0.45_wp, 0.7_wp, 0.9_wp, &
+         1.25_wp, 1.9_wp]
+      type(dg_t) :: s
+      real(wp) :: x0(3), dx(3), expected
+      integer :: i, j
+
+      do i = 1, size(at)
+         do j = 1, size(at)
+            x0 = [at(i), 1.0_wp, 1.0_wp]
+            dx = [at(j) - at(i), 0.2_wp, 0.1_wp]
+            s = operate(15, x0, dx)
+            expected = increment_of(expect, 15, x0, dx)
+            call check_near(error, s%df, expected, 4.0_wp*eps, 1.0_wp, "df")
+            call check_near(error, s%f1 - s%f0, expected, 4.0_wp*eps, 1.0_wp, "values")
+            call check_near(error, s%g(1)*dx(1), expected, 4.0_wp*eps, 1.0_wp, "g.dx")
+            call check_near(error, s%c, slopes_of(expect, 15, x0 + dx), 40.0_wp*eps, 1.0_wp, &
+               "gradient")
+            call check_second(error, 15, x0, dx, "rounded clip, " // to_text(at(i)) // " to " &
+               // to_text(at(j)))
+         end do
+      end do
+      s = dg_clip(dg_variable(1, 0.5_wp, 0.1_wp), clip_width)
+      call check_near(error, [s%f0, s%df, s%c(1)], [0.5_wp, 0.1_wp, 1.0_wp], 2.0_wp*eps, 1.0_wp, &
+         "exact between the bands")
+      s = dg_clip(dg_variable(1, 0.0_wp, 1.0_wp), clip_width)
+      call check_near(error, [s%f0, s%f1, s%c(1)], [0.0_wp, 1.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, &
+         "exact at the bounds")
+   end subroutine test_rounded_clip
 
    !> F = x^3 + p a b x - (a^2 + b) with the variables a, b and x as number 3; p > 0 makes it rise.
    pure function cubic(x0, dx) result(f)

@@ -94,10 +94,16 @@ contains
 
    pure function text_of(i, k) result(text)
       integer, intent(in) :: i, k
-      character(len=:), allocatable :: text
+      character(len=text_length(i, k)) :: text
 
       text = ", combination " // to_text(i) // ", place " // to_text(k)
    end function text_of
+
+   pure integer function text_length(i, k)
+      integer, intent(in) :: i, k
+
+      text_length = len(", combination , place ") + len(to_text(i)) + len(to_text(k))
+   end function text_length
 
    ! ---- closed forms ---------------------------------------------------------------------------
 

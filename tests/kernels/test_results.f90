@@ -53,16 +53,16 @@ contains
    end subroutine collect_results
 
    !> A path of our own, without extension, in the folder for temporary files.
-   function scratch(name) result(base)
+   subroutine scratch(name, base)
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: base
+      character(len=:), allocatable, intent(out) :: base
       character(len=1024) :: folder
       integer :: stat
 
       call get_environment_variable("TMPDIR", folder, status=stat)
       if (stat /= 0 .or. folder == "") folder = "/tmp"
       base = trim(folder) // "/emcon_kernels_" // to_text(int(c_getpid())) // "_" // name
-   end function scratch
+   end subroutine scratch
 
    subroutine remove_all(base)
       character(len=*), intent(in) :: base
@@ -99,7 +99,7 @@ contains
       type(string_t) :: deck(2)
       character(len=:), allocatable :: base
 
-      base = scratch("history")
+      call scratch("history", base)
       deck(1)%text = "*HEADING"
       deck(2)%text = " blanks around "
       call history_create(history, base, columns, error)
@@ -118,7 +118,7 @@ contains
       type(error_t), allocatable :: ignored
       character(len=:), allocatable :: base
 
-      base = scratch("resumed")
+      call scratch("resumed", base)
       deck(1)%text = "*HEADING"
       deck(2)%text = " blanks around "
       call history_create(killed, base, columns, error)
@@ -223,7 +223,7 @@ contains
       real(dp), allocatable :: u(:), time(:)
       integer, allocatable :: connectivity(:), offset(:)
 
-      base = scratch("fields")
+      call scratch("fields", base)
       call create_sample(vtk, base, error)
       if (.not. allocated(error)) call write_frames(vtk, 1, 5, error)
       if (.not. allocated(error)) call vtkhdf_close(vtk, error)
@@ -258,7 +258,7 @@ contains
       character(len=:), allocatable :: base
       real(dp), allocatable :: before(:), after(:)
 
-      base = scratch("published")
+      call scratch("published", base)
       call create_sample(old, base, error)
       if (.not. allocated(error)) call write_frames(old, 1, 3, error)
       if (.not. allocated(error)) call vtkhdf_close(old, error)
@@ -286,7 +286,7 @@ contains
       real(wp) :: u(2, 3), u_back(2, 3)
       integer :: numbers(3)
 
-      base = scratch("restart")
+      call scratch("restart", base)
       call random_number(u)
       u(1, 1) = tiny(1.0_wp)
       u(2, 2) = -huge(1.0_wp)
@@ -337,14 +337,14 @@ contains
       type(error_t), allocatable :: raised
       character(len=:), allocatable :: base
 
-      base = scratch("junk")
+      call scratch("junk", base)
       call restart_read(restart, base // ".rst.h5", raised)
       call check_error(error, raised, err_file, "does not exist", "missing file")
       call file_open(file, base // ".rst.h5", "w", raised)
       call file_put(file, repeat("junk", 1000), raised)
       call file_close(file, raised)
       call restart_read(restart, base // ".rst.h5", raised)
-      call check_error(error, raised, err_file, "not an HDF5 file", "junk")
+      call check_error(error, raised, err_file, "has no seal", "junk")
       call create_sample(vtk, base, raised)
       call vtkhdf_close(vtk, raised)
       call restart_read(restart, base // ".vtkhdf", raised)
@@ -358,7 +358,7 @@ contains
       type(error_t), allocatable :: raised
       character(len=:), allocatable :: base
 
-      base = scratch("lock")
+      call scratch("lock", base)
       call log_open(first, base // ".log", .false., error)
       if (allocated(error)) return
       call log_line(first, "a line")
@@ -394,7 +394,7 @@ contains
       type(error_t), allocatable :: raised
       character(len=:), allocatable :: base
 
-      base = scratch("folders")
+      call scratch("folders", base)
       call file_open(file, base // ".junk", "w", error)
       if (allocated(error)) return
       call file_close(file, raised)

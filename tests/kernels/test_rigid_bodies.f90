@@ -108,7 +108,7 @@ contains
       integer :: i, k, n_assembly
 
       sorted = rows
-      call rigid_bodies_find(system, scene, rows, .true., bodies)
+      call rigid_bodies_find(system, scene, scene%x, rows, .true., .true., bodies)
       call find_assemblies(bodies, sorted, assembly, n_assembly, order)
       count_motions = 0
       do i = 1, n_assembly

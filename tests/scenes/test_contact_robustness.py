@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scene_tools import EPSILON, Deck, number, run_deck
+from scene_tools import EPSILON, Deck, number, run_one_sided
 
 MORTAR = {"formulation": "MORTAR"}
 CHOICES = {
@@ -210,7 +210,7 @@ TOUCHING = {
 def test_gap_zero_with_coincident_nodes(tmp_path, name, choice):
     """Pressed together from the start: the upper block is thrown back."""
     scene = TOUCHING[name]
-    run = run_deck(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
     assert_sound(scene, run)
     assert run.history["active"].max() >= 1 and run.history["active"][-1] == 0
     # Bodies that part have exchanged more than half of the momentum; equal rigid ones all of it.
@@ -223,7 +223,7 @@ def test_gap_zero_with_coincident_nodes(tmp_path, name, choice):
 def test_gap_zero_without_pressure(tmp_path, velocity, choice):
     """Bodies that slide along or leave each other feel nothing."""
     scene = two_blocks(LOWER, ((0, 1), (1, 1), (3, 2)), velocity=velocity)
-    run = run_deck(scene.dynamic(0.02, 0.2), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.02, 0.2), tmp_path, **CHOICES[choice])
     assert_sound(scene, run)
     assert (run.history["active"] == 0).all()
     assert np.abs(run.history["strain"]).max() <= 1e-24*run.history["kinetic"][0]
@@ -233,7 +233,7 @@ def test_gap_zero_without_pressure(tmp_path, velocity, choice):
 def test_two_passes_with_coincident_nodes(tmp_path, choice):
     scene = two_blocks(LOWER, ((0, 1.02), (1, 1), (4, 2)), "AA", velocity=(0, -1))
     scene.pair += [pair[::-1] for pair in scene.pair]
-    run = run_deck(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
     assert_sound(scene, run)
     assert momentum_of(run, 0)[-1, 1] < -0.5
 
@@ -264,7 +264,7 @@ CORNERS = {
 @pytest.mark.parametrize("name", CORNERS)
 def test_corners_meet(tmp_path, name, choice):
     scene = CORNERS[name]
-    run = run_deck(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
     assert_sound(scene, run)
     assert run.history["active"].max() >= 1
     assert momentum_of(run, 0)[-1, 1] < 0
@@ -275,7 +275,7 @@ def test_corners_meet(tmp_path, name, choice):
 def test_tips_meet(tmp_path, shift, choice):
     """Tip on tip. Gauss points lie inside the edges: they may all look past a tip."""
     scene = tips(shift)
-    run = run_deck(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.02, 0.6), tmp_path, **CHOICES[choice])
     assert_sound(scene, run)
     assert run.history["active"].max() >= 1
     assert momentum_of(run, 0)[-1, 1] < 0
@@ -296,7 +296,7 @@ def test_no_tunnelling(tmp_path, gap, choice, initiation):
     """
     scene = two_blocks(TARGET, ((-0.6, gap), (1, 1), (4, 4)), "AT", velocity=(0, -12.5),
                        stiffness=2000.0)
-    run = run_deck(scene.dynamic(0.1, 0.5), tmp_path, initiation=initiation, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.1, 0.5), tmp_path, initiation=initiation, **CHOICES[choice])
     assert_sound(scene, run, initiation, deepest=1.0)
     assert momentum_of(run, 0)[-1, 1] < 0
 
@@ -307,7 +307,7 @@ def test_no_flight_through_a_body(tmp_path, swap, choice):
     """One step would carry the block from above to below the other."""
     scene = two_blocks(((-2, -1), (4, 1), (8, 2)), ((-0.6, 1), (1, 1), (4, 4)), "AA", swap,
                        velocity=(0, -10), stiffness=500.0)
-    run = run_deck(scene.dynamic(0.5, 1.0), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.5, 1.0), tmp_path, **CHOICES[choice])
     assert_sound(scene, run, deepest=1.0)
     assert run.history["cuts"][1:].sum() > 0
     assert momentum_of(run, 0)[-1, 1] < 0
@@ -325,7 +325,7 @@ def test_sandwich(tmp_path, gap, cells, choice):
     scene.add("PLATE", (0, 1 + gap), (1, 0.5), (cells[1], 2))
     scene.add("UP", (0, 1.5 + 2*gap), (1, 1), (cells[2], 2), velocity=(0, -1))
     scene.pair = [("PLATE_B", "LOW_T"), ("PLATE_T", "UP_B")]
-    run = run_deck(scene.dynamic(0.02, 0.5), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.02, 0.5), tmp_path, **CHOICES[choice])
     assert_sound(scene, run)
     assert momentum_of(run, 0)[-1, 1] < 0 < momentum_of(run, 2)[-1, 1]
 
@@ -336,7 +336,7 @@ def test_one_node_in_two_pairs(tmp_path, choice):
     scene = Scene().add("FLOOR", (0, -1), (3, 1), (6, 2)).add("WALL", (-1, 0), (1, 2), (2, 4))
     scene.add("BLOCK", (0.05, 0.05), (1, 1), (3, 3), velocity=(-1, -1))
     scene.pair = [("BLOCK_A", "FLOOR_A"), ("BLOCK_A", "WALL_A")]
-    run = run_deck(scene.dynamic(0.02, 0.5), tmp_path, **CHOICES[choice])
+    run = run_one_sided(scene.dynamic(0.02, 0.5), tmp_path, **CHOICES[choice])
     assert_sound(scene, run)
     assert (momentum_of(run, 2)[-1] > momentum_of(run, 2)[0]).all()
 
@@ -358,7 +358,7 @@ def test_sides_that_do_not_touch_change_nothing(tmp_path, choice):
     for side in ("BT", "AA"):
         scene = pressed(side)
         deck = scene.static(0.25, HELD, "UP_T, 1, 1", "UP_T, 2, 2, -0.1")
-        run = run_deck(deck, tmp_path/side, **CHOICES[choice])
+        run = run_one_sided(deck, tmp_path/side, **CHOICES[choice])
         force.append(run.fields()["contact_force"][-1])
     # To what Newton's method leaves, 1e-12 of the forces before they cancel.
     assert np.abs(force[0]).max() > 1
@@ -370,7 +370,7 @@ def test_sides_that_do_not_touch_change_nothing(tmp_path, choice):
 def test_nearly_coincident_nodes_and_ends(tmp_path, shift, choice):
     """Edges covered to 1e-3 and 1e-5, or but for as much; points that pass nodes: it converges."""
     deck = pressed("BT", shift=shift).static(0.25, HELD, "UP_T, 1, 1", "UP_T, 2, 2, -0.1")
-    fields = run_deck(deck, tmp_path, **CHOICES[choice]).fields()
+    fields = run_one_sided(deck, tmp_path, **CHOICES[choice]).fields()
     force = fields["contact_force"][-1]
     assert np.abs(force.sum(axis=0)).max() <= 256*EPSILON*np.abs(force).max()
     # No multiplier stands out because its surface is small: no node carries more than what would
@@ -396,7 +396,7 @@ def test_turned_as_a_whole(tmp_path, choice):
             cards += [(f"*AMPLITUDE, NAME=A{k}_{axis}\n{table}",
                        f"*BOUNDARY, AMPLITUDE=A{k}_{axis}\n{k}, {axis}, {axis}, 1.")]
     scene.cards += [amplitude for amplitude, _ in cards]
-    run = run_deck(scene.static(1/9, *(boundary for _, boundary in cards)), tmp_path,
+    run = run_one_sided(scene.static(1/9, *(boundary for _, boundary in cards)), tmp_path,
                    **CHOICES[choice])
     fields = run.fields()
     assert len(fields.time) == 10

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from scene_tools import DECKS, EPSILON, Deck, figures, run_deck
+from scene_tools import DECKS, EPSILON, Deck, figures, run_deck, run_one_sided
 
 #: Names of what a step can choose; the rest of a choice is what the decks say.
 CHOICES = {
@@ -190,7 +190,7 @@ def assert_conserved(run, deck, tolerance=1e-11):
 def test_free_bodies_conserve(tmp_path, scene, choice):
     deck = DECKS / f"{scene}.inp"
     t_end, h = FREE[scene]
-    run = run_deck(deck, tmp_path, h=h, t_end=t_end, frame=t_end/20, **CHOICES[choice])
+    run = run_one_sided(deck, tmp_path, h=h, t_end=t_end, frame=t_end/20, **CHOICES[choice])
     assert_conserved(run, deck)
     assert run.history["active"].max() >= 2
     assert np.nanmin(run.fields()["contact_gap"]) >= -1e-12
@@ -200,7 +200,7 @@ def test_free_bodies_conserve(tmp_path, scene, choice):
 @pytest.mark.parametrize("scene", ["two_bodies", "three_bodies"])
 def test_bodies_meet_and_part(tmp_path, scene, choice):
     t_end, h = FREE[scene]
-    run = run_deck(DECKS / f"{scene}.inp", tmp_path, h=h, t_end=t_end, **CHOICES[choice])
+    run = run_one_sided(DECKS / f"{scene}.inp", tmp_path, h=h, t_end=t_end, **CHOICES[choice])
     active = run.history["active"]
     assert active[0] == 0 and active.max() > 0 and active[-1] == 0
     # Each body has been turned round or set going.
@@ -225,7 +225,7 @@ def test_momenta_of_the_headings(tmp_path):
         r"px is (\S+) of the left, (\S+) of the middle and (\S+) of the right disc, "
         r"all \+- (\S+) over",
     )
-    run = run_deck(DECKS / "three_bodies.inp", tmp_path, t_end=0.8)
+    run = run_one_sided(DECKS / "three_bodies.inp", tmp_path, t_end=0.8)
     momentum = run.series("BODIES", "MOMENTUM")[1][-1, :, 0]
     np.testing.assert_allclose(momentum, px, rtol=0, atol=spread)
 
@@ -236,7 +236,7 @@ def test_two_passes(tmp_path, choice, method):
     """Each pair in both orders: constraints that depend on each other."""
     deck = made("three_bodies", tmp_path, "--two-pass")
     t_end, h = FREE["three_bodies"]
-    run = run_deck(deck, tmp_path, h=h, t_end=t_end, method=method, **CHOICES[choice])
+    run = run_one_sided(deck, tmp_path, h=h, t_end=t_end, method=method, **CHOICES[choice])
     assert_conserved(run, deck)
     assert run.history["active"].max() >= 2
 
@@ -249,7 +249,7 @@ def test_folded_strip_does_not_pass_through_itself(tmp_path, choice):
     side by a fraction of an element, a quarter here.
     """
     deck = DECKS / "self_contact.inp"
-    run = run_deck(deck, tmp_path, t_end=0.8, frame=0.02, **CHOICES[choice])
+    run = run_one_sided(deck, tmp_path, t_end=0.8, frame=0.02, **CHOICES[choice])
     fields = run.fields()
     x = fields.x
     legs = [np.flatnonzero((x[:, 0] > 0) & (sign*x[:, 1] > 0)) for sign in (1, -1)]

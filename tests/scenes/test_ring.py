@@ -70,10 +70,14 @@ def test_no_root_is_said_only_where_energy_is_lost(ring, h):
 
 @ALL
 def test_nothing_penetrates(ring, initiation, h):
-    """Gaps are per master edge, of length 1 here: in all frames, and in every increment."""
+    """Gaps of slave nodes are per master edge, of length 1 here; overlap is looked for both ways.
+
+    Where gaps close exactly, master nodes go in between slave nodes: contact has one side.
+    """
     run = ring(initiation, h)
     assert np.nanmin(run.fields()["contact_gap"]) >= -1e-12
-    assert run.closing(r"deepest penetration (\S+) of an element") <= 1e-12
+    limit = 1e-12 if initiation == "PERSISTENT" else 1e-3
+    assert run.closing(r"deepest penetration (\S+) of an element") <= limit
 
 
 @ALL

@@ -4,4 +4,5 @@ import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT / part) for part in ("tests", "tests/extremes", "input_decks")]
+PARTS = ("tests", "tests/scenes", "tests/extremes", "input_decks")
+sys.path[:0] = [str(ROOT / part) for part in PARTS]

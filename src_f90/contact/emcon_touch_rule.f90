@@ -1,0 +1,77 @@
+!> Which edges of a surface in contact with itself a constraint of one of its nodes looks at.
+!>
+!> With one side, the first along the surface of two that meet is the slave, and each node has one
+!> constraint. With both sides every node is held, also on bodies that the surface runs over; as it
+!> may touch several of them at once, it has a constraint for each class of bodies.
+!> Source: docs/theory.md, section 4.
+module emcon_touch_rule
+   use emcon_bodies, only : bodies_find
+   use emcon_chain, only : chain_t
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t
+   use emcon_self_contact, only : self_contact_may_touch
+   implicit none
+   private
+   public :: touch_rule_t, touch_rule_init, touch_rule_sees, touch_rule_allows
+
+   !> Classes of bodies at most, and with them constraints of a node.
+   integer, parameter :: most_classes = 4
+
+   type :: touch_rule_t
+      logical :: both_sides = .false.
+      integer :: n_class = 1
+      integer, allocatable :: body(:)            !! (n_edge) only with both sides
+   end type touch_rule_t
+
+contains
+
+   !> The rule for a chain, whose bodies fall into classes in turn.
+   pure subroutine touch_rule_init(self, chain, scene, both_sides)
+      type(touch_rule_t), intent(out) :: self
+      type(chain_t), intent(in) :: chain
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: both_sides
+      integer, allocatable :: body(:)
+      integer :: n_body
+
+      self%both_sides = both_sides
+      if (.not. both_sides) return
+      call bodies_find(scene%element_node, size(scene%x, 2), body, n_body)
+      self%body = body(chain%edge(1, :))
+      if (any(self%body == 0)) then                    ! a surface of edges without elements
+         self%body = chain%part
+         n_body = size(chain%is_closed)
+      end if
+      self%n_class = max(1, min(n_body, most_classes))
+   end subroutine touch_rule_init
+
+   !> Does a constraint of class `class` look at edge `e`?
+   pure logical function touch_rule_sees(self, class, e) result(sees)
+      type(touch_rule_t), intent(in) :: self
+      integer, intent(in) :: class, e
+
+      sees = .true.
+      if (self%n_class > 1) sees = 1 + mod(self%body(e) - 1, self%n_class) == class
+   end function touch_rule_sees
+
+   !> May node `k` of the chain touch edge `e` at x + u? On another body any edge that is the
+   !> nearest one; on its own never that of another closed boundary: the body lies between them.
+   pure logical function touch_rule_allows(self, chain, k, e, x, u) result(allows)
+      type(touch_rule_t), intent(in) :: self
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: k, e
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
+      integer :: own
+
+      if (self%both_sides) then
+         own = maxval(chain%node_edge(:, k))
+         allows = self%body(own) /= self%body(e)
+         if (allows) return
+         associate (p => chain%part(own), q => chain%part(e))
+            if (p /= q .and. chain%is_closed(p) .and. chain%is_closed(q)) return
+         end associate
+      end if
+      allows = self_contact_may_touch(chain, k, e, self%both_sides, x, u)
+   end function touch_rule_allows
+
+end module emcon_touch_rule

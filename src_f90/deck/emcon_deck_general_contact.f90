@@ -1,0 +1,253 @@
+!> *CONTACT, *CONTACT INCLUSIONS and *CONTACT PROPERTY ASSIGNMENT: all with all.
+!>
+!> What is included becomes pairs with both sides held: a surface with itself, on one body or on
+!> many, or with another one. All exterior is one surface, of every free face that is not tied.
+module emcon_deck_general_contact
+   use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
+      next_line
+   use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
+   use emcon_deck_surfaces, only : find_surface, surface_names
+   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_element_kinds, only : element_kinds
+   use emcon_scene, only : contact_pair_t, formulation_nts, scene_t, surface_t, where_text
+   implicit none
+   private
+   public :: read_general_contact
+
+   character(len=*), parameter :: exterior_name = "ALL_EXTERIOR"
+
+contains
+
+   !> Everything below *CONTACT.
+   subroutine read_general_contact(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      integer :: i, i_contact, n
+
+      i_contact = 0
+      n = 0
+      do i = 1, size(reader%card)
+         associate (card => reader%card(i))
+            select case (card%name)
+            case ("CONTACT")
+               if (i_contact == 0) i_contact = i
+            case ("CONTACTINCLUSIONS", "CONTACTPROPERTYASSIGNMENT")
+               if (i_contact == 0) call card_error(reader, card, "there is no *CONTACT before")
+               if (card%name == "CONTACTPROPERTYASSIGNMENT") then
+                  call check_properties(reader, card, scene)
+               else
+                  n = n + 1
+                  call read_inclusions(reader, card, scene)
+               end if
+            end select
+         end associate
+      end do
+      if (i_contact > 0 .and. n == 0) call card_error(reader, reader%card(i_contact), "nothing " &
+         // "is included; say what by *CONTACT INCLUSIONS, ALL EXTERIOR or by its data lines")
+   end subroutine read_general_contact
+
+   !> ALL EXTERIOR, or one line for each surface with itself or with another one. A blank name means
+   !> all exterior.
+   subroutine read_inclusions(reader, card, scene)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(inout) :: scene
+      type(data_t) :: data
+      integer :: side, surface(2), n
+      logical :: is_ok
+
+      if (has_option(card, "ALLEXTERIOR")) call include_exterior(reader, card, scene)
+      n = 0
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         n = n + 1
+         if (has_option(card, "ALLEXTERIOR")) then
+            call data_error(reader, data, "ALL EXTERIOR includes every surface already")
+            return
+         end if
+         call check_count(reader, data, 0, 2, "surface, surface")
+         is_ok = data%ok
+         if (is_blank(data, 1) .and. is_blank(data, 2) .and. is_ok) then
+            call include_exterior(reader, card, scene)
+            cycle
+         end if
+         do side = 1, 2
+            call get_surface(reader, data, scene, side, surface(side))
+            if (surface(side) == 0 .and. side == 2 .and. is_blank(data, 2)) surface(2) = surface(1)
+            is_ok = is_ok .and. surface(side) > 0
+         end do
+         if (is_ok) call include_pair(reader, data, scene, surface)
+      end do
+      if (n == 0 .and. .not. has_option(card, "ALLEXTERIOR")) call card_error(reader, card, &
+         "no surface is given; name them, or use ALL EXTERIOR")
+   end subroutine read_inclusions
+
+   !> Number of the surface of faces or edges in field `side`; 0: blank or wrong.
+   subroutine get_surface(reader, data, scene, side, surface)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: side
+      integer, intent(out) :: surface
+      character(len=:), allocatable :: name
+
+      surface = 0
+      if (side == 2 .and. is_blank(data, side)) return
+      data%ok = .true.
+      call get_name(reader, data, side, "surface", name)
+      if (.not. data%ok) return
+      surface = find_surface(scene%surface, name)
+      if (surface == 0) then
+         if (.not. reader%doubt_names) call data_error(reader, data, "unknown surface " &
+            // quoted(name) // suggestion(name, surface_names(scene%surface)))
+      else if (scene%surface(surface)%is_nodal) then
+         call data_error(reader, data, "the surface " // quoted(name) // " has TYPE=NODE, but " &
+            // "its edges are needed too; define it by element faces (*SURFACE, TYPE=ELEMENT)")
+         surface = 0
+      end if
+   end subroutine get_surface
+
+   !> Contact between two surfaces, or of one with itself; each once.
+   subroutine include_pair(reader, data, scene, surface)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(inout) :: scene
+      integer, intent(in) :: surface(2)
+      integer :: i
+
+      do i = 1, size(scene%pair)
+         associate (pair => scene%pair(i))
+            if (.not. (all([pair%slave, pair%master] == surface) .or. &
+               all([pair%master, pair%slave] == surface))) cycle
+            call data_error(reader, data, "contact between " // scene%surface(surface(1))%name &
+               // " and " // scene%surface(surface(2))%name // " is given twice; first at " &
+               // where_text(scene, pair%origin))
+            return
+         end associate
+      end do
+      call append_pair(scene, data%card, surface(1), surface(2), is_reverse=.false.)
+      if (surface(1) /= surface(2)) call append_pair(scene, data%card, surface(2), surface(1), &
+         is_reverse=.true.)
+   end subroutine include_pair
+
+   subroutine append_pair(scene, card, slave, master, is_reverse)
+      type(scene_t), intent(inout) :: scene
+      type(card_t), intent(in) :: card
+      integer, intent(in) :: slave, master
+      logical, intent(in) :: is_reverse
+      type(contact_pair_t) :: pair
+
+      pair%origin = card%origin
+      pair%slave = slave
+      pair%master = master
+      pair%formulation = formulation_nts
+      pair%both_sides = .true.
+      pair%is_reverse = is_reverse
+      scene%pair = [scene%pair, pair]
+   end subroutine append_pair
+
+   !> Every free face that is not tied, in contact with every other.
+   subroutine include_exterior(reader, card, scene)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(inout) :: scene
+      type(surface_t) :: surface
+
+      if (reader%doubt_elements .or. reader%doubt_names) return
+      if (size(scene%pair) > 0) then
+         call card_error(reader, card, "ALL EXTERIOR includes every surface, but there is " &
+            // "contact already at " // where_text(scene, scene%pair(1)%origin) // "; take it out")
+         return
+      end if
+      if (find_surface(scene%surface, exterior_name) > 0) then
+         call card_error(reader, card, "ALL EXTERIOR defines a surface " // exterior_name &
+            // "; give yours another name")
+         return
+      end if
+      call find_exterior(scene, surface)
+      surface%name = exterior_name
+      surface%origin = card%origin
+      if (size(surface%element) == 0) then
+         call card_error(reader, card, "there is no free face")
+         return
+      end if
+      scene%surface = [scene%surface, surface]
+      call append_pair(scene, card, size(scene%surface), size(scene%surface), is_reverse=.false.)
+   end subroutine include_exterior
+
+   !> The free faces of all elements that are on no surface of a tie.
+   subroutine find_exterior(scene, surface)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(out) :: surface
+      type(adjacency_t) :: adjacency
+      logical, allocatable :: is_in(:, :)        ! (face, element)
+      integer :: e, f, i
+
+      call adjacency_init(adjacency, scene)
+      allocate(is_in(maxval(element_kinds%n_face), size(scene%element_label)), source=.false.)
+      do e = 1, size(is_in, 2)
+         if (scene%element_node(1, e) == 0) cycle
+         do f = 1, element_kinds(scene%element_kind(e))%n_face
+            is_in(f, e) = n_neighbours(scene, adjacency, e, f) == 0
+         end do
+      end do
+      do i = 1, size(scene%tie)
+         call leave_out(scene%tie(i)%slave)
+         call leave_out(scene%tie(i)%master)
+      end do
+      associate (all => [(i, i = 0, size(is_in) - 1)], n => size(is_in, 1))
+         surface%element = 1 + pack(all, reshape(is_in, [size(is_in)]))/n
+         surface%face = 1 + mod(pack(all, reshape(is_in, [size(is_in)])), n)
+      end associate
+      allocate(surface%node(0))
+
+   contains
+
+      subroutine leave_out(tied)
+         integer, intent(in) :: tied              !! surface; 0: it was wrong
+         integer :: k
+
+         if (tied == 0) return
+         if (.not. allocated(scene%surface(tied)%element)) return
+         do k = 1, size(scene%surface(tied)%element)
+            is_in(scene%surface(tied)%face(k), scene%surface(tied)%element(k)) = .false.
+         end do
+      end subroutine leave_out
+
+   end subroutine find_exterior
+
+   !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions
+   !> mean the same, hard contact without friction.
+   subroutine check_properties(reader, card, scene)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(data_t) :: data
+      character(len=:), allocatable :: name
+      integer :: i, side
+      logical :: is_known
+
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, 3, 3, "surface, surface, surface interaction")
+         if (.not. data%ok) cycle
+         do side = 1, 2
+            if (is_blank(data, side)) cycle
+            call get_name(reader, data, side, "surface", name)
+            if (.not. data%ok .or. reader%doubt_names .or. name == "GLOBAL") cycle
+            if (find_surface(scene%surface, name) == 0) call data_error(reader, data, &
+               "unknown surface " // quoted(name) // suggestion(name, surface_names(scene%surface)))
+         end do
+         call get_name(reader, data, 3, "surface interaction", name)
+         if (.not. data%ok) cycle
+         is_known = reader%doubt_names
+         do i = 1, size(reader%interaction)
+            is_known = is_known .or. reader%interaction(i)%text == name
+         end do
+         if (.not. is_known) call data_error(reader, data, "unknown surface interaction " &
+            // quoted(name) // suggestion(name, reader%interaction))
+      end do
+   end subroutine check_properties
+
+end module emcon_deck_general_contact

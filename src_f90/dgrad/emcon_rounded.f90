@@ -1,0 +1,91 @@
+!> max(a, 0) and the bounds 0 and 1 with their corners rounded on the inner side, by cubics.
+!>
+!> 0 and 1 are exact outside, so is a from the end of the band on; there is one tangent everywhere.
+!> Source: docs/theory.md, section 2, rounded corners.
+module emcon_rounded
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: rounded_part, rounded_part_slope, rounded_chord, rounded_clip, rounded_clip_slope
+
+contains
+
+   !> max(a, 0); with t = a/width, width (2 t^2 - t^3) where 0 < t < 1.
+   elemental real(wp) function rounded_part(a, width)
+      real(wp), intent(in) :: a, width
+
+      rounded_part = max(0.0_wp, a)
+      if (rounded_part < width) rounded_part = a*max(0.0_wp, (a/width)*(2.0_wp - a/width))
+   end function rounded_part
+
+   !> Slope of `rounded_part`, width > 0.
+   elemental real(wp) function rounded_part_slope(a, width)
+      real(wp), intent(in) :: a, width
+
+      associate (t => max(0.0_wp, min(1.0_wp, a/width)))
+         rounded_part_slope = t*(4.0_wp - 3.0_wp*t)
+      end associate
+   end function rounded_part_slope
+
+   !> Divided difference of `rounded_part` from `a0` to `a1` and its derivative by a1, width > 0:
+   !> the mean of the slope over the way, and that of the curvature times the part of the way.
+   pure subroutine rounded_chord(a0, a1, width, slope, rate)
+      real(wp), intent(in) :: a0, a1, width
+      real(wp), intent(out) :: slope, rate
+      real(wp) :: total, low, high, first, last, within
+
+      total = abs(a1 - a0)
+      if (.not. total > 0.0_wp) then
+         slope = rounded_part_slope(a1, width)
+         rate = 0.0_wp
+         if (a1 > 0.0_wp .and. a1 < width) rate = 0.5_wp*curvature(a1)
+         return
+      end if
+      low = min(a0, a1)
+      high = max(a0, a1)
+      first = max(low, 0.0_wp)
+      last = min(high, width)
+      within = max(0.0_wp, last - first)/total
+      associate (s => first/width, t => last/width)
+         slope = max(0.0_wp, high - max(low, width))/total &
+            + within*(2.0_wp*(s + t) - (s*s + s*t + t*t))
+      end associate
+      associate (middle => 0.5_wp*(first + last))
+         rate = within*(moment(first) + 4.0_wp*moment(middle) + moment(last))/6.0_wp
+      end associate
+
+   contains
+
+      pure real(wp) function curvature(a)
+         real(wp), intent(in) :: a
+
+         curvature = (4.0_wp - 6.0_wp*(a/width))/width
+      end function curvature
+
+      pure real(wp) function moment(a)
+         real(wp), intent(in) :: a
+
+         moment = curvature(a)*(abs(a - a0)/total)
+      end function moment
+
+   end subroutine rounded_chord
+
+   !> `a` held within 0..1, both corners rounded; width < 1/2.
+   elemental real(wp) function rounded_clip(a, width)
+      real(wp), intent(in) :: a, width
+
+      if (a < 0.5_wp) then
+         rounded_clip = rounded_part(a, width)
+      else
+         rounded_clip = 1.0_wp - rounded_part(1.0_wp - a, width)
+      end if
+   end function rounded_clip
+
+   !> Slope of `rounded_clip`, width > 0.
+   elemental real(wp) function rounded_clip_slope(a, width)
+      real(wp), intent(in) :: a, width
+
+      rounded_clip_slope = rounded_part_slope(min(a, 1.0_wp - a), width)
+   end function rounded_clip_slope
+
+end module emcon_rounded

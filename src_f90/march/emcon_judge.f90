@@ -1,0 +1,292 @@
+!> The judge: after each step, is a body inside another, whatever the constraints say?
+!>
+!> All pieces that contact pairs name are looked at both ways: nodes of either against the outline
+!> of the other, and edges against edges, also of a piece against itself; at the end of the step
+!> and, where it moves by much, on the straight way there. While boxes are apart nothing is done.
+!> Source: docs/theory.md, section 4.11.
+module emcon_judge
+   use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
+   use emcon_kinds, only : wp
+   use emcon_outline, only : outline_init, outline_t
+   use emcon_overlap, only : crossing_find, length_of, nearest_depth, nearest_t, &
+      nearest_update
+   use emcon_scene, only : scene_t
+   implicit none
+   private
+   public :: judge_t, overlap_t, judge_init, judge_step
+
+   !> Between two looks pieces move against each other by less than this part of the shortest edge:
+   !> what is as thin as that edge is seen on the way through.
+   real(wp), parameter :: look_motion = 0.5_wp
+   !> Looks at one step at most.
+   integer, parameter :: most_looks = 64
+   !> On the way, overlap below this fraction of an edge is the straight way past a corner.
+   real(wp), parameter :: passing = 0.1_wp
+
+   !> The deepest overlap that was found.
+   type :: overlap_t
+      real(wp) :: depth = 0.0_wp                 !! per length of the edge; 0: none
+      integer :: node = 0                        !! that is behind
+      integer :: edge(2) = 0                     !! the nodes of the edge that it is behind
+   end type overlap_t
+
+   !> Where a piece is in a step.
+   type :: extent_t
+      real(wp) :: low(2) = 0.0_wp, high(2) = 0.0_wp              !! box over the step [L]
+      real(wp) :: least(2) = 0.0_wp, most(2) = 0.0_wp            !! of the motions of its nodes [L]
+      real(wp) :: shortest = 0.0_wp, longest = 0.0_wp            !! edge [L]
+   end type extent_t
+
+   type :: judge_t
+      type(outline_t) :: outline
+      type(extent_t), allocatable :: extent(:)   !! (n_piece) of the step
+      real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement at a look [L]
+      real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges at a look [L]
+      integer, allocatable :: near(:), found(:)  !! work space for lists of edges
+   end type judge_t
+
+contains
+
+   !> Set up for the contact pairs of `scene`.
+   subroutine judge_init(self, scene)
+      type(judge_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      integer :: n
+
+      call outline_init(self%outline, scene)
+      n = size(self%outline%edge, 2)
+      allocate(self%extent(self%outline%n_piece), self%near(n), self%found(n))
+      allocate(self%low(2, n), self%high(2, n), source=0.0_wp)
+      allocate(self%u(2, size(scene%x, 2)), source=0.0_wp)
+   end subroutine judge_init
+
+   !> The deepest overlap in the step from `u0` by `du`.
+   subroutine judge_step(self, x, u0, du, overlap)
+      type(judge_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (2, n_node) [L]
+      type(overlap_t), intent(out) :: overlap
+      type(overlap_t) :: here
+      integer :: p, q, k, n_look
+
+      do p = 1, self%outline%n_piece
+         call measure(self, p, x, u0, du)
+      end do
+      do p = 1, self%outline%n_piece
+         do q = p, self%outline%n_piece
+            if (.not. self%outline%meets(p, q)) cycle
+            if (is_apart(self%extent(p), self%extent(q))) cycle
+            n_look = count_looks(self%extent(p), self%extent(q))
+            do k = 1, n_look
+               call look(self, p, q, x, u0, du, real(k, wp)/real(n_look, wp), here)
+               if (k < n_look .and. here%depth < passing) cycle
+               if (here%depth > overlap%depth) overlap = here
+            end do
+         end do
+      end do
+   end subroutine judge_step
+
+   !> Box, motion and edges of piece `p` over the step.
+   pure subroutine measure(self, p, x, u0, du)
+      type(judge_t), intent(inout) :: self
+      integer, intent(in) :: p
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp) :: here(2), length, way(2)
+      integer :: e, k
+
+      associate (extent => self%extent(p), edge => self%outline%edge)
+         extent%low = huge(1.0_wp)
+         extent%high = -huge(1.0_wp)
+         extent%least = huge(1.0_wp)
+         extent%most = -huge(1.0_wp)
+         extent%shortest = huge(1.0_wp)
+         extent%longest = 0.0_wp
+         do e = self%outline%start(p), self%outline%start(p + 1) - 1
+            do k = 1, 2
+               associate (move => du(:, edge(k, e)))
+                  here = x(:, edge(k, e)) + u0(:, edge(k, e))
+                  extent%low = min(extent%low, here, here + move)
+                  extent%high = max(extent%high, here, here + move)
+                  extent%least = min(extent%least, move)
+                  extent%most = max(extent%most, move)
+               end associate
+            end do
+            way = between(x, u0, edge(1, e), edge(2, e))
+            length = dot_product(way, way)
+            extent%shortest = min(extent%shortest, length)
+            extent%longest = max(extent%longest, length)
+         end do
+         extent%shortest = sqrt(extent%shortest)
+         extent%longest = sqrt(extent%longest)
+      end associate
+   end subroutine measure
+
+   !> The way from node `i` to node `j` at x + u, differences first.
+   pure function between(x, u, i, j) result(way)
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      integer, intent(in) :: i, j
+      real(wp) :: way(2)
+
+      way = (x(:, j) - x(:, i)) + (u(:, j) - u(:, i))
+   end function between
+
+   pure logical function is_apart(one, other)
+      type(extent_t), intent(in) :: one, other
+
+      is_apart = any(one%low > other%high) .or. any(other%low > one%high)
+   end function is_apart
+
+   !> Looks at the step for two pieces, so that they move by little in between.
+   pure integer function count_looks(one, other) result(n)
+      type(extent_t), intent(in) :: one, other
+      real(wp) :: motion
+
+      n = 1
+      motion = length_of(max(one%most - other%least, other%most - one%least))
+      if (motion > look_motion*min(one%shortest, other%shortest)) n = max(1, ceiling(min( &
+         real(most_looks, wp), motion/(look_motion*min(one%shortest, other%shortest)))))
+   end function count_looks
+
+   !> The deepest overlap of pieces `p` and `q`, or of one with itself, at x + u0 + share du.
+   subroutine look(self, p, q, x, u0, du, share, overlap)
+      type(judge_t), intent(inout) :: self
+      integer, intent(in) :: p, q
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: share
+      type(overlap_t), intent(out) :: overlap
+
+      call place_edges(self, p, x, u0, du, share)
+      if (q /= p) call place_edges(self, q, x, u0, du, share)
+      call look_one_way(self, p, q, x, .true., overlap)
+      if (q /= p) call look_one_way(self, q, p, x, .false., overlap)
+   end subroutine look
+
+   !> Displacements of the nodes of piece `p`, and the boxes of its edges.
+   pure subroutine place_edges(self, p, x, u0, du, share)
+      type(judge_t), intent(inout) :: self
+      integer, intent(in) :: p
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: share
+      real(wp) :: a(2), b(2)
+      integer :: e
+
+      do e = self%outline%start(p), self%outline%start(p + 1) - 1
+         associate (i => self%outline%edge(1, e), j => self%outline%edge(2, e))
+            self%u(:, i) = u0(:, i) + share*du(:, i)
+            self%u(:, j) = u0(:, j) + share*du(:, j)
+            a = x(:, i) + self%u(:, i)
+            b = x(:, j) + self%u(:, j)
+         end associate
+         self%low(:, e) = min(a, b)
+         self%high(:, e) = max(a, b)
+      end do
+   end subroutine place_edges
+
+   !> Nodes of piece `p` in piece `q`, and with `crosses` edges of both that cross.
+   subroutine look_one_way(self, p, q, x, crosses, overlap)
+      type(judge_t), intent(inout) :: self
+      integer, intent(in) :: p, q
+      real(wp), intent(in), contiguous :: x(:, :)
+      logical, intent(in) :: crosses
+      type(overlap_t), intent(inout) :: overlap
+      type(box_tree_t) :: tree
+      real(wp) :: low(2, 2), high(2, 2), reach
+      integer :: e, n_near, n_found
+
+      reach = max(self%extent(p)%longest, self%extent(q)%longest)
+      call box_of(self, p, low(:, 1), high(:, 1))
+      call box_of(self, q, low(:, 2), high(:, 2))
+      n_near = 0
+      do e = self%outline%start(q), self%outline%start(q + 1) - 1
+         if (any(self%low(:, e) > high(:, 1) + reach) &
+            .or. any(self%high(:, e) < low(:, 1) - reach)) cycle
+         n_near = n_near + 1
+         self%near(n_near) = e
+      end do
+      if (n_near == 0) return
+      call box_tree_init(tree, self%low(:, self%near(:n_near)), self%high(:, self%near(:n_near)))
+      do e = self%outline%start(p), self%outline%start(p + 1) - 1
+         if (any(self%low(:, e) > high(:, 2)) .or. any(self%high(:, e) < low(:, 2))) cycle
+         n_found = 0
+         call box_tree_find(tree, self%low(:, e), self%high(:, e), merge(0.0_wp, reach, p == q), &
+            self%found, n_found)
+         if (n_found == 0) cycle
+         if (p /= q) then
+            call try_node(self, x, self%outline%edge(1, e), self%near(self%found(:n_found)), &
+               reach, overlap)
+            if (self%outline%link(2, e) == 0) call try_node(self, x, self%outline%edge(2, e), &
+               self%near(self%found(:n_found)), reach, overlap)
+         end if
+         if (crosses) call try_edge(self, x, e, self%near(self%found(:n_found)), overlap)
+      end do
+   end subroutine look_one_way
+
+   !> The box of piece `p` at the present look.
+   pure subroutine box_of(self, p, low, high)
+      type(judge_t), intent(in) :: self
+      integer, intent(in) :: p
+      real(wp), intent(out) :: low(2), high(2)
+
+      associate (first => self%outline%start(p), last => self%outline%start(p + 1) - 1)
+         low = minval(self%low(:, first:last), dim=2)
+         high = maxval(self%high(:, first:last), dim=2)
+      end associate
+   end subroutine box_of
+
+   !> Is `node` behind the outline of which `other` are the edges within `reach`? At the end of an
+   !> outline that is open there is no behind.
+   pure subroutine try_node(self, x, node, other, reach, overlap)
+      type(judge_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      integer, intent(in) :: node                !! of the scene
+      integer, intent(in) :: other(:)
+      real(wp), intent(in) :: reach              !! [L]
+      type(overlap_t), intent(inout) :: overlap
+      type(nearest_t) :: nearest
+      real(wp) :: depth, next_along(2)
+      integer :: k, next
+
+      associate (edge => self%outline%edge)
+         if (any(edge(:, other) == node)) return
+         do k = 1, size(other)
+            call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
+               between(x, self%u, edge(1, other(k)), edge(2, other(k))))
+         end do
+         if (nearest%edge == 0 .or. nearest%square > reach**2) return
+         next_along = nearest%along
+         if (nearest%side > 0) then
+            next = self%outline%link(nearest%side, nearest%edge)
+            if (next == 0) return
+            next_along = between(x, self%u, edge(1, next), edge(2, next))
+         end if
+         depth = nearest_depth(nearest, next_along)/length_of(nearest%along)
+         if (depth > overlap%depth) overlap = overlap_t(depth, node, edge(:, nearest%edge))
+      end associate
+   end subroutine try_node
+
+   !> Does edge `e` cross one of `other`? Edges that share a node or are neighbours do not.
+   pure subroutine try_edge(self, x, e, other, overlap)
+      type(judge_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      integer, intent(in) :: e
+      integer, intent(in) :: other(:)
+      type(overlap_t), intent(inout) :: overlap
+      type(nearest_t) :: found
+      real(wp) :: depth
+      integer :: k, f
+
+      do k = 1, size(other)
+         f = other(k)
+         associate (a => self%outline%edge(:, e), b => self%outline%edge(:, f))
+            if (any(a == b(1)) .or. any(a == b(2))) cycle
+            call crossing_find(between(x, self%u, a(1), a(2)), reshape([ &
+               between(x, self%u, a(1), b(1)), between(x, self%u, a(1), b(2))], [2, 2]), found)
+            if (found%edge == 0) cycle
+            depth = sqrt(found%square)/length_of(found%along)
+            if (depth <= overlap%depth) cycle
+            if (found%edge <= 2) overlap = overlap_t(depth, b(found%edge), a)
+            if (found%edge > 2) overlap = overlap_t(depth, a(found%edge - 2), b)
+         end associate
+      end do
+   end subroutine try_edge
+
+end module emcon_judge

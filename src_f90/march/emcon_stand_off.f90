@@ -1,0 +1,59 @@
+!> The air across which contact forces act: what the constraints hold open.
+module emcon_stand_off
+   use emcon_constraints, only : constraint_place, constraint_set_t
+   use emcon_kinds, only : wp
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: stand_off_t, stand_off_add, stand_off_mean
+
+   !> Forces below this fraction of the largest one of the step are round-off.
+   real(wp), parameter :: least_force = sqrt(epsilon(1.0_wp))
+
+   !> Gaps are fractions of the edge that they are measured over, 0 where closed.
+   type :: stand_off_t
+      real(wp) :: largest = 0.0_wp
+      real(wp) :: impulse = 0.0_wp               !! sum of force times duration [M L/T]
+      real(wp) :: impulse_gap = 0.0_wp           !! the same, each times its gap [M L/T]
+   end type stand_off_t
+
+contains
+
+   !> Add the contacts of `set` at the end of a step of duration `h`, with the gaps last measured.
+   pure subroutine stand_off_add(self, system, set, h)
+      type(stand_off_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: h                  !! [T]
+      real(wp) :: force(set%n), total(2), gap
+      integer :: k, first, pair, i
+
+      first = set%n_linear + 1
+      if (first > set%n) return
+      do k = first, set%n
+         associate (item => set%item(k))
+            total = sum(item%g(:, :item%n_slave), dim=2)
+            force(k) = abs(set%lam(k))*sqrt(dot_product(total, total))   ! norm2 knows the units
+         end associate
+      end do
+      do k = first, set%n
+         if (force(k) <= least_force*maxval(force(first:))) cycle
+         call constraint_place(system, set%id(k), pair, i)
+         associate (state => system%contact(pair)%contact%state(i))
+            gap = max(0.0_wp, state%gap1)/state%size
+         end associate
+         self%largest = max(self%largest, gap)
+         self%impulse = self%impulse + force(k)*h
+         self%impulse_gap = self%impulse_gap + force(k)*h*gap
+      end do
+   end subroutine stand_off_add
+
+   !> Mean gap, weighted by the impulses that went across it.
+   pure real(wp) function stand_off_mean(self)
+      type(stand_off_t), intent(in) :: self
+
+      stand_off_mean = 0.0_wp
+      if (self%impulse > 0.0_wp) stand_off_mean = self%impulse_gap/self%impulse
+   end function stand_off_mean
+
+end module emcon_stand_off

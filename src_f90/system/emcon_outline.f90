@@ -1,0 +1,201 @@
+!> The outlines of the pieces of a mesh that meet in contact, whatever surfaces the deck names.
+!>
+!> A piece is what hangs together by elements; its outline are the faces that one element alone has,
+!> the body to the left. What a tie holds together is no outline. Surfaces of edges without elements
+!> stand for themselves.
+module emcon_outline
+   use emcon_bodies, only : bodies_find
+   use emcon_element_kinds, only : element_kinds
+   use emcon_kinds, only : dp
+   use emcon_scene, only : scene_t, surface_t
+   use emcon_sort, only : find_sorted, sort_order, unique_sorted
+   use emcon_surface_edges, only : surface_edges
+   implicit none
+   private
+   public :: outline_t, outline_init
+
+   type :: outline_t
+      integer :: n_piece = 0                     !! pieces that meet others or themselves
+      integer, allocatable :: start(:)           !! (n_piece + 1) first edge of each piece
+      integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node, piece by piece
+      !> (2, n_edge) the edges before and after; 0: the outline ends there, or branches
+      integer, allocatable :: link(:, :)
+      logical, allocatable :: meets(:, :)        !! (n_piece, n_piece) symmetric
+   end type outline_t
+
+contains
+
+   subroutine outline_init(self, scene)
+      type(outline_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: connected(:, :), piece(:), number(:), edge(:, :), order(:)
+      integer :: n_body, p
+
+      call connect(scene, connected)
+      call bodies_find(connected, size(scene%x, 2), piece, n_body)
+      call find_meetings(self, scene, piece, number)
+      allocate(self%start(self%n_piece + 1), source=1)
+      if (self%n_piece > 0) then
+         call find_edges(scene, edge)
+         call leave_out_ties(scene, edge)
+      else
+         allocate(edge(2, 0))
+      end if
+      ! From here on the piece of a node is its place among those that meet; 0: none of them.
+      piece = [(find_sorted(number, piece(p)), p = 1, size(piece))]
+      edge = edge(:, pack([(p, p = 1, size(edge, 2))], piece(edge(1, :)) > 0))
+      order = sort_order(piece(edge(1, :)))
+      self%edge = edge(:, order)
+      do p = 1, self%n_piece
+         self%start(p + 1) = self%start(p) + count(piece(edge(1, :)) == p)
+      end do
+      call link_edges(self, size(scene%x, 2))
+   end subroutine outline_init
+
+   !> Elements, and after them surfaces of edges, by their nodes.
+   pure subroutine connect(scene, connected)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: connected(:, :)   !! (n, n_element + n_edge), 0: no node
+      integer, allocatable :: edge(:, :), spread(:, :)
+      integer :: s
+
+      connected = scene%element_node
+      do s = 1, size(scene%surface)
+         if (.not. allocated(scene%surface(s)%edge)) cycle
+         edge = scene%surface(s)%edge
+         allocate(spread(size(connected, 1), size(edge, 2)), source=0)
+         spread(:2, :) = edge
+         connected = reshape([connected, spread], &
+            [size(connected, 1), size(connected, 2) + size(edge, 2)])
+         deallocate(spread)
+      end do
+   end subroutine connect
+
+   !> Which pieces have a part in contact pairs, and which of them meet there.
+   subroutine find_meetings(self, scene, piece, number)
+      type(outline_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: piece(:)            !! (n_node)
+      integer, allocatable, intent(out) :: number(:)   !! (n_piece) as in `piece`, ascending
+      integer, allocatable :: slave(:), master(:)
+      integer :: k
+
+      allocate(number(0))
+      do k = 1, size(scene%pair)
+         call pieces_of(scene, scene%surface(scene%pair(k)%slave), piece, slave)
+         call pieces_of(scene, scene%surface(scene%pair(k)%master), piece, master)
+         number = unique_sorted([number, slave, master])
+      end do
+      self%n_piece = size(number)
+      allocate(self%meets(size(number), size(number)), source=.false.)
+      do k = 1, size(scene%pair)
+         call pieces_of(scene, scene%surface(scene%pair(k)%slave), piece, slave)
+         call pieces_of(scene, scene%surface(scene%pair(k)%master), piece, master)
+         slave = places(number, slave)
+         master = places(number, master)
+         self%meets(slave, master) = .true.
+         self%meets(master, slave) = .true.
+      end do
+   end subroutine find_meetings
+
+   pure function places(sorted, value)
+      integer, intent(in) :: sorted(:), value(:)
+      integer :: places(size(value)), i
+
+      do i = 1, size(value)
+         places(i) = find_sorted(sorted, value(i))
+      end do
+   end function places
+
+   !> The pieces that `surface` is on.
+   pure subroutine pieces_of(scene, surface, piece, found)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: piece(:)
+      integer, allocatable, intent(out) :: found(:)    !! ascending
+      integer, allocatable :: edge(:, :)
+
+      if (surface%is_nodal) then
+         found = unique_sorted(piece(surface%node))
+      else
+         call surface_edges(scene, surface, edge)
+         found = unique_sorted(piece(edge(1, :)))
+      end if
+   end subroutine pieces_of
+
+   !> Faces that one element alone has, and the edges of surfaces without elements.
+   subroutine find_edges(scene, edge)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: edge(:, :)  !! (2, n)
+      integer, allocatable :: order(:)
+      real(dp), allocatable :: key(:)
+      logical, allocatable :: is_free(:)
+      integer :: e, f, n, s
+
+      n = 0
+      allocate(edge(2, sum(element_kinds(scene%element_kind)%n_face)))
+      do e = 1, size(scene%element_kind)
+         associate (kind => element_kinds(scene%element_kind(e)))
+            do f = 1, kind%n_face
+               n = n + 1
+               edge(:, n) = scene%element_node(kind%face_node(:, f), e)
+            end do
+         end associate
+      end do
+      key = real(minval(edge, 1), dp)*real(size(scene%x, 2) + 1, dp) + real(maxval(edge, 1), dp)
+      order = sort_order(key)
+      allocate(is_free(n), source=.true.)
+      do e = 2, n
+         if (key(order(e)) > key(order(e - 1))) cycle
+         is_free(order(e - 1:e)) = .false.
+      end do
+      edge = edge(:, pack([(e, e = 1, n)], is_free))
+      do s = 1, size(scene%surface)
+         if (.not. allocated(scene%surface(s)%edge)) cycle
+         edge = reshape([edge, scene%surface(s)%edge], &
+            [2, size(edge, 2) + size(scene%surface(s)%edge, 2)])
+      end do
+   end subroutine find_edges
+
+   !> Take out the edges of the surfaces of ties.
+   pure subroutine leave_out_ties(scene, edge)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(inout) :: edge(:, :)
+      integer, allocatable :: tied(:, :)
+      integer :: follower(size(scene%x, 2)), k, i
+
+      follower = 0
+      do k = 1, size(scene%tie)
+         if (scene%tie(k)%slave == 0) cycle          ! known by its rows alone
+         call surface_edges(scene, scene%surface(scene%tie(k)%slave), tied)
+         follower(tied(1, :)) = tied(2, :)
+         call surface_edges(scene, scene%surface(scene%tie(k)%master), tied)
+         follower(tied(1, :)) = tied(2, :)
+      end do
+      edge = edge(:, pack([(i, i = 1, size(edge, 2))], follower(edge(1, :)) /= edge(2, :)))
+   end subroutine leave_out_ties
+
+   !> Find the neighbours of each edge. Where two outlines meet in a node, neither goes on.
+   pure subroutine link_edges(self, n_node)
+      type(outline_t), intent(inout) :: self
+      integer, intent(in) :: n_node
+      integer :: ends(n_node), begins(n_node), i
+
+      ends = 0
+      begins = 0
+      do i = 1, size(self%edge, 2)
+         associate (a => self%edge(1, i), b => self%edge(2, i))
+            begins(a) = merge(i, -1, begins(a) == 0)
+            ends(b) = merge(i, -1, ends(b) == 0)
+         end associate
+      end do
+      allocate(self%link(2, size(self%edge, 2)))
+      do i = 1, size(self%edge, 2)
+         associate (a => self%edge(1, i), b => self%edge(2, i))
+            self%link(1, i) = merge(max(0, ends(a)), 0, begins(a) > 0)
+            self%link(2, i) = merge(max(0, begins(b)), 0, ends(b) > 0)
+         end associate
+      end do
+   end subroutine link_edges
+
+end module emcon_outline

@@ -1,0 +1,313 @@
+"""What decks mean: small runs whose displacements and reactions are known in closed form."""
+
+import pathlib
+import re
+
+import numpy as np
+import pytest
+from scene_tools import EPSILON, Deck, emcon, run_deck
+
+MESHES = pathlib.Path(__file__).resolve().parent/"included"
+YOUNG, POISSON, LENGTH, DENSITY = 100.0, 0.3, 2.0, 0.5
+#: Strain along the bar per stress along it: plane strain, free to narrow.
+COMPLIANCE = (1.0 - POISSON**2)/YOUNG
+#: Digits of one linear solve: condition of the bar's 8 unknowns (1e3) times roundings.
+DIGITS = 1e5*EPSILON
+#: A bar of one element along y, 1 wide and 2 long; its lower end is held upright at y = 0.
+BAR = f"""\
+*NODE, NSET=ALL
+1, 0., 0.
+2, 1., 0.
+3, 1., {LENGTH}
+4, 0., {LENGTH}
+*ELEMENT, TYPE=CPE4, ELSET=BAR
+1, 1, 2, 3, 4
+*NSET, NSET=END
+3, 4
+*NSET, NSET=FOOT
+1, 2
+*MATERIAL, NAME=M
+*ELASTIC
+{YOUNG}, {POISSON}
+*DENSITY
+{DENSITY}
+*SOLID SECTION, ELSET=BAR, MATERIAL=M
+*AMPLITUDE, NAME=LATE
+0., 0., 0.5, 0., 1., 1.
+*BOUNDARY
+FOOT, 2
+1, 1
+"""
+PRINT = "*NODE PRINT, NSET=ALL\nU, RF\n"
+
+
+def static(*steps):
+    """Static steps of two increments, each with the cards of one text."""
+    return "".join(f"*STEP\n*STATIC, DIRECT\n0.5, 1.\n{cards}{PRINT}*END STEP\n" for cards in steps)
+
+
+def run(tmp_path, text, code=0):
+    return run_deck(Deck(text, "deck"), tmp_path, code)
+
+
+def ends(done):
+    """Upward displacement of the two nodes of the free end at the end of each step."""
+    time, u = done.series("ALL", "U")
+    at = [np.flatnonzero(time == t)[-1] for t in range(1, round(time[-1]) + 1)]
+    return u[at][:, 2:, 1]
+
+
+def pulled(*forces):
+    """The same in closed form, for the force on the whole end."""
+    return COMPLIANCE*LENGTH*np.array(forces)[:, None]*np.ones(2)
+
+
+def assert_pulled(done, *forces):
+    scale = COMPLIANCE*LENGTH*max(1.0, *np.abs(forces))
+    assert ends(done) == pytest.approx(pulled(*forces), rel=0, abs=DIGITS*scale)
+
+
+# ---- loads: added within a step, replaced by a later one ------------------------------------------
+
+
+@pytest.mark.parametrize("cards, force", [
+    ("*CLOAD\nEND, 2, 1.\nEND, 2, 0.5\n", 3.0),
+    ("*CLOAD\nEND, 2, 1.\n*CLOAD\n3, 2, 0.5\n4, 2, 0.5\n", 3.0),
+    ("*CLOAD\nEND, 2, 1.\n*CLOAD, AMPLITUDE=LATE\nEND, 2, 0.5\n", 3.0),
+    ("*CLOAD\nEND, 2, 1.\n*CLOAD, OP=NEW\nEND, 2, 0.5\n", 3.0),
+    ("*DLOAD\nBAR, P3, -1.\nBAR, P3, -0.5\n", 1.5),
+    ("*DLOAD\nBAR, P3, -1.\n*DLOAD, AMPLITUDE=LATE\n1, P3, -0.5\n", 1.5),
+    ("*DLOAD\nBAR, P3, -1.\n*CLOAD\nEND, 2, 0.5\n", 2.0),
+], ids=["lines", "cards", "amplitude", "op-new", "pressure", "pressures", "both"])
+def test_loads_of_one_step_are_added(cards, force, tmp_path):
+    assert_pulled(run(tmp_path, BAR + static(cards)), force)
+
+
+@pytest.mark.parametrize("second, forces", [
+    ("*CLOAD\nEND, 2, 4.\n", (3.0, 8.0)),
+    ("*CLOAD\nEND, 2, 4.\nEND, 2, 1.\n", (3.0, 10.0)),
+    ("*CLOAD, OP=NEW\nEND, 2, 4.\n", (3.0, 8.0)),
+    ("*CLOAD, OP=NEW\n", (3.0, 0.0)),
+    ("", (3.0, 3.0)),
+], ids=["one", "two", "new", "none", "kept"])
+def test_loads_of_a_later_step_replace_all_of_an_earlier_one(second, forces, tmp_path):
+    first = "*CLOAD\nEND, 2, 1.\nEND, 2, 0.5\n"
+    assert_pulled(run(tmp_path, BAR + static(first, second)), *forces)
+
+
+def test_a_replaced_sum_is_left_along_a_ramp(tmp_path):
+    """Half-way through the second step the force is the mean of the sums of both steps."""
+    done = run(tmp_path, BAR + static("*CLOAD\nEND, 2, 1.\nEND, 2, 0.5\n", "*CLOAD\nEND, 2, 4.\n"))
+    time, u = done.series("ALL", "U")
+    middle = u[time == 1.5][0, 2:, 1]
+    assert middle == pytest.approx(pulled(5.5)[0], rel=DIGITS)
+
+
+def test_each_load_keeps_its_amplitude(tmp_path):
+    done = run(tmp_path, BAR + static("*CLOAD\nEND, 2, 1.\n*CLOAD, AMPLITUDE=LATE\nEND, 2, 0.5\n"))
+    time, u = done.series("ALL", "U")
+    assert u[time == 0.5][0, 2:, 1] == pytest.approx(pulled(1.0)[0], rel=DIGITS)
+
+
+@pytest.mark.parametrize("second, expected", [
+    (None, (3.0, -4.0)),
+    ("*DLOAD\nBAR, GRAV, 7., 0., 1.\n", (0.0, 7.0)),
+    ("*DLOAD\nBAR, GRAV, 2., 5., 0.\nBAR, GRAV, 1., 0., -2.\n", (2.0, -1.0)),
+], ids=["added", "turned", "again"])
+def test_gravity_in_two_directions_is_added(second, expected, tmp_path):
+    """The supports carry the weight; within a step it runs from one weight to the other."""
+    first = "*DLOAD\nBAR, GRAV, 3., 1., 0.\nBAR, GRAV, 4., 0., -1.\n"
+    done = run(tmp_path, BAR + static(first, *([second] if second else [])))
+    time, force = done.series("ALL", "RF")
+    weight = DENSITY*LENGTH*np.array(expected)
+    scale = DENSITY*LENGTH*7.0
+    assert force[-1].sum(axis=0) == pytest.approx(-weight, abs=DIGITS*scale)
+    if second:
+        half = 0.5*(weight + DENSITY*LENGTH*np.array((3.0, -4.0)))
+        assert force[time == 1.5][0].sum(axis=0) == pytest.approx(-half, abs=DIGITS*scale)
+
+
+# ---- supports -----------------------------------------------------------------------------------
+
+
+def test_the_last_of_two_displacements_holds(tmp_path):
+    done = run(tmp_path, BAR + static("*BOUNDARY\nEND, 2, 2, 0.5\n4, 2, 2, 0.1\n3, 2, 2, 0.1\n"))
+    assert ends(done) == pytest.approx(0.1*np.ones((1, 2)), rel=DIGITS)
+    assert "node 4 was prescribed otherwise before" in done.errors
+    assert "node 3 was prescribed otherwise before" in done.errors
+
+
+def test_the_same_displacement_twice_is_no_contradiction(tmp_path):
+    done = run(tmp_path, BAR + static("*BOUNDARY\nEND, 2, 2, 0.5\n4, 2, 2, 0.5\n"))
+    assert "otherwise" not in done.errors
+
+
+@pytest.mark.parametrize("option, middle", [("", 0.05), (", AMPLITUDE=LATE", 0.0)])
+def test_a_displacement_before_the_first_step_is_one_of_that_step(option, middle, tmp_path):
+    text = BAR + f"*BOUNDARY{option}\nEND, 2, 2, 0.1\n" + static("", "")
+    done = run(tmp_path, text)
+    time, u = done.series("ALL", "U")
+    assert u[time == 0.5][0, 2:, 1] == pytest.approx(middle*np.ones(2), rel=DIGITS, abs=0)
+    assert ends(done) == pytest.approx(0.1*np.ones((2, 2)), rel=DIGITS)
+    inside = run(tmp_path / "inside", BAR + static(f"*BOUNDARY{option}\nEND, 2, 2, 0.1\n", ""))
+    assert done.digits() == inside.digits()
+
+
+@pytest.mark.parametrize("name, free", [
+    ("ENCASTRE", ()), ("pinned", ()), ("XSYMM", (1,)), ("YSYMM", (0,)), ("ZSYMM", (0, 1)),
+    ("XASYMM", (0,)), ("YASYMM", (1,)), ("ZASYMM", ()),
+])
+def test_supports_by_name(name, free, tmp_path):
+    """What the name holds does not move; the rest does."""
+    text = BAR + f"*BOUNDARY\n4, {name}\n" + static("*CLOAD\nEND, 1, 1.\nEND, 2, 1.\n")
+    _, u = run(tmp_path, text).series("ALL", "U")
+    assert [i for i in (0, 1) if u[-1, 3, i] != 0.0] == list(free)
+
+
+def test_zeros_out_of_the_plane_change_nothing(tmp_path):
+    load = "*CLOAD\nEND, 2, 1.\n"
+    plain = run(tmp_path / "plain", BAR + static(load))
+    zeros = run(tmp_path / "zeros", BAR + "*BOUNDARY\nALL, 3, 6\nEND, 3, 3, 0.\n"
+                + static(load + "END, 3, 0.\nEND, 6, 0.\n"))
+    assert "warning: " not in zeros.errors
+    assert zeros.digits() == plain.digits()
+
+
+# ---- the files of Gmsh --------------------------------------------------------------------------
+
+#: A punch on a block: what both decks below say after their mesh.
+PUNCH = f"""\
+*MATERIAL, NAME=M
+*ELASTIC
+{YOUNG}, {POISSON}
+*SOLID SECTION, ELSET=block, MATERIAL=M
+*SOLID SECTION, ELSET=punch, MATERIAL=M
+*SURFACE INTERACTION, NAME=HARD
+*CONTACT PAIR, INTERACTION=HARD, TYPE=MORTAR
+SOLE, FLOOR
+*BOUNDARY
+HELD, ENCASTRE
+PUSHED, 1
+*STEP, NLGEOM
+*STATIC
+0.5, 1.
+*BOUNDARY
+PUSHED, 2, 2, -0.1
+*END STEP
+"""
+LINES = """\
+*SURFACE, NAME=FLOOR
+floor
+*SURFACE, NAME=SOLE
+18
+19
+*NSET, NSET=HELD, ELSET=bottom
+*NSET, NSET=PUSHED, ELSET=top
+"""
+FACES = """\
+*SURFACE, NAME=FLOOR
+28, S3
+29, S2
+*SURFACE, NAME=SOLE
+30, S4
+34, S4
+*NSET, NSET=HELD
+1, 2, 10
+*NSET, NSET=PUSHED
+7, 8, 16
+"""
+
+
+def by_hand(text):
+    """The mesh of a file of Gmsh as one would write it: no lines, plane strain."""
+    cards = [card for card in Deck(text).card
+             if "T3D2" not in card[0] and card[0] not in ("*ELSET,ELSET=" + name for name in
+                                                          ("bottom", "floor", "sole", "top"))]
+    return "".join("\n".join([head.replace("CPS", "CPE"), *data]) + "\n" for head, data in cards)
+
+
+def test_a_file_of_gmsh_means_what_one_would_write_by_hand(tmp_path):
+    """Lines are faces of the elements they lie on; an orphan point and idle lines do not disturb."""
+    mesh = (MESHES/"gmsh.inp").read_text()
+    gmsh = run(tmp_path/"gmsh", mesh + LINES + PUNCH)
+    hand = run(tmp_path/"hand", by_hand(mesh) + FACES + PUNCH)
+    assert gmsh.digits() == hand.digits()
+    assert gmsh.history["active"][-1] > 0
+    for text in ("elements of type T3D2 are lines", "CPS3 is read as CPE3", "CPS4 is read as CPE4",
+                 "node 9 belongs to no element"):
+        assert gmsh.errors.count(text) == 1
+    assert hand.errors.count("warning: ") == 1
+
+
+def test_a_set_of_lines_is_a_surface_of_edges(tmp_path):
+    """The direction of the lines says where the body is: of the floor it is to the left."""
+    mesh = (MESHES/"gmsh.inp").read_text()
+    edges = LINES.replace("NAME=FLOOR", "NAME=FLOOR, TYPE=EDGE")
+    faces = run(tmp_path/"faces", mesh + LINES + PUNCH)
+    assert run(tmp_path/"edges", mesh + edges + PUNCH).digits() == faces.digits()
+
+
+# ---- what changes nothing, and what would ---------------------------------------------------------
+
+#: Each text of the bar's deck with the same text at neutral values.
+NEUTRAL = [
+    ("1, 0., 0.\n", "1, 0., 0., 0., 0., 0.\n"),
+    ("TYPE=CPE4, ELSET=BAR\n1, 1, 2, 3, 4\n", "TYPE=CPE4, ELSET=BAR, OFFSET=0.\n1, 1, 2, 3, 4, 0\n"),
+    ("*ELASTIC\n100.0, 0.3\n", "*ELASTIC, DEPENDENCIES=0\n100.0, 0.3, 0.\n"),
+    ("ELSET=BAR, MATERIAL=M\n", "ELSET=BAR, MATERIAL=M, OFFSET=0.0\n1., 0.\n"),
+    ("*STEP\n", "*STEP, UNSYMM=NO\n"),
+    ("*DYNAMIC, DIRECT\n0.5, 1.\n", "*DYNAMIC, DIRECT, ALPHA=-0.\n0.5, 1., 0., 0., 0.\n"),
+    ("*CLOAD\nEND, 2, 1.\n", "*CLOAD, TIME DELAY=0., LOAD CASE=1\nEND, 2, 1., 0.\n"),
+    ("*BOUNDARY\nFOOT, 2\n", "*BOUNDARY, LOAD CASE=1\nFOOT, 2, 2, 0., 0.\n"),
+]
+
+
+def moving():
+    """The bar, pulled suddenly."""
+    return BAR + "*STEP\n*DYNAMIC, DIRECT\n0.5, 1.\n*CLOAD\nEND, 2, 1.\n" + PRINT + "*END STEP\n"
+
+
+@pytest.mark.parametrize("plain, neutral", NEUTRAL, ids=lambda text: text.split("\n")[0])
+def test_neutral_values_change_nothing(plain, neutral, tmp_path):
+    assert plain in moving()
+    done = run(tmp_path/"neutral", moving().replace(plain, neutral))
+    assert "warning: " not in done.errors
+    assert done.digits() == run(tmp_path/"plain", moving()).digits()
+
+
+@pytest.mark.parametrize("plain, other", [
+    ("*STEP\n", "*STEP, UNSYMM=YES\n"),
+    ("*DYNAMIC, DIRECT\n", "*DYNAMIC, DIRECT, ALPHA=-0.05\n"),
+    ("ELSET=BAR, MATERIAL=M\n", "ELSET=BAR, MATERIAL=M, OFFSET=0.1\n"),
+    ("*CLOAD\nEND, 2, 1.\n", "*CLOAD\nEND, 2, 1., 0.1\n"),
+    ("*MATERIAL, NAME=M\n", "*MATERIAL, NAME=M\n1., 2.\n"),
+    ("*DYNAMIC, DIRECT\n", "*CONTACT PRINT\nCDIS\n*DYNAMIC, DIRECT\n"),
+    ("*DYNAMIC, DIRECT\n", "*CONTACT INITIATION, TYPE=ADMISSIBLE, GAP TOLERANCE=1.\n*DYNAMIC, DIRECT\n"),
+    ("*DYNAMIC, DIRECT\n", "*ENERGY PRINT, FREQUENCY=5\nALLSE\n*DYNAMIC, DIRECT\n"),
+    ("*END STEP\n", "*END STEP\n1., 2.\n"),
+], ids=["unsymm", "alpha", "offset", "fields", "lines", "no-pair", "tolerance", "energy", "end"])
+def test_nothing_is_ignored_without_a_word(plain, other, tmp_path):
+    """Values that would mean something here are refused or warned of, once."""
+    assert plain in moving()
+    deck = Deck("").write(tmp_path/"deck.inp")
+    deck.write_text(moving().replace(plain, other))
+    told = emcon("check", deck).stderr
+    assert len(re.findall(r"deck\.inp:\d+: (?:error|warning): ", told)) == 1, told
+
+
+@pytest.mark.parametrize("edits", [
+    [("TYPE=CPE4", "TYPE=CPE8R")],
+    [("TYPE=CPE4, ELSET=FOUNDATION", "TYPE=B21, ELSET=FOUNDATION"),
+     ("TOP, 2, -1.\n", "TOP, 2, -1.\n*DLOAD\n1, P1, 1.\n*EL PRINT, ELSET=FOUNDATION\nS\n")],
+    [("TYPE=CPE4, ELSET=BLOCK", "TYPE=C3D8, ELSET=BLOCK"), ("BLOCK, S1", "11, S1\n12, S1")],
+], ids=["all", "loads", "faces"])
+def test_a_refused_element_type_is_one_message(edits, tmp_path):
+    """Nothing that only follows from it: missing elements, sets, faces, sections."""
+    text = (MESHES.parent/"good_plain.inp").read_text()
+    for plain, other in edits:
+        assert plain in text
+        text = text.replace(plain, other)
+    deck = tmp_path/"deck.inp"
+    deck.write_text(text)
+    told = emcon("check", deck).stderr
+    assert len(re.findall(r"(?:error|warning): ", told)) == 1 and "element type" in told, told

@@ -1,0 +1,186 @@
+!> The judge: overlaps of blocks in closed form, both ways, on the way, and of a piece with itself.
+module test_judge
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_errors, only : error_t
+   use emcon_judge, only : judge_init, judge_step, judge_t, overlap_t
+   use emcon_kinds, only : wp
+   use emcon_scene, only : contact_pair_t, scene_t
+   use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, right, &
+      scene_begin, top
+   implicit none
+   private
+   public :: collect_judge
+
+   real(wp), parameter :: eps = epsilon(1.0_wp)
+
+contains
+
+   subroutine collect_judge(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("apart and touching", test_apart), &
+         test_case_t("a corner in an edge, whichever is the slave", test_corner), &
+         test_case_t("a block in its twin, all sides in line", test_twin), &
+         test_case_t("edges that cross with no end inside", test_cross), &
+         test_case_t("a block that has been crossed in one step", test_crossed), &
+         test_case_t("nothing is lost far from the origin", test_far), &
+         test_case_t("a piece that goes into itself", test_self), &
+         test_case_t("bodies without a pair are not looked at", test_no_pair)]
+   end subroutine collect_judge
+
+   !> Block 1 on [0, 4] x [0, 1] of 4 x 1 elements, top the master; block 2 of `n` elements on
+   !> `extent`, standing at `low`, bottom the slave, or the other way round.
+   subroutine make_scene(scene, low, extent, n, is_reversed)
+      type(scene_t), intent(out) :: scene
+      real(wp), intent(in) :: low(2), extent(2)
+      integer, intent(in) :: n(2)
+      logical, intent(in) :: is_reversed
+      type(block_t) :: lower, upper
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [4, 1], [0.0_wp, 0.0_wp], [4.0_wp, 1.0_wp], lower)
+      call add_block(scene, "CPE4", n, low, extent, upper)
+      call add_surface(scene, "BASE", lower, [top])
+      call add_surface(scene, "SLIDER", upper, [bottom])
+      scene%pair = [contact_pair_t(slave=merge(1, 2, is_reversed), &
+         master=merge(2, 1, is_reversed))]
+   end subroutine make_scene
+
+   !> What the judge finds if nothing moves, or if the nodes from `first` on move by `motion`.
+   subroutine judged(scene, overlap, first, motion)
+      type(scene_t), intent(in) :: scene
+      type(overlap_t), intent(out) :: overlap
+      integer, intent(in), optional :: first
+      real(wp), intent(in), optional :: motion(2)
+      type(judge_t) :: judge
+      real(wp) :: du(2, size(scene%x, 2))
+      integer :: i
+
+      du = 0.0_wp
+      if (present(first)) then
+         do i = first, size(du, 2)
+            du(:, i) = motion
+         end do
+      end if
+      call judge_init(judge, scene)
+      call judge_step(judge, scene%x, scene%u0, du, overlap)
+   end subroutine judged
+
+   subroutine test_apart(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_scene(scene, [1.3_wp, 1.5_wp], [1.0_wp, 1.0_wp], [1, 1], .false.)
+      call judged(scene, overlap)
+      call check_equal(error, overlap%node, 0, "apart")
+      call make_scene(scene, [1.3_wp, 1.0_wp], [1.0_wp, 1.0_wp], [1, 1], .false.)
+      call judged(scene, overlap)
+      call check_true(error, overlap%depth <= eps, "touching")
+      call make_scene(scene, [4.0_wp, 0.2_wp], [1.0_wp, 1.0_wp], [1, 1], .false.)
+      call judged(scene, overlap)
+      call check_true(error, overlap%depth <= eps, "side by side")
+   end subroutine test_apart
+
+   !> Both corners of the slider are 1/8 deep between nodes of the base, whose edges are 1 long; as
+   !> master or slave, and so is the base in a slider that is turned upside down onto it.
+   subroutine test_corner(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      logical :: is_reversed
+      integer :: k
+
+      do k = 1, 2
+         is_reversed = k == 2
+         call make_scene(scene, [1.3_wp, 0.875_wp], [0.5_wp, 0.5_wp], [1, 1], is_reversed)
+         call judged(scene, overlap)
+         call check_near(error, overlap%depth, 0.125_wp, 4.0_wp*eps, 1.0_wp, "depth")
+         call check_true(error, any(overlap%node == [11, 12]), "node")
+         call check_equal(error, overlap%edge, [8, 7], "edge")
+      end do
+   end subroutine test_corner
+
+   !> As wide as the base and in line with it: no edges cross, yet it is 1/4 deep.
+   subroutine test_twin(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_scene(scene, [0.0_wp, 0.75_wp], [4.0_wp, 1.0_wp], [4, 1], .false.)
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.25_wp, 4.0_wp*eps, 1.0_wp, "depth")
+   end subroutine test_twin
+
+   !> A plus of two bars, no node of either in the other: the bar that stands goes out of the base
+   !> by 1/4 below, where edges are 1 long.
+   subroutine test_cross(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_scene(scene, [1.25_wp, -0.25_wp], [0.5_wp, 2.0_wp], [1, 1], .false.)
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.25_wp, 4.0_wp*eps, 1.0_wp, "depth")
+   end subroutine test_cross
+
+   !> From above the base to below it in one step: free at both ends, yet it is seen in the middle.
+   subroutine test_crossed(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_scene(scene, [1.3_wp, 1.25_wp], [0.5_wp, 0.5_wp], [1, 1], .false.)
+      call judged(scene, overlap, first=11, motion=[0.0_wp, -2.5_wp])
+      call check_true(error, overlap%depth >= 0.25_wp, "seen on the way")
+      call judged(scene, overlap, first=11, motion=[0.0_wp, 2.5_wp])
+      call check_equal(error, overlap%node, 0, "away from it")
+   end subroutine test_crossed
+
+   !> A motion of 2**30 edges for all: rounded by a millionth of an edge, and yet the same.
+   subroutine test_far(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_scene(scene, [1.25_wp, 0.875_wp], [0.5_wp, 0.5_wp], [1, 1], .false.)
+      scene%u0 = 2.0_wp**30
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.125_wp, 4.0_wp*eps, 1.0_wp, "depth")
+   end subroutine test_far
+
+   !> A strip whose end is put into its middle.
+   subroutine test_self(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      type(block_t) :: strip
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [8, 1], [0.0_wp, 0.0_wp], [8.0_wp, 1.0_wp], strip)
+      call add_surface(scene, "SKIN", strip, [bottom, right, top, left])
+      scene%pair = [contact_pair_t(slave=1, master=1)]
+      call judged(scene, overlap)
+      call check_equal(error, overlap%node, 0, "straight")
+      ! Bent back above itself, and the lower corner of its end 0.2 below the top.
+      scene%u0(:, block_node(strip, 8, 0)) = [2.5_wp, 1.5_wp] - [8.0_wp, 0.0_wp]
+      scene%u0(:, block_node(strip, 8, 1)) = [2.5_wp, 0.8_wp] - [8.0_wp, 1.0_wp]
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.2_wp, 8.0_wp*eps, 1.0_wp, "depth")
+      call check_equal(error, overlap%node, block_node(strip, 8, 1), "node")
+   end subroutine test_self
+
+   subroutine test_no_pair(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_scene(scene, [1.3_wp, 0.5_wp], [1.0_wp, 1.0_wp], [1, 1], .false.)
+      deallocate(scene%pair)
+      allocate(scene%pair(0))
+      call judged(scene, overlap)
+      call check_equal(error, overlap%node, 0, "no pair")
+   end subroutine test_no_pair
+
+end module test_judge

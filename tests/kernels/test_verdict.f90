@@ -1,0 +1,77 @@
+!> The verdict from running figures.
+module test_verdict
+   use check, only : check_equal, check_true, test_case_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good, verdict_line, &
+      verdict_t
+   implicit none
+   private
+   public :: collect_verdict
+
+contains
+
+   subroutine collect_verdict(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("a clean run is good", test_good), &
+         test_case_t("what is bad is named", test_bad), &
+         test_case_t("a tenth of an edge is a failure", test_deep), &
+         test_case_t("a run that failed is not good", test_failed)]
+   end subroutine collect_verdict
+
+   subroutine test_good(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+
+      verdict%largest_energy = 2.0_wp
+      verdict%dynamic_drift = 1.0e-10_wp
+      verdict%largest_drift = 1.0_wp             ! of statics: shown, not judged
+      verdict%n_warning = 3
+      call verdict_end(verdict)
+      call check_true(error, verdict_is_good(verdict), "good")
+      call check_true(error, .not. verdict_is_failure(verdict, .true.), "no failure")
+   end subroutine test_good
+
+   subroutine test_bad(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+      character(len=:), allocatable :: line
+
+      verdict%largest_energy = 2.0_wp
+      verdict%dynamic_drift = 3.0e-10_wp
+      verdict%unconverged = 1.0e-3_wp
+      verdict%deepest = 1.0e-2_wp
+      call verdict_end(verdict)
+      call check_equal(error, verdict%reasons%n, 3, "reasons")
+      call verdict_line(verdict, line)
+      call check_true(error, index(line, "verdict: BAD: ") == 1, line)
+      call check_true(error, index(line, "does NOT close") > 0, line)
+      call check_true(error, .not. verdict_is_good(verdict), "not good")
+      call check_true(error, .not. verdict_is_failure(verdict, .false.), "no failure by itself")
+      call check_true(error, verdict_is_failure(verdict, .true.), "a failure if strict")
+   end subroutine test_bad
+
+   subroutine test_deep(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+
+      verdict%deepest = 0.11_wp
+      call verdict_end(verdict)
+      call check_true(error, verdict_is_failure(verdict, .false.), "a failure")
+   end subroutine test_deep
+
+   subroutine test_failed(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+      character(len=:), allocatable :: line
+
+      verdict%has_dynamics = .true.
+      call verdict_end(verdict, "the analysis stops")
+      call check_true(error, .not. verdict_is_good(verdict), "not good")
+      call verdict_line(verdict, line)
+      call check_equal(error, line, "verdict: NOT COMPLETED", "line")
+   end subroutine test_failed
+
+end module test_verdict

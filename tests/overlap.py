@@ -1,0 +1,217 @@
+"""Do bodies overlap? Looked at from outside, with nothing but positions and cells.
+
+`Bodies` finds the bodies of a mesh (cells that hang together by nodes) and their outlines from
+the cells alone; surfaces, pairs and constraints of a deck play no part. `Bodies.overlap(x)` is
+the deepest overlap of one configuration, `worst(fields)` that of a whole run, between its frames
+too: on the straight way from frame to frame, so that a thin body that was crossed is seen.
+
+What counts is a point of an outline, or the centre of a cell, inside another body: its distance
+from that body's outline, in the length of the deck and by the length of the edge it is behind. Of
+an outline all nodes are looked at, and the middle of each part of an edge between its crossings
+with the other outline: bodies may overlap with no node of either inside the other. A body inside
+itself is found by its outline likewise, away from the own edges of the point.
+"""
+
+import dataclasses
+import itertools
+
+import numpy as np
+
+#: Largest relative motion between two looks at a step, by the shortest edge: what is as thin as
+#: one edge is then seen at least a quarter of an edge deep on the way through.
+LOOK = 0.5
+
+
+@dataclasses.dataclass(frozen=True, order=True)
+class Overlap:
+    """How deep, by the edge (what is compared) and in length, and where."""
+
+    by_edge: float = 0.0
+    depth: float = 0.0
+    time: float = 0.0
+    bodies: tuple = ()             # numbers from 0, in the order of their first nodes
+    place: tuple = ()              # of the node, centre or end of an edge
+
+    def __str__(self):
+        if not self.bodies:
+            return "no overlap"
+        return (f"body {self.bodies[0] + 1} is {self.depth:.3g} ({self.by_edge:.3g} edges) inside "
+                f"body {self.bodies[1] + 1} at ({self.place[0]:.4g}, {self.place[1]:.4g}), "
+                f"time {self.time:.6g}")
+
+
+# ---- figures of the plane -----------------------------------------------------------------------
+
+
+def cross(a, b):
+    return a[..., 0]*b[..., 1] - a[..., 1]*b[..., 0]
+
+
+def to_edges(p, a, b):
+    """Distance of each point from each edge a-b: (n_point, n_edge)."""
+    d = b - a
+    to_p = p[:, None] - a
+    share = np.clip((to_p*d).sum(-1)/np.maximum((d*d).sum(-1), np.finfo(float).tiny), 0, 1)
+    return np.linalg.norm(to_p - share[..., None]*d, axis=-1)
+
+
+def layers(p, a, b):
+    """How many times closed outlines a-b, the inside to the left, go around each point."""
+    to_a, to_b = a - p[:, None], b - p[:, None]
+    up = (to_a[..., 1] <= 0) & (to_b[..., 1] > 0)
+    down = (to_a[..., 1] > 0) & (to_b[..., 1] <= 0)
+    left = cross(to_a, to_b)
+    return (up & (left > 0)).sum(1) - (down & (left < 0)).sum(1)
+
+
+def more_layers(p, a, b, inside, touches):
+    """How many times outlines go around points of their own, beyond the material there.
+
+    `touches` (n_point, n_edge) are the edges that the point is on; the others turn about it by
+    the angle `inside` of the material, and by a full turn for each further layer.
+    """
+    to_a, to_b = a - p[:, None], b - p[:, None]
+    turn = np.arctan2(cross(to_a, to_b), (to_a*to_b).sum(-1))
+    return np.rint((np.where(touches, 0.0, turn).sum(1) - inside)/(2*np.pi)).astype(int)
+
+
+def parts(a, b, c, d, alike):
+    """Edges a-b in parts, cut where edges c-d cross them: middles (n, 2), and the edge of each.
+
+    Edges that are `alike` (n_edge, n_other) are the same or share a node: they do not cross.
+    """
+    along, across = (b - a)[:, None], d - c
+    turn = cross(along, across)
+    to_c = c - a[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s, t = cross(to_c, across)/turn, cross(to_c, along)/turn
+    hit = (s > 0) & (s < 1) & (t >= 0) & (t <= 1) & ~alike
+    cuts = np.concatenate([np.zeros((len(a), 1)), np.sort(np.where(hit, s, 1.0), axis=1),
+                           np.ones((len(a), 1))], axis=1)
+    k, m = np.nonzero(np.diff(cuts, axis=1) > 0)
+    middle = 0.5*(cuts[k, m] + cuts[k, m + 1])
+    return a[k] + middle[:, None]*(b - a)[k], k
+
+
+# ---- bodies -------------------------------------------------------------------------------------
+
+
+class Bodies:
+    """The bodies of a mesh: cells (0-based nodes, counter-clockwise) and outlines of each."""
+
+    def __init__(self, cells):
+        self.cells = [np.asarray(cell) for cell in cells]
+        faces = [(int(i), int(j)) for cell in self.cells
+                 for i, j in zip(cell, np.roll(cell, -1), strict=True)]
+        twice = {(j, i) for i, j in faces} & set(faces)
+        self.edge = np.array([face for face in faces if face not in twice])
+        body = self._together()
+        self.n = 1 + max(body.values())
+        self.body_of_edge = np.array([body[i] for i in self.edge[:, 0]])
+        self.body_of_cell = np.array([body[int(cell[0])] for cell in self.cells])
+
+    def _together(self):
+        """Node -> number of its body: cells that share a node are of one body."""
+        above = {}
+
+        def top(i):
+            while above.setdefault(i, i) != i:
+                above[i] = i = above[above[i]]
+            return i
+
+        for cell in self.cells:
+            for i in cell[1:]:
+                one, other = sorted((top(int(cell[0])), top(int(i))))
+                above[other] = one
+        numbers = {root: k for k, root in enumerate(sorted({top(i) for i in above}))}
+        return {i: numbers[top(i)] for i in above}
+
+    def edges(self, body):
+        return self.edge[self.body_of_edge == body]
+
+    def overlap(self, x, time=0.0, alone=()):
+        """The deepest overlap of the configuration `x` (n_node, 2).
+
+        `alone` are pairs of bodies (i, j), i <= j, not to be looked at: (i, i) is a body with
+        itself.
+        """
+        box = [(x[e].min((0, 1)), x[e].max((0, 1))) for e in map(self.edges, range(self.n))]
+        found = [Overlap()]
+        for i, j in itertools.combinations_with_replacement(range(self.n), 2):
+            if (i, j) in alone:
+                continue
+            if i == j:
+                found += self._with_itself(x, i)
+            elif (np.maximum(box[i][0], box[j][0]) <= np.minimum(box[i][1], box[j][1])).all():
+                found += [*self._inside(x, i, j, box[j]), *self._inside(x, j, i, box[i])]
+        return dataclasses.replace(max(found), time=float(time))
+
+    def _inside(self, x, i, j, box):
+        """The deepest of the points of body i that are inside body j."""
+        edge, own = self.edges(j), self.edges(i)
+        near = ((x[own].max(1) >= box[0]) & (x[own].min(1) <= box[1])).all(1)
+        middles, _ = parts(*x[own[near].T], *x[edge.T], False)
+        centres = [x[cell].mean(0) for cell in
+                   itertools.compress(self.cells, self.body_of_cell == i)]
+        p = np.vstack([x[np.unique(own)], middles, centres])
+        p = p[((p >= box[0]) & (p <= box[1])).all(1)]
+        p = p[layers(p, *x[edge.T]) > 0]
+        return deepest(p, x[edge], to_edges(p, *x[edge.T]), (i, j))
+
+    def _with_itself(self, x, i):
+        """The deepest point of the outline of body i in another part of the body."""
+        edge = self.edges(i)
+        into = {node: k for k, node in enumerate(edge[:, 1])}
+        out_of = {node: k for k, node in enumerate(edge[:, 0])}
+        node = np.unique(edge)
+        after = x[edge[[out_of[n] for n in node], 1]] - x[node]
+        before = x[edge[[into[n] for n in node], 0]] - x[node]
+        inside = np.arctan2(cross(after, before), (after*before).sum(-1)) % (2*np.pi)
+        touches = (edge[None] == node[:, None, None]).any(-1)
+        alike = (edge[:, None, :, None] == edge[None, :, None, :]).any((-1, -2))
+        middles, k = parts(*x[edge.T], *x[edge.T], alike)
+        p = np.vstack([x[node], middles])
+        inside = np.append(inside, np.full(len(middles), np.pi))
+        touches = np.vstack([touches, k[:, None] == np.arange(len(edge))])
+        deep = more_layers(p, *x[edge.T], inside, touches) > 0
+        away = np.where(touches[deep], np.inf, to_edges(p[deep], *x[edge.T]))
+        return deepest(p[deep], x[edge], away, (i, i))
+
+    def worst(self, x, time, alone=()):
+        """The deepest overlap of frames `x` (n_frame, n_node, 2) and on the way between them."""
+        shortest = np.linalg.norm(np.diff(x[0][self.edge], axis=1)[:, 0], axis=-1).min()
+        nodes = np.unique(self.edge)
+        found = [self.overlap(x[0], time[0], alone)]
+        for k in range(1, len(x)):
+            step = (x[k] - x[k - 1])[nodes]
+            # No two nodes move against each other by more than the diagonal of all motions.
+            looks = max(1, int(np.ceil(np.linalg.norm(np.ptp(step, axis=0))/(LOOK*shortest))))
+            for s in np.arange(1, looks + 1)/looks:
+                found.append(self.overlap(
+                    x[k - 1] + s*(x[k] - x[k - 1]), time[k - 1] + s*(time[k] - time[k - 1]), alone
+                ))
+        return max(found)
+
+
+def deepest(p, edge, away, bodies):
+    """A list of the deepest of points behind edges, `away` (n_point, n_edge) from them, or none."""
+    if not len(p):
+        return []
+    k = int(np.argmax(away.min(1)))
+    m = int(np.argmin(away[k]))
+    depth = float(away[k, m])
+    length = float(np.linalg.norm(edge[m, 1] - edge[m, 0]))
+    return [Overlap(depth/length, depth, 0.0, bodies, tuple(map(float, p[k])))]
+
+
+def worst(fields, alone=()):
+    """The deepest overlap of a run that wrote its displacements in every increment."""
+    bodies = Bodies(fields.cells)
+    return bodies.worst(fields.x + fields["displacement"], fields.time, alone)
+
+
+def frames(fields, alone=()):
+    """The deepest overlap of each frame, by itself."""
+    bodies = Bodies(fields.cells)
+    return [bodies.overlap(x, t, alone)
+            for x, t in zip(fields.x + fields["displacement"], fields.time, strict=True)]

@@ -1,0 +1,38 @@
+"""The benches, the book's generator and the generators of decks run: in short forms."""
+
+import subprocess
+import sys
+
+import pytest
+from scene_tools import CRASH, DECKS, ROOT, emcon
+
+BENCH = ROOT / "tests" / "bench"
+
+
+def run(*command):
+    done = subprocess.run([sys.executable, *map(str, command)], capture_output=True, text=True,
+                          timeout=300)  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not CRASH.search(done.stdout + done.stderr)
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", ["bench_ring", "bench_python"])
+def test_bench(name):
+    """Its tables are there; their figures are nothing to judge by."""
+    assert len([line for line in run(BENCH / f"{name}.py", "--short").splitlines() if line]) > 9
+
+
+@pytest.mark.parametrize("chapter", ["patch", "contact_patch_points"])
+def test_chapter_of_the_book(chapter):
+    text = run(BENCH / "verification.py", chapter)
+    assert text.startswith(f"{chapter}\n") and text.count("|") > 6
+
+
+@pytest.mark.parametrize("generator", sorted(p.name for p in DECKS.glob("make_*.py")))
+def test_generator_of_decks(generator, tmp_path):
+    """What it makes by default is a deck that the program accepts."""
+    deck = tmp_path / "made.inp"
+    run(DECKS / generator, "--output", deck)
+    done = emcon("check", deck, "--quiet")
+    assert done.returncode == 0, done.stderr
