@@ -5,7 +5,8 @@ gfortran's own -M needs the .mod files first, so it cannot order the first build
 
 gfortran leaves a module file alone whose interface has not changed. The rule of such a file does
 nothing, after which make looks at its time: an edit of a body compiles one file. Only where the
-module file is gone, the object is made again.
+module file is gone, the object is made again: found while make reads the rules, for a call of make
+in a recipe would run in a dry run (`make -n`) too, once for each way from module to module.
 """
 
 import pathlib
@@ -51,8 +52,10 @@ def rules(folder, module_folder, sources):
         if needed:
             yield f"{objects[s]}: {' '.join(sorted(needed))}"
     for m in sorted(home):
-        yield (f"{module_folder}/{m}.mod: {objects[home[m]]} ; "
-               "@test -f $@ || { rm -f $<; $(MAKE) --no-print-directory $<; }")
+        file, made = f"{module_folder}/{m}.mod", objects[home[m]]
+        yield f"{file}: {made} ;"
+        yield f"{made}: $(if $(wildcard {file}),,always)"
+    yield ".PHONY: always"
 
 
 if __name__ == "__main__":

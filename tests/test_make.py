@@ -70,14 +70,19 @@ class Tree:
         path.parent.mkdir(exist_ok=True)
         path.write_text(text)
 
-    def make(self, *goals):
-        """Command lines of compilations by the file they compile."""
+    def compiled(self, *goals):
+        """The command lines of compilations that make prints, and the files they compile."""
         environment = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MAKELEVEL")}
-        done = subprocess.run(["make", "V=1", *goals], cwd=self.folder, env=environment,
-                              capture_output=True, text=True, timeout=120)  # fmt: skip
+        # `timeout` of coreutils: it ends what make has started, too.
+        done = subprocess.run(["timeout", "120", "make", "V=1", *goals], cwd=self.folder,
+                              env=environment, capture_output=True, text=True)  # fmt: skip
         assert done.returncode == 0, done.stdout + done.stderr
         lines = re.findall(r"^(.* -c (\S+\.[fF]90) .*)$", done.stdout, re.M)
-        return {pathlib.Path(file).stem: line for line, file in lines}
+        return [(pathlib.Path(file).stem, line) for line, file in lines]
+
+    def make(self, *goals):
+        """Command lines of compilations by the file they compile."""
+        return dict(self.compiled(*goals))
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +127,16 @@ def test_the_library_keeps_its_flags_below_the_kernel_tests(tree):
     commands = tree.make("kernels")
     assert " -O2 " in commands["emcon_low"] and " -O0 " not in commands["emcon_low"]
     assert " -O0 " in commands["main"]
+
+
+def test_a_dry_run_ends_and_makes_nothing(tmp_path):
+    """Each file is told once: a recipe that calls make would tell it on every way through it."""
+    tree = Tree(tmp_path)
+    library = ["emcon_beside", "emcon_low", "emcon_middle", "emcon_top"]
+    assert sorted(name for name, _ in tree.compiled("--dry-run", "lib")) == library
+    assert not list(tmp_path.rglob("*.o"))
+    tree.make("lib")
+    module = tmp_path / "build/release/mod/emcon_low.mod"
+    module.unlink()
+    assert "emcon_low" in tree.make("--dry-run", "lib")
+    assert not module.exists()
