@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import json
-import json
 import os
 import pathlib
 import re

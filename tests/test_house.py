@@ -4,6 +4,8 @@ The rooms stand in the order of ROOMS; a module uses its own room and rooms befo
 functions take the root of a tree and return findings, so they are tried on bad trees below.
 """
 
+import ast
+import collections
 import graphlib
 import importlib.util
 import pathlib
@@ -110,6 +112,25 @@ def top_level(root):
     return sorted(e for e in entries - TOP if not e.startswith("."))
 
 
+def bound(body):
+    """Names that the statements of a module or class define or import, but by assignment."""
+    for node in body:
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            yield node.name
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield from (a.asname or a.name for a in node.names if a.name != "*")
+
+
+def hidden(root):
+    """Definitions in Python that a second one of their name hides: tests that never run."""
+    for path in sorted(p for top in TOP for p in (root / top).rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for body in [tree.body, *(n.body for n in ast.walk(tree) if isinstance(n, ast.ClassDef))]:
+            for name, times in collections.Counter(bound(body)).items():
+                if times > 1:
+                    yield f"{path.relative_to(root)}: defines {name} {times} times"
+
+
 CHECKS = {
     "names": names,
     "arrows up": arrows_up,
@@ -117,6 +138,7 @@ CHECKS = {
     "stop": lambda root: statements(root, STOP, {"app"}),
     "print": lambda root: statements(root, PRINT, {"app", "results"}),
     "top level": top_level,
+    "hidden": hidden,
 }
 
 
@@ -143,6 +165,7 @@ GOOD = {
     "api/emcon_stepper.f90": "module emcon_stepper\n   use :: emcon_text\n"
     "   use, intrinsic :: iso_c_binding\nend module emcon_stepper\n",
     "app/emcon.f90": "program emcon\n   use emcon_stepper\n   print *, 1\n   stop 1\nend program\n",
+    "order.py": "def f():\n    pass\n\n\nclass A:\n    def f(self):\n        pass\n",
 }
 BAD = {
     "names": {"base/emcon_sort.f90": "module emcon_order\nend module emcon_order\n"},
@@ -166,6 +189,10 @@ BAD = {
     "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
     "stop, exit": {"api/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},
     "print": {"deck/emcon_a.f90": "module emcon_a\n   write (*, *) x\nend module emcon_a\n"},
+    "hidden": {"order.py": "def f():\n    pass\n\n\ndef f():\n    pass\n"},
+    "hidden, method": {"order.py": "class A:\n    def f(self):\n        pass\n    f = 1\n\n"
+                       "    def f(self):\n        pass\n"},
+    "hidden, import": {"order.py": "from a import f\n\n\ndef f():\n    pass\n"},
 }
 
 
