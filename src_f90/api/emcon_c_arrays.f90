@@ -11,20 +11,24 @@ module emcon_c_arrays
    public :: take_list, take_field, take_integers, take_flags, check_range, check_ascending
    public :: put_flags
 
+   !> Twice as many numbers can just be counted.
+   integer, parameter :: most_nodes = 2**30 - 1
+
 contains
 
-   !> The `n` finite numbers at `from`.
-   subroutine take_list(name, from, n, list, error)
+   !> The `n` finite numbers at `from`; none where there is an error.
+   subroutine take_list(name, from, n, list, error, needed)
       character(len=*), intent(in) :: name       !! of the argument
       type(c_ptr), intent(in) :: from
       integer(c_int), intent(in) :: n
       real(wp), allocatable, intent(out) :: list(:)
       type(error_t), allocatable, intent(inout) :: error
+      integer, intent(in), optional :: needed    !! what `n` has to be; < 0: any
       real(c_double), pointer :: array(:)
       integer :: i
 
-      allocate(list(max(n, 0_c_int)), source=0.0_wp)
-      call check_array(name, from, n, error)
+      allocate(list(0))
+      call check_array(name, from, n, error, needed)
       if (allocated(error) .or. n == 0) return
       call c_f_pointer(from, array, [n])
       do i = 1, n
@@ -44,23 +48,26 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       real(wp), allocatable :: list(:)
 
-      call take_list(name, from, 2*int(n, c_int), list, error)
+      if (.not. allocated(error) .and. n > most_nodes) call raise(error, err_input, name // &
+         " is for " // to_text(n) // " nodes, more than can be counted")
+      call take_list(name, from, 2*max(-1, min(n, most_nodes)), list, error)
       allocate(field(2, size(list)/2))
       field = reshape(list, shape(field))
    end subroutine take_field
 
    !> The `n` integers at `from`, each raised by `base`.
-   subroutine take_integers(name, from, n, base, list, error)
+   subroutine take_integers(name, from, n, base, list, error, needed)
       character(len=*), intent(in) :: name
       type(c_ptr), intent(in) :: from
       integer(c_int), intent(in) :: n
       integer, intent(in) :: base                !! 1: numbers that count from 0 in C
       integer, allocatable, intent(out) :: list(:)
       type(error_t), allocatable, intent(inout) :: error
+      integer, intent(in), optional :: needed    !! what `n` has to be; < 0: any
       integer(c_int), pointer :: array(:)
 
-      allocate(list(max(n, 0_c_int)), source=0)
-      call check_array(name, from, n, error)
+      allocate(list(0))
+      call check_array(name, from, n, error, needed)
       if (allocated(error) .or. n == 0) return
       call c_f_pointer(from, array, [n])
       if (any(array >= huge(array) - base)) then
@@ -71,16 +78,17 @@ contains
    end subroutine take_integers
 
    !> The `n` flags at `from`.
-   subroutine take_flags(name, from, n, flag, error)
+   subroutine take_flags(name, from, n, flag, error, needed)
       character(len=*), intent(in) :: name
       type(c_ptr), intent(in) :: from
       integer(c_int), intent(in) :: n
       logical, allocatable, intent(out) :: flag(:)
       type(error_t), allocatable, intent(inout) :: error
+      integer, intent(in), optional :: needed    !! what `n` has to be; < 0: any
       integer, allocatable :: list(:)
       integer :: i
 
-      call take_integers(name, from, n, 0, list, error)
+      call take_integers(name, from, n, 0, list, error, needed)
       flag = list /= 0
       if (allocated(error)) return
       do i = 1, size(list)
@@ -91,20 +99,32 @@ contains
       end do
    end subroutine take_flags
 
-   !> There is an array, unless it is empty.
-   subroutine check_array(name, from, n, error)
+   !> There is an array of the size that is needed, unless it is empty.
+   subroutine check_array(name, from, n, error, needed)
       character(len=*), intent(in) :: name
       type(c_ptr), intent(in) :: from
       integer(c_int), intent(in) :: n
       type(error_t), allocatable, intent(inout) :: error
+      integer, intent(in), optional :: needed
 
       if (allocated(error)) return
       if (n < 0) then
          call raise(error, err_input, "the size of " // name // " is " // to_text(int(n)))
+      else if (.not. is_needed(n, needed)) then
+         call raise(error, err_input, name // " has " // to_text(int(n)) // " entries, not " // &
+            to_text(needed))
       else if (n > 0 .and. .not. c_associated(from)) then
          call raise(error, err_input, name // " is NULL")
       end if
    end subroutine check_array
+
+   pure logical function is_needed(n, needed)
+      integer(c_int), intent(in) :: n
+      integer, intent(in), optional :: needed
+
+      is_needed = .true.
+      if (present(needed)) is_needed = n == needed .or. needed < 0
+   end function is_needed
 
    !> Numbers that count from 0 in C, and from 1 in `list`, are below `n`. One may be a scalar.
    pure subroutine check_range(name, list, n, error)

@@ -13,7 +13,7 @@ module emcon_flat_interface
       emcon_interface_get_positions, emcon_interface_get_sizes, emcon_interface_get_tie_matrices, &
       emcon_interface_new, emcon_interface_prepare, emcon_interface_set, options_c, settings_c, &
       sizes_c
-   use emcon_interface_handle, only : host_at, host_t
+   use emcon_interface_handle, only : host_at, host_has_nodes, host_t
    implicit none
    private
    public :: new_interface, close_interface, message, notes, add_surface, add_pair, add_tie
@@ -31,9 +31,9 @@ contains
       real(c_double), intent(in), target :: x(2, n_node)
       integer(c_int64_t), intent(out) :: handle
       integer(c_int), intent(out) :: ierr
-      type(c_ptr) :: face
+      type(c_ptr), target :: face
 
-      ierr = emcon_interface_new(n_node, c_loc(x), face)
+      ierr = emcon_interface_new(n_node, c_loc(x), c_loc(face))
       handle = transfer(face, handle)
    end subroutine new_interface
 
@@ -67,7 +67,7 @@ contains
       call host_at(handle, host)
       if (.not. associated(host)) return
       n = host%face%notes%n
-      if (i < n) text = host%face%notes%item(i + 1)%text
+      if (i >= 0 .and. i < n) text = host%face%notes%item(i + 1)%text
    end subroutine notes
 
    subroutine add_surface(handle, name, n_edge, edge, number, ierr)
@@ -116,9 +116,10 @@ contains
       real(c_double), intent(in) :: gap_tolerance
       integer(c_int), intent(in) :: is_last_try, is_end
       integer(c_int), intent(out) :: ierr
+      type(settings_c), target :: settings
 
-      ierr = emcon_interface_set(transfer(handle, c_null_ptr), &
-         settings_c(initiation, gap_tolerance, is_last_try, is_end))
+      settings = settings_c(initiation, gap_tolerance, is_last_try, is_end)
+      ierr = emcon_interface_set(transfer(handle, c_null_ptr), c_loc(settings))
    end subroutine set_options
 
    subroutine prepare(handle, n_node, held, ierr)
@@ -128,6 +129,7 @@ contains
       integer(c_int), intent(out) :: ierr
       !f2py threadsafe
 
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_prepare(transfer(handle, c_null_ptr), c_loc(held))
    end subroutine prepare
 
@@ -136,9 +138,9 @@ contains
       integer(c_int64_t), intent(in) :: handle
       integer(c_int), intent(out) :: n(7)
       integer(c_int), intent(out) :: ierr
-      type(sizes_c) :: counts
+      type(sizes_c), target :: counts
 
-      ierr = emcon_interface_get_sizes(transfer(handle, c_null_ptr), counts)
+      ierr = emcon_interface_get_sizes(transfer(handle, c_null_ptr), c_loc(counts))
       n = [counts%n_node, counts%n_surface, counts%n_pair, counts%n_tie, counts%n_contact, &
          counts%n_unknown, counts%n_selected]
    end subroutine sizes
@@ -152,6 +154,7 @@ contains
 
       x = 0.0_c_double
       largest_move = 0.0_c_double
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_get_positions(transfer(handle, c_null_ptr), c_loc(x), &
          c_loc(largest_move))
    end subroutine positions
@@ -193,6 +196,7 @@ contains
       real(c_double), intent(inout), target :: field(2, n_node)
       integer(c_int), intent(out) :: ierr
 
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_follow(transfer(handle, c_null_ptr), c_loc(field))
    end subroutine follow
 
@@ -202,6 +206,7 @@ contains
       real(c_double), intent(inout), target :: field(2, n_node)
       integer(c_int), intent(out) :: ierr
 
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_gather(transfer(handle, c_null_ptr), c_loc(field))
    end subroutine gather
 

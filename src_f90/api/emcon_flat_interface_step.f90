@@ -2,7 +2,7 @@
 module emcon_flat_interface_step
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
    use emcon_errors, only : err_input, err_none
-   use emcon_interface_handle, only : host_at, host_t
+   use emcon_interface_handle, only : host_at, host_has_nodes, host_t
    use emcon_interface_step_c, only : emcon_interface_begin_step, emcon_interface_choose, &
       emcon_interface_drop, emcon_interface_evaluate, emcon_interface_get_areas, &
       emcon_interface_get_curvature, emcon_interface_get_gaps, emcon_interface_get_null_space, &
@@ -27,6 +27,7 @@ contains
       !f2py threadsafe
 
       active = 0
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_begin_step(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), &
          n_contact, c_loc(was_active), c_loc(active))
    end subroutine begin_step
@@ -43,7 +44,10 @@ contains
       type(gap_c), target :: state(n_contact)
       !f2py threadsafe
 
+      flag = 0
+      gap = 0.0_c_double
       state = gap_c(0, 0, 0.0_c_double, 0.0_c_double, 0.0_c_double)
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_get_gaps(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), &
          n_contact, c_loc(state))
       flag(:, 1) = state%is_near
@@ -62,6 +66,7 @@ contains
       integer(c_int), intent(out) :: ierr
       !f2py threadsafe
 
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_select(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), &
          n_contact, c_loc(active), c_null_ptr)
    end subroutine select_active
@@ -76,6 +81,7 @@ contains
       integer(c_int), intent(out) :: ierr
       !f2py threadsafe
 
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_choose(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), &
          min(n, n_target), c_loc(contact), c_loc(target_gap))
    end subroutine choose
@@ -91,6 +97,7 @@ contains
       !f2py threadsafe
 
       n = 0
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_evaluate(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), &
          c_null_ptr)
       call host_at(handle, host)
@@ -139,6 +146,7 @@ contains
       !f2py threadsafe
 
       product = 0.0_c_double
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_second_times(transfer(handle, c_null_ptr), n, c_loc(lam), &
          c_loc(direction), c_loc(product))
    end subroutine second_times
@@ -164,6 +172,7 @@ contains
       outcome = 0
       sizes = c_null_ptr
       if (has_magnitude /= 0) sizes = c_loc(magnitude)
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_update_active(transfer(handle, c_null_ptr), c_loc(u0), c_loc(du), n, &
          c_loc(lam), sizes, n_contact, c_loc(active), c_loc(is_done), c_loc(outcome))
    end subroutine update_active
@@ -179,6 +188,7 @@ contains
 
       area = 0.0_c_double
       length = 0.0_c_double
+      if (.not. host_has_nodes(handle, n_node, ierr)) return
       ierr = emcon_interface_get_areas(transfer(handle, c_null_ptr), c_loc(u1), n_contact, &
          c_loc(area), c_loc(length))
    end subroutine areas

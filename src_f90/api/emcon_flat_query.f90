@@ -5,14 +5,15 @@
 module emcon_flat_query
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_csr, only : csr_t
-   use emcon_errors, only : error_t
-   use emcon_handle, only : at_df, at_links, at_mass, at_p, handle_find, handle_fits, &
-      handle_pass, model_t
+   use emcon_errors, only : err_input, error_t
+   use emcon_handle, only : at_df, at_links, at_mass, at_p, handle_fail, handle_find, &
+      handle_fits, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_stepper_constraints, only : query_constraints, query_curvature_times, query_links, &
       query_multipliers, query_null_space
    use emcon_stepper_query, only : query_evaluate, query_guess, query_mass, query_momenta, &
       query_residual, query_tangent, query_unknowns
+   use emcon_text, only : to_text
    implicit none
    private
    public :: guess, evaluate, get_residual, get_unknown_residual, get_unknowns, get_momenta, &
@@ -187,6 +188,7 @@ contains
       sizes = 0
       call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
+      if (.not. has_place(model, place, size(model%matrix), ierr)) return
       associate (matrix => model%matrix(place))
          select case (place)
          case (at_mass)
@@ -200,6 +202,18 @@ contains
          if (.not. allocated(error)) sizes = sizes_of(matrix)
       end associate
    end subroutine make_matrix
+
+   !> Whether `place` is one of the first `n`; else an error.
+   logical function has_place(model, place, n, ierr)
+      type(model_t), intent(inout) :: model
+      integer(c_int), intent(in) :: place
+      integer, intent(in) :: n
+      integer(c_int), intent(inout) :: ierr
+
+      has_place = place >= 1 .and. place <= n
+      if (.not. has_place) call handle_fail(model, "there is no matrix " // to_text(int(place)), &
+         err_input, ierr)
+   end function has_place
 
    !> P and DF of the last evaluation.
    subroutine make_null_space(handle, sizes, ierr)
@@ -245,6 +259,7 @@ contains
       value = 0.0_c_double
       call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
+      if (.not. has_place(model, place, size(model%matrix) + 2, ierr)) return
       select case (place - size(model%matrix))
       case (1)
          call copy_csr(model, model%report%discrete_gradient, row_start, column, value, ierr)

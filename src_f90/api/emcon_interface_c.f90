@@ -4,7 +4,7 @@ module emcon_interface_c
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_int64_t, &
       c_loc, c_null_ptr, c_ptr
    use emcon_c_arrays, only : check_range, take_field, take_flags, take_integers
-   use emcon_c_border, only : c_string, f_text, put_field, put_matrix, &
+   use emcon_c_border, only : c_string, check_given, f_text, put_field, put_matrix, &
       put_numbers, put_values
    use emcon_errors, only : err_input, error_t
    use emcon_interface, only : interface_add_pair, interface_add_surface, interface_add_tie, &
@@ -57,14 +57,17 @@ contains
       call host_at(transfer(face, 0_c_int64_t), host)
    end subroutine c_host
 
-   integer(c_int) function emcon_interface_new(n_node, x, face) result(ierr) bind(c)
+   integer(c_int) function emcon_interface_new(n_node, x, place) result(ierr) bind(c)
       integer(c_int), value :: n_node
-      type(c_ptr), value :: x
-      type(c_ptr), intent(out) :: face
+      type(c_ptr), value :: x, place
       type(host_t), pointer :: host
       type(error_t), allocatable :: error
+      type(c_ptr), pointer :: face
       real(wp), allocatable :: position(:, :)
 
+      ierr = err_input
+      if (.not. c_associated(place)) return      ! nothing could be told of it, nor freed
+      call c_f_pointer(place, face)
       face = transfer(host_make(), c_null_ptr)
       call c_host(face, host, ierr)
       call take_field("x", x, n_node, position, error)
@@ -128,7 +131,8 @@ contains
       if (.not. c_associated(name) .and. allocated(host%face%scene%surface)) then
         title = to_text(size(host%face%scene%surface))
       end if
-      call take_integers("edge", edge, 2_c_int*min(n_edge, most_edges), 1, node, error)
+      call take_integers("edge", edge, 2_c_int*max(-1_c_int, min(n_edge, most_edges)), 1, node, &
+         error)
       if (host%face%n_node > 0) call check_range("edge", node, host%face%n_node, error)
       if (.not. allocated(error)) call interface_add_surface(host%face, title, &
          reshape(node, [2, size(node)/2]), number, error)
@@ -206,16 +210,20 @@ contains
    end function emcon_interface_add_tie
 
    integer(c_int) function emcon_interface_set(face, settings) result(ierr) bind(c)
-      type(c_ptr), value :: face
-      type(settings_c), intent(in) :: settings
+      type(c_ptr), value :: face, settings
       type(host_t), pointer :: host
       type(error_t), allocatable :: error
+      type(settings_c), pointer :: wanted
 
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
-      call interface_set(host%face, merge(settings%initiation, 1_c_int, &
-         settings%initiation /= 0), real(settings%gap_tolerance, wp), &
-         settings%is_last_try == 0, settings%is_end /= 0, error)
+      call check_given("settings", settings, error)
+      if (.not. allocated(error)) then
+         call c_f_pointer(settings, wanted)
+         call interface_set(host%face, merge(wanted%initiation, 1_c_int, &
+            wanted%initiation /= 0), real(wanted%gap_tolerance, wp), &
+            wanted%is_last_try == 0, wanted%is_end /= 0, error)
+      end if
       call host_pass(host, error, ierr)
    end function emcon_interface_set
 
@@ -238,17 +246,20 @@ contains
    end function emcon_interface_prepare
 
    integer(c_int) function emcon_interface_get_sizes(face, sizes) result(ierr) bind(c)
-      type(c_ptr), value :: face
-      type(sizes_c), intent(out) :: sizes
+      type(c_ptr), value :: face, sizes
       type(host_t), pointer :: host
       type(error_t), allocatable :: error
+      type(sizes_c), pointer :: to
 
-      sizes = sizes_c(0, 0, 0, 0, 0, 0, 0)
+      if (c_associated(sizes)) then
+         call c_f_pointer(sizes, to)
+         to = sizes_c(0, 0, 0, 0, 0, 0, 0)
+      end if
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       call host_pass(host, error, ierr)
-      if (host%face%n_node == 0) return
-      sizes = sizes_c(host%face%n_node, size(host%face%scene%surface), size(host%face%scene%pair), &
+      if (host%face%n_node == 0 .or. .not. c_associated(sizes)) return
+      to = sizes_c(host%face%n_node, size(host%face%scene%surface), size(host%face%scene%pair), &
          size(host%face%scene%tie), host%face%n_constraint, host%face%n_unknown, &
          host%face%active%set%n)
    end function emcon_interface_get_sizes

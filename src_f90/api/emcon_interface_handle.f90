@@ -10,12 +10,14 @@ module emcon_interface_handle
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, err_none, error_t, raise
    use emcon_interface, only : interface_t
+   use emcon_interface_stage, only : check_evaluated
    use emcon_interface_step, only : constraint_values_t
    use emcon_text, only : to_text
    implicit none
    private
    public :: host_t, host_new, host_find, host_free, host_pass, host_fit, host_put, host_index
-   public :: host_make, host_at, host_keep
+   public :: host_make, host_at, host_keep, host_contacts, host_selected, host_unknowns, &
+      host_has_nodes
    public :: handle_size, no_handle
 
    integer, parameter :: handle_size = 3
@@ -126,15 +128,57 @@ contains
       end associate
    end subroutine host_keep
 
+   !> How many possible contacts there are; -1 if that is not known yet.
+   pure integer function host_contacts(host) result(n)
+      type(host_t), intent(in) :: host
+
+      n = merge(host%face%n_constraint, -1, host%face%is_prepared)
+   end function host_contacts
+
+   !> How many of them are selected and evaluated.
+   pure integer function host_selected(host) result(n)
+      type(host_t), intent(in) :: host
+      type(error_t), allocatable :: error
+
+      call check_evaluated(host%face, "", error)
+      n = merge(-1, host%face%active%set%n, allocated(error))
+   end function host_selected
+
+   !> How many unknowns the links have.
+   pure integer function host_unknowns(host) result(n)
+      type(host_t), intent(in) :: host
+
+      n = merge(host%face%n_unknown, -1, host%face%is_prepared)
+   end function host_unknowns
+
    !> An error if the host's array has not the extent that is needed.
    subroutine host_fit(name, actual, needed, error)
       character(len=*), intent(in) :: name       !! of the argument
-      integer, intent(in) :: actual, needed
+      integer, intent(in) :: actual
+      integer, intent(in) :: needed              !! < 0: any
       type(error_t), allocatable, intent(inout) :: error
 
-      if (allocated(error) .or. actual == needed) return
+      if (allocated(error) .or. actual == needed .or. needed < 0) return
       call raise(error, err_input, name // " is " // to_text(actual) // ", not " // to_text(needed))
    end subroutine host_fit
+
+   !> Whether fields of the host are over the nodes of the interface at an address. The code and
+   !> the text of an error, if not.
+   logical function host_has_nodes(address, n_node, ierr)
+      integer(c_int64_t), intent(in) :: address
+      integer(c_int), intent(in) :: n_node
+      integer(c_int), intent(out) :: ierr
+      type(host_t), pointer :: host
+      type(error_t), allocatable :: error
+
+      host_has_nodes = .false.
+      ierr = err_input
+      call host_at(address, host)
+      if (.not. associated(host)) return
+      call host_fit("n_node", n_node, host%face%n_node, error)
+      call host_pass(host, error, ierr)
+      host_has_nodes = .not. allocated(error)
+   end function host_has_nodes
 
    !> A matrix in the host's arrays, rows and columns from 1: row i has the entries row(i) to
    !> row(i + 1) - 1. If there is too little room, `n_entry` tells how much is needed.

@@ -92,6 +92,8 @@ contains
          call refuse(error, place, "called before interface_null_space")
       else if (size(self%space%gap%dependent) /= self%active%set%n) then
          call refuse(error, place, "the constraints have changed since interface_null_space")
+      else
+         call check_evaluated(self, place, error)
       end if
    end subroutine check_space
 

@@ -12,7 +12,8 @@ module emcon_interface_step_c
    use emcon_errors, only : error_t
    use emcon_interface_areas, only : interface_areas
    use emcon_interface_c, only : c_host
-   use emcon_interface_handle, only : host_keep, host_pass, host_t
+   use emcon_interface_handle, only : host_contacts, host_fit, host_keep, host_pass, &
+      host_selected, host_t, host_unknowns
    use emcon_interface_null_space, only : interface_multipliers, interface_null_space, &
       interface_particular
    use emcon_interface_step, only : interface_begin_step, interface_choose, &
@@ -67,7 +68,7 @@ contains
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       call take_motion(host, u0, du, start, motion, error)
-      call take_flags("was_active", was_active, n_contact, flag, error)
+      call take_flags("was_active", was_active, n_contact, flag, error, host_contacts(host))
       allocate(next, mold=flag)
       if (.not. allocated(error)) call interface_begin_step(host%face, start, motion, flag, next, &
          error)
@@ -89,8 +90,11 @@ contains
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       call take_motion(host, u0, du, start, motion, error)
-      allocate(state(max(n_contact, 0_c_int)))
-      if (.not. allocated(error)) call interface_gaps(host%face, start, motion, state, error)
+      call host_fit("n_contact", n_contact, host_contacts(host), error)
+      if (.not. allocated(error)) then
+         allocate(state(max(0, host_contacts(host))))
+         call interface_gaps(host%face, start, motion, state, error)
+      end if
       call host_pass(host, error, ierr)
       if (allocated(error) .or. .not. c_associated(gap)) return
       call c_f_pointer(gap, to, shape(state))
@@ -114,7 +118,7 @@ contains
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       call take_motion(host, u0, du, start, motion, error)
-      call take_flags("active", active, n_contact, flag, error)
+      call take_flags("active", active, n_contact, flag, error, host_contacts(host))
       if (.not. allocated(error)) call interface_select(host%face, start, motion, flag, error)
       call host_pass(host, error, ierr)
       if (.not. allocated(error)) call put_numbers([count(flag)], n)
@@ -189,7 +193,7 @@ contains
 
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
-      call take_list("lam", lam, n, multiplier, error)
+      call take_list("lam", lam, n, multiplier, error, host_selected(host))
       if (.not. allocated(error)) call interface_curvature(host%face, multiplier, host%curvature, &
          error)
       call host_pass(host, error, ierr)
@@ -207,7 +211,7 @@ contains
 
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
-      call take_list("lam", lam, n, multiplier, error)
+      call take_list("lam", lam, n, multiplier, error, host_selected(host))
       call take_field("direction", direction, host%face%n_node, along, error)
       allocate(field, mold=along)
       if (.not. allocated(error)) call interface_second_times(host%face, multiplier, along, field, &
@@ -235,8 +239,8 @@ contains
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       call take_motion(host, u0, du, start, motion, error)
-      call take_list("lam", lam, n, multiplier, error)
-      call take_flags("active", active, n_contact, flag, error)
+      call take_list("lam", lam, n, multiplier, error, host_selected(host))
+      call take_flags("active", active, n_contact, flag, error, host_contacts(host))
       if (c_associated(magnitude)) call take_field("magnitude", magnitude, host%face%n_node, &
          sizes, error)
       ! Without sizes the last argument counts as absent.
@@ -256,13 +260,16 @@ contains
       type(c_ptr), value :: area, length
       type(host_t), pointer :: host
       type(error_t), allocatable :: error
-      real(wp), allocatable :: reached(:, :)
-      real(wp) :: areas(max(n_contact, 0_c_int)), lengths(max(n_contact, 0_c_int))
+      real(wp), allocatable :: reached(:, :), areas(:), lengths(:)
 
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       call take_field("u1", u1, host%face%n_node, reached, error)
-      if (.not. allocated(error)) call interface_areas(host%face, reached, areas, lengths, error)
+      call host_fit("n_contact", n_contact, host_contacts(host), error)
+      if (.not. allocated(error)) then
+         allocate(areas(max(0, host_contacts(host))), lengths(max(0, host_contacts(host))))
+         call interface_areas(host%face, reached, areas, lengths, error)
+      end if
       call host_pass(host, error, ierr)
       if (allocated(error)) return
       call put_values(areas, area)
@@ -302,14 +309,18 @@ contains
       type(host_t), pointer :: host
       type(error_t), allocatable :: error
       integer, allocatable :: place(:)
-      logical :: left(max(n_contact, 0_c_int))
+      logical, allocatable :: left(:)
 
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
       call take_integers("redundant", redundant, n_redundant, 1, place, error)
       if (host%face%has_stencils) call check_range("redundant", place, host%face%active%set%n, &
          error)
-      if (.not. allocated(error)) call interface_drop(host%face, place, left, error)
+      call host_fit("n_contact", n_contact, host_contacts(host), error)
+      if (.not. allocated(error)) then
+         allocate(left(max(0, host_contacts(host))))
+         call interface_drop(host%face, place, left, error)
+      end if
       call host_pass(host, error, ierr)
       if (.not. allocated(error)) call put_flags(left, active)
    end function emcon_interface_drop
@@ -323,13 +334,16 @@ contains
       type(c_ptr), value :: lam
       type(host_t), pointer :: host
       type(error_t), allocatable :: error
-      real(wp), allocatable :: force(:)
-      real(wp) :: multiplier(max(n, 0_c_int))
+      real(wp), allocatable :: force(:), multiplier(:)
 
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
-      call take_list("residual", residual, n_unknown, force, error)
-      if (.not. allocated(error)) call interface_multipliers(host%face, force, multiplier, error)
+      call take_list("residual", residual, n_unknown, force, error, host_unknowns(host))
+      call host_fit("n", n, host_selected(host), error)
+      if (.not. allocated(error)) then
+         allocate(multiplier(max(0, host_selected(host))))
+         call interface_multipliers(host%face, force, multiplier, error)
+      end if
       call host_pass(host, error, ierr)
       if (.not. allocated(error)) call put_values(multiplier, lam)
    end function emcon_interface_multipliers
@@ -343,13 +357,16 @@ contains
       type(c_ptr), value :: dw
       type(host_t), pointer :: host
       type(error_t), allocatable :: error
-      real(wp), allocatable :: left(:)
-      real(wp) :: motion(max(n_unknown, 0_c_int))
+      real(wp), allocatable :: left(:), motion(:)
 
       call c_host(face, host, ierr)
       if (.not. associated(host)) return
-      call take_list("defect", defect, n, left, error)
-      if (.not. allocated(error)) call interface_particular(host%face, left, motion, error)
+      call take_list("defect", defect, n, left, error, host_selected(host))
+      call host_fit("n_unknown", n_unknown, host_unknowns(host), error)
+      if (.not. allocated(error)) then
+         allocate(motion(max(0, host_unknowns(host))))
+         call interface_particular(host%face, left, motion, error)
+      end if
       call host_pass(host, error, ierr)
       if (.not. allocated(error)) call put_values(motion, dw)
    end function emcon_interface_particular

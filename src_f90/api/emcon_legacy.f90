@@ -10,7 +10,7 @@
 !> The names carry an underscore at the end, as compilers append it to those of external
 !> subroutines: CALL EMNEW(...) finds `emnew_`.
 module emcon_legacy
-   use, intrinsic :: iso_c_binding, only : c_char, c_double, c_int
+   use, intrinsic :: iso_c_binding, only : c_char, c_double, c_int, c_int64_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_interface, only : interface_add_pair, interface_add_surface, interface_add_tie, &
@@ -152,7 +152,7 @@ contains
    !> T of u = T w, 2 N rows over NU unknowns; freedom A of node I is 2 (I - 1) + A.
    subroutine emlink(ih, n, maxnz, nz, irow, icol, val, ierr) bind(c, name="emlink_")
       integer(c_int), intent(in) :: ih(handle_size), n, maxnz
-      integer(c_int), intent(out) :: nz, irow(2*n + 1), icol(maxnz)
+      integer(c_int), intent(out) :: nz, irow(2_c_int64_t*n + 1), icol(maxnz)
       real(c_double), intent(out) :: val(maxnz)
       integer(c_int), intent(out) :: ierr
       type(host_t), pointer :: host
@@ -174,7 +174,7 @@ contains
       integer(c_int), intent(in) :: ih(handle_size), it, iwhich, maxrow
       integer(c_int), intent(out) :: nr
       integer(c_int), intent(in) :: maxnz
-      integer(c_int), intent(out) :: nz, irow(maxrow + 1), icol(maxnz)
+      integer(c_int), intent(out) :: nz, irow(maxrow + 1_c_int64_t), icol(maxnz)
       real(c_double), intent(out) :: val(maxnz)
       integer(c_int), intent(out) :: ierr
       type(host_t), pointer :: host
@@ -206,8 +206,11 @@ contains
 
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      allocate(field, source=real(f, wp))
-      call interface_follow(host%face, field, error)
+      call host_fit("EMFOLL: N", n, host%face%n_node, error)
+      if (.not. allocated(error)) then
+         allocate(field, source=real(f, wp))
+         call interface_follow(host%face, field, error)
+      end if
       call host_pass(host, error, ierr)
       if (.not. allocated(error)) f = real(field, c_double)
    end subroutine emfoll

@@ -1,12 +1,12 @@
 !> Calls of a step for codes in the manner of Fortran 77; see emcon_legacy, and emcon_interface_step
 !> for what they do. U0(2,N): displacements at the start of the step; DU(2,N): the motion in it.
 module emcon_legacy_step
-   use, intrinsic :: iso_c_binding, only : c_double, c_int
+   use, intrinsic :: iso_c_binding, only : c_double, c_int, c_int64_t
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
-   use emcon_interface_handle, only : handle_size, host_find, host_fit, host_index, host_pass, &
-      host_put, host_t
+   use emcon_interface_handle, only : handle_size, host_contacts, host_find, host_fit, &
+      host_index, host_pass, host_put, host_selected, host_t, host_unknowns
    use emcon_interface_null_space, only : interface_multipliers, interface_null_space, &
       interface_particular
    use emcon_interface_step, only : interface_begin_step, interface_curvature, interface_drop, &
@@ -26,15 +26,18 @@ contains
       integer(c_int), intent(in) :: iwas(m)
       integer(c_int), intent(out) :: iact(m), ierr
       type(host_t), pointer :: host
-      logical :: active(m)
+      logical, allocatable :: active(:)
       type(error_t), allocatable :: error
 
-      iact = 0
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      call interface_begin_step(host%face, real(u0, wp), real(du, wp), iwas /= 0, active, error)
+      call fit(host, "EMBEG", error, n=n, m=m)
+      if (.not. allocated(error)) then
+         allocate(active(max(0, host_contacts(host))))
+         call interface_begin_step(host%face, real(u0, wp), real(du, wp), iwas /= 0, active, error)
+      end if
       call host_pass(host, error, ierr)
-      iact = merge(1, 0, active)
+      if (.not. allocated(error)) iact = merge(1, 0, active)
    end subroutine embeg
 
    !> All gaps at the start, G0(M), and at the end of the step, G1(M), where NEAR(M) is 1: there is
@@ -46,16 +49,18 @@ contains
       real(c_double), intent(out) :: g0(m), g1(m)
       integer(c_int), intent(out) :: ierr
       type(host_t), pointer :: host
-      type(gap_state_t) :: state(m)
+      type(gap_state_t), allocatable :: state(:)
       type(error_t), allocatable :: error
 
-      near = 0
-      g0 = 0.0_c_double
-      g1 = 0.0_c_double
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      call interface_gaps(host%face, real(u0, wp), real(du, wp), state, error)
+      call fit(host, "EMGAP", error, n=n, m=m)
+      if (.not. allocated(error)) then
+         allocate(state(max(0, host_contacts(host))))
+         call interface_gaps(host%face, real(u0, wp), real(du, wp), state, error)
+      end if
       call host_pass(host, error, ierr)
+      if (allocated(error)) return
       near = merge(1, 0, state%is_near)
       g0 = real(state%gap0, c_double)
       g1 = real(state%gap1, c_double)
@@ -74,13 +79,15 @@ contains
       type(error_t), allocatable :: error
 
       k = 0
-      id = 0
-      target = 0.0_c_double
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      call interface_select(host%face, real(u0, wp), real(du, wp), iact /= 0, error)
+      call fit(host, "EMSEL", error, n=n, m=m)
+      if (.not. allocated(error)) call interface_select(host%face, real(u0, wp), real(du, wp), &
+         iact /= 0, error)
       call host_pass(host, error, ierr)
       if (allocated(error)) return
+      id = 0
+      target = 0.0_c_double
       associate (set => host%face%active%set)
          k = set%n
          id(:k) = set%id
@@ -95,7 +102,7 @@ contains
       integer(c_int), intent(in) :: ih(handle_size), n, k
       real(c_double), intent(in) :: u0(2, n), du(2, n)
       integer(c_int), intent(in) :: maxnz
-      integer(c_int), intent(out) :: nz, irow(k + 1), icol(maxnz)
+      integer(c_int), intent(out) :: nz, irow(k + 1_c_int64_t), icol(maxnz)
       real(c_double), intent(out) :: g(maxnz), c(maxnz), defect(k), dgap(k)
       integer(c_int), intent(out) :: ierr
       type(host_t), pointer :: host
@@ -104,6 +111,7 @@ contains
       nz = 0
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
+      call fit(host, "EMEVAL", error, n=n)
       call host_fit("EMEVAL: K", k, host%face%active%set%n, error)
       if (.not. allocated(error)) call interface_evaluate(host%face, real(u0, wp), real(du, wp), &
          host%values, error)
@@ -120,7 +128,7 @@ contains
       integer(c_int), intent(in) :: ih(handle_size), k
       real(c_double), intent(in) :: alam(k)
       integer(c_int), intent(in) :: n, maxnz
-      integer(c_int), intent(out) :: nz, irow(2*n + 1), icol(maxnz)
+      integer(c_int), intent(out) :: nz, irow(2_c_int64_t*n + 1), icol(maxnz)
       real(c_double), intent(out) :: val(maxnz)
       integer(c_int), intent(out) :: ierr
       type(host_t), pointer :: host
@@ -130,7 +138,7 @@ contains
       nz = 0
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      call host_fit("EMCURV: N", n, host%face%n_node, error)
+      call fit(host, "EMCURV", error, n=n, k=k)
       if (.not. allocated(error)) call interface_curvature(host%face, real(alam, wp), matrix, error)
       if (.not. allocated(error)) call host_put(matrix, irow, icol, val, nz, error)
       call host_pass(host, error, ierr)
@@ -148,13 +156,15 @@ contains
       real(wp), allocatable :: product(:, :)
       type(error_t), allocatable :: error
 
-      prod = 0.0_c_double
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      allocate(product(2, n))
-      call interface_second_times(host%face, real(alam, wp), real(dir, wp), product, error)
+      call fit(host, "EMTIME", error, n=n, k=k)
+      if (.not. allocated(error)) then
+         allocate(product(2, n))
+         call interface_second_times(host%face, real(alam, wp), real(dir, wp), product, error)
+      end if
       call host_pass(host, error, ierr)
-      prod = real(product, c_double)
+      if (.not. allocated(error)) prod = real(product, c_double)
    end subroutine emtime
 
    !> The next set IACT(M) after the step was solved with the selected one; IDONE = 1: it stands,
@@ -169,13 +179,17 @@ contains
       integer(c_int), intent(inout) :: iact(m)
       integer(c_int), intent(out) :: idone, istat, ierr
       type(host_t), pointer :: host
-      logical :: active(m), is_done
+      logical, allocatable :: active(:)
+      logical :: is_done
       type(error_t), allocatable :: error
 
       idone = 0
       istat = 0
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
+      call fit(host, "EMUPD", error, n=n, m=m, k=k)
+      call host_pass(host, error, ierr)
+      if (allocated(error)) return
       active = iact /= 0
       if (any(abs(amag) > 0.0_c_double)) then
          call interface_update_active(host%face, real(u0, wp), real(du, wp), real(alam, wp), &
@@ -195,15 +209,18 @@ contains
       integer(c_int), intent(in) :: ih(handle_size), nred, ired(nred), m
       integer(c_int), intent(out) :: iact(m), ierr
       type(host_t), pointer :: host
-      logical :: active(m)
+      logical, allocatable :: active(:)
       type(error_t), allocatable :: error
 
-      iact = 0
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      call interface_drop(host%face, ired, active, error)
+      call fit(host, "EMDROP", error, m=m)
+      if (.not. allocated(error)) then
+         allocate(active(max(0, host_contacts(host))))
+         call interface_drop(host%face, ired, active, error)
+      end if
       call host_pass(host, error, ierr)
-      iact = merge(1, 0, active)
+      if (.not. allocated(error)) iact = merge(1, 0, active)
    end subroutine emdrop
 
    !> P and DF, one pattern of NU rows over NU - K columns, for the contacts of the last EMEVAL.
@@ -211,7 +228,7 @@ contains
    subroutine emnull(ih, nu, k, maxnz, nz, irow, icol, p, df, nred, ired, ierr) &
       bind(c, name="emnull_")
       integer(c_int), intent(in) :: ih(handle_size), nu, k, maxnz
-      integer(c_int), intent(out) :: nz, irow(nu + 1), icol(maxnz)
+      integer(c_int), intent(out) :: nz, irow(nu + 1_c_int64_t), icol(maxnz)
       real(c_double), intent(out) :: p(maxnz), df(maxnz)
       integer(c_int), intent(out) :: nred, ired(k), ierr
       type(host_t), pointer :: host
@@ -221,14 +238,14 @@ contains
 
       nz = 0
       nred = 0
-      irow = 1
-      ired = 0
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
       call host_fit("EMNULL: NU", nu, host%face%n_unknown, error)
       call host_fit("EMNULL: K", k, host%face%active%set%n, error)
       if (.not. allocated(error)) call interface_null_space(host%face, force, gap, redundant, error)
       if (.not. allocated(error)) then
+         irow = 1
+         ired = 0
          nred = size(redundant)
          ired(:nred) = redundant
          if (nred == 0) call host_index(force, irow, icol, nz, error)
@@ -247,15 +264,18 @@ contains
       real(c_double), intent(out) :: alam(k)
       integer(c_int), intent(out) :: ierr
       type(host_t), pointer :: host
-      real(wp) :: lam(k)
+      real(wp), allocatable :: lam(:)
       type(error_t), allocatable :: error
 
-      alam = 0.0_c_double
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      call interface_multipliers(host%face, real(r, wp), lam, error)
+      call fit(host, "EMLAM", error, k=k, nu=nu)
+      if (.not. allocated(error)) then
+         allocate(lam(max(0, host_selected(host))))
+         call interface_multipliers(host%face, real(r, wp), lam, error)
+      end if
       call host_pass(host, error, ierr)
-      alam = real(lam, c_double)
+      if (.not. allocated(error)) alam = real(lam, c_double)
    end subroutine emlam
 
    !> DW(NU): the motion of dependent unknowns that closes DEFECT(K), after EMNULL.
@@ -266,15 +286,32 @@ contains
       real(c_double), intent(out) :: dw(nu)
       integer(c_int), intent(out) :: ierr
       type(host_t), pointer :: host
-      real(wp) :: part(nu)
+      real(wp), allocatable :: part(:)
       type(error_t), allocatable :: error
 
-      dw = 0.0_c_double
       call host_find(ih, host, ierr)
       if (.not. associated(host)) return
-      call interface_particular(host%face, real(defect, wp), part, error)
+      call fit(host, "EMPART", error, k=k, nu=nu)
+      if (.not. allocated(error)) then
+         allocate(part(max(0, host_unknowns(host))))
+         call interface_particular(host%face, real(defect, wp), part, error)
+      end if
       call host_pass(host, error, ierr)
-      dw = real(part, c_double)
+      if (.not. allocated(error)) dw = real(part, c_double)
    end subroutine empart
+
+   !> An error for the first count that is not what the interface has, before arrays are touched.
+   subroutine fit(host, place, error, n, m, k, nu)
+      type(host_t), intent(in) :: host
+      character(len=*), intent(in) :: place      !! the subroutine
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int), intent(in), optional :: n, m         !! nodes, possible contacts
+      integer(c_int), intent(in), optional :: k, nu        !! selected contacts, unknowns
+
+      if (present(n)) call host_fit(place // ": N", n, host%face%n_node, error)
+      if (present(m)) call host_fit(place // ": M", m, host_contacts(host), error)
+      if (present(k)) call host_fit(place // ": K", k, host_selected(host), error)
+      if (present(nu)) call host_fit(place // ": NU", nu, host_unknowns(host), error)
+   end subroutine fit
 
 end module emcon_legacy_step

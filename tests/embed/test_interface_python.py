@@ -375,6 +375,29 @@ def test_calls_before_prepare_after_it_and_after_close() -> None:
             call()
 
 
+def test_fields_over_other_nodes_are_refused_below_python_too() -> None:
+    """What the package hands over has been looked at there; the functions below look again."""
+    face, u0, _ = two_strips()
+    build, step, handle = interface_module._build, interface_module._step, face._handle
+    fine, short = np.asfortranarray(u0.T), np.asfortranarray(u0.T[:, 1:])
+    flags, contacts = np.zeros(short.shape, np.int32), np.zeros(face.n_contact, np.int32)
+    numbers = np.zeros(0)
+    assert step.begin_step(handle, fine, fine, contacts)[-1] == 0
+    for routine, *arguments in (
+        (build.prepare, flags), (build.positions, short.shape[1]), (build.follow, short),
+        (build.gather, short), (step.begin_step, short, short, contacts),
+        (step.gaps, short, short, face.n_contact), (step.select_active, short, short, contacts),
+        (step.choose, short, short, contacts[:0], numbers), (step.evaluate, short, short),
+        (step.second_times, numbers, short),
+        (step.update_active, short, short, numbers, 0, short, contacts),
+        (step.areas, short, face.n_contact),
+    ):  # fmt: skip
+        answer = routine(handle, *arguments)
+        assert (answer[-1] if isinstance(answer, tuple) else answer) == 2, routine
+        assert b"n_node is 15, not 16" in build.message(handle), routine
+    assert step.evaluate(handle, fine, fine)[-1] == 0
+
+
 def test_use_from_two_threads_at_once_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     face, u0, du = two_strips()
     choose_all(face, u0, du)

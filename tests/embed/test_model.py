@@ -368,6 +368,16 @@ def test_many_errors_and_unlucky_text_do_no_harm() -> None:
     Model("Ünïcode in a heading is fine").cards("** Kommentar: ä").heading("zwei ß")
 
 
+def test_matrices_that_a_model_has_not_are_refused() -> None:
+    """Numbers that the package does not use."""
+    handle = int(_core.emcon_flat.new_model())
+    for place in (-1, 0, 99, 2**31 - 1):
+        assert _core.emcon_flat_query.make_matrix(handle, place, 0)[-1] == 2
+        assert _core.emcon_flat_query.get_csr(handle, place, 1, 1)[-1] == 2
+        assert f"no matrix {place}" in _core.emcon_flat.last_error(handle).decode()
+    _core.emcon_flat.close_model(handle)
+
+
 def test_lines_of_a_text_are_counted_where_that_is_asked_for(tmp_path: Path) -> None:
     """`read_text` with the passages of a text in one file and in two."""
     (tmp_path/"nodes.inp").write_text("*NODE\n1, 0., 0.\n2, 0., nan\n")
