@@ -3,18 +3,19 @@
 !>
 !> Two rows of one pattern are eliminated at once and with the same pivots, for constraints that
 !> have a gradient for the forces and another one for the motion; rows of which there is only one
-!> come twice. A row of which nothing but round-off is left depends on rows before it. Columns past
-!> `n_free` never give a pivot. Source: docs/theory.md, section 5.
+!> come twice. A row of which nothing but round-off is left depends on rows before it, one of which
+!> little is left nearly so: neither is kept. Columns past `n_free` never give a pivot. Source: docs/theory.md, section 5.
 module emcon_row_elimination
    use emcon_kinds, only : dp, hp, wp
    implicit none
    private
    public :: row_elimination_t, elimination_begin, elimination_add, elimination_left
    public :: elimination_resolve
-   public :: row_kept, row_redundant, row_poor
+   public :: row_kept, row_redundant, row_poor, row_near
 
-   !> What became of a row: poor, no unknown is fit to be a pivot of both.
-   integer, parameter :: row_kept = 1, row_redundant = 2, row_poor = 3
+   !> What became of a row. Poor: no unknown is fit to be a pivot of both; near: it says nearly what
+   !> rows before it say.
+   integer, parameter :: row_kept = 1, row_redundant = 2, row_poor = 3, row_near = 4
 
    !> What is left of a row is round-off below this multiple of the largest term that entered it.
    real(hp), parameter :: redundancy_tol = 512.0_hp &
@@ -29,6 +30,8 @@ module emcon_row_elimination
 
    type :: row_elimination_t
       integer :: n_free = 0                      !! columns that may give a pivot
+      !> A row of which less than this part of the largest term is left is `row_near`.
+      real(hp) :: nearness = 0.0_hp
       integer :: n_row = 0                       !! rows added so far
       integer, allocatable :: pivot(:)           !! (rows) column of the pivot; 0: redundant
       ! The present row, over all columns, both of its kinds:
@@ -99,6 +102,10 @@ contains
       self%row_start(k + 1) = self%row_start(k)
       if (any(left <= redundancy_tol*self%largest_term)) then
          fate = row_redundant
+         return
+      end if
+      if (any(left <= self%nearness*self%largest_term)) then
+         fate = row_near
          return
       end if
       call choose(self, k, own, left, fate)

@@ -3,8 +3,10 @@
 !> A constraint is taken in when its gap would be negative at the end of the step, and let go when
 !> its multiplier is. If a set comes back, the union of the sets in the cycle is taken and
 !> constraints are only added from then on: at once for persistent contact, which makes no energy
-!> if it is held too long; else only where the step cannot be cut any more. Linear constraints that
-!> are not eliminated act always.
+!> if it is held too long; else only where the step cannot be cut any more. Of constraints that say
+!> nearly the same one acts until the other is needed too. Where Newton's method does not converge,
+!> what pulls is let go before the step is cut. Linear constraints that are not eliminated act
+!> always. Source: docs/theory.md, section 6.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
    use emcon_contact, only : deepest_arrival, gap_state_t
@@ -12,7 +14,7 @@ module emcon_active_set
    use emcon_errors, only : error_t
    use emcon_holding, only : holding_complete, holding_find_free, holding_t
    use emcon_kinds, only : wp
-   use emcon_newton, only : newton_converged, newton_redundant, newton_solve, newton_t
+   use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, newton_t
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : pose_t, system_t
@@ -42,6 +44,7 @@ module emcon_active_set
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start
       logical :: has_inertia = .true.            !! energy is to be kept
+      logical :: puts_off = .false.              !! what follows from others nearly waits
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
       logical, allocatable :: is_active(:)       !! (n_constraint)
@@ -55,6 +58,9 @@ module emcon_active_set
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
+      logical, allocatable :: is_put_off(:)      !! (n_constraint) nearly so: they waited once
+      logical, allocatable :: is_let_go(:)       !! (n_constraint) they pulled where Newton failed
+      real(wp), allocatable :: before(:, :)      !! (2, n_node) first guess of the present set
       !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
@@ -70,11 +76,13 @@ contains
       type(system_t), intent(in) :: system
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
-         self%comes_and_goes, self%is_dropped, self%overclosure)
+         self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure)
       allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%comes_and_goes(system%n_constraint), source=.false.)
       allocate(self%is_dropped(system%n_constraint), source=.false.)
+      allocate(self%is_put_off(system%n_constraint), source=.false.)
+      allocate(self%is_let_go(system%n_constraint), source=.false.)
       allocate(self%lam(system%n_constraint), source=0.0_wp)
       allocate(self%tried(system%n_constraint, most_sets), source=.false.)
       call constraints_select(self%set, [integer ::])
@@ -131,13 +139,20 @@ contains
          call active_set_select(self, system, scene, state%u, du)
          call stopwatch_stop(system%contact_clock)
          if (allocated(self%holding%text)) return
+         self%before = du
          call newton_solve(newton, system, scene, correction, self%set, pose, state%u, state%v, &
             offset, du, status, error)
          if (allocated(error)) return
          self%lam(self%set%id) = self%set%lam
          self%n_newton = self%n_newton + newton%n_iteration
          if (status == newton_redundant) then
-            call active_set_drop(self, correction%redundant(:correction%n_redundant))
+            call put_off(self, pack(correction%redundant, correction%is_near))
+            call active_set_drop(self, pack(correction%redundant, .not. correction%is_near))
+            cycle
+         end if
+         if (status == newton_diverged) then
+            call let_go_pulling(self, state%lam, du, is_done)
+            if (is_done) return
             cycle
          end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
@@ -191,6 +206,8 @@ contains
       self%only_adds = .false.
       self%comes_and_goes = .false.
       self%is_dropped = .false.
+      self%is_put_off = .false.
+      self%is_let_go = .false.
    end subroutine active_set_begin
 
    !> The next set from the motion `du` and the multipliers that solve the step with the present
@@ -266,6 +283,8 @@ contains
          call constraint_place(system, self%set%id(k), pair, i)
          self%set%is_kept(k) = .true.
          if (pair == 0) cycle
+         self%set%is_firm(k) = .not. self%puts_off .or. self%only_adds &
+            .or. self%is_put_off(self%set%id(k))
          self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k))
          associate (gap => system%contact(pair)%contact%state(i))
             ! What is closed too far is never pushed out: that would make energy.
@@ -370,6 +389,43 @@ contains
       end function stands_off
 
    end subroutine update
+
+   !> Newton's method has not converged: let go of the contacts that pull in its last iterate, each
+   !> once in a step, and start again with the multipliers `lam` from where it started. `is_done` if
+   !> there are none.
+   pure subroutine let_go_pulling(self, lam, du, is_done)
+      type(active_set_t), intent(inout) :: self
+      real(wp), intent(in) :: lam(:)             !! (n_constraint)
+      real(wp), intent(inout), contiguous :: du(:, :)
+      logical, intent(out) :: is_done
+      integer :: k
+
+      is_done = .true.
+      if (self%only_adds) return
+      do k = self%set%n_linear + 1, self%set%n
+         associate (id => self%set%id(k))
+            if (self%is_let_go(id) .or. .not. self%set%lam(k) < 0.0_wp) cycle
+            self%is_let_go(id) = .true.
+            self%is_active(id) = .false.
+            is_done = .false.
+         end associate
+      end do
+      if (is_done) return
+      self%lam = lam
+      self%n_tried = 0
+      du = self%before
+   end subroutine let_go_pulling
+
+   !> Constraints that follow from others nearly, at the places `near` of the set, wait: each comes
+   !> back once its gap closes without it, and then goes before those others.
+   pure subroutine put_off(self, near)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(in) :: near(:)
+
+      self%is_put_off(self%set%id(near)) = .true.
+      self%is_active(self%set%id(near)) = .false.
+      self%n_tried = 0
+   end subroutine put_off
 
    !> Constraints that follow from earlier ones do not act in this step. They stand at the places
    !> `redundant` of the set; of constraints that depend on each other the last ones go.

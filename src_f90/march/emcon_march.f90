@@ -208,6 +208,7 @@ contains
          call correction_reset(self%correction, merge(step%constraint_method, &
             method_saddle_point, self%system%is_reduced))
          call velocity_update_reset(self%velocity_update)
+         self%active%puts_off = .true.
          self%active%holds_gap = step%initiation == initiation_persistent &
             .and. self%scheme%has_inertia
          self%active%has_inertia = self%scheme%has_inertia

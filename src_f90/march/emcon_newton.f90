@@ -43,6 +43,9 @@ module emcon_newton
    real(wp), parameter :: stall_gain = 0.9_wp
    integer, parameter :: most_stalls = 6, few_stalls = 2
    real(wp), parameter :: stall_floor = 1.0e4_wp*epsilon(1.0_wp)
+   !> After a few iterations without a new best residual half of a correction is taken, down to this
+   !> part: at a kink whole ones lead from one side to the other and back.
+   real(wp), parameter :: least_damping = 0.125_wp
 
    !> What follows an evaluation.
    integer, parameter :: next_done = 0, next_tangent = 1, next_old_tangent = 2, next_give_up = 3
@@ -71,6 +74,7 @@ module emcon_newton
       real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far
       real(wp) :: best = 0.0_wp
       integer :: n_stall = 0                     !! iterations since the best one
+      real(wp) :: damping = 1.0_wp               !! part of a correction that is taken
       integer :: n_polish = 0                    !! corrections with the old tangent
       logical :: is_polish = .false.             !! within tolerance: down to round-off from here
       logical :: is_idle = .false.               !! no load: all forces are round-off
@@ -182,6 +186,7 @@ contains
       self%n_history = 0
       self%n_polish = 0
       self%n_stall = 0
+      self%damping = 1.0_wp
       self%best = huge(self%best)
       self%last = huge(self%last)
       self%is_polish = .false.
@@ -216,6 +221,11 @@ contains
       self%n_stall = self%n_stall + 1
       if (size < stall_gain*self%best) self%n_stall = 0
       self%best = min(self%best, size)
+      if (self%n_stall >= few_stalls) then
+         self%damping = max(least_damping, 0.5_wp*self%damping)
+      else
+         self%damping = min(1.0_wp, 2.0_wp*self%damping)
+      end if
       if (self%n_stall > few_stalls .and. size <= stall_floor) return
       next = next_tangent
       if (self%n_stall > most_stalls .or. self%n_iteration == self%maximum &
@@ -249,6 +259,10 @@ contains
       call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
       if (allocated(error)) return
       self%n_solve = self%n_solve + 1
+      if (.not. self%is_polish) then
+         self%correction = self%damping*self%correction
+         self%dlam = self%damping*self%dlam
+      end if
       call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
       set%lam = set%lam + self%dlam
    end subroutine correct

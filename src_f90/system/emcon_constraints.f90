@@ -26,6 +26,8 @@ module emcon_constraints
       type(constraint_t), allocatable :: item(:) !! (n) values and derivatives
       real(wp), allocatable :: target(:)         !! (n) mean gap to hold [L]
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
+      !> (n) it acts also where it says nearly what others say
+      logical, allocatable :: is_firm(:)
       real(wp), allocatable :: lam(:)            !! (n) multipliers [M L/T^2]
       real(wp), allocatable :: defect(:)         !! (n) f(q1), what is left of the gap to the target
       type(csr_t) :: force_rows                  !! (n x n_unknown) discrete gradients
@@ -42,11 +44,12 @@ contains
       self%n = size(id)
       self%n_linear = 0
       self%id = id
-      if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, self%lam, &
-         self%defect)
-      allocate(self%item(self%n), self%is_kept(self%n))
+      if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, &
+         self%is_firm, self%lam, self%defect)
+      allocate(self%item(self%n), self%is_kept(self%n), self%is_firm(self%n))
       allocate(self%target(self%n), self%lam(self%n), self%defect(self%n), source=0.0_wp)
       self%is_kept = .false.
+      self%is_firm = .true.
    end subroutine constraints_select
 
    !> Pair and number within the pair of constraint `id`; pair 0: a linear one.

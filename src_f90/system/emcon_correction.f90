@@ -27,7 +27,8 @@ module emcon_correction
    type :: correction_t
       integer :: method = method_null_space      !! as the deck asks
       integer :: n_redundant = 0                 !! constraints that depend on earlier ones
-      integer, allocatable :: redundant(:)       !! (n_redundant) their places in the set, ascending
+      integer, allocatable :: redundant(:)       !! (n_redundant) their places in the set
+      logical, allocatable :: is_near(:)         !! (n_redundant) they depend on others nearly only
       logical :: uses_null_space = .false.       !! for the last constraints
       logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
       integer :: obstacle = obstacle_none        !! and why
@@ -96,7 +97,10 @@ contains
             call independent_rows_find(null_space%rows, set, system%numbering)
          end if
          self%n_redundant = null_space%rows%n_redundant
-         if (self%n_redundant > 0) self%redundant = null_space%rows%redundant(:self%n_redundant)
+         if (self%n_redundant > 0) then
+            self%redundant = null_space%rows%redundant(:self%n_redundant)
+            self%is_near = null_space%rows%is_near(:self%n_redundant)
+         end if
       end associate
       call stopwatch_stop(self%clock)
    end subroutine correction_lay_out

@@ -1,7 +1,7 @@
 !> Which constraints are independent, and for each an unknown that can be eliminated with it.
 !>
-!> The rows of discrete gradients and of gradients at the end are eliminated together, in their
-!> order. What comes out depends on the present gradients only, not on earlier choices. Source:
+!> The rows of discrete gradients and of gradients at the end are eliminated together, firm ones
+!> first, else in their order. What comes out depends on the present gradients only, not on earlier choices. Source:
 !> docs/theory.md, section 5.
 module emcon_independent_rows
    use emcon_constraints, only : constraint_set_t
@@ -9,14 +9,19 @@ module emcon_independent_rows
    use emcon_kinds, only : hp
    use emcon_numbering, only : numbering_t
    use emcon_row_elimination, only : elimination_add, elimination_begin, row_elimination_t, &
-      row_poor, row_redundant
+      row_near, row_poor, row_redundant
    implicit none
    private
    public :: independent_rows_t, independent_rows_find
 
+   !> A constraint of which less than this part is left says nearly what others say: two nodes that
+   !> face each other, held from both sides.
+   real(hp), parameter :: nearness = 0.01_hp
+
    type :: independent_rows_t
       integer :: n_redundant = 0
       integer, allocatable :: redundant(:)       !! (n) the first n_redundant: rows to be dropped
+      logical, allocatable :: is_near(:)         !! (n) of these: it depends on others nearly only
       integer, allocatable :: dependent(:)       !! (n) unknown to eliminate; 0: redundant
       logical :: is_poor = .false.               !! some row has no good pivot in both gradients
       type(row_elimination_t), private :: elimination
@@ -34,42 +39,59 @@ contains
       do k = 1, set%n
          own(:, k) = numbering%unknown(:, set%item(k)%node(1))
       end do
-      call eliminate(self, set%force_rows, set%gap_rows, own)
+      call eliminate(self, set%force_rows, set%gap_rows, own, set%is_firm)
       ! Where no unknown serves both, only the forces tell what is redundant.
       if (.not. self%is_poor) return
-      call eliminate(self, set%force_rows, set%force_rows, own)
+      call eliminate(self, set%force_rows, set%force_rows, own, set%is_firm)
       self%is_poor = .true.
    end subroutine independent_rows_find
 
    !> Eliminate all rows of `force` and `gap`, two matrices of one pattern, or those before the
-   !> first without a good pivot.
-   subroutine eliminate(self, force, gap, own)
+   !> first without a good pivot; firm ones first.
+   subroutine eliminate(self, force, gap, own, is_firm)
       type(independent_rows_t), intent(inout) :: self
       type(csr_t), intent(in) :: force, gap
       integer, intent(in) :: own(:, :)               !! (2, n) unknowns of the slave nodes
-      integer :: k, fate
+      logical, intent(in) :: is_firm(:)              !! (n)
+      integer :: order(size(is_firm)), i, k, fate
 
-      if (allocated(self%redundant)) then
-         if (size(self%redundant) /= force%n_row) deallocate(self%redundant)
-      end if
-      if (.not. allocated(self%redundant)) allocate(self%redundant(force%n_row))
-      self%n_redundant = 0
-      self%redundant = 0
-      self%is_poor = .false.
-      call elimination_begin(self%elimination, force%n_row, force%n_col, force%n_col)
-      do k = 1, force%n_row
+      call begin(self, force)
+      order = [pack([(k, k = 1, size(is_firm))], is_firm), &
+         pack([(k, k = 1, size(is_firm))], .not. is_firm)]
+      do i = 1, size(order)
+         k = order(i)
+         self%elimination%nearness = merge(0.0_hp, nearness, is_firm(k))
          associate (from => force%row_start(k) + 1, to => force%row_start(k + 1))
             call elimination_add(self%elimination, force%column(from:to) + 1, &
                real(force%value(from:to), hp), real(gap%value(from:to), hp), own(:, k), fate)
          end associate
-         if (fate == row_redundant) then
+         self%dependent(k) = self%elimination%pivot(i)
+         if (fate == row_redundant .or. fate == row_near) then
             self%n_redundant = self%n_redundant + 1
             self%redundant(self%n_redundant) = k
+            self%is_near(self%n_redundant) = fate == row_near
          end if
          self%is_poor = fate == row_poor
          if (self%is_poor) exit
       end do
-      self%dependent = self%elimination%pivot
    end subroutine eliminate
+
+   !> Nothing eliminated yet, with room for all rows of `force`.
+   subroutine begin(self, force)
+      type(independent_rows_t), intent(inout) :: self
+      type(csr_t), intent(in) :: force
+
+      if (allocated(self%redundant)) then
+         if (size(self%redundant) /= force%n_row) deallocate(self%redundant, self%is_near, &
+            self%dependent)
+      end if
+      if (.not. allocated(self%redundant)) allocate(self%redundant(force%n_row), &
+         self%is_near(force%n_row), self%dependent(force%n_row))
+      self%n_redundant = 0
+      self%redundant = 0
+      self%dependent = 0
+      self%is_poor = .false.
+      call elimination_begin(self%elimination, force%n_row, force%n_col, force%n_col)
+   end subroutine begin
 
 end module emcon_independent_rows

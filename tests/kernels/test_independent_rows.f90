@@ -20,6 +20,7 @@ contains
          test_case_t("of opposite constraints the later one is redundant", test_opposite), &
          test_case_t("a combination of three is redundant", test_combination), &
          test_case_t("nearly dependent is not dependent", test_nearly), &
+         test_case_t("what is nearly dependent waits, unless it is firm", test_near), &
          test_case_t("a constraint without unknowns is redundant", test_prescribed), &
          test_case_t("a chain has the slave nodes' larger unknowns", test_chain), &
          test_case_t("entries equal by symmetry: the first", test_tie), &
@@ -86,6 +87,52 @@ contains
       call independent_rows_find(rows, problem%set, problem%numbering)
       call check_equal(error, rows%n_redundant, 0, "redundant constraints")
    end subroutine test_nearly
+
+   !> Two nodes over each other: row 5 = -row 2 but for a distance between the nodes, by the edge.
+   !> Down to round-off it depends on row 2 nearly. Firm rows come first; two firm ones both stay.
+   subroutine test_near(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: round_off = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+      real(wp), parameter :: distance(6) = [1.0_wp, 1.0e6_wp, 1.0e9_wp, 1.0e12_wp, &
+         1.0e13_wp, 1.0e15_wp]*round_off
+      type(problem_t) :: problem
+      type(independent_rows_t) :: rows
+      integer :: i
+
+      do i = 1, size(distance)
+         call make_problem(problem)
+         call become_combination(problem, 5, [2], [-1.0_wp])
+         associate (item => problem%set%item(5))
+            item%g(:, 2) = item%g(:, 2)*(1.0_wp - distance(i))
+            item%c(:, 2) = item%c(:, 2)*(1.0_wp - distance(i))
+         end associate
+         call make_rows(problem)
+         problem%set%is_firm = .false.
+         call find([5])
+         if (i > 1 .and. i < size(distance)) call check_true(error, rows%is_near(1), "nearly")
+         problem%set%is_firm(5) = .true.
+         call find([2])
+         problem%set%is_firm = .true.
+         if (i > 1) call find([integer ::])
+         if (i == 1) call find([5])
+         if (i == 1) call check_true(error, .not. rows%is_near(1), "to round-off")
+      end do
+
+   contains
+
+      !> `expected` are redundant, but for the largest distance.
+      subroutine find(expected)
+         integer, intent(in) :: expected(:)
+
+         call independent_rows_find(rows, problem%set, problem%numbering)
+         if (i < size(distance)) then
+            call check_equal(error, rows%redundant(:rows%n_redundant), expected, "to be dropped")
+         else
+            call check_equal(error, rows%n_redundant, 0, "to be dropped")
+         end if
+      end subroutine find
+
+   end subroutine test_near
 
    subroutine test_prescribed(error)
       type(error_t), allocatable, intent(out) :: error

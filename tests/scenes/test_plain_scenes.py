@@ -29,6 +29,16 @@ def test_crossing_squares_do_not_miss(tmp_path, formulation, n):
     assert not missed
 
 
+@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
+@pytest.mark.parametrize("name", ["tower", "ledge", "slave floor", "drop", "punch", "gears"])
+def test_nodes_held_from_both_sides_at_once_need_no_cuts(tmp_path, name, method):
+    """Nodes nearly on nodes, in dents that they make: contacts that say the same, and kinks."""
+    done = Outcome(SCENES[name](), tmp_path, ALL, formulation="NODE TO SURFACE", method=method)
+    assert done.code == 0
+    assert done.run.history["cuts"].sum() <= 8
+    assert done.energy_error <= 1e-12
+
+
 @pytest.mark.parametrize("name", ["wedge", "ledge", "bullet", "strips", "corners", "slide off",
                                   "accordion", "edge along edge"])
 @pytest.mark.parametrize("sides", [BOTH, ALL])
