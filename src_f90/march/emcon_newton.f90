@@ -43,8 +43,7 @@ module emcon_newton
    real(wp), parameter :: stall_gain = 0.9_wp
    integer, parameter :: most_stalls = 6, few_stalls = 2
    real(wp), parameter :: stall_floor = 1.0e4_wp*epsilon(1.0_wp)
-   !> After a few iterations without a new best residual half of a correction is taken, down to this
-   !> part: at a kink whole ones lead from one side to the other and back.
+   !> Least part of a correction that is taken: at a kink whole ones lead to and fro.
    real(wp), parameter :: least_damping = 0.125_wp
 
    !> What follows an evaluation.
@@ -221,16 +220,26 @@ contains
       self%n_stall = self%n_stall + 1
       if (size < stall_gain*self%best) self%n_stall = 0
       self%best = min(self%best, size)
-      if (self%n_stall >= few_stalls) then
-         self%damping = max(least_damping, 0.5_wp*self%damping)
-      else
-         self%damping = min(1.0_wp, 2.0_wp*self%damping)
-      end if
+      call choose_damping(self)
       if (self%n_stall > few_stalls .and. size <= stall_floor) return
       next = next_tangent
       if (self%n_stall > most_stalls .or. self%n_iteration == self%maximum &
          .or. .not. size < huge(size)) next = next_give_up
    end subroutine judge
+
+   !> Half of what was taken of the last correction if the residual, the last in the history, is no
+   !> smaller than one of the two before it, else twice as much. The first guess may happen to have a
+   !> small one.
+   pure subroutine choose_damping(self)
+      type(newton_t), intent(inout) :: self
+
+      self%damping = min(1.0_wp, 2.0_wp*self%damping)
+      associate (n => self%n_history)
+         if (n < 4) return
+         if (self%last >= stall_gain*minval(self%history(n - 2:n - 1))) &
+            self%damping = max(least_damping, 0.25_wp*self%damping)
+      end associate
+   end subroutine choose_damping
 
    !> Factorise for the present tangent.
    subroutine factorise(self, system, correction, set, status, error)
