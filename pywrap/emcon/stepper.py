@@ -324,18 +324,18 @@ class Stepper(Queries, Conditions):
     @property
     def ledger(self) -> dict[str, float]:
         """`energies` and `momenta` together."""
-        names = ("kinetic", "strain", "potential", "external_work", "contact_work", "total",
-                 "px", "py", "lz")
+        names = ("kinetic", "strain", "potential", "external_work", "contact_work",
+                 "stabilization", "total", "px", "py", "lz")
         return dict(zip(names, map(float, self._handle.call(_state.get_ledger))))
 
     def energies(self) -> dict[str, float]:
         """Energies and works [M L^2/T^2]: kinetic, strain, potential, external_work, contact_work,
-        total.
+        stabilization, total.
 
         `potential` is that of given forces; total = kinetic + strain + potential - external_work.
         """
-        return dict(list(self.ledger.items())[:6])
+        return dict(list(self.ledger.items())[:7])
 
     def momenta(self) -> dict[str, float]:
         """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`."""
-        return dict(list(self.ledger.items())[6:])
+        return dict(list(self.ledger.items())[7:])

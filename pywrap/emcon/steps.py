@@ -95,6 +95,13 @@ class Step(Cards):
         """
         return self._card("CONTACT INTERFERENCE", {"SHRINK": True})
 
+    def contact_controls(self, *, stabilize: bool) -> Step:
+        """`*CONTACT CONTROLS`: STABILIZE, or RESET to what holds by default, for static steps.
+
+        With STABILIZE a motion that nothing holds and no load works on is as small as it can be.
+        """
+        return self._card("CONTACT CONTROLS", {"STABILIZE": True} if stabilize else {"RESET": True})
+
     def mortar(self, *, integration: str | None = None, points: int | str | None = None,
                multiplier: str | None = None, normal: str | None = None,
                feature_angle: Number | None = None) -> Step:

@@ -78,6 +78,7 @@ typedef struct emcon_ledger {
    double total;     /* kinetic + strain + potential - external_work */
    double px, py;    /* momentum */
    double lz;        /* angular momentum about the origin */
+   double stabilization;   /* work of what *CONTACT CONTROLS, STABILIZE bears: round-off */
 } emcon_ledger;
 
 /* A sparse matrix by rows: row i has the entries row_start[i] to row_start[i + 1] - 1 of `column`

@@ -65,6 +65,7 @@ contains
          to%px = real(from%momentum(1), c_double)
          to%py = real(from%momentum(2), c_double)
          to%lz = real(from%angular, c_double)
+         to%stabilization = real(from%stabilization, c_double)
       end associate
    end function emcon_get_ledger
 

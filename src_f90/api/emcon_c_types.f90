@@ -18,6 +18,7 @@ module emcon_c_types
 
    type, bind(c) :: ledger_c
       real(c_double) :: kinetic, strain, potential, external_work, contact_work, total, px, py, lz
+      real(c_double) :: stabilization
    end type ledger_c
 
    type, bind(c) :: csr_c

@@ -240,10 +240,11 @@ contains
       end associate
    end subroutine get_pairs
 
-   !> Kinetic and strain energy, that of given forces, external and contact work, total, px, py, lz.
+   !> Kinetic and strain energy, that of given forces, work of external forces, of contact, of what
+   !> stabilization bears, total, px, py, lz.
    subroutine get_ledger(handle, values, ierr)
       integer(c_int64_t), intent(in) :: handle
-      real(c_double), intent(out) :: values(9)
+      real(c_double), intent(out) :: values(10)
       integer(c_int), intent(out) :: ierr
       type(model_t), pointer :: model
 
@@ -251,10 +252,11 @@ contains
       call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       associate (ledger => model%stepper%march%ledger)
-         values(:6) = [real(ledger%kinetic, c_double), real(ledger%strain, c_double), &
+         values(:7) = [real(ledger%kinetic, c_double), real(ledger%strain, c_double), &
             real(ledger%potential, c_double), real(ledger%external_work, c_double), &
-            real(ledger%contact_work, c_double), real(ledger%total, c_double)]
-         values(7:) = [real(ledger%momentum, c_double), real(ledger%angular, c_double)]
+            real(ledger%contact_work, c_double), real(ledger%stabilization, c_double), &
+            real(ledger%total, c_double)]
+         values(8:) = [real(ledger%momentum, c_double), real(ledger%angular, c_double)]
       end associate
    end subroutine get_ledger
 

@@ -25,9 +25,12 @@ module emcon_recorder
    !> Frames of a deck that asks for no field output.
    integer, parameter :: default_frames = 100
 
-   character(len=13), parameter :: column_names(17) = [character(len=13) :: "increment", "time", &
-      "h", "kinetic", "strain", "external_work", "contact_work", "total", "px", "py", "lz", &
-      "active", "newton", "cuts", "penetration", "stand_off", "cpu"]
+   character(len=13), parameter :: column_names(18) = [character(len=13) :: "increment", "time", &
+      "h", "kinetic", "strain", "external_work", "contact_work", "stabilization", "total", "px", &
+      "py", "lz", "active", "newton", "cuts", "penetration", "stand_off", "cpu"]
+
+   character(len=*), parameter :: counts(4) = [character(len=9) :: "increment", "active", &
+      "newton", "cuts"]
 
    type :: recorder_t
       type(vtkhdf_t) :: fields
@@ -86,9 +89,12 @@ contains
 
    pure function columns() result(list)
       type(column_t) :: list(size(column_names))
+      integer :: i
 
       list%name = column_names
-      list([1, 12, 13, 14])%is_integer = .true.
+      do i = 1, size(list)
+         list(i)%is_integer = any(list(i)%name == counts)
+      end do
    end function columns
 
    !> The fields that some step asks for; all of them if none asks for any.
@@ -199,8 +205,9 @@ contains
          call history_append(self%history, [real(dp) :: real(state%increment, dp), &
             real(state%time, dp), real(increment%h, dp), real(ledger%kinetic, dp), &
             real(ledger%strain, dp), real(ledger%external_work, dp), &
-            real(ledger%contact_work, dp), real(ledger%total, dp), real(ledger%momentum, dp), &
-            real(ledger%angular, dp), real(increment%n_active, dp), real(increment%n_newton, dp), &
+            real(ledger%contact_work, dp), real(ledger%stabilization, dp), &
+            real(ledger%total, dp), real(ledger%momentum, dp), real(ledger%angular, dp), &
+            real(increment%n_active, dp), real(increment%n_newton, dp), &
             real(increment%n_cut, dp), real(increment%overlap%depth, dp), &
             real(increment%stand_off%largest, dp), cpu], error)
          if (allocated(error)) return

@@ -239,7 +239,7 @@ contains
          call restart_put(restart, "time", [state%start_time, state%time])
          call restart_put(restart, "ledger", [ledger%kinetic, ledger%strain, ledger%potential, &
             ledger%external_work, ledger%contact_work, ledger%total, ledger%momentum, &
-            ledger%angular])
+            ledger%angular, ledger%stabilization])
          call restart_put(restart, "energy", state%energy)
          call restart_put(restart, "potential", [state%potential])
          call restart_put(restart, "u", state%u)
@@ -320,7 +320,7 @@ contains
       type(stepper_t), intent(inout) :: self
       type(restart_t), intent(in) :: restart
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: value(9), potential(1)
+      real(wp) :: value(10), potential(1)
 
       associate (state => self%march%state)
          call restart_get(restart, "internal", state%internal, error)
@@ -332,7 +332,7 @@ contains
       self%march%state%potential = potential(1)
       self%march%ledger = ledger_t(kinetic=value(1), strain=value(2), potential=value(3), &
          external_work=value(4), contact_work=value(5), total=value(6), momentum=value(7:8), &
-         angular=value(9))
+         angular=value(9), stabilization=value(10))
    end subroutine load_measured
 
    !> What the model of the file was given, `self` has been given too.

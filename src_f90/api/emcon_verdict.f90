@@ -38,6 +38,7 @@ module emcon_verdict
       real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
       real(wp) :: unconverged_time = 0.0_wp      !! [T]
       type(stand_off_t) :: stand_off
+      real(wp) :: stabilization = 0.0_wp         !! work of what STABILIZE bears
       integer :: n_newton = 0
       integer :: n_cut = 0
       real(wp), allocatable :: largest_force(:)  !! (n_pair) on the slave side
@@ -79,6 +80,7 @@ contains
             self%deepest_time = state%time
             call place_text(stepper, increment%overlap, self%place)
          end if
+         self%stabilization = stepper%march%ledger%stabilization
          if (increment%unconverged > self%unconverged) then
             self%unconverged = increment%unconverged
             self%unconverged_time = state%time
@@ -156,6 +158,9 @@ contains
       if (present(message)) self%message = message
       self%reasons = notes_t()
       if (.not. allocated(self%place)) self%place = ""
+      if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
+         "loads do work on motions that nothing holds: stabilization bears " // &
+         to_text(self%stabilization, 3))
       if (self%dynamic_drift > ten_digits*self%largest_energy) call note_add(self%reasons, &
          "the energy balance does NOT close to ten digits (" // &
          to_text(self%dynamic_drift/self%largest_energy, 3) // " of the largest energy)")
@@ -233,6 +238,9 @@ contains
                " of the largest energy, deepest penetration " // to_text(self%deepest, 3) // &
                " of an element")
             call add_checked(stepper, lines)
+            if (abs(self%stabilization) > 0.0_wp) call note_add(lines, &
+               "work of what stabilization bears " // to_text(self%stabilization/scale, 3) // &
+               " of the largest energy")
             if (self%stand_off%impulse > 0.0_wp) call note_add(lines, &
                "largest stand-off of contact " // to_text(self%stand_off%largest, 3) // &
                " of an element, mean over the impulse " // &

@@ -61,6 +61,7 @@ contains
          call add_number(line, "strain", ledger%strain)
          call add_number(line, "external_work", ledger%external_work)
          call add_number(line, "contact_work", ledger%contact_work)
+         call add_number(line, "stabilization", ledger%stabilization)
          call add_number(line, "total", ledger%total)
       end associate
       call add_number(line, "total_at_start", self%total0)

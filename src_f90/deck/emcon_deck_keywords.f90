@@ -73,6 +73,9 @@ module emcon_deck_keywords
       keyword_t("EQUATION", in_both, "!REMOVE,!REMOVEALL,!INPUT"), &
       keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,!AMPLITUDE,!OP,!TYPE", &
          has_data=.false.), &
+      keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,!AUTOMATICTOLERANCES," &
+         // "!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MASTER,!SLAVE,!MAXCHP,!PERRMX,!UERRMX," &
+         // "!STIFFNESSSCALEFACTOR,!TANGENTFRACTION:1", has_data=.false.), &
       keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,!TIMEDELAY:0,!LOADCASE:1," &
          // "!USER,!SUBMODEL"), &
       keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,~UNSYMM:NO," &
@@ -147,7 +150,6 @@ module emcon_deck_keywords
       keyword_t("CONTACT FORMULATION", in_both, "", "all with all holds the nodes of both sides"), &
       keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
       keyword_t("CONTACT DAMPING", in_model, "", "contact is enforced exactly, without damping"), &
-      keyword_t("CONTACT CONTROLS", in_both, "", "contact is enforced exactly"), &
       keyword_t("CHANGE FRICTION", in_step, "", "there is no friction"), &
       keyword_t("MODEL CHANGE", in_step, "", "pairs and elements stay for the whole run"), &
       keyword_t("DSLOAD", in_step, "", "use *DLOAD with element faces"), &

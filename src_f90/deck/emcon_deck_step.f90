@@ -5,6 +5,8 @@
 module emcon_deck_step
    use emcon_deck_conditions, only : conditions_carry, conditions_init, conditions_store, &
       conditions_t
+   use emcon_deck_contact_settings, only : check_statics, read_controls, read_initiation, &
+      read_interference
    use emcon_deck_loads, only : read_boundary, read_cload, read_dload
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
@@ -14,8 +16,7 @@ module emcon_deck_step
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, initiation_admissible, initiation_persistent, &
-      initiation_velocity_update, method_null_space, method_saddle_point, origin_t, &
+   use emcon_scene, only : contact_pair_t, method_null_space, method_saddle_point, origin_t, &
       procedure_dynamic, procedure_static, scene_t, step_t
    use emcon_text, only : to_text
    implicit none
@@ -75,6 +76,7 @@ contains
       step%initiation = last%initiation
       step%gap_tolerance = last%gap_tolerance
       step%contact = last%contact
+      step%stabilizes = last%stabilizes
       step%newton_tolerance = last%newton_tolerance
       step%newton_maximum = last%newton_maximum
       step%restart_frequency = last%restart_frequency
@@ -103,6 +105,8 @@ contains
                call read_initiation(reader, card, step)
             case ("CONTACTINTERFERENCE")
                call read_interference(reader, card, pair, step)
+            case ("CONTACTCONTROLS")
+               call read_controls(reader, card, pair, step)
             case ("MORTAR")
                call read_mortar(reader, card, pair, step%contact)
             case ("SURFACESMOOTHING")
@@ -117,9 +121,7 @@ contains
          end associate
       end do
       call read_step_card(reader, reader%card(i_first), step)
-      if (step%resolves_overclosure .and. step%procedure == procedure_dynamic) call card_error( &
-         reader, reader%card(i_first), "*CONTACT INTERFERENCE is for *STATIC steps: in dynamics " &
-         // "pushing bodies apart would make energy")
+      call check_statics(reader, i_first, step)
       if (step%procedure /= 0 .or. reader%doubt_names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
          "the step has no procedure: *STATIC or *DYNAMIC")
@@ -242,42 +244,6 @@ contains
          call refuse_option(reader, card, "TYPE", known, "")
       end select
    end subroutine read_constraint_method
-
-   subroutine read_initiation(reader, card, step)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(step_t), intent(inout) :: step
-
-      select case (option_name(card, "TYPE"))
-      case ("", "PERSISTENT")
-         step%initiation = initiation_persistent
-      case ("ADMISSIBLE")
-         step%initiation = initiation_admissible
-      case ("VELOCITYUPDATE")
-         step%initiation = initiation_velocity_update
-      case default
-         call refuse_option(reader, card, "TYPE", "PERSISTENT, ADMISSIBLE, VELOCITY UPDATE", "")
-      end select
-      call option_real(reader, card, "GAP TOLERANCE", step%gap_tolerance)
-      if (has_option(card, "GAPTOLERANCE") .and. step%initiation /= initiation_persistent) &
-         call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
-   end subroutine read_initiation
-
-   !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
-   subroutine read_interference(reader, card, pair, step)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(contact_pair_t), intent(in) :: pair(:)
-      type(step_t), intent(inout) :: step
-
-      if (.not. has_option(card, "SHRINK")) call card_error(reader, card, "SHRINK is missing: " &
-         // "only the overclosure that is there at the start can be resolved")
-      if (card%step > 1) call card_error(reader, card, "it belongs into the first step: later " &
-         // "ones begin without overclosure")
-      if (size(pair) == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
-         "there is no *CONTACT PAIR")
-      step%resolves_overclosure = .true.
-   end subroutine read_interference
 
    subroutine read_newton(reader, card, step)
       type(reader_t), intent(inout) :: reader

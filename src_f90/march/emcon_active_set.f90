@@ -12,7 +12,7 @@ module emcon_active_set
    use emcon_contact, only : deepest_arrival, gap_state_t
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
-   use emcon_holding, only : holding_complete, holding_find_free, holding_t
+   use emcon_holding, only : holding_complete, holding_find_free, holding_forget, holding_t
    use emcon_kinds, only : wp
    use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, newton_t
    use emcon_scene, only : scene_t
@@ -127,17 +127,18 @@ contains
       real(wp), intent(inout), contiguous :: du(:, :)    !! (2, n_node)
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_done
+      logical :: is_done, is_held
 
       call stopwatch_start(system%contact_clock)
       call active_set_begin(self, system, scene, state, du)
       call stopwatch_stop(system%contact_clock)
       do
          call stopwatch_start(system%contact_clock)
-         if (self%holding%is_needed) call hold(self, system, scene, pose, state%u, newton%driven, &
-            du, status)
+         if (self%holding%is_needed) call hold(self, system, scene, pose, state%u, &
+            newton%driven, du)
          call active_set_select(self, system, scene, state%u, du)
          call stopwatch_stop(system%contact_clock)
+         status = step_not_held
          if (allocated(self%holding%text)) return
          self%before = du
          call newton_solve(newton, system, scene, correction, self%set, pose, state%u, state%v, &
@@ -160,8 +161,9 @@ contains
          call stopwatch_start(system%contact_clock)
          call active_set_advance(self, system, scene, state, du, is_done, status)
          if (is_done .and. status == step_done .and. self%holding%is_needed) then
-            call holding_find_free(self%holding, system, scene, pose, state%u, du, self%is_active)
-            if (allocated(self%holding%text)) status = step_not_held
+            call holding_find_free(self%holding, system, scene, pose, state%u, du, &
+               self%is_active, is_held)
+            if (.not. is_held) status = step_not_held
          end if
          call stopwatch_stop(system%contact_clock)
          if (is_done) return
@@ -170,21 +172,18 @@ contains
 
    !> Take in what holds the bodies that would be free with the present set. The prescribed motion
    !> `driven` in `du`, which the first correction of Newton's method meets, is left out on the way.
-   subroutine hold(self, system, scene, pose, u0, driven, du, status)
+   subroutine hold(self, system, scene, pose, u0, driven, du)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(pose_t), intent(in) :: pose
       real(wp), intent(in), contiguous :: u0(:, :), driven(:, :)     !! (2, n_node)
       real(wp), intent(inout), contiguous :: du(:, :)                !! (2, n_node)
-      integer, intent(out) :: status
-      logical :: is_held
       integer :: pair
 
       du = du - driven
-      call holding_complete(self%holding, system, scene, pose, u0, du, self%is_active, is_held)
+      call holding_complete(self%holding, system, scene, pose, u0, du, self%is_active)
       du = du + driven
-      status = merge(step_done, step_not_held, is_held)
       do pair = 1, size(system%contact)
          call system%contact(pair)%contact%begin_step(scene%x, u0, du)
       end do
@@ -199,6 +198,7 @@ contains
       real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
 
       call begin_contact(self, system, scene, state, du)
+      call holding_forget(self%holding)
       self%lam = state%lam
       self%n_newton = 0
       self%n_tried = 0
@@ -329,9 +329,12 @@ contains
                   end if
                   self%is_stale = self%is_stale .or. has_drifted(k, gap)
                   noise = force_noise*sum(system%magnitude(:, contact%node(i)))
+                  if (.not. self%has_inertia) noise = noise + force_noise &
+                     *sum(system%response%rounding(:, contact%node(i)))
                   if (.not. gap%is_leaving .and. &
                      (self%only_adds .or. self%set%lam(k) >= -noise)) cycle
                   self%is_active(id) = .false.
+                  if (self%holding%is_needed) self%holding%has_pulled(id) = .true.
                else
                   if (.not. (gap%is_near .and. gap%is_over)) cycle
                   if (self%is_dropped(id)) then

@@ -14,6 +14,8 @@ module emcon_ledger
       real(wp) :: potential = 0.0_wp             !! of given forces
       real(wp) :: external_work = 0.0_wp         !! of loads and prescribed motion, since the start
       real(wp) :: contact_work = 0.0_wp          !! of contact forces, since the start
+      !> Of what STABILIZE bears: forces that are left on bodies that nothing holds, since the start
+      real(wp) :: stabilization = 0.0_wp
       real(wp) :: total = 0.0_wp
       real(wp) :: momentum(2) = 0.0_wp           !! [M L/T]
       real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]

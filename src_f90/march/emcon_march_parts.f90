@@ -44,17 +44,30 @@ contains
             cycle
          end if
          call reason_text(self, scene, status, reason)
-         call note_add(increment%notes, "increment cut at time " // &
-            to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // reason)
-         increment%n_cut = increment%n_cut + 1
-         level = level + 1
-         if (level > self%n_level) then
-            call failure_text(self, scene, start, h, reason)
-            call raise(error, err_analysis, reason)
-            return
+         if (.not. is_hopeless(self, status)) then
+            call note_add(increment%notes, "increment cut at time " // &
+               to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // reason)
+            increment%n_cut = increment%n_cut + 1
+            level = level + 1
+            if (level <= self%n_level) cycle
+            reason = "with h = " // to_text(h) // ", the smallest allowed, " // reason
          end if
+         call failure_text(self, scene, reason)
+         call raise(error, err_analysis, "the analysis stops at time " // &
+            to_text(start%total_time, 9) // ": " // reason)
+         return
       end do
    end subroutine march_in_parts
+
+   !> Whether a smaller step fails for the same reason: nothing was solved yet, or a larger load
+   !> could bring into contact what holds a body, not a smaller one.
+   pure logical function is_hopeless(self, status)
+      type(march_t), intent(in) :: self
+      integer, intent(in) :: status
+
+      is_hopeless = status == step_not_held .and. &
+         (self%active%n_newton == 0 .or. .not. self%active%holding%is_pushed)
+   end function is_hopeless
 
    !> Why a step failed.
    subroutine reason_text(self, scene, status, text)
@@ -79,24 +92,24 @@ contains
       case (step_stands_off)
          text = "a contact would close over more than the gap tolerance"
       case (step_not_held)
-         text = "nothing holds what moves without resistance: " // self%active%holding%text // &
-            "; add *BOUNDARY conditions"
+         text = "nothing holds what moves without resistance: " // self%active%holding%text
+         if (.not. self%active%holding%is_pushed) text = text // ", on which no load does work"
+         text = text // "; add *BOUNDARY conditions"
+         if (.not. self%active%holding%is_pushed) text = text // &
+            ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
       case default
          text = "reason " // to_text(status)
       end select
    end subroutine reason_text
 
-   !> Text of the error that ends an analysis, made of the reason why its last step failed.
-   subroutine failure_text(self, scene, start, h, text)
+   !> Add to the reason why the last step failed, which ends a static analysis, what contact would
+   !> have to hold.
+   subroutine failure_text(self, scene, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
-      type(instant_t), intent(in) :: start
-      real(wp), intent(in) :: h
       character(len=:), allocatable, intent(inout) :: text
       character(len=:), allocatable :: motion
 
-      text = "the analysis stops at time " // to_text(start%total_time, 9) // ": with h = " // &
-         to_text(h) // ", the smallest allowed, " // text
       if (.not. self%scheme%has_inertia .and. .not. allocated(self%active%holding%text)) then
          call free_motion_text(self%system, scene, &
             scene%step(self%state%i_step)%prescribed, motion, with_contact=.true.)

@@ -201,6 +201,7 @@ contains
             step => scene%step(self%state%i_step))
          system%residual = system%residual - self%newton%contact
          call gather_dependent(system%numbering, system%residual)
+         call book_stabilization(self, increment)
          do i = 1, size(state%v, 2)
             do a = 1, 2
                if (system%numbering%unknown(a, i) > 0) then
@@ -249,6 +250,32 @@ contains
          end do
       end associate
    end subroutine commit
+
+   !> Tell of what moves with nothing to hold it, and of what was brought into contact without load.
+   !> The stiffness of STABILIZE is in the tangent alone: it bears what the balance leaves over.
+   subroutine book_stabilization(self, increment)
+      type(march_t), intent(inout) :: self
+      type(increment_t), intent(inout) :: increment
+      integer :: i, a
+
+      associate (holding => self%active%holding, system => self%system)
+         if (.not. holding%is_needed) return
+         if (any(holding%brought > 0.0_wp .and. self%active%is_active)) call note_add( &
+            increment%warnings, holding%brought_text // ", on which no load does work: moved " // &
+            "over a gap of " // to_text(maxval(holding%brought, mask=self%active%is_active), 3) &
+            // " onto the surface nearest to it")
+         if (.not. allocated(holding%text)) return
+         call note_add(increment%warnings, holding%text // ", on which no load does work: the " // &
+            "smallest motion is taken, as STABILIZE asks for")
+         do i = 1, size(self%du, 2)
+            do a = 1, 2
+               if (system%numbering%unknown(a, i) == 0) cycle
+               self%ledger%stabilization = self%ledger%stabilization &
+                  - system%residual(a, i)*self%du(a, i)
+            end do
+         end do
+      end associate
+   end subroutine book_stabilization
 
    !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
    !> docs/theory.md, section 7); in statics forces are taken as linear over the step.

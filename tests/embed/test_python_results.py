@@ -21,8 +21,8 @@ from emcon.__main__ import main  # noqa: E402
 from emcon.results import (cpu_seconds, read_contact_force,  # noqa: E402
                            read_wall_seconds)
 
-COLUMNS = ("increment,time,h,kinetic,strain,external_work,contact_work,total,px,py,lz,active,"
-           "newton,cuts,cpu").split(",")
+COLUMNS = ("increment,time,h,kinetic,strain,external_work,contact_work,stabilization,total,"
+           "px,py,lz,active,newton,cuts,cpu").split(",")
 COUNTS = ("increment", "active", "newton", "cuts")
 ALL_FIELDS = ("displacement", "velocity", "reaction_force", "cauchy_stress", "von_mises",
               "contact_pressure", "contact_gap", "contact_active", "contact_force")

@@ -18,6 +18,7 @@ DIMENSION = {
     "strain": (2, 1, -2),
     "external_work": (2, 1, -2),
     "contact_work": (2, 1, -2),
+    "stabilization": (2, 1, -2),
     "total": (2, 1, -2),
     "px": (1, 1, -1),
     "py": (1, 1, -1),

@@ -1,0 +1,85 @@
+!> Settings of contact in a step: how it begins, what overlaps at the start, what nothing holds.
+module emcon_deck_contact_settings
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_name, &
+      option_real, reader_t, refuse_option
+   use emcon_scene, only : contact_pair_t, initiation_admissible, initiation_persistent, &
+      initiation_velocity_update, procedure_dynamic, step_t
+   implicit none
+   private
+   public :: read_initiation, read_interference, read_controls, check_statics
+
+contains
+
+   !> *CONTACT INITIATION: what a contact does that begins.
+   subroutine read_initiation(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+
+      select case (option_name(card, "TYPE"))
+      case ("", "PERSISTENT")
+         step%initiation = initiation_persistent
+      case ("ADMISSIBLE")
+         step%initiation = initiation_admissible
+      case ("VELOCITYUPDATE")
+         step%initiation = initiation_velocity_update
+      case default
+         call refuse_option(reader, card, "TYPE", "PERSISTENT, ADMISSIBLE, VELOCITY UPDATE", "")
+      end select
+      call option_real(reader, card, "GAP TOLERANCE", step%gap_tolerance)
+      if (has_option(card, "GAPTOLERANCE") .and. step%initiation /= initiation_persistent) &
+         call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
+   end subroutine read_initiation
+
+   !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
+   subroutine read_interference(reader, card, pair, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(step_t), intent(inout) :: step
+
+      if (.not. has_option(card, "SHRINK")) call card_error(reader, card, "SHRINK is missing: " &
+         // "only the overclosure that is there at the start can be resolved")
+      if (card%step > 1) call card_error(reader, card, "it belongs into the first step: later " &
+         // "ones begin without overclosure")
+      if (size(pair) == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+         "there is no *CONTACT PAIR")
+      step%resolves_overclosure = .true.
+   end subroutine read_interference
+
+   !> *CONTACT CONTROLS, STABILIZE or RESET: bodies that nothing holds and no load moves.
+   subroutine read_controls(reader, card, pair, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(step_t), intent(inout) :: step
+
+      if (option_name(card, "STABILIZE") /= "") call refuse_option(reader, card, "STABILIZE", &
+         "no value", "the motion is the smallest one, whatever the stiffness")
+      if (has_option(card, "STABILIZE") .eqv. has_option(card, "RESET")) call card_error(reader, &
+         card, "either STABILIZE or RESET is to be given")
+      if (size(pair) == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+         "there is no *CONTACT PAIR")
+      step%stabilizes = has_option(card, "STABILIZE")
+   end subroutine read_controls
+
+   !> Cards after `i_first` that a dynamic step cannot have.
+   subroutine check_statics(reader, i_first, step)
+      type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: i_first
+      type(step_t), intent(in) :: step
+      integer :: i
+
+      if (step%procedure /= procedure_dynamic) return
+      if (step%resolves_overclosure) call card_error(reader, reader%card(i_first), &
+         "*CONTACT INTERFERENCE is for *STATIC steps: in dynamics pushing bodies apart would " &
+         // "make energy")
+      do i = i_first + 1, size(reader%card)
+         if (reader%card(i)%name == "STEP") exit
+         if (reader%card(i)%name /= "CONTACTCONTROLS") cycle
+         if (has_option(reader%card(i), "STABILIZE")) call card_error(reader, reader%card(i), &
+            "STABILIZE is for *STATIC steps: in dynamics inertia holds bodies")
+      end do
+   end subroutine check_statics
+
+end module emcon_deck_contact_settings

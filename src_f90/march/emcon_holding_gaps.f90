@@ -1,0 +1,142 @@
+!> Gaps of contacts along motions of bodies: which close first, which are in the way.
+module emcon_holding_gaps
+   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
+      constraints_select
+   use emcon_kinds, only : dp, wp
+   use emcon_rigid_bodies, only : rigid_bodies_t, rigid_field
+   use emcon_scene, only : scene_t
+   use emcon_system, only : pose_t, system_t
+   implicit none
+   private
+   public :: gaps_measure, gaps_evaluate, gaps_that_can_act, gaps_next_to_close, gaps_nearest, &
+      gaps_keep_closed
+   public :: in_the_way
+
+   !> Contacts that close at the same time, by this fraction of an edge, are taken in together.
+   real(wp), parameter :: together = 1.0e-3_wp
+   !> A contact that closes by less than this, per unit of a motion, is not in its way.
+   real(wp), parameter :: in_the_way = sqrt(epsilon(1.0_wp))
+
+contains
+
+   !> Gaps for the motion `du`, of the stencils that it calls for.
+   subroutine gaps_measure(system, scene, u0, du)
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      integer :: pair
+
+      do pair = 1, size(system%contact)
+         call system%contact(pair)%contact%begin_step(scene%x, u0, du)
+         call system%contact(pair)%contact%measure(scene%x, u0, du)
+      end do
+   end subroutine gaps_measure
+
+   !> The contacts that `is_meant` marks, as they are at u0 + du.
+   subroutine gaps_evaluate(system, scene, pose, u0, du, is_meant, set)
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      logical, intent(in) :: is_meant(:)         !! (n_constraint)
+      type(constraint_set_t), intent(out) :: set
+      integer :: k, pair, i, id
+
+      call constraints_select(set, pack([(k, k = 1, size(is_meant))], &
+         is_meant .and. [(k > system%linear%n, k = 1, size(is_meant))]))
+      do k = 1, set%n
+         id = set%id(k)
+         call constraint_place(system, id, pair, i)
+         set%target(k) = system%contact(pair)%contact%state(i)%gap1
+      end do
+      call constraints_evaluate(set, system, scene, pose, u0, du)
+   end subroutine gaps_evaluate
+
+   !> Contacts that can act at the end of the motion that was measured.
+   pure function gaps_that_can_act(system) result(is_meant)
+      type(system_t), intent(in) :: system
+      logical :: is_meant(system%n_constraint)
+      integer :: pair
+
+      is_meant = .false.
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact, &
+               first => system%first_constraint(pair) + 1, &
+               last => system%first_constraint(pair + 1))
+            is_meant(first:last) = contact%state%is_near .and. contact%state%is_over &
+               .and. .not. contact%state%is_leaving
+            is_meant(first:last) = is_meant(first:last) .and. &
+               contact%state%gap1 > -contact%deepest_start*contact%state%size
+         end associate
+      end do
+   end function gaps_that_can_act
+
+   !> Of the contacts `set` those that close first on a way, and when; huge if none does.
+   pure subroutine gaps_next_to_close(set, way, time, is_next)
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: way(:, :)          !! (2, n_node) per time
+      real(wp), intent(out) :: time
+      logical, intent(out) :: is_next(:)         !! (n_constraint)
+      real(wp) :: rate(set%n), gap(set%n)
+      integer :: k, i
+
+      time = huge(time)
+      is_next = .false.
+      do k = 1, set%n
+         associate (item => set%item(k))
+            rate(k) = 0.0_wp
+            do i = 1, item%n_node
+               rate(k) = rate(k) - dot_product(item%c(:, i), way(:, item%node(i)))
+            end do
+            gap(k) = max(0.0_wp, set%target(k))
+            if (rate(k) <= in_the_way*sum(abs(item%c(:, :item%n_node)))) rate(k) = 0.0_wp
+            if (rate(k) > 0.0_wp) time = min(time, gap(k)/rate(k))
+         end associate
+      end do
+      do k = 1, set%n
+         if (rate(k) > 0.0_wp) is_next(set%id(k)) = &
+            gap(k) - time*rate(k) <= together*set%item(k)%size
+      end do
+   end subroutine gaps_next_to_close
+
+   !> Of the contacts `set` those with the smallest gap that prevent a motion that is left.
+   pure subroutine gaps_nearest(set, bodies, member, z, is_next)
+      type(constraint_set_t), intent(in) :: set
+      type(rigid_bodies_t), intent(in) :: bodies
+      integer, intent(in) :: member(:)           !! bodies of an assembly
+      real(dp), intent(in) :: z(:, :)            !! (3*members, n) motions that are left of it
+      logical, intent(out) :: is_next(:)         !! (n_constraint)
+      real(wp) :: way(2, size(bodies%of_node)), rate(set%n), smallest
+      integer :: j, k, i
+
+      rate = 0.0_wp
+      do j = 1, size(z, 2)
+         call rigid_field(bodies, member, z(:, j), way)
+         do k = 1, set%n
+            associate (item => set%item(k))
+               rate(k) = max(rate(k), abs(sum([(dot_product(item%c(:, i), &
+                  way(:, item%node(i))), i = 1, item%n_node)]))/sum(abs(item%c(:, :item%n_node))))
+            end associate
+         end do
+      end do
+      is_next = .false.
+      if (.not. any(rate > in_the_way)) return
+      smallest = minval(set%target, mask=rate > in_the_way)
+      do k = 1, set%n
+         is_next(set%id(k)) = rate(k) > in_the_way .and. &
+            set%target(k) - smallest <= together*set%item(k)%size
+      end do
+   end subroutine gaps_nearest
+
+   !> Of the contacts `set` that `is_meant` marks keep those whose gaps are closed.
+   pure subroutine gaps_keep_closed(set, is_meant)
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(inout) :: is_meant(:)      !! (n_constraint)
+      integer :: k
+
+      do k = 1, set%n
+         if (set%target(k) > together*set%item(k)%size) is_meant(set%id(k)) = .false.
+      end do
+   end subroutine gaps_keep_closed
+
+end module emcon_holding_gaps
