@@ -6,7 +6,8 @@ gfortran's own -M needs the .mod files first, so it cannot order the first build
 gfortran leaves a module file alone whose interface has not changed. The rule of such a file does
 nothing, after which make looks at its time: an edit of a body compiles one file. Only where the
 module file is gone, the object is made again: found while make reads the rules, for a call of make
-in a recipe would run in a dry run (`make -n`) too, once for each way from module to module.
+in a recipe would run in a dry run (`make -n`) too, once for each way from module to module. The +
+lets that look at the times.
 """
 
 import pathlib
@@ -53,7 +54,7 @@ def rules(folder, module_folder, sources):
             yield f"{objects[s]}: {' '.join(sorted(needed))}"
     for m in sorted(home):
         file, made = f"{module_folder}/{m}.mod", objects[home[m]]
-        yield f"{file}: {made} ;"
+        yield f"{file}: {made} ; +@:"
         yield f"{made}: $(if $(wildcard {file}),,always)"
     yield ".PHONY: always"
 

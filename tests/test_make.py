@@ -136,6 +136,10 @@ def test_a_dry_run_ends_and_makes_nothing(tmp_path):
     assert sorted(name for name, _ in tree.compiled("--dry-run", "lib")) == library
     assert not list(tmp_path.rglob("*.o"))
     tree.make("lib")
+    tree.write("base/emcon_low.f90", LOW.replace("2*i", "i + i"))
+    assert set(tree.make("--dry-run", "lib")) >= {"emcon_low"}
+    tree.make("lib")
+    assert not tree.make("--dry-run", "lib")
     module = tmp_path / "build/release/mod/emcon_low.mod"
     module.unlink()
     assert "emcon_low" in tree.make("--dry-run", "lib")
