@@ -1,6 +1,6 @@
 # EMCON. `make help` lists what can be made.
 #
-# MODE=release|debug, WP=real64|real128|real32 (kind of the state; each has its own folder),
+# MODE=release|debug|sanitize, WP=real64|real128|real32 (kind of the state; a folder for each),
 # V=1 shows commands, FFLAGS=... and CFLAGS=... are added to the flags below.
 # Compiler and libraries are looked up once, by .ci/setup, into build/config.mk.
 
@@ -9,8 +9,8 @@ WP ?= real64
 PREFIX ?= /usr/local
 BUILD := build/$(MODE)$(if $(filter-out real64,$(WP)),-$(WP))
 O := $(BUILD)/obj
-ifeq ($(filter $(MODE),release debug),)
-$(error MODE is release or debug, not '$(MODE)')
+ifeq ($(filter $(MODE),release debug sanitize),)
+$(error MODE is release, debug or sanitize, not '$(MODE)')
 endif
 ifeq ($(filter $(WP),real32 real64 real128),)
 $(error WP is real32, real64 or real128, not '$(WP)')
@@ -27,7 +27,8 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench soak docs install status clean help
+.PHONY: run test lib app pywrap kernels benches lint bench soak sanitize docs install status clean \
+	help
 
 # ---- set-up -------------------------------------------------------------------------------------
 
@@ -89,6 +90,13 @@ FFLAGS_debug := -O0 -fcheck=all,no-array-temps -fbacktrace -ffpe-trap=invalid,ze
 CFLAGS_ALL := -std=c99 -pedantic -Wall -Wextra -fPIC -g -ffp-contract=off
 CFLAGS_release := -O2
 CFLAGS_debug := -O0
+# What is optimised away is not checked. null: gfortran hands an absent array on by loading its
+# descriptor, which is harmless; the address sanitizer sees what is not.
+SANITIZE := -fsanitize=address,undefined -fno-sanitize=null
+FFLAGS_sanitize := -O0 -g1 $(SANITIZE) -fcheck=bounds,do,mem,pointer,recursion
+CFLAGS_sanitize := -O0 -g1 $(SANITIZE)
+# A libubsan that is shared writes to no file but standard error.
+LDFLAGS_sanitize := $(SANITIZE) -static-libubsan
 FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(FFLAGS)
 CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(CFLAGS)
 LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(LAPACK_LIBS)
@@ -135,12 +143,12 @@ $(BUILD)/libemcon.a: $(LIB_OBJ)
 
 $(BUILD)/$(SHARED): $(LIB_OBJ)
 	@echo "  LINK  $@"
-	$(Q)$(FC) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $^ $(LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $^ $(LIBS)
 	$(Q)ln -sf $(@F) $(BUILD)/libemcon.so
 
 $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
-	$(Q)$(FC) -o $@ $^ $(LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS)
 
 # Optimising tests that hold whole models takes minutes and gigabytes, and gains nothing.
 # `private`: the library, made on the way, keeps its own flags.
@@ -148,7 +156,7 @@ $(call objects,$(KERNEL_SRC)): private FFLAGS_release := -O0
 
 $(BUILD)/kernels: $(call objects,$(KERNEL_SRC)) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
-	$(Q)$(FC) -o $@ $^ $(LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS)
 
 lib: $(BUILD)/libemcon.a $(BUILD)/$(SHARED)  ## the library, build/release/libemcon.{a,so}
 app: $(BUILD)/emcon  ## the program, build/release/emcon
@@ -228,9 +236,14 @@ bench:  ## print the timed scenes of tests/bench
 	@set -e; for script in tests/bench/*.py; do $(PY) $$script; done
 
 SECONDS ?= 600
-soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: bad decks, damaged files, calls, kills
+soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, calls, kills; threads
 	$(BUILDING) app lib
 	@$(PY) tests/soak/soak.py --seconds $(SECONDS)
+	@EMCON_OPENS=20000 $(PY) -m pytest -q tests/embed/test_threads.py
+
+sanitize: .venv/test.stamp  ## build and run under the address and undefined-behaviour sanitizers
+	$(BUILDING) MODE=sanitize WP=real64 app lib kernels
+	@$(PY) tests/soak/sanitize.py
 
 docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
 	.venv/bin/python -m ford --quiet .ci/ford.md
@@ -247,7 +260,8 @@ install: app lib  ## program, library, modules, header and emcon.pc below PREFIX
 		$(wildcard src_f90/api/*.h) $(TO)/include/emcon
 	printf '%s\n' 'prefix=$(abspath $(PREFIX))' 'Name: emcon' 'Version: $(VERSION)' \
 		'Description: energy-momentum conserving contact dynamics' \
-		'Cflags: -I$${prefix}/include/emcon' 'Libs: -L$${prefix}/lib -lemcon' \
+		'Cflags: -I$${prefix}/include/emcon' \
+		'$(strip Libs: -L$${prefix}/lib -lemcon $(LDFLAGS_$(MODE)))' \
 		'Libs.private: $(LIBS) -lgfortran -lm' > $(TO)/lib/pkgconfig/emcon.pc
 
 status:  ## compiler, libraries and Python packages that were found

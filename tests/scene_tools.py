@@ -15,7 +15,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 DECKS = ROOT / "input_decks"
-PROGRAM = ROOT / "build" / "release" / "emcon"
+PROGRAM = pathlib.Path(os.environ.get("EMCON", ROOT / "build" / "release" / "emcon"))
 EPSILON = np.finfo(float).eps
 
 #: What a program that crashed, or a library that was not asked to speak, leaves on the screen.

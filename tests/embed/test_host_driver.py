@@ -9,9 +9,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from embed_tools import HERE, ROOT, SANITIZED
 
-HERE = Path(__file__).parent
-LIBRARY = HERE.parents[1]/"build"/"release"
+LIBRARY = ROOT/"build"/("sanitize" if SANITIZED else "release")
 DRIVER = HERE/"host_driver.f"
 EPS = 2.0**-52
 # 400 steps, each with a few roundings of an energy of size 1.
@@ -80,7 +80,7 @@ def build(source: Path, folder: Path) -> Path:
     heading = re.search(r"^C +(gfortran.*\n(?:C {6}.*\n)*)", DRIVER.read_text(), re.MULTILINE)
     line = " ".join(part.lstrip("C ").strip() for part in heading[1].splitlines())
     (folder/"host_driver.f").write_text(source.read_text())
-    run(line, cwd=folder)
+    run(line + " -fsanitize=address,undefined -static-libubsan"*SANITIZED, cwd=folder)
     return folder/"host_driver"
 
 
