@@ -88,12 +88,14 @@ class Step(Cards):
         """
         return self._card("CONTACT INITIATION", {"TYPE": type, "GAP TOLERANCE": gap_tolerance})
 
-    def contact_interference(self) -> Step:
+    def contact_interference(self, *, amplitude: str | None = None) -> Step:
         """`*CONTACT INTERFERENCE, SHRINK`: overlaps at the start are pushed apart over the step.
 
         The step has to be the first one and static.
+
+        amplitude       the part that is left, from 1 to 0; without one linear over the step
         """
-        return self._card("CONTACT INTERFERENCE", {"SHRINK": True})
+        return self._card("CONTACT INTERFERENCE", {"SHRINK": True, "AMPLITUDE": amplitude})
 
     def contact_controls(self, *, stabilize: bool) -> Step:
         """`*CONTACT CONTROLS`: STABILIZE, or RESET to what holds by default, for static steps.

@@ -2,8 +2,13 @@
 module emcon_deck_contact_settings
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_name, &
       option_real, reader_t, refuse_option
-   use emcon_scene, only : contact_pair_t, initiation_admissible, initiation_persistent, &
-      initiation_velocity_update, procedure_dynamic, step_t
+   use emcon_deck_tables, only : find_table, table_names
+   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_kinds, only : wp
+   use emcon_scene, only : amplitude_t, contact_pair_t, find_amplitude_value, &
+      initiation_admissible, initiation_persistent, initiation_velocity_update, &
+      procedure_dynamic, step_t
+   use emcon_text, only : to_text
    implicit none
    private
    public :: read_initiation, read_interference, read_controls, check_statics
@@ -32,11 +37,13 @@ contains
    end subroutine read_initiation
 
    !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
-   subroutine read_interference(reader, card, pair, step)
+   subroutine read_interference(reader, card, pair, amplitude, step)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(contact_pair_t), intent(in) :: pair(:)
+      type(amplitude_t), intent(in) :: amplitude(:)
       type(step_t), intent(inout) :: step
+      character(len=:), allocatable :: name
 
       if (.not. has_option(card, "SHRINK")) call card_error(reader, card, "SHRINK is missing: " &
          // "only the overclosure that is there at the start can be resolved")
@@ -45,6 +52,11 @@ contains
       if (size(pair) == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
          "there is no *CONTACT PAIR")
       step%resolves_overclosure = .true.
+      name = option_name(card, "AMPLITUDE")
+      if (name == "") return
+      step%overclosure_amplitude = find_table(amplitude, name)
+      if (step%overclosure_amplitude == 0 .and. .not. reader%doubt_names) call card_error(reader, &
+         card, "unknown amplitude " // quoted(name) // suggestion(name, table_names(amplitude)))
    end subroutine read_interference
 
    !> *CONTACT CONTROLS, STABILIZE or RESET: bodies that nothing holds and no load moves.
@@ -63,13 +75,16 @@ contains
       step%stabilizes = has_option(card, "STABILIZE")
    end subroutine read_controls
 
-   !> Cards after `i_first` that a dynamic step cannot have.
-   subroutine check_statics(reader, i_first, step)
+   !> Cards after `i_first` that the procedure of the step, or its duration, does not allow.
+   subroutine check_statics(reader, i_first, amplitude, step)
       type(reader_t), intent(inout) :: reader
       integer, intent(in) :: i_first
+      type(amplitude_t), intent(in) :: amplitude(:)
       type(step_t), intent(in) :: step
       integer :: i
 
+      if (step%overclosure_amplitude > 0) call check_left(reader, reader%card(i_first), &
+         amplitude(step%overclosure_amplitude), step%duration)
       if (step%procedure /= procedure_dynamic) return
       if (step%resolves_overclosure) call card_error(reader, reader%card(i_first), &
          "*CONTACT INTERFERENCE is for *STATIC steps: in dynamics pushing bodies apart would " &
@@ -81,5 +96,22 @@ contains
             "STABILIZE is for *STATIC steps: in dynamics inertia holds bodies")
       end do
    end subroutine check_statics
+
+   !> The part of overclosure that is left: all of it at the start of the step, none at its end.
+   subroutine check_left(reader, card, amplitude, duration)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(amplitude_t), intent(in) :: amplitude
+      real(wp), intent(in) :: duration           !! [T]
+      real(wp) :: at_start, at_end, slope
+
+      call find_amplitude_value(amplitude, 0.0_wp, at_start, slope)
+      call find_amplitude_value(amplitude, duration, at_end, slope)
+      if (abs(at_start - 1.0_wp) > 0.0_wp .or. abs(at_end) > 0.0_wp &
+         .or. any(amplitude%value < 0.0_wp .or. amplitude%value > 1.0_wp)) call card_error(reader, &
+         card, "*CONTACT INTERFERENCE: the amplitude " // amplitude%name // " is the part of " // &
+         "overclosure that is left: from 1 at the start of the step to 0 at its end, never " // &
+         "beyond; here from " // to_text(at_start) // " to " // to_text(at_end))
+   end subroutine check_left
 
 end module emcon_deck_contact_settings

@@ -71,7 +71,7 @@ module emcon_deck_keywords
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
          // "~NOROTATION,~NOTHICKNESS,!CYCLICSYMMETRY,!MULTISTAGE,!TIEDNSET,!CONSTRAINTRATIO"), &
       keyword_t("EQUATION", in_both, "!REMOVE,!REMOVEALL,!INPUT"), &
-      keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,!AMPLITUDE,!OP,!TYPE", &
+      keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,!OP,!TYPE", &
          has_data=.false.), &
       keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,!AUTOMATICTOLERANCES," &
          // "!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MASTER,!SLAVE,!MAXCHP,!PERRMX,!UERRMX," &

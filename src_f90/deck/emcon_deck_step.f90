@@ -16,8 +16,8 @@ module emcon_deck_step
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, method_null_space, method_saddle_point, origin_t, &
-      procedure_dynamic, procedure_static, scene_t, step_t
+   use emcon_scene, only : amplitude_t, contact_pair_t, method_null_space, method_saddle_point, &
+      origin_t, procedure_dynamic, procedure_static, scene_t, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -53,7 +53,7 @@ contains
          end do
          call inherit(last, scene%step(k))
          scene%step(k)%origin = reader%card(i)%origin
-         call read_settings(reader, i, scene%pair, scene%step(k))
+         call read_settings(reader, i, scene%pair, scene%amplitude, scene%step(k))
          call conditions_carry(conditions, scene%amplitude, last, time)
          if (k > 1) time = time + last%duration
          call read_conditions(reader, i, scene, conditions, requests)
@@ -83,10 +83,11 @@ contains
    end subroutine inherit
 
    !> Procedure and settings of the step whose first card is `i_first`.
-   subroutine read_settings(reader, i_first, pair, step)
+   subroutine read_settings(reader, i_first, pair, amplitude, step)
       type(reader_t), intent(inout) :: reader
       integer, intent(in) :: i_first
       type(contact_pair_t), intent(in) :: pair(:)
+      type(amplitude_t), intent(in) :: amplitude(:)
       type(step_t), intent(inout) :: step
       integer :: i
 
@@ -104,7 +105,7 @@ contains
             case ("CONTACTINITIATION")
                call read_initiation(reader, card, step)
             case ("CONTACTINTERFERENCE")
-               call read_interference(reader, card, pair, step)
+               call read_interference(reader, card, pair, amplitude, step)
             case ("CONTACTCONTROLS")
                call read_controls(reader, card, pair, step)
             case ("MORTAR")
@@ -121,7 +122,7 @@ contains
          end associate
       end do
       call read_step_card(reader, reader%card(i_first), step)
-      call check_statics(reader, i_first, step)
+      call check_statics(reader, i_first, amplitude, step)
       if (step%procedure /= 0 .or. reader%doubt_names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
          "the step has no procedure: *STATIC or *DYNAMIC")

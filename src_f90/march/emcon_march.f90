@@ -7,13 +7,14 @@ module emcon_march
    use emcon_errors, only : err_analysis, err_input, err_interrupt, error_t, raise
    use emcon_given, only : given_t
    use emcon_holding, only : holding_begin, holding_t
-   use emcon_judge, only : judge_init
+   use emcon_judge, only : judge_init, judge_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_parts, only : march_in_parts
    use emcon_march_step, only : increment_t, march_t
    use emcon_newton, only : interrupt_interface, newton_init
    use emcon_numbering, only : spread_dependent
+   use emcon_overclosure, only : overclosure_check
    use emcon_pair_record, only : pair_record_init
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : initiation_persistent, method_saddle_point, procedure_dynamic, &
@@ -192,6 +193,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(pose_t) :: rest
+      type(overlap_t) :: overlap
       integer :: i
 
       associate (step => scene%step(self%state%i_step), state => self%state)
@@ -224,6 +226,12 @@ contains
          end do
          call active_set_overclosure(self%active, self%system, scene, state%u_start, &
             step%resolves_overclosure)
+         self%meant_overlap = 0.0_wp
+         if (step%resolves_overclosure) then
+            call judge_step(self%judge, scene%x, state%u_start, self%system%zero, overlap)
+            self%meant_overlap = overlap%depth
+            call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
+         end if
          call count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = grid_time(self, step, state%n_grid)
          self%du = 0.0_wp

@@ -8,7 +8,7 @@ module emcon_march_parts
    use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : scene_t
-   use emcon_text, only : note_add, to_text
+   use emcon_text, only : note_add, notes_append, notes_t, to_text
    implicit none
    private
    public :: march_in_parts
@@ -29,6 +29,8 @@ contains
       real(wp) :: h
       integer :: level, place, status
 
+      call notes_append(increment%warnings, self%warnings)
+      self%warnings = notes_t()
       level = 0
       place = 0
       do while (place < 2**self%n_level)

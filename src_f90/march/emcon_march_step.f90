@@ -13,7 +13,7 @@ module emcon_march_step
    use emcon_newton, only : interrupt_interface, newton_t
    use emcon_numbering, only : gather_dependent, spread_dependent
    use emcon_pair_record, only : pair_record_measure
-   use emcon_scene, only : initiation_velocity_update, scene_t
+   use emcon_scene, only : find_amplitude_value, initiation_velocity_update, scene_t
    use emcon_scheme, only : scheme_t
    use emcon_stand_off, only : stand_off_add, stand_off_t
    use emcon_state, only : state_t
@@ -53,8 +53,11 @@ module emcon_march_step
       type(active_set_t) :: active
       type(correction_t) :: correction
       type(velocity_update_t) :: velocity_update
+      type(notes_t) :: warnings                  !! to be told with the next increment
       type(judge_t) :: judge
       type(stopwatch_t) :: judge_clock
+      !> Overlap per edge with which a step began that resolves it
+      real(wp) :: meant_overlap = 0.0_wp
       integer :: n_grid = 0                      !! grid increments in the step
       integer :: most_stride = 1                 !! largest increment, in grid increments
       integer :: n_level = 0                     !! halvings allowed
@@ -83,8 +86,8 @@ contains
       self%active%may_cut = may_cut
       self%active%gap_tolerance = 0.0_wp
       if (may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
-      self%active%left = 1.0_wp - [start%step_time, start%step_time + h] &
-         /scene%step(self%state%i_step)%duration
+      self%active%left = [overclosure_left(scene, self%state, start%step_time), &
+         overclosure_left(scene, self%state, start%step_time + h)]
       do attempt = 1, 2
          call march_guess(self, scene, start, h, is_at_rest=attempt == 2)
          call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
@@ -97,6 +100,7 @@ contains
       call stopwatch_start(self%judge_clock)
       call judge_step(self%judge, scene%x, self%state%u, self%du, overlap)
       call stopwatch_stop(self%judge_clock)
+      overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
       if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
       if (any(self%active%comes_and_goes)) then
          call cycling_text(self, scene, text)
@@ -109,6 +113,22 @@ contains
       end if
       call commit(self, scene, h, increment, error)
    end subroutine march_step
+
+   !> The part of the overclosure at the start of the step that is left at `step_time`.
+   pure real(wp) function overclosure_left(scene, state, step_time)
+      type(scene_t), intent(in) :: scene
+      type(state_t), intent(in) :: state
+      real(wp), intent(in) :: step_time          !! [T]
+      real(wp) :: slope
+
+      associate (step => scene%step(state%i_step))
+         overclosure_left = 1.0_wp - step_time/step%duration
+         if (step%overclosure_amplitude == 0) return
+         associate (amplitude => scene%amplitude(step%overclosure_amplitude))
+            call find_amplitude_value(amplitude, step_time, overclosure_left, slope)
+         end associate
+      end associate
+   end function overclosure_left
 
    !> The contacts of the last step that opened and closed in turn, by their slave nodes.
    subroutine cycling_text(self, scene, text)

@@ -195,6 +195,7 @@ module emcon_scene
       real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
       type(contact_options_t) :: contact
       logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
+      integer :: overclosure_amplitude = 0           !! part that is left over time; 0: linear to 0
       logical :: stabilizes = .false.                !! statics: what no load works on may be free
       real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
       integer :: newton_maximum = 20
