@@ -47,6 +47,18 @@ def test_check_writes_nothing(deck, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_press_fit(tmp_path):
+    """Second order: the elements are an eighth of the wall thick; twice as large ones err more."""
+    deck = DECKS / "press_fit.inp"
+    pressure, bore = figures(deck, r"pressure (\S+); radial displacement (\S+) at the bore and")
+    fields = run_deck(deck, tmp_path).fields()
+    inside = np.abs(np.linalg.norm(fields.x, axis=1) - 1.0) < 1e-6
+    radial = (fields["displacement"][-1] * fields.x).sum(axis=1)[inside]
+    assert radial == pytest.approx(bore, rel=1/64)
+    found = fields["contact_pressure"][-1]
+    assert found[found > 0] == pytest.approx(pressure, rel=1/64)
+
+
 def test_spinning_ring(tmp_path):
     deck = DECKS / "spinning_ring.inp"
     energy, mass = figures(deck, r"total energy (\S+) \(all kinetic at the start\); mass (\S+);")
