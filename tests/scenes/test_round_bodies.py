@@ -1,12 +1,21 @@
-"""Statics of a disc in a groove under a lid: no support, and free to roll where it is round."""
+"""Statics of round bodies that contact alone holds, and that may be free to roll.
 
+A disc in a groove under a lid, and Hertz contact by load from the first increment on.
+"""
+
+import functools
 import math
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
 
 import numpy as np
 import overlap
 import pytest
 from plain_scenes import Scene
-from scene_tools import Deck, number, run_deck
+from scene_tools import DECKS, Deck, figures, number, run_deck
 from test_statics import FORMULATIONS, ROUNDED, displacement, solve, tower
 
 LOAD, RIM, RADIUS = 2.0, 24, 1.0
@@ -161,3 +170,59 @@ def test_body_without_load_is_brought_to_its_master(tmp_path, formulation):
     assert "moved over a gap of 0.1 onto the surface nearest to it" in run.errors
     assert run.verdict["verdict"] == "good" and run.verdict["warning_count"] == 1
     assert "no load" not in solve(tmp_path, tower([0.0], formulation, load=0.0)).errors
+
+
+# ---- Hertz by load --------------------------------------------------------------------------------
+
+
+@functools.lru_cache
+def hertz(level, is_free=False):
+    """The deck of make_hertz.py with its second step only, the pressure.
+
+    `is_free`: no support of the upper cylinder either, which may roll on the lower one.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "made.inp"
+        command = [sys.executable, DECKS / "make_hertz.py", "--level", str(level), "--output", path]
+        subprocess.run(list(map(str, command)), check=True)
+        text, known = path.read_text(), figures(path, r"= (\S+), peak pressure 2 F/\(pi a\) = (\S+),")
+    model, _, press = re.split(r"^\*STEP\n", text, flags=re.M)
+    if is_free:
+        model = re.sub(r"(?s)(NSET=AXIS.*)\*NSET, NSET=AXIS[^*]*", r"\1", model)
+        press = press.replace("*DLOAD", STABILIZE + "\n*DLOAD")
+    return model + "*STEP\n" + press.replace(", OP=NEW", ""), known
+
+
+def pressed(folder, formulation, level, is_free=False):
+    """The run, and half-width and peak of the pressure on the slave side over those of Hertz."""
+    text, (width, peak) = hertz(level, is_free)
+    kind = {"formulation": formulation[0], "multiplier": formulation[1]}
+    run = run_deck(Deck(text, "hertz"), folder, **kind)
+    fields = run.fields()
+    # The upper cylinder, whose nodes come last: the others of its arc bear 0.
+    first = np.flatnonzero(fields.x[:, 1] < -1e-9).max() + 1
+    x, force = fields.x[first:, 0], fields["contact_force"][-1][first:, 1]
+    assert force.sum() == pytest.approx(10.0, rel=1e-9)
+    # The second moment of half an ellipse is a^2/4; edges are even where contact is.
+    found = 2*math.sqrt((force*x**2).sum()/force.sum())
+    return run, found/width - 1, force.max()/(width/level)/peak - 1
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
+@pytest.mark.parametrize("level", [3, 6])
+def test_hertz_by_load(tmp_path, formulation, level):
+    """No step that closes the contact first. Half-width and peak to second order of an edge."""
+    _, width, peak = pressed(tmp_path, formulation, level)
+    assert abs(width) < level**-2 and abs(peak) < level**-2
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
+def test_hertz_by_load_without_support(tmp_path, formulation):
+    """Free to roll on the lower cylinder: with STABILIZE as if it were guided."""
+    held, width, peak = pressed(tmp_path / "held", formulation, 3)
+    run, free_width, free_peak = pressed(tmp_path, formulation, 3, is_free=True)
+    assert "free to rotate, on which no load does work" in run.errors
+    assert (free_width, free_peak) == pytest.approx((width, peak), abs=1e-8)
+    u = held.fields()["displacement"][-1]
+    assert np.allclose(run.fields()["displacement"][-1], u, rtol=0, atol=1e-8*np.abs(u).max())
+    assert np.abs(run.history["stabilization"]).max() < 1e-10*held.history["strain"][-1]
