@@ -15,8 +15,12 @@ import numpy as np
 import overlap
 import pytest
 from plain_scenes import Scene
-from scene_tools import DECKS, Deck, figures, number, run_deck
+from scene_tools import DECKS, ROOT, Deck, figures, number, run_deck
 from test_statics import FORMULATIONS, ROUNDED, displacement, solve, tower
+
+sys.path.insert(0, str(ROOT / "pywrap"))
+
+from emcon.stepper import Stepper  # noqa: E402
 
 LOAD, RIM, RADIUS = 2.0, 24, 1.0
 STABILIZE = "*CONTACT CONTROLS, STABILIZE"
@@ -147,6 +151,20 @@ def test_what_a_load_moves_is_not_stabilized(tmp_path, formulation):
     run = solve(tmp_path, tower([0.0], formulation, held="", step=sideways), code=3)
     assert "body of element 101 is free to move in x" in run.errors
     assert "no load does work" not in run.errors
+
+
+def test_restart_file_holds_what_is_borne(tmp_path):
+    deck = static_deck(groove(0.0), FORMULATIONS[4], step=STABILIZE).write(tmp_path / "groove.inp")
+    with Stepper(deck) as stepper:
+        stepper.run(until=0.5)
+        before = stepper.ledger
+        assert before["stabilization"] != 0.0
+        stepper.write_restart(tmp_path / "half.rst.h5")
+        stepper.run()
+        with Stepper.from_restart(tmp_path / "half.rst.h5") as other:
+            assert other.ledger == before
+            other.run()
+            assert other.ledger == stepper.ledger
 
 
 def test_reset_asks_for_the_error_again(tmp_path):
