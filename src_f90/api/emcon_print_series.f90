@@ -177,9 +177,10 @@ contains
             label = scene%element_label(item)
          case (of_constraints)
             set = "CONTACT"
-            item = [(i, i = system%first_constraint(1) + 1, system%n_constraint)]
+            item = [(i, i = system%first_constraint(1) + 1, &
+               system%first_constraint(system%n_pair + 1))]
             allocate(label(0))
-            do i = 1, size(system%contact)
+            do i = 1, system%n_pair
                label = [label, scene%node_label(system%contact(i)%contact%node)]
             end do
          case default

@@ -122,15 +122,16 @@ contains
       type(contact_report_t), intent(inout) :: report
       type(constraint_set_t), intent(in) :: set
       type(system_t), intent(in) :: system
-      integer :: k, i
+      integer :: k, i, contact
 
       report%n = set%n
       report%id = set%id
       allocate(report%pair(set%n), report%node(set%n))
       allocate(report%gap0(set%n), report%gap1(set%n), report%dgap(set%n), report%size(set%n))
       do k = 1, set%n
-         call constraint_place(system, set%id(k), report%pair(k), i)
-         report%node(k) = system%contact(report%pair(k))%contact%node(i)
+         call constraint_place(system, set%id(k), contact, i)
+         report%pair(k) = abs(system%of_pair(contact))
+         report%node(k) = system%contact(contact)%contact%node(i)
          report%gap0(k) = set%item(k)%gap0
          report%gap1(k) = set%item(k)%gap1
          report%dgap(k) = set%item(k)%dgap

@@ -12,7 +12,7 @@ module emcon_chain
    use emcon_text, only : to_text
    implicit none
    private
-   public :: chain_t, chain_init, chain_number, chain_thickness, chain_tributary, &
+   public :: chain_t, chain_init, chain_number, chain_shortest, chain_thickness, chain_tributary, &
       chain_distance, chain_is_joint, chain_touches, chain_corners, chain_crossing, surface_edges
 
    type :: chain_t
@@ -65,6 +65,21 @@ contains
       if (allocated(error)) return
       call chain_number(self)
    end subroutine chain_init
+
+   !> Length of the shortest edge at node `i` of the chain; of a node without edges huge.
+   pure real(wp) function chain_shortest(self, i) result(shortest)
+      type(chain_t), intent(in) :: self
+      integer, intent(in) :: i                   !! index into `node`
+      integer :: k
+
+      shortest = huge(shortest)
+      if (self%n_edge == 0) return
+      do k = 1, 2
+         associate (e => self%node_edge(k, i))
+            if (e > 0) shortest = min(shortest, self%length(e))
+         end associate
+      end do
+   end function chain_shortest
 
    !> Find the neighbours of each edge.
    subroutine link_edges(self, scene, surface, error)

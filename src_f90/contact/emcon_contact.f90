@@ -44,12 +44,14 @@ module emcon_contact
       real(wp) :: gap0 = 0.0_wp                       !! mean gap Phi/W [L]
       real(wp) :: gap1 = 0.0_wp
       real(wp) :: size = 0.0_wp
+      real(wp) :: closed = 0.0_wp                     !! the gap at which it acts, < 0: a guard [L]
    end type gap_state_t
 
    type, abstract :: contact_t
       integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       logical :: meets_statics = .false.              !! a step of the deck is static
+      real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at minus this, by the edge
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
       !> from there on the other side of a thin body is meant.

@@ -3,7 +3,8 @@
 !> The master surface is a polygon, or smoothed. A surface may be in contact with itself.
 !> Source: docs/theory.md, section 4.
 module emcon_nts
-   use emcon_chain, only : chain_corners, chain_init, chain_t, chain_thickness, chain_tributary
+   use emcon_chain, only : chain_corners, chain_init, chain_shortest, chain_t, chain_thickness, &
+      chain_tributary
    use emcon_contact, only : constraint_resize, constraint_t, contact_t, gap_state_t
    use emcon_dgrad10, only : dg10_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
@@ -38,6 +39,7 @@ module emcon_nts
       integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
       integer, allocatable :: class(:)                !! (n_constraint) of bodies that it looks at
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
+      real(wp), allocatable :: own_size(:)            !! (n_constraint) shortest slave edge there [L]
       type(near_list_t) :: near
       integer, allocatable :: near_item(:)            !! (n_constraint) its place in that list
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
@@ -88,6 +90,8 @@ contains
       allocate(self%edge(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint))
       self%deepest_start = touch_tol
+      self%slack = pair%slack
+      self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
       self%thickness = self%thickness(self%chain_node)
       associate (n => self%n_constraint/self%rule%n_class)
@@ -116,6 +120,7 @@ contains
       type(contact_options_t), intent(in) :: options
 
       self%smoothing = options%smoothing
+      if (self%slack > 0.0_wp) self%smoothing = smoothing_none       ! guards watch the mesh
       if (self%smoothing /= smoothing_hermite) return
       if (.not. allocated(self%smooth)) then
          allocate(self%is_corner(self%master%n_edge), self%smooth(self%n_constraint))
@@ -220,6 +225,7 @@ contains
       call polygon_stencil(self%master, self%node(i), self%edge(i), x, u0, n, node, before, after)
       call stencil_gather(x, u0, du, n, node, local, dlocal)
       state%size = stencil_length(x, node)
+      state%closed = -self%slack*min(state%size, self%own_size(i))
       call nts_gap_value(local(:, :n), before, after, self%rounding*state%size, state%gap0, xi0)
       do k = 1, n
          local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))

@@ -61,22 +61,22 @@ contains
       depth = sign(sqrt(self%square), left)
    end function nearest_depth
 
-   !> Two edges that cross: the shortest way of an end of one to the other. Ways from the first node
-   !> of `a`: to its last node, and to the first and the last node of `b`. The number of the nearest
-   !> "edge" is that of the end: 1, 2 of `b`, which is in `a`; 3, 4 of `a`, in `b`; 0: no crossing.
-   pure subroutine crossing_find(a, to_b, found)
+   !> Do two edges cross, where along `a`, and does it go behind the other there? Ways from the first
+   !> node of `a`: to its last node, and to the first and the last node of `b`.
+   pure subroutine crossing_find(a, to_b, crosses, share, enters)
       real(wp), intent(in) :: a(2), to_b(2, 2)   !! [L]
-      type(nearest_t), intent(out) :: found
+      logical, intent(out) :: crosses
+      real(wp), intent(out) :: share             !! of `a` before the crossing
+      logical, intent(out) :: enters
       real(wp) :: b(2), side(4)
 
       b = to_b(:, 2) - to_b(:, 1)
       side = [cross(a, to_b(:, 1)), cross(a, to_b(:, 2)), cross(b, -to_b(:, 1)), &
          cross(b, a - to_b(:, 1))]
-      if (.not. (is_between(side(1), side(2)) .and. is_between(side(3), side(4)))) return
-      call nearest_update(found, 1, to_b(:, 1), a)
-      call nearest_update(found, 2, to_b(:, 2), a)
-      call nearest_update(found, 3, -to_b(:, 1), b)
-      call nearest_update(found, 4, a - to_b(:, 1), b)
+      crosses = is_between(side(1), side(2)) .and. is_between(side(3), side(4))
+      share = 0.0_wp
+      if (crosses) share = side(3)/(side(3) - side(4))
+      enters = side(4) > 0.0_wp
    end subroutine crossing_find
 
    !> Is 0 between `a` and `b`? Signs are compared: a product of small numbers would vanish.

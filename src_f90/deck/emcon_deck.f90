@@ -25,6 +25,7 @@ module emcon_deck
    use emcon_deck_tables, only : read_amplitudes, read_initial_conditions, read_time_points
    use emcon_deck_ties, only : read_ties
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
+   use emcon_guards, only : guards_find
    use emcon_scene, only : scene_t
    use emcon_text, only : string_t
    implicit none
@@ -82,6 +83,7 @@ contains
       call read_pairs(reader, scene)
       call read_ties(reader, scene)
       call read_general_contact(reader, scene)
+      call guards_find(scene%pair, scene%surface, scene%guard)
       call read_equations(reader, scene)
       call read_steps(reader, scene)
       call check_shapes(reader, scene)

@@ -25,11 +25,11 @@ module emcon_active_set
    public :: active_set_overclosure, active_set_begin, active_set_select, active_set_advance, &
       active_set_drop
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
-      step_stands_off, step_not_held
+      step_stands_off, step_not_held, step_overlaps
 
    !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
    integer, parameter :: step_done = 0, step_refused = 1, step_diverged = 2, step_singular = 3, &
-      step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8
+      step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8, step_overlaps = 9
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -285,11 +285,11 @@ contains
          if (pair == 0) cycle
          self%set%is_firm(k) = .not. self%puts_off .or. self%only_adds &
             .or. self%is_put_off(self%set%id(k))
-         self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k))
          associate (gap => system%contact(pair)%contact%state(i))
+            self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k)) + gap%closed
             ! What is closed too far is never pushed out: that would make energy.
-            self%set%is_kept(k) = self%holds_gap .or. &
-               (self%has_inertia .and. gap%gap0 < -touch_tol*gap%size)
+            self%set%is_kept(k) = self%holds_gap .or. (self%has_inertia .and. &
+               gap%gap0 < self%set%target(k) - touch_tol*gap%size)
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate
       end do
@@ -320,7 +320,7 @@ contains
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                gap = contact%state(i)
-               allowed = self%left*self%overclosure(id)
+               allowed = self%left*self%overclosure(id) + gap%closed
                if (self%is_active(id)) then
                   k = k + 1
                   if (.not. gap%is_covered) status = step_too_far
@@ -338,7 +338,7 @@ contains
                else
                   if (.not. (gap%is_near .and. gap%is_over)) cycle
                   if (self%is_dropped(id)) then
-                     if (goes_through(gap)) status = step_too_far
+                     if (goes_through(gap, allowed(1))) status = step_too_far
                      cycle
                   end if
                   if (gap%is_arriving .and. self%has_inertia) then
@@ -354,6 +354,8 @@ contains
                   if (gap%gap0 - allowed(0) < -contact%deepest_start*gap%size .and. &
                      .not. state%is_active(id)) cycle
                   if (gap%gap1 - allowed(1) >= -gap_noise*gap%size) cycle
+                  ! What the pairs take in may hold the bodies away from their guards.
+                  if (contact%slack > 0.0_wp .and. has_changed) cycle
                   if (.not. gap%is_covered .or. (self%has_inertia .and. &
                      gap%gap0 > contact%farthest_start)) status = step_too_far
                   self%is_active(id) = .true.
@@ -378,10 +380,11 @@ contains
 
       !> Does a contact that was left out close all the same? Then it does not follow from others:
       !> it had lost its surface in an iteration.
-      pure logical function goes_through(gap)
+      pure logical function goes_through(gap, least)
          type(gap_state_t), intent(in) :: gap
+         real(wp), intent(in) :: least           !! gap that is closed [L]
 
-         goes_through = self%may_cut .and. gap%gap1 < min(gap%gap0, 0.0_wp) - touch_tol*gap%size
+         goes_through = self%may_cut .and. gap%gap1 < min(gap%gap0, least) - touch_tol*gap%size
       end function goes_through
 
       !> Would a new contact be held at a larger distance than the deck allows?

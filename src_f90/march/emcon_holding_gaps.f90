@@ -63,6 +63,7 @@ contains
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
+            if (contact%slack > 0.0_wp) cycle
             is_meant(first:last) = contact%state%is_near .and. contact%state%is_over &
                .and. .not. contact%state%is_leaving
             is_meant(first:last) = is_meant(first:last) .and. &

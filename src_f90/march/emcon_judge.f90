@@ -1,32 +1,35 @@
 !> The judge: after each step, is a body inside another, whatever the constraints say?
 !>
 !> All pieces that contact pairs name are looked at both ways: nodes of either against the outline
-!> of the other, and edges against edges, also of a piece against itself; at the end of the step
-!> and, where it moves by much, on the straight way there. While boxes are apart nothing is done.
+!> of the other, and what lies of edges between their crossings with the other, also of a piece with
+!> itself; at the end of the step and, where it moves by much, on the straight way there. While boxes
+!> are apart nothing is done.
 !> Source: docs/theory.md, section 4.11.
 module emcon_judge
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp
-   use emcon_outline, only : outline_init, outline_t
-   use emcon_overlap, only : crossing_find, length_of, nearest_depth, nearest_t, &
-      nearest_update
+   use emcon_outline, only : outline_init, outline_meets, outline_t
+   use emcon_overlap, only : crossing_find, length_of, nearest_depth, nearest_t, nearest_update
    use emcon_scene, only : scene_t
    implicit none
    private
    public :: judge_t, overlap_t, judge_init, judge_step
 
-   !> Between two looks pieces move against each other by less than this part of the shortest edge:
-   !> what is as thin as that edge is seen on the way through.
+   !> Between two looks pieces move against each other by less than this part of the thinnest
+   !> element: one look at what goes through it is then at least half as deep.
    real(wp), parameter :: look_motion = 0.5_wp
    !> Looks at one step at most.
    integer, parameter :: most_looks = 64
-   !> On the way, overlap below this fraction of an edge is the straight way past a corner.
-   real(wp), parameter :: passing = 0.1_wp
+   !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
+   !> element behind it, is the straight way past a corner.
+   real(wp), parameter :: passing = 0.1_wp, passing_thin = 0.2_wp
+   !> Crossings of one edge that are told apart.
+   integer, parameter :: most_crossings = 8
 
    !> The deepest overlap that was found.
    type :: overlap_t
       real(wp) :: depth = 0.0_wp                 !! per length of the edge; 0: none
-      integer :: node = 0                        !! that is behind
+      integer :: node = 0                        !! that is behind, or the nearest on its edge
       integer :: edge(2) = 0                     !! the nodes of the edge that it is behind
    end type overlap_t
 
@@ -34,7 +37,8 @@ module emcon_judge
    type :: extent_t
       real(wp) :: low(2) = 0.0_wp, high(2) = 0.0_wp              !! box over the step [L]
       real(wp) :: least(2) = 0.0_wp, most(2) = 0.0_wp            !! of the motions of its nodes [L]
-      real(wp) :: shortest = 0.0_wp, longest = 0.0_wp            !! edge [L]
+      real(wp) :: thinnest = 0.0_wp                              !! element at the outline [L]
+      real(wp) :: longest = 0.0_wp                               !! edge [L]
    end type extent_t
 
    type :: judge_t
@@ -43,6 +47,8 @@ module emcon_judge
       real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement at a look [L]
       real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges at a look [L]
       integer, allocatable :: near(:), found(:)  !! work space for lists of edges
+      integer, allocatable :: other(:)           !! and of pieces
+      logical :: is_passing = .false.            !! at a look on the way
    end type judge_t
 
 contains
@@ -56,6 +62,7 @@ contains
       call outline_init(self%outline, scene)
       n = size(self%outline%edge, 2)
       allocate(self%extent(self%outline%n_piece), self%near(n), self%found(n))
+      allocate(self%other(self%outline%n_piece))
       allocate(self%low(2, n), self%high(2, n), source=0.0_wp)
       allocate(self%u(2, size(scene%x, 2)), source=0.0_wp)
    end subroutine judge_init
@@ -65,25 +72,45 @@ contains
       type(judge_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (2, n_node) [L]
       type(overlap_t), intent(out) :: overlap
-      type(overlap_t) :: here
-      integer :: p, q, k, n_look
+      type(box_tree_t) :: tree
+      integer :: p, i, n
 
       do p = 1, self%outline%n_piece
          call measure(self, p, x, u0, du)
       end do
-      do p = 1, self%outline%n_piece
-         do q = p, self%outline%n_piece
-            if (.not. self%outline%meets(p, q)) cycle
-            if (is_apart(self%extent(p), self%extent(q))) cycle
-            n_look = count_looks(self%extent(p), self%extent(q))
-            do k = 1, n_look
-               call look(self, p, q, x, u0, du, real(k, wp)/real(n_look, wp), here)
-               if (k < n_look .and. here%depth < passing) cycle
-               if (here%depth > overlap%depth) overlap = here
+      associate (extent => self%extent)
+         call box_tree_init(tree, reshape([(extent(p)%low, p = 1, size(extent))], &
+            [2, size(extent)]), reshape([(extent(p)%high, p = 1, size(extent))], &
+            [2, size(extent)]))
+         do p = 1, self%outline%n_piece
+            n = 0
+            call box_tree_find(tree, extent(p)%low, extent(p)%high, 0.0_wp, self%other, n)
+            do i = 1, n
+               if (self%other(i) < p) cycle
+               if (.not. outline_meets(self%outline, p, self%other(i))) cycle
+               call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
             end do
          end do
-      end do
+      end associate
    end subroutine judge_step
+
+   !> Look at two pieces, or one and itself, as often as the step needs.
+   subroutine judge_pieces(self, p, q, x, u0, du, overlap)
+      type(judge_t), intent(inout) :: self
+      integer, intent(in) :: p, q
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(overlap_t), intent(inout) :: overlap
+      integer :: k, n
+
+      n = count_looks(self%extent(p), self%extent(q))
+      do k = 1, n
+         self%is_passing = k < n
+         call place_edges(self, p, x, u0, du, real(k, wp)/real(n, wp))
+         if (q /= p) call place_edges(self, q, x, u0, du, real(k, wp)/real(n, wp))
+         call look_one_way(self, p, q, x, overlap)
+         if (q /= p) call look_one_way(self, q, p, x, overlap)
+      end do
+   end subroutine judge_pieces
 
    !> Box, motion and edges of piece `p` over the step.
    pure subroutine measure(self, p, x, u0, du)
@@ -98,7 +125,7 @@ contains
          extent%high = -huge(1.0_wp)
          extent%least = huge(1.0_wp)
          extent%most = -huge(1.0_wp)
-         extent%shortest = huge(1.0_wp)
+         extent%thinnest = huge(1.0_wp)
          extent%longest = 0.0_wp
          do e = self%outline%start(p), self%outline%start(p + 1) - 1
             do k = 1, 2
@@ -112,10 +139,9 @@ contains
             end do
             way = between(x, u0, edge(1, e), edge(2, e))
             length = dot_product(way, way)
-            extent%shortest = min(extent%shortest, length)
+            extent%thinnest = min(extent%thinnest, self%outline%thickness(e))
             extent%longest = max(extent%longest, length)
          end do
-         extent%shortest = sqrt(extent%shortest)
          extent%longest = sqrt(extent%longest)
       end associate
    end subroutine measure
@@ -129,12 +155,6 @@ contains
       way = (x(:, j) - x(:, i)) + (u(:, j) - u(:, i))
    end function between
 
-   pure logical function is_apart(one, other)
-      type(extent_t), intent(in) :: one, other
-
-      is_apart = any(one%low > other%high) .or. any(other%low > one%high)
-   end function is_apart
-
    !> Looks at the step for two pieces, so that they move by little in between.
    pure integer function count_looks(one, other) result(n)
       type(extent_t), intent(in) :: one, other
@@ -142,23 +162,10 @@ contains
 
       n = 1
       motion = length_of(max(one%most - other%least, other%most - one%least))
-      if (motion > look_motion*min(one%shortest, other%shortest)) n = max(1, ceiling(min( &
-         real(most_looks, wp), motion/(look_motion*min(one%shortest, other%shortest)))))
+      associate (least => look_motion*min(one%thinnest, other%thinnest))
+         if (motion > least) n = ceiling(min(real(most_looks, wp), motion/least))
+      end associate
    end function count_looks
-
-   !> The deepest overlap of pieces `p` and `q`, or of one with itself, at x + u0 + share du.
-   subroutine look(self, p, q, x, u0, du, share, overlap)
-      type(judge_t), intent(inout) :: self
-      integer, intent(in) :: p, q
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: share
-      type(overlap_t), intent(out) :: overlap
-
-      call place_edges(self, p, x, u0, du, share)
-      if (q /= p) call place_edges(self, q, x, u0, du, share)
-      call look_one_way(self, p, q, x, .true., overlap)
-      if (q /= p) call look_one_way(self, q, p, x, .false., overlap)
-   end subroutine look
 
    !> Displacements of the nodes of piece `p`, and the boxes of its edges.
    pure subroutine place_edges(self, p, x, u0, du, share)
@@ -181,12 +188,11 @@ contains
       end do
    end subroutine place_edges
 
-   !> Nodes of piece `p` in piece `q`, and with `crosses` edges of both that cross.
-   subroutine look_one_way(self, p, q, x, crosses, overlap)
+   !> Nodes and parts of edges of piece `p` in piece `q`.
+   subroutine look_one_way(self, p, q, x, overlap)
       type(judge_t), intent(inout) :: self
       integer, intent(in) :: p, q
       real(wp), intent(in), contiguous :: x(:, :)
-      logical, intent(in) :: crosses
       type(overlap_t), intent(inout) :: overlap
       type(box_tree_t) :: tree
       real(wp) :: low(2, 2), high(2, 2), reach
@@ -216,7 +222,7 @@ contains
             if (self%outline%link(2, e) == 0) call try_node(self, x, self%outline%edge(2, e), &
                self%near(self%found(:n_found)), reach, overlap)
          end if
-         if (crosses) call try_edge(self, x, e, self%near(self%found(:n_found)), overlap)
+         call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, overlap)
       end do
    end subroutine look_one_way
 
@@ -242,7 +248,7 @@ contains
       real(wp), intent(in) :: reach              !! [L]
       type(overlap_t), intent(inout) :: overlap
       type(nearest_t) :: nearest
-      real(wp) :: depth, next_along(2)
+      real(wp) :: next_along(2)
       integer :: k, next
 
       associate (edge => self%outline%edge)
@@ -258,35 +264,116 @@ contains
             if (next == 0) return
             next_along = between(x, self%u, edge(1, next), edge(2, next))
          end if
-         depth = nearest_depth(nearest, next_along)/length_of(nearest%along)
-         if (depth > overlap%depth) overlap = overlap_t(depth, node, edge(:, nearest%edge))
+         call take_deeper(self, nearest, nearest_depth(nearest, next_along), node, overlap)
       end associate
    end subroutine try_node
 
-   !> Does edge `e` cross one of `other`? Edges that share a node or are neighbours do not.
-   pure subroutine try_edge(self, x, e, other, overlap)
+   !> Is a part of edge `e`, between its crossings with `other`, inside? Looked at is its middle,
+   !> and with `has_ends` the node where it ends. Neighbours do not cross.
+   pure subroutine try_edge(self, x, e, other, has_ends, overlap)
       type(judge_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
+      logical, intent(in) :: has_ends
       type(overlap_t), intent(inout) :: overlap
-      type(nearest_t) :: found
-      real(wp) :: depth
-      integer :: k, f
+      real(wp) :: share(0:most_crossings + 1)
+      logical :: goes_in(most_crossings)
+      integer :: k, n
 
+      call find_crossings(self, x, e, other, n, share, goes_in)
+      do k = 0, n
+         if (.not. is_inside(k)) cycle
+         call try_place(self, x, e, 0.5_wp*(share(k) + share(k + 1)), other, overlap)
+         if (.not. has_ends) cycle
+         if (k == 0) call try_place(self, x, e, 0.0_wp, other, overlap)
+         if (k == n) call try_place(self, x, e, 1.0_wp, other, overlap)
+      end do
+
+   contains
+
+      !> Is the part after crossing `k` inside?
+      pure logical function is_inside(k)
+         integer, intent(in) :: k
+
+         is_inside = .false.
+         if (k > 0) is_inside = goes_in(k)
+         if (k < n) is_inside = is_inside .or. .not. goes_in(k + 1)
+      end function is_inside
+
+   end subroutine try_edge
+
+   !> Where edge `e` crosses `other` edges, in order, from 0 before the first to 1 after the last.
+   pure subroutine find_crossings(self, x, e, other, n, share, goes_in)
+      type(judge_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      integer, intent(in) :: e
+      integer, intent(in) :: other(:)
+      integer, intent(out) :: n
+      real(wp), intent(out) :: share(0:)
+      logical, intent(out) :: goes_in(:)
+      real(wp) :: new
+      logical :: crosses, enters
+      integer :: k, i
+
+      n = 0
+      share(0) = 0.0_wp
       do k = 1, size(other)
-         f = other(k)
-         associate (a => self%outline%edge(:, e), b => self%outline%edge(:, f))
+         associate (a => self%outline%edge(:, e), b => self%outline%edge(:, other(k)))
             if (any(a == b(1)) .or. any(a == b(2))) cycle
             call crossing_find(between(x, self%u, a(1), a(2)), reshape([ &
-               between(x, self%u, a(1), b(1)), between(x, self%u, a(1), b(2))], [2, 2]), found)
-            if (found%edge == 0) cycle
-            depth = sqrt(found%square)/length_of(found%along)
-            if (depth <= overlap%depth) cycle
-            if (found%edge <= 2) overlap = overlap_t(depth, b(found%edge), a)
-            if (found%edge > 2) overlap = overlap_t(depth, a(found%edge - 2), b)
+               between(x, self%u, a(1), b(1)), between(x, self%u, a(1), b(2))], [2, 2]), &
+               crosses, new, enters)
          end associate
+         if (.not. crosses .or. n == size(goes_in)) cycle
+         i = count(share(1:n) <= new)
+         share(i + 2:n + 1) = share(i + 1:n)
+         goes_in(i + 2:n + 1) = goes_in(i + 1:n)
+         share(i + 1) = new
+         goes_in(i + 1) = enters
+         n = n + 1
       end do
-   end subroutine try_edge
+      share(n + 1) = 1.0_wp
+   end subroutine find_crossings
+
+   !> How deep is the place `share` along edge `e` in `other` edges, that are not its neighbours?
+   pure subroutine try_place(self, x, e, share, other, overlap)
+      type(judge_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      integer, intent(in) :: e
+      real(wp), intent(in) :: share
+      integer, intent(in) :: other(:)
+      type(overlap_t), intent(inout) :: overlap
+      type(nearest_t) :: nearest
+      integer :: k
+
+      associate (a => self%outline%edge(:, e))
+         do k = 1, size(other)
+            associate (b => self%outline%edge(:, other(k)))
+               if (any(a == b(1)) .or. any(a == b(2))) cycle
+               call nearest_update(nearest, other(k), between(x, self%u, b(1), a(1)) &
+                  + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
+            end associate
+         end do
+         if (nearest%edge > 0) call take_deeper(self, nearest, sqrt(nearest%square), &
+            a(merge(1, 2, share < 0.5_wp)), overlap)
+      end associate
+   end subroutine try_place
+
+   !> Keep what is `depth` behind the edge `nearest` if it is the deepest so far.
+   pure subroutine take_deeper(self, nearest, depth, node, overlap)
+      type(judge_t), intent(in) :: self
+      type(nearest_t), intent(in) :: nearest
+      real(wp), intent(in) :: depth              !! [L]
+      integer, intent(in) :: node
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: length
+
+      length = length_of(nearest%along)
+      if (.not. depth > overlap%depth*length) return
+      if (self%is_passing .and. depth < min(passing*length, &
+         passing_thin*self%outline%thickness(nearest%edge))) return
+      overlap = overlap_t(depth/length, node, self%outline%edge(:, nearest%edge))
+   end subroutine take_deeper
 
 end module emcon_judge

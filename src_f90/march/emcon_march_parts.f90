@@ -1,7 +1,7 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
    use emcon_active_set, only : step_cycling, step_diverged, step_done, step_not_held, &
-      step_refused, step_singular, step_stands_off, step_too_far
+      step_overlaps, step_refused, step_singular, step_stands_off, step_too_far
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_loads, only : instant_t
@@ -99,6 +99,8 @@ contains
          text = text // "; add *BOUNDARY conditions"
          if (.not. self%active%holding%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
+      case (step_overlaps)
+         text = "bodies would overlap where no contact acts"
       case default
          text = "reason " // to_text(status)
       end select

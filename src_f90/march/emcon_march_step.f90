@@ -2,7 +2,8 @@
 !>
 !> `march_t` holds all that a march through time needs; how it cuts and counts: emcon_march.
 module emcon_march_step
-   use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_refused
+   use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_overlaps, &
+      step_refused
    use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
@@ -25,6 +26,9 @@ module emcon_march_step
    private
    public :: march_t, increment_t, march_step, march_guess, follow_links, cycling_text
 
+   !> New overlap beyond this, by the edge, cuts an increment, down to this level of its halvings.
+   real(wp), parameter :: deepest_new = 0.06_wp
+   integer, parameter :: judge_levels = 5
    !> Nodes named in a message.
    integer, parameter :: most_named = 10
 
@@ -99,8 +103,12 @@ contains
       if (status /= step_done) return
       call stopwatch_start(self%judge_clock)
       call judge_step(self%judge, scene%x, self%state%u, self%du, overlap)
+      if (may_cut .and. h > scale(increment%h, -judge_levels)) then
+         if (goes_in(self, scene, overlap)) status = step_overlaps
+      end if
       call stopwatch_stop(self%judge_clock)
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
+      if (status /= step_done) return
       if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
       if (any(self%active%comes_and_goes)) then
          call cycling_text(self, scene, text)
@@ -129,6 +137,29 @@ contains
          end associate
       end associate
    end function overclosure_left
+
+   !> Has the step brought bodies deeper into each other than guards allow, by nodes that a contact
+   !> which does not act could hold? In a smaller step such a contact sees them come.
+   logical function goes_in(self, scene, overlap)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(overlap_t), intent(in) :: overlap
+      type(overlap_t) :: before
+      integer :: pair
+
+      goes_in = .false.
+      if (overlap%depth <= deepest_new) return
+      do pair = 1, size(self%system%contact)
+         associate (node => self%system%contact(pair)%contact%node, &
+               is_active => self%active%is_active(self%system%first_constraint(pair) + 1:))
+            goes_in = goes_in .or. any((node == overlap%node .or. node == overlap%edge(1) .or. &
+               node == overlap%edge(2)) .and. .not. is_active(:size(node)))
+         end associate
+      end do
+      if (.not. goes_in) return
+      call judge_step(self%judge, scene%x, self%state%u, self%system%zero, before)
+      goes_in = overlap%depth > before%depth + 0.1_wp*deepest_new
+   end function goes_in
 
    !> The contacts of the last step that opened and closed in turn, by their slave nodes.
    subroutine cycling_text(self, scene, text)

@@ -33,7 +33,7 @@ contains
       type(pair_record_t), intent(out) :: self
       type(system_t), intent(in) :: system
 
-      allocate(self%total(size(system%contact)))
+      allocate(self%total(system%n_pair))
       allocate(self%force(2, system%n_constraint), source=0.0_wp)
       allocate(self%area(system%n_constraint), source=0.0_wp)
    end subroutine pair_record_init
@@ -46,28 +46,42 @@ contains
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (2, n_node)
       real(wp), intent(in) :: lag
-      integer :: pair, first, last
+      integer :: k, first, last
 
+      self%total = pair_total_t()
       last = set%n_linear
-      do pair = 1, size(self%total)
+      do k = 1, size(system%contact)
          first = last + 1
-         last = count(set%id <= system%first_constraint(pair + 1))
-         call add_up(self%total(pair), set%item(first:last), set%lam(first:last), x, u, du, lag)
-         call measure_nodes(self, system, pair, set%item(first:last), set%lam(first:last))
-         call measure_areas(self, system, pair, set%id(first:last), x, u)
+         last = count(set%id <= system%first_constraint(k + 1))
+         associate (total => self%total(abs(system%of_pair(k))))
+            if (system%of_pair(k) < 0) call exchange_sides(total)
+            call add_up(total, set%item(first:last), set%lam(first:last), x, u, du, lag)
+            if (system%of_pair(k) < 0) call exchange_sides(total)
+         end associate
+         call measure_nodes(self, system, k, set%item(first:last), set%lam(first:last))
+         call measure_areas(self, system, k, set%id(first:last), x, u)
       end do
    end subroutine pair_record_measure
 
-   !> Forces and moments on both sides of a pair.
+   pure subroutine exchange_sides(total)
+      type(pair_total_t), intent(inout) :: total
+      real(wp) :: slave(3)
+
+      slave = total%slave
+      total%slave = total%master
+      total%master = slave
+   end subroutine exchange_sides
+
+   !> Add forces and moments on both sides of a pair.
    pure subroutine add_up(total, item, lam, x, u, du, lag)
-      type(pair_total_t), intent(out) :: total
+      type(pair_total_t), intent(inout) :: total
       type(constraint_t), intent(in) :: item(:)
       real(wp), intent(in) :: lam(:), lag
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)
       real(wp) :: place(2), force(3)
       integer :: k, i
 
-      total%n_active = size(item)
+      total%n_active = total%n_active + size(item)
       do k = 1, size(item)
          do i = 1, item(k)%n_node
             associate (node => item(k)%node(i))
@@ -84,25 +98,25 @@ contains
       end do
    end subroutine add_up
 
-   !> Forces of the pair on its slave nodes.
-   subroutine measure_nodes(self, system, pair, item, lam)
+   !> Forces of contact `k` on its slave nodes.
+   subroutine measure_nodes(self, system, k, item, lam)
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      integer, intent(in) :: pair
+      integer, intent(in) :: k
       type(constraint_t), intent(in) :: item(:)
       real(wp), intent(in) :: lam(:)
-      integer :: k, i, first
+      integer :: j, i, first
 
-      first = system%first_constraint(pair)
-      associate (force => system%f_work, node => system%contact(pair)%contact%node, &
-            twin => system%contact(pair)%contact%twin)
+      first = system%first_constraint(k)
+      associate (force => system%f_work, node => system%contact(k)%contact%node, &
+            twin => system%contact(k)%contact%twin)
          do i = 1, size(node)
             force(:, node(i)) = 0.0_wp
             if (twin(i) > 0) force(:, twin(i)) = 0.0_wp
          end do
-         do k = 1, size(item)
-            do i = 1, item(k)%n_slave
-               force(:, item(k)%node(i)) = force(:, item(k)%node(i)) + lam(k)*item(k)%g(:, i)
+         do j = 1, size(item)
+            do i = 1, item(j)%n_slave
+               force(:, item(j)%node(i)) = force(:, item(j)%node(i)) + lam(j)*item(j)%g(:, i)
             end do
          end do
          do i = 1, size(node)
@@ -115,18 +129,20 @@ contains
       end associate
    end subroutine measure_nodes
 
-   !> Areas of all multipliers of the pair, and the length over which it acts.
-   subroutine measure_areas(self, system, pair, id, x, u)
+   !> Areas of all multipliers of contact `k`, and the length over which it acts.
+   subroutine measure_areas(self, system, k, id, x, u)
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(in) :: system
-      integer, intent(in) :: pair
-      integer, intent(in) :: id(:)               !! constraints of the pair that act
+      integer, intent(in) :: k
+      integer, intent(in) :: id(:)               !! its constraints that act
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp) :: length(system%contact(pair)%contact%n_constraint)
+      real(wp) :: length(system%contact(k)%contact%n_constraint)
 
-      associate (contact => system%contact(pair)%contact, before => system%first_constraint(pair))
+      associate (contact => system%contact(k)%contact, before => system%first_constraint(k))
          call contact%area(x, u, self%area(before + 1:before + contact%n_constraint), length)
-         self%total(pair)%length = sum(length(id - before))
+         associate (total => self%total(abs(system%of_pair(k))))
+            total%length = total%length + sum(length(id - before))
+         end associate
       end associate
    end subroutine measure_areas
 

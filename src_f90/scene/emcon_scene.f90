@@ -96,6 +96,9 @@ module emcon_scene
       integer :: formulation = formulation_nts
       logical :: both_sides = .false.                !! nodes of both surfaces are held
       logical :: is_reverse = .false.                !! the second half of a pair with both sides
+      logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
+      real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
+      integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
    end type contact_pair_t
@@ -224,6 +227,7 @@ module emcon_scene
       type(section_t), allocatable :: section(:)
       type(amplitude_t), allocatable :: amplitude(:)
       type(contact_pair_t), allocatable :: pair(:)
+      type(contact_pair_t), allocatable :: guard(:)  !! of the pairs: emcon_guards
       type(tie_t), allocatable :: tie(:)
       type(equation_t), allocatable :: equation(:)
       type(origin_t) :: given_origin

@@ -6,13 +6,17 @@
 module emcon_outline
    use emcon_bodies, only : bodies_find
    use emcon_element_kinds, only : element_kinds
-   use emcon_kinds, only : dp
+   use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t, surface_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
    use emcon_surface_edges, only : surface_edges
    implicit none
    private
-   public :: outline_t, outline_init
+   public :: outline_t, outline_init, outline_meets
+
+   type :: pieces_t
+      integer, allocatable :: piece(:)           !! ascending
+   end type pieces_t
 
    type :: outline_t
       integer :: n_piece = 0                     !! pieces that meet others or themselves
@@ -20,7 +24,10 @@ module emcon_outline
       integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node, piece by piece
       !> (2, n_edge) the edges before and after; 0: the outline ends there, or branches
       integer, allocatable :: link(:, :)
-      logical, allocatable :: meets(:, :)        !! (n_piece, n_piece) symmetric
+      !> (n_edge) shortest side of the element behind it, of an edge without one its length [L]
+      real(wp), allocatable :: thickness(:)
+      type(pieces_t), allocatable :: on(:)       !! (n_surface) pieces that it is on
+      integer, allocatable :: pair(:, :)         !! (2, n_pair) surfaces that meet
    end type outline_t
 
 contains
@@ -29,6 +36,8 @@ contains
       type(outline_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       integer, allocatable :: connected(:, :), piece(:), number(:), edge(:, :), order(:)
+      real(wp), allocatable :: thickness(:)
+      logical, allocatable :: is_meant(:)
       integer :: n_body, p
 
       call connect(scene, connected)
@@ -36,16 +45,19 @@ contains
       call find_meetings(self, scene, piece, number)
       allocate(self%start(self%n_piece + 1), source=1)
       if (self%n_piece > 0) then
-         call find_edges(scene, edge)
-         call leave_out_ties(scene, edge)
+         call find_edges(scene, edge, thickness)
       else
-         allocate(edge(2, 0))
+         allocate(edge(2, 0), thickness(0))
       end if
       ! From here on the piece of a node is its place among those that meet; 0: none of them.
       piece = [(find_sorted(number, piece(p)), p = 1, size(piece))]
-      edge = edge(:, pack([(p, p = 1, size(edge, 2))], piece(edge(1, :)) > 0))
+      call find_untied(scene, edge, is_meant)
+      is_meant = is_meant .and. piece(edge(1, :)) > 0
+      edge = edge(:, pack([(p, p = 1, size(edge, 2))], is_meant))
+      thickness = pack(thickness, is_meant)
       order = sort_order(piece(edge(1, :)))
       self%edge = edge(:, order)
+      self%thickness = thickness(order)
       do p = 1, self%n_piece
          self%start(p + 1) = self%start(p) + count(piece(edge(1, :)) == p)
       end do
@@ -71,41 +83,46 @@ contains
       end do
    end subroutine connect
 
-   !> Which pieces have a part in contact pairs, and which of them meet there.
+   !> Which pieces have a part in contact pairs, and which surfaces meet there.
    subroutine find_meetings(self, scene, piece, number)
       type(outline_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: piece(:)            !! (n_node)
       integer, allocatable, intent(out) :: number(:)   !! (n_piece) as in `piece`, ascending
-      integer, allocatable :: slave(:), master(:)
-      integer :: k
+      integer :: s, i
 
-      allocate(number(0))
-      do k = 1, size(scene%pair)
-         call pieces_of(scene, scene%surface(scene%pair(k)%slave), piece, slave)
-         call pieces_of(scene, scene%surface(scene%pair(k)%master), piece, master)
-         number = unique_sorted([number, slave, master])
+      self%pair = reshape([scene%pair%slave, scene%pair%master], [2, size(scene%pair)], order=[2, 1])
+      allocate(self%on(size(scene%surface)), number(0))
+      do s = 1, size(scene%surface)
+         allocate(self%on(s)%piece(0))
+         if (.not. any(self%pair == s)) cycle
+         call pieces_of(scene, scene%surface(s), piece, self%on(s)%piece)
+         number = unique_sorted([number, self%on(s)%piece])
       end do
       self%n_piece = size(number)
-      allocate(self%meets(size(number), size(number)), source=.false.)
-      do k = 1, size(scene%pair)
-         call pieces_of(scene, scene%surface(scene%pair(k)%slave), piece, slave)
-         call pieces_of(scene, scene%surface(scene%pair(k)%master), piece, master)
-         slave = places(number, slave)
-         master = places(number, master)
-         self%meets(slave, master) = .true.
-         self%meets(master, slave) = .true.
+      do s = 1, size(scene%surface)
+         associate (on => self%on(s)%piece)
+            on = [(find_sorted(number, on(i)), i = 1, size(on))]
+         end associate
       end do
    end subroutine find_meetings
 
-   pure function places(sorted, value)
-      integer, intent(in) :: sorted(:), value(:)
-      integer :: places(size(value)), i
+   !> Does a contact pair bring pieces `p` and `q` together?
+   pure logical function outline_meets(self, p, q) result(meets)
+      type(outline_t), intent(in) :: self
+      integer, intent(in) :: p, q
+      integer :: k
 
-      do i = 1, size(value)
-         places(i) = find_sorted(sorted, value(i))
+      meets = .true.
+      do k = 1, size(self%pair, 2)
+         associate (slave => self%on(self%pair(1, k))%piece, &
+               master => self%on(self%pair(2, k))%piece)
+            if (find_sorted(slave, p) > 0 .and. find_sorted(master, q) > 0) return
+            if (find_sorted(slave, q) > 0 .and. find_sorted(master, p) > 0) return
+         end associate
       end do
-   end function places
+      meets = .false.
+   end function outline_meets
 
    !> The pieces that `surface` is on.
    pure subroutine pieces_of(scene, surface, piece, found)
@@ -124,9 +141,10 @@ contains
    end subroutine pieces_of
 
    !> Faces that one element alone has, and the edges of surfaces without elements.
-   subroutine find_edges(scene, edge)
+   subroutine find_edges(scene, edge, thickness)
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: edge(:, :)  !! (2, n)
+      real(wp), allocatable, intent(out) :: thickness(:)   !! (n) [L]
       integer, allocatable :: order(:)
       real(dp), allocatable :: key(:)
       logical, allocatable :: is_free(:)
@@ -134,12 +152,14 @@ contains
 
       n = 0
       allocate(edge(2, sum(element_kinds(scene%element_kind)%n_face)))
+      allocate(thickness(size(edge, 2)))
       do e = 1, size(scene%element_kind)
          associate (kind => element_kinds(scene%element_kind(e)))
             do f = 1, kind%n_face
-               n = n + 1
-               edge(:, n) = scene%element_node(kind%face_node(:, f), e)
+               edge(:, n + f) = scene%element_node(kind%face_node(:, f), e)
             end do
+            thickness(n + 1:n + kind%n_face) = minval(lengths(scene, edge(:, n + 1:n + kind%n_face)))
+            n = n + kind%n_face
          end associate
       end do
       key = real(minval(edge, 1), dp)*real(size(scene%x, 2) + 1, dp) + real(maxval(edge, 1), dp)
@@ -150,19 +170,30 @@ contains
          is_free(order(e - 1:e)) = .false.
       end do
       edge = edge(:, pack([(e, e = 1, n)], is_free))
+      thickness = pack(thickness, is_free)
       do s = 1, size(scene%surface)
          if (.not. allocated(scene%surface(s)%edge)) cycle
+         thickness = [thickness, lengths(scene, scene%surface(s)%edge)]
          edge = reshape([edge, scene%surface(s)%edge], &
             [2, size(edge, 2) + size(scene%surface(s)%edge, 2)])
       end do
    end subroutine find_edges
 
-   !> Take out the edges of the surfaces of ties.
-   pure subroutine leave_out_ties(scene, edge)
+   pure function lengths(scene, edge) result(length)
       type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(inout) :: edge(:, :)
+      integer, intent(in) :: edge(:, :)          !! (2, n)
+      real(wp) :: length(size(edge, 2))
+
+      length = sqrt(sum((scene%x(:, edge(2, :)) - scene%x(:, edge(1, :)))**2, dim=1))
+   end function lengths
+
+   !> Which edges are on no surface of a tie?
+   pure subroutine find_untied(scene, edge, is_untied)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: edge(:, :)          !! (2, n)
+      logical, allocatable, intent(out) :: is_untied(:)    !! (n)
       integer, allocatable :: tied(:, :)
-      integer :: follower(size(scene%x, 2)), k, i
+      integer :: follower(size(scene%x, 2)), k
 
       follower = 0
       do k = 1, size(scene%tie)
@@ -172,8 +203,8 @@ contains
          call surface_edges(scene, scene%surface(scene%tie(k)%master), tied)
          follower(tied(1, :)) = tied(2, :)
       end do
-      edge = edge(:, pack([(i, i = 1, size(edge, 2))], follower(edge(1, :)) /= edge(2, :)))
-   end subroutine leave_out_ties
+      is_untied = follower(edge(1, :)) /= edge(2, :)
+   end subroutine find_untied
 
    !> Find the neighbours of each edge. Where two outlines meet in a node, neither goes on.
    pure subroutine link_edges(self, n_node)

@@ -18,7 +18,7 @@ module emcon_system
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_point_function, only : point_failed
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
-   use emcon_scene, only : law_linear, method_null_space, procedure_dynamic, scene_t
+   use emcon_scene, only : contact_pair_t, law_linear, method_null_space, procedure_dynamic, scene_t
    use emcon_solid, only : obstacle_text, solid_init, solid_respond, solid_response_t, solid_t, &
       solid_tangent_times
    use emcon_text, only : note_add, notes_t, to_text
@@ -49,7 +49,9 @@ module emcon_system
       type(csr_t) :: mass                        !! node by node, the same in all directions
       type(linear_rows_t) :: linear              !! rows of ties and equations
       type(contact_box_t), allocatable :: contact(:)
-      integer, allocatable :: first_constraint(:)   !! (n_pair + 1) constraints before each pair
+      integer, allocatable :: first_constraint(:)   !! (n_contact + 1) constraints before each
+      integer :: n_pair = 0                      !! of the scene; guards come after them
+      integer, allocatable :: of_pair(:)         !! (n_contact) < 0: with the pair's sides exchanged
       integer :: n_constraint = 0
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
@@ -120,18 +122,27 @@ contains
       allocate(self%u_work(2, n), self%f_work(2, n), self%zero(2, n), source=0.0_wp)
    end subroutine system_init
 
-   !> The contact pairs and the numbers of their constraints, after the linear ones.
+   !> The contact of pairs and guards, and the numbers of their constraints, after the linear ones.
    subroutine init_contact(self, scene, error)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      type(contact_pair_t), allocatable :: pair(:)
       integer :: i
 
-      allocate(self%contact(size(scene%pair)))
-      allocate(self%first_constraint(size(scene%pair) + 1), source=self%linear%n)
+      self%n_pair = size(scene%pair)
+      self%of_pair = [(i, i = 1, self%n_pair)]
+      if (allocated(scene%guard)) then
+         allocate(pair, source=[scene%pair, scene%guard])
+         self%of_pair = [self%of_pair, merge(-1, 1, scene%guard%is_reverse)*scene%guard%of_pair]
+      else
+         allocate(pair, source=scene%pair)
+      end if
+      allocate(self%contact(size(pair)))
+      allocate(self%first_constraint(size(pair) + 1), source=self%linear%n)
       self%n_constraint = self%linear%n
-      do i = 1, size(scene%pair)
-         call new_contact(scene, scene%pair(i), self%contact(i)%contact, error)
+      do i = 1, size(pair)
+         call new_contact(scene, pair(i), self%contact(i)%contact, error)
          if (allocated(error)) return
          self%n_constraint = self%n_constraint + self%contact(i)%contact%n_constraint
          self%first_constraint(i + 1) = self%n_constraint

@@ -1,0 +1,67 @@
+!> Guards: node-to-segment contact that begins only where a node has gone in too far.
+!>
+!> A pair holds the nodes of its slave, or means of gaps; a corner of the master may go in between
+!> two of them. For each direction in which no pair holds the nodes themselves a guard does, from a
+!> small depth on.
+!> Source: docs/theory.md, section 4.11.
+module emcon_guards
+   use emcon_kinds, only : wp
+   use emcon_scene, only : contact_pair_t, formulation_nts, surface_t
+   implicit none
+   private
+   public :: guards_find
+
+   !> So far a node may go in, by the length of the edge: polygons of coarse curved surfaces, and
+   !> gaps that are closed in the mean, stay above it.
+   real(wp), parameter :: guard_slack = 0.05_wp
+
+contains
+
+   !> The guards of the pairs, each direction once.
+   pure subroutine guards_find(pair, surface, guard)
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(surface_t), intent(in) :: surface(:)
+      type(contact_pair_t), allocatable, intent(out) :: guard(:)     !! in the order of `pair`
+      integer :: i
+
+      allocate(guard(0))
+      do i = 1, size(pair)
+         if (.not. pair(i)%is_guarded .or. pair(i)%slave == 0 .or. pair(i)%master == 0) cycle
+         call watch(pair, i, .false., guard)
+         if (.not. surface(pair(i)%slave)%is_nodal) call watch(pair, i, .true., guard)
+      end do
+   end subroutine guards_find
+
+   !> Append the guard of pair `i`, or of it with its sides exchanged, unless there is one.
+   pure subroutine watch(pair, i, is_reverse, guard)
+      type(contact_pair_t), intent(in) :: pair(:)
+      integer, intent(in) :: i
+      logical, intent(in) :: is_reverse
+      type(contact_pair_t), allocatable, intent(inout) :: guard(:)
+      type(contact_pair_t) :: new
+
+      new = pair(i)
+      if (is_reverse) then
+         new%slave = pair(i)%master
+         new%master = pair(i)%slave
+      end if
+      if (any(holds_nodes(pair, new%slave, new%master)) .or. &
+         any(guard%slave == new%slave .and. guard%master == new%master)) return
+      new%formulation = formulation_nts
+      new%both_sides = .true.
+      new%is_reverse = is_reverse
+      new%slack = guard_slack
+      new%of_pair = i
+      guard = [guard, new]
+   end subroutine watch
+
+   !> Does a pair hold each node of `slave` in front of `master`?
+   elemental logical function holds_nodes(pair, slave, master)
+      type(contact_pair_t), intent(in) :: pair
+      integer, intent(in) :: slave, master
+
+      holds_nodes = pair%formulation == formulation_nts .and. pair%slave == slave &
+         .and. pair%master == master .and. (slave /= master .or. pair%both_sides)
+   end function holds_nodes
+
+end module emcon_guards
