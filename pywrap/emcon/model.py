@@ -339,12 +339,14 @@ class Model(Cards):
 
     def contact_pair(self, slave: str, master: str, *, interaction: str | None = None,
                      type: str = "NODE TO SURFACE", sides: str | None = None,
-                     adjust: Number | None = None) -> Model:
+                     guard: str | None = None, adjust: Number | None = None) -> Model:
         """`*CONTACT PAIR` of two surfaces, or of one with itself.
 
         interaction   default one of its own, frictionless
         type          NODE TO SURFACE, SEGMENT or MORTAR
         sides         ONE (default): nodes of the slave are held; BOTH: of the master too
+        guard         YES (default): nodes that the pair does not hold go in by a twentieth of an
+                      edge at most; NO: they may go in
         adjust        distance [L] up to which slave nodes are moved onto the master, or a node set
         """
         if interaction is None:
@@ -353,7 +355,8 @@ class Model(Cards):
                 self.interaction(interaction)
                 self._has_frictionless = True
         return self._card("CONTACT PAIR", {"INTERACTION": interaction, "TYPE": type,
-                                           "SIDES": sides, "ADJUST": adjust}, [(slave, master)])
+                                           "SIDES": sides, "GUARD": guard, "ADJUST": adjust},
+                          [(slave, master)])
 
     def contact(self, *surfaces: str | tuple[str, str],
                 interaction: str | None = None) -> Model:

@@ -30,7 +30,7 @@ contains
       if (.not. allocated(model%stepper%march%scheme)) return
       associate (system => model%stepper%march%system)
          to%n_contact = system%n_constraint - system%linear%n
-         to%n_pair = size(system%contact)
+         to%n_pair = system%n_pair
          to%n_body = system%n_body
          to%n_unknown = system%numbering%n_unknown
          to%n_constraint = system%n_constraint
@@ -150,7 +150,7 @@ contains
                   last => system%first_constraint(i + 1) - before)
                of_node(first:last) = &
                   model%stepper%scene%node_label(system%contact(i)%contact%node)
-               of_pair(first:last) = i - 1
+               of_pair(first:last) = abs(system%of_pair(i)) - 1
             end associate
          end do
          call put_numbers(of_node, label)

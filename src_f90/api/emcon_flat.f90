@@ -82,7 +82,7 @@ contains
          n = [system%solid%n_node, system%solid%n_element, &
             system%n_constraint - system%linear%n, system%n_body, &
             system%numbering%n_unknown, size(model%stepper%scene%step), &
-            size(system%contact)]
+            system%n_pair]
       end associate
    end subroutine model_size
 

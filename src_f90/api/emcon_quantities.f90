@@ -200,7 +200,7 @@ contains
       allocate(values(size(at_slave, 1), size(stepper%scene%x, 2)), source=0.0_dp)
       if (variable == "CDIS") values = ieee_value(1.0_dp, ieee_quiet_nan)
       associate (system => stepper%march%system)
-         do pair = 1, size(system%contact)
+         do pair = 1, merge(system%n_pair, size(system%contact), variable == "CDIS")
             do i = 1, system%contact(pair)%contact%n_constraint
                id = system%first_constraint(pair) + i
                associate (node => system%contact(pair)%contact%node(i), &

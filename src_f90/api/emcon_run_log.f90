@@ -1,6 +1,7 @@
 !> What a run tells of itself: the lines of the log.
 module emcon_run_log
    use emcon_element_kinds, only : element_kinds
+   use emcon_guards, only : guard_slack
    use emcon_kinds, only : wp
    use emcon_link_lines, only : add_link_lines
    use emcon_log, only : log_line, log_t
@@ -72,6 +73,8 @@ contains
                to_text(system%contact(k)%contact%n_constraint) // " nodes) on " // &
                scene%surface(scene%pair(k)%master)%name // ", " // how)
          end do
+         if (size(scene%guard) > 0) call add("contact: guards hold nodes that the pairs do not, " // &
+            "deeper than " // to_text(guard_slack) // " of an edge")
          do k = 1, size(scene%step)
             call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
                ", h = " // to_text(scene%step(k)%h) // &

@@ -86,7 +86,8 @@ contains
             call contact%begin_step(x, system%u_work, du)
             call contact%measure(x, system%u_work, du)
             is_near(system%first_constraint(pair) + 1:system%first_constraint(pair + 1)) = &
-               contact%state%is_near .and. contact%state%is_over
+               contact%state%is_near .and. contact%state%is_over .and. &
+               (pair <= system%n_pair .or. contact%state%gap1 < contact%state%closed)
          end associate
       end do
    end subroutine find_near

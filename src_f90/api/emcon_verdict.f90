@@ -41,6 +41,7 @@ module emcon_verdict
       real(wp) :: stabilization = 0.0_wp         !! work of what STABILIZE bears
       integer :: n_newton = 0
       integer :: n_cut = 0
+      integer :: n_guarded = 0                   !! increments in which guards act
       real(wp), allocatable :: largest_force(:)  !! (n_pair) on the slave side
       logical :: has_dynamics = .false.          !! a step keeps energy
       integer :: n_warning = 0
@@ -74,6 +75,7 @@ contains
 
       self%n_newton = self%n_newton + increment%n_newton
       self%n_cut = self%n_cut + increment%n_cut
+      if (increment%is_guarded) self%n_guarded = self%n_guarded + 1
       associate (state => stepper%march%state)
          if (increment%overlap%depth > self%deepest) then
             self%deepest = increment%overlap%depth
@@ -241,6 +243,9 @@ contains
             if (abs(self%stabilization) > 0.0_wp) call note_add(lines, &
                "work of what stabilization bears " // to_text(self%stabilization/scale, 3) // &
                " of the largest energy")
+            if (self%n_guarded > 0) call note_add(lines, "guards hold nodes in " // &
+               to_text(self%n_guarded) // " increments: SIDES=BOTH, the other surface as slave or " &
+               // "a finer mesh there make them needless")
             if (self%stand_off%impulse > 0.0_wp) call note_add(lines, &
                "largest stand-off of contact " // to_text(self%stand_off%largest, 3) // &
                " of an element, mean over the impulse " // &

@@ -57,6 +57,7 @@ contains
          call add_number(line, "time", state%time)
          call add_number(line, "newton", real(self%n_newton, wp))
          call add_number(line, "cuts", real(self%n_cut, wp))
+         call add_number(line, "guarded_increments", real(self%n_guarded, wp))
          call add_number(line, "kinetic", ledger%kinetic)
          call add_number(line, "strain", ledger%strain)
          call add_number(line, "external_work", ledger%external_work)
@@ -131,7 +132,7 @@ contains
          self%deepest_time, self%unconverged, self%unconverged_time, self%stand_off%largest, &
          self%stand_off%impulse, self%stand_off%impulse_gap])
       call restart_put(restart, "effort", [self%n_newton, self%n_cut, self%n_warning, &
-         merge(1, 0, self%has_dynamics)])
+         merge(1, 0, self%has_dynamics), self%n_guarded])
       call restart_put(restart, "pair_largest", self%largest_force)
       if (allocated(self%place)) then
          place(1)%text = self%place
@@ -148,7 +149,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(string_t), allocatable :: text(:)
       real(wp) :: figure(12)
-      integer :: effort(4)
+      integer :: effort(5)
 
       call restart_get(restart, "verdict", figure, error)
       if (.not. allocated(error)) call restart_get(restart, "effort", effort, error)
@@ -167,6 +168,7 @@ contains
       self%stand_off%impulse_gap = figure(12)
       self%n_newton = effort(1)
       self%n_cut = effort(2)
+      self%n_guarded = effort(5)
       self%n_warning = effort(3)
       self%has_dynamics = effort(4) == 1
       allocate(self%largest_force(max(0, restart_size(restart, "pair_largest"))))

@@ -51,6 +51,7 @@ module emcon_contact
       integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       logical :: meets_statics = .false.              !! a step of the deck is static
+      logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at minus this, by the edge
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;

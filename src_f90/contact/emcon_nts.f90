@@ -91,6 +91,7 @@ contains
       allocate(self%state(self%n_constraint))
       self%deepest_start = touch_tol
       self%slack = pair%slack
+      self%both_sides = pair%both_sides
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
       self%thickness = self%thickness(self%chain_node)

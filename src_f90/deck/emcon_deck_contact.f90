@@ -258,11 +258,32 @@ contains
       if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, common)
+      call read_guard(reader, card, any(pair%both_sides), common)
       do i = 1, size(pair)
          pair(i)%adjust_distance = common%adjust_distance
          pair(i)%adjust_set = common%adjust_set
+         pair(i)%is_guarded = common%is_guarded
       end do
    end subroutine read_pair_options
+
+   !> GUARD= of a card: are nodes that the pairs do not hold kept from going in too far?
+   subroutine read_guard(reader, card, both_sides, common)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      logical, intent(in) :: both_sides
+      type(contact_pair_t), intent(inout) :: common
+
+      select case (option_name(card, "GUARD"))
+      case ("", "YES")
+         common%is_guarded = .true.
+      case ("NO")
+         common%is_guarded = .false.
+      case default
+         call refuse_option(reader, card, "GUARD", "YES, NO", "")
+      end select
+      if (both_sides .and. has_option(card, "GUARD")) call card_error(reader, card, "GUARD has no " &
+         // "meaning with SIDES=BOTH, which holds the nodes of both surfaces; take it out")
+   end subroutine read_guard
 
    !> ADJUST= a distance or a node set.
    subroutine read_adjust(reader, card, scene, common)

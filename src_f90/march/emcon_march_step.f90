@@ -7,6 +7,7 @@ module emcon_march_step
    use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
+   use emcon_guards, only : guard_slack
    use emcon_judge, only : judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -27,7 +28,7 @@ module emcon_march_step
    public :: march_t, increment_t, march_step, march_guess, follow_links, cycling_text
 
    !> New overlap beyond this, by the edge, cuts an increment, down to this level of its halvings.
-   real(wp), parameter :: deepest_new = 0.06_wp
+   real(wp), parameter :: deepest_new = 1.2_wp*guard_slack
    integer, parameter :: judge_levels = 5
    !> Nodes named in a message.
    integer, parameter :: most_named = 10
@@ -39,6 +40,7 @@ module emcon_march_step
       integer :: n_newton = 0                    !! iterations, over all cuts and active sets
       integer :: n_cut = 0
       integer :: n_active = 0
+      logical :: is_guarded = .false.            !! guards act in it
       type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge
       type(stand_off_t) :: stand_off             !! air across which contact forces act
       real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
@@ -83,7 +85,6 @@ contains
       type(increment_t), intent(inout) :: increment
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
-      type(overlap_t) :: overlap
       character(len=:), allocatable :: text
       integer :: attempt
 
@@ -101,15 +102,8 @@ contains
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
-      call stopwatch_start(self%judge_clock)
-      call judge_step(self%judge, scene%x, self%state%u, self%du, overlap)
-      if (may_cut .and. h > scale(increment%h, -judge_levels)) then
-         if (goes_in(self, scene, overlap)) status = step_overlaps
-      end if
-      call stopwatch_stop(self%judge_clock)
-      overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
+      call judge(self, scene, h, may_cut, increment, status)
       if (status /= step_done) return
-      if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
       if (any(self%active%comes_and_goes)) then
          call cycling_text(self, scene, text)
          call note_add(increment%notes, text // ": held closed in this step")
@@ -138,8 +132,29 @@ contains
       end associate
    end function overclosure_left
 
-   !> Has the step brought bodies deeper into each other than guards allow, by nodes that a contact
-   !> which does not act could hold? In a smaller step such a contact sees them come.
+   !> Let the judge look at the solved step: cut it, or keep what was found.
+   subroutine judge(self, scene, h, may_cut, increment, status)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h
+      logical, intent(in) :: may_cut
+      type(increment_t), intent(inout) :: increment
+      integer, intent(inout) :: status
+      type(overlap_t) :: overlap
+
+      call stopwatch_start(self%judge_clock)
+      call judge_step(self%judge, scene%x, self%state%u, self%du, overlap)
+      overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
+      if (may_cut .and. h > scale(increment%h, -judge_levels)) then
+         if (goes_in(self, scene, overlap)) status = step_overlaps
+      end if
+      call stopwatch_stop(self%judge_clock)
+      if (status == step_done .and. overlap%depth > increment%overlap%depth) &
+         increment%overlap = overlap
+   end subroutine judge
+
+   !> Has the step brought bodies deeper into each other than guards allow, at nodes that contact of
+   !> both sides could hold and does not? In a smaller step it sees them come.
    logical function goes_in(self, scene, overlap)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -150,10 +165,12 @@ contains
       goes_in = .false.
       if (overlap%depth <= deepest_new) return
       do pair = 1, size(self%system%contact)
-         associate (node => self%system%contact(pair)%contact%node, &
+         associate (contact => self%system%contact(pair)%contact, &
                is_active => self%active%is_active(self%system%first_constraint(pair) + 1:))
-            goes_in = goes_in .or. any((node == overlap%node .or. node == overlap%edge(1) .or. &
-               node == overlap%edge(2)) .and. .not. is_active(:size(node)))
+            if (.not. contact%both_sides) cycle
+            goes_in = goes_in .or. any(.not. is_active(:contact%n_constraint) .and. &
+               (contact%node == overlap%node .or. contact%node == overlap%edge(1) .or. &
+               contact%node == overlap%edge(2)))
          end associate
       end do
       if (.not. goes_in) return
@@ -287,6 +304,8 @@ contains
          if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             trim(correction_reason(self%correction)) // ": solved as a saddle point")
          call stand_off_add(increment%stand_off, system, set, h)
+         increment%is_guarded = increment%is_guarded .or. &
+            any(set%id > system%first_constraint(system%n_pair + 1))
          increment%residual = self%newton%history(:self%newton%n_history)
          if (self%newton%last > self%newton%tolerance .and. .not. self%newton%is_idle) then
             increment%unconverged = max(increment%unconverged, self%newton%last)

@@ -9,7 +9,7 @@ module emcon_guards
    use emcon_scene, only : contact_pair_t, formulation_nts, surface_t
    implicit none
    private
-   public :: guards_find
+   public :: guards_find, guard_slack
 
    !> So far a node may go in, by the length of the edge: polygons of coarse curved surfaces, and
    !> gaps that are closed in the mean, stay above it.

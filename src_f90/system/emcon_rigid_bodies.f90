@@ -142,7 +142,7 @@ contains
       end do
       touches = .false.
       if (contact_holds) then
-         do k = 1, size(system%contact)
+         do k = 1, system%n_pair
             call mark_contact_bodies(system, scene, k, touches)
          end do
       end if

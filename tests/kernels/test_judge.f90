@@ -83,8 +83,9 @@ contains
       call check_true(error, overlap%depth <= eps, "side by side")
    end subroutine test_apart
 
-   !> Both corners of the slider are 1/8 deep between nodes of the base, whose edges are 1 long; as
-   !> master or slave, and so is the base in a slider that is turned upside down onto it.
+   !> Both corners of the slider are 1/8 deep between nodes of the base, whose edges are 1 long, but
+   !> so is the middle of what it covers of the base in the slider, whose edges are 1/2 long; as
+   !> master or slave.
    subroutine test_corner(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -96,9 +97,9 @@ contains
          is_reversed = k == 2
          call make_scene(scene, [1.3_wp, 0.875_wp], [0.5_wp, 0.5_wp], [1, 1], is_reversed)
          call judged(scene, overlap)
-         call check_near(error, overlap%depth, 0.125_wp, 4.0_wp*eps, 1.0_wp, "depth")
-         call check_true(error, any(overlap%node == [11, 12]), "node")
-         call check_equal(error, overlap%edge, [8, 7], "edge")
+         call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
+         call check_true(error, any(overlap%node == [7, 8]), "node")
+         call check_equal(error, overlap%edge, [11, 12], "edge")
       end do
    end subroutine test_corner
 
@@ -113,8 +114,8 @@ contains
       call check_near(error, overlap%depth, 0.25_wp, 4.0_wp*eps, 1.0_wp, "depth")
    end subroutine test_twin
 
-   !> A plus of two bars, no node of either in the other: the bar that stands goes out of the base
-   !> by 1/4 below, where edges are 1 long.
+   !> A plus of two bars, no node of either in the other: the middle of the sides of the bar that
+   !> stands is 1/2 deep in the base, where edges are 1 long.
    subroutine test_cross(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -122,7 +123,7 @@ contains
 
       call make_scene(scene, [1.25_wp, -0.25_wp], [0.5_wp, 2.0_wp], [1, 1], .false.)
       call judged(scene, overlap)
-      call check_near(error, overlap%depth, 0.25_wp, 4.0_wp*eps, 1.0_wp, "depth")
+      call check_near(error, overlap%depth, 0.5_wp, 4.0_wp*eps, 1.0_wp, "depth")
    end subroutine test_cross
 
    !> From above the base to below it in one step: free at both ends, yet it is seen in the middle.
@@ -147,7 +148,7 @@ contains
       call make_scene(scene, [1.25_wp, 0.875_wp], [0.5_wp, 0.5_wp], [1, 1], .false.)
       scene%u0 = 2.0_wp**30
       call judged(scene, overlap)
-      call check_near(error, overlap%depth, 0.125_wp, 4.0_wp*eps, 1.0_wp, "depth")
+      call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
    end subroutine test_far
 
    !> A strip whose end is put into its middle.
@@ -156,6 +157,11 @@ contains
       type(scene_t) :: scene
       type(overlap_t) :: overlap
       type(block_t) :: strip
+      !> Places of the last four pairs of nodes, below and above.
+      real(wp), parameter :: bent(2, 2, 5:8) = reshape([5.5_wp, 0.5_wp, 4.5_wp, 1.5_wp, &
+         5.5_wp, 2.5_wp, 4.5_wp, 2.0_wp, 4.5_wp, 3.5_wp, 4.0_wp, 2.5_wp, &
+         2.0_wp, 1.5_wp, 2.5_wp, 0.8_wp], [2, 2, 4])
+      integer :: i, j
 
       call scene_begin(scene)
       call add_block(scene, "CPE4", [8, 1], [0.0_wp, 0.0_wp], [8.0_wp, 1.0_wp], strip)
@@ -164,8 +170,13 @@ contains
       call judged(scene, overlap)
       call check_equal(error, overlap%node, 0, "straight")
       ! Bent back above itself, and the lower corner of its end 0.2 below the top.
-      scene%u0(:, block_node(strip, 8, 0)) = [2.5_wp, 1.5_wp] - [8.0_wp, 0.0_wp]
-      scene%u0(:, block_node(strip, 8, 1)) = [2.5_wp, 0.8_wp] - [8.0_wp, 1.0_wp]
+      do i = 5, 8
+         do j = 0, 1
+            associate (node => block_node(strip, i, j))
+               scene%u0(:, node) = bent(:, j + 1, i) - scene%x(:, node)
+            end associate
+         end do
+      end do
       call judged(scene, overlap)
       call check_near(error, overlap%depth, 0.2_wp, 8.0_wp*eps, 1.0_wp, "depth")
       call check_equal(error, overlap%node, block_node(strip, 8, 1), "node")
