@@ -9,13 +9,14 @@ module emcon_nts
    use emcon_dgrad10, only : dg10_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
    use emcon_errors, only : error_t
+   use emcon_facing, only : facing_allows
    use emcon_hermite_gap, only : hermite_gap, hermite_gap_value
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_nts_gap, only : nts_gap, nts_gap_value
-   use emcon_nts_stencil, only : edge_distance, most_nodes, polygon_stencil, smooth_stencil, &
-      smooth_stencil_t, stencil_gather, stencil_length
+   use emcon_nts_stencil, only : edge_distance, is_outside, most_nodes, polygon_stencil, &
+      smooth_stencil, smooth_stencil_t, stencil_gather, stencil_length
    use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite, &
       smoothing_none
    use emcon_self_contact, only : self_contact_is_apart
@@ -34,6 +35,7 @@ module emcon_nts
       type(chain_t) :: slave
       type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
+      logical :: has_both_sides = .false.             !! the nodes of the master are held elsewhere
       integer :: smoothing = smoothing_none
       type(touch_rule_t) :: rule                      !! only of such a surface
       integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
@@ -75,6 +77,7 @@ contains
       call chain_join(self%slave, scene)
       call chain_join(self%master, scene)
       self%is_self = pair%slave == pair%master
+      self%has_both_sides = pair%both_sides
       if (self%is_self) call touch_rule_init(self%rule, self%slave, scene, &
          pair%both_sides)
       associate (n => size(self%slave%node))
@@ -161,12 +164,27 @@ contains
       if (.not. touch_rule_sees(self%rule, self%class(i), e)) return
       distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
       if (.not. distance < best) return
+      if (.not. bears(self, i, e, x, u)) return
       if (self%is_self) then
          if (.not. touch_rule_allows(self%rule, self%slave, self%chain_node(i), e, x, u)) return
       end if
       best = distance
       self%edge(i) = e
    end subroutine choose_nearer
+
+   !> May edge `e` keep the node of constraint `i` out? With both sides held, a face that does not
+   !> bear on the node counts only from outside: where corners meet, a node behind it is not to slide
+   !> past the face that bears.
+   pure logical function bears(self, i, e, x, u)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i, e
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+
+      bears = .not. self%has_both_sides .or. self%smoothing == smoothing_hermite
+      if (.not. bears) bears = is_outside(x, u, self%node(i), self%master%edge(:, e))
+      if (.not. bears) bears = facing_allows(self%slave, self%chain_node(i), &
+         self%master%edge(:, e), x, u)
+   end function bears
 
    !> Finish the choice for constraint `i`: a node beside its edge, over others of its own surface
    !> that it must not touch, has none.
@@ -223,7 +241,7 @@ contains
       integer :: n, node(5), before, after, k
       real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1
 
-      call polygon_stencil(self%master, self%node(i), self%edge(i), x, u0, n, node, before, after)
+      call stencil_of(self, i, x, u0, n, node, before, after)
       call stencil_gather(x, u0, du, n, node, local, dlocal)
       state%size = stencil_length(x, node)
       state%closed = -self%slack*min(state%size, self%own_size(i))
@@ -237,6 +255,30 @@ contains
       state%is_covered = .true.
       if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, x, u0, du)
    end function polygon_state
+
+   !> Nodes over the polygon: slave node, edge, and what is there before and after that may keep the
+   !> node out.
+   pure subroutine stencil_of(self, i, x, u0, n, node, before, after)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      integer, intent(out) :: n, node(5), before, after
+
+      call polygon_stencil(self%master, self%node(i), self%edge(i), x, u0, n, node, before, after)
+      if (after > 0) then
+         if (.not. bears(self, i, self%master%next(self%edge(i)), x, u0)) then
+            n = n - 1
+            after = 0
+         end if
+      end if
+      if (before == 0) return
+      if (bears(self, i, self%master%previous(self%edge(i)), x, u0)) return
+      n = n - 1
+      before = 0
+      if (after == 0) return
+      node(4) = node(5)
+      after = 4
+   end subroutine stencil_of
 
    pure subroutine smooth_state(self, i, x, u0, du, state, is_found)
       type(nts_t), intent(in) :: self
@@ -306,6 +348,7 @@ contains
             if (e == 0) exit
             if (k == 1) inside = min(inside, distance_of(e))
             if (k == 1) cycle
+            if (.not. bears(self, i, e, x, u0)) exit
             if (self%is_self) then
                if (.not. self_contact_is_apart(self%slave, self%chain_node(i), e)) exit
             end if
@@ -360,7 +403,7 @@ contains
       real(wp) :: local(2, 5), dlocal(2, 5)
       type(dg10_t) :: gap
 
-      call polygon_stencil(self%master, self%node(i), self%edge(i), x, u0, n, node, before, after)
+      call stencil_of(self, i, x, u0, n, node, before, after)
       call stencil_gather(x, u0, du, n, node, local, dlocal)
       call begin_constraint(item, x, node(:n))
       gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*item%size)

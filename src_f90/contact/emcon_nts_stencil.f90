@@ -7,11 +7,13 @@ module emcon_nts_stencil
    implicit none
    private
    public :: smooth_stencil_t, polygon_stencil, smooth_stencil
-   public :: stencil_gather, stencil_length, edge_distance
+   public :: stencil_gather, stencil_length, edge_distance, is_outside
    public :: most_nodes
 
    !> Nodes of a stencil at most: slave node and five edges.
    integer, parameter :: most_nodes = 7
+   !> In front of an edge by less than this fraction of it is not in front.
+   real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
    !> Corners sharper than this (cosine of the turn) end the polygon: the bisector degenerates.
    real(wp), parameter :: sharpest_cosine = -0.9_wp
 
@@ -163,5 +165,16 @@ contains
       b = b - xi*a
       edge_distance = sqrt(dot_product(b, b))
    end function edge_distance
+
+   !> Is a node in front of the line of an edge, by more than round-off?
+   pure logical function is_outside(x, u, node, edge)
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      integer, intent(in) :: node, edge(2)
+      real(wp) :: a(2), b(2)
+
+      a = (x(:, edge(2)) - x(:, edge(1))) + (u(:, edge(2)) - u(:, edge(1)))
+      b = (x(:, node) - x(:, edge(1))) + (u(:, node) - u(:, edge(1)))
+      is_outside = b(1)*a(2) - b(2)*a(1) > touch_tol*dot_product(a, a)
+   end function is_outside
 
 end module emcon_nts_stencil

@@ -31,7 +31,8 @@ contains
          test_case_t("smoothed: values, identity, momenta", test_smooth), &
          test_case_t("smoothed: lost near the centre of curvature", test_lost), &
          test_case_t("smoothed surface ends at its own slave node", test_own_node), &
-         test_case_t("a strip in contact with itself", test_self)]
+         test_case_t("a strip in contact with itself", test_self), &
+         test_case_t("corners that meet are held by the faces that bear", test_corners)]
    end subroutine collect_nts
 
    !> A gap of 1/4 that closes by 3/8 in the middle of the step.
@@ -60,6 +61,48 @@ contains
             1.0_wp], tol, 1.0_wp, "gap")
       end do
    end subroutine test_states
+
+   !> A square on its twin, a tenth below its top and to a side by little: of the two corners on the
+   !> left, with one side held the gap is the way out to the side, with both sides one of them at
+   !> least has the depth. A corner that is in front of the side is no contact of its own.
+   subroutine test_corners(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: depth = 0.1_wp, sideways(3) = [1.0e-12_wp, 0.0_wp, -1.0e-12_wp]
+      real(wp), parameter :: rounding = 1.0e-6_wp      ! of corners, per edge
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(contact_pair_t) :: pair
+      type(nts_t) :: nts(2)
+      real(wp), allocatable :: u(:, :)
+      real(wp) :: gap(2)
+      integer :: side, k
+      logical :: has_both
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], lower)
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, 1.0_wp], [1.0_wp, 1.0_wp], upper)
+      call add_surface(scene, "LOWER", lower, [bottom, right, top, left])
+      call add_surface(scene, "UPPER", upper, [bottom, right, top, left])
+      allocate(u, source=0.0_wp*scene%x)
+      u(2, 5:) = -depth
+      do k = 1, 6
+         has_both = k > 3
+         u(1, 5:) = sideways(1 + mod(k - 1, 3))
+         do side = 1, 2
+            pair%slave = side
+            pair%master = 3 - side
+            pair%both_sides = has_both
+            call nts_init(nts(side), scene, pair, error)
+            if (allocated(error)) return
+            call nts(side)%begin_step(scene%x, u, 0.0_wp*u)
+            call nts(side)%measure(scene%x, u, 0.0_wp*u)
+         end do
+         gap(1) = nts(1)%state(findloc(nts(1)%node, block_node(lower, 0, 1), 1))%gap0
+         gap(2) = nts(2)%state(findloc(nts(2)%node, block_node(upper, 0, 0), 1))%gap0
+         call check_near(error, minval(gap), merge(-depth, -abs(u(1, 5)), has_both), rounding, &
+            1.0_wp, "corner behind, both sides held: " // to_text(k))
+      end do
+   end subroutine test_corners
 
    !> Over the side of the lower block no constraint may act; at its corner one may.
    subroutine test_past_end(error)

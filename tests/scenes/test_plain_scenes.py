@@ -40,7 +40,7 @@ def test_nodes_held_from_both_sides_at_once_need_no_cuts(tmp_path, name, method)
 
 
 @pytest.mark.parametrize("name", ["wedge", "ledge", "bullet", "strips", "corners", "slide off",
-                                  "accordion", "edge along edge"])
+                                  "accordion", "edge along edge", "twin", "tower", "crossing"])
 @pytest.mark.parametrize("sides", [BOTH, ALL])
 def test_two_sided_contact_overlaps_nowhere(tmp_path, sides, name):
     done = Outcome(SCENES[name](), tmp_path, sides, formulation="NODE TO SURFACE")
