@@ -26,7 +26,7 @@ contains
       integer :: i
 
       is_smooth = scene%step(system%i_step)%contact%smoothing == smoothing_hermite
-      do i = 1, size(system%contact)
+      do i = 1, system%n_pair
          associate (contact => system%contact(i)%contact, pair => scene%pair(i), &
                first => system%first_constraint(i) + 1, last => system%first_constraint(i + 1))
             deepest = -minval(overclosure(first:last))
