@@ -17,6 +17,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 DECKS = ROOT / "input_decks"
 PROGRAM = pathlib.Path(os.environ.get("EMCON", ROOT / "build" / "release" / "emcon"))
 EPSILON = np.finfo(float).eps
+#: A program that checks every access takes longer: how many times what is allowed to others.
+PATIENCE = float(os.environ.get("EMCON_PATIENCE", "1"))
 
 #: What a program that crashed, or a library that was not asked to speak, leaves on the screen.
 CRASH = re.compile(
@@ -35,7 +37,7 @@ def emcon(*arguments, timeout=120, **options):
         [PROGRAM, *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=timeout,
+        timeout=timeout*PATIENCE,
         **options,
     )
     assert_no_crash(done.returncode, done.stdout + done.stderr)

@@ -40,6 +40,7 @@ def environment(folder, leaks=True):
     return os.environ | {
         "MODE": "sanitize",                           # of `make install`
         "EMCON": str(BUILD / "emcon"),
+        "EMCON_PATIENCE": "10",
         "EMCON_OPENS": os.environ.get("EMCON_OPENS", "20000"),
         "ASAN_OPTIONS": f"{options}:detect_leaks={leaks:d}",
         "UBSAN_OPTIONS": f"{options}:halt_on_error=1:suppressions={known}",
