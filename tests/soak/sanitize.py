@@ -1,6 +1,6 @@
 """Programs and runs under the address and undefined-behaviour sanitizers: `make sanitize`.
 
-    .venv/bin/python tests/soak/sanitize.py [--jobs 1] [kernels programs decks runs fuzzers]
+    .venv/bin/python tests/soak/sanitize.py [--jobs 1] [PART...]
 
 Programs of MODE=sanitize end at the first thing that is found. What they write about it goes into
 files (of undefined behaviour in a shared library: to standard error); any such file is a failure,
@@ -18,18 +18,18 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "sanitize"
 TESTS = [sys.executable, "-m", "pytest", "-q"]
+SOAK = [sys.executable, ROOT / "tests/soak/soak.py", "--seed=1"]
 EMBED = ROOT / "tests" / "embed"
-#: No program is left out that is not compiled here: Python is not.
+#: What is compiled and linked with the library there; Python cannot load it with a sanitizer in it.
 PROGRAMS = ["c", "c_query", "arrays", "fortran", "host_driver", "host_solid", "interface_c",
             "threads"]  # fmt: skip
 PARTS = {
     "kernels": [BUILD / "kernels"],
     "programs": [*TESTS, *(EMBED / f"test_{name}.py" for name in PROGRAMS)],
     "decks": [*TESTS, ROOT / "tests/decks"],
-    "runs": [*TESTS, f"{ROOT}/tests/scenes/test_input_decks.py::test_runs",
-             ROOT / "tests/extremes/test_restart.py", "-k", "not moment"],  # fmt: skip
-    "fuzzers": [sys.executable, ROOT / "tests/soak/soak.py", "--cases=40", "--seed=1", "decks",
-                "restart", "kill"],  # fmt: skip
+    "runs": [*TESTS, f"{ROOT}/tests/scenes/test_input_decks.py::test_runs"],
+    "fuzzers": [*SOAK, "--cases=40", "decks", "restart"],
+    "kills": [*SOAK, "--cases=5", "kill"],
 }
 
 
