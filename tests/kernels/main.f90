@@ -25,6 +25,7 @@ program main
    use test_given_deck, only : collect_given_deck
    use test_given_force, only : collect_given_force
    use test_given_law, only : collect_given_law
+   use test_guards, only : collect_guards
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
    use test_initial_contact, only : collect_initial_contact
@@ -118,6 +119,7 @@ program main
    call run("given_deck", collect_given_deck)
    call run("given_force", collect_given_force)
    call run("node_potential", collect_node_potential)
+   call run("guards", collect_guards)
    call run("hermite_gap", collect_hermite_gap)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar", collect_mortar)

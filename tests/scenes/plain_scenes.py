@@ -26,9 +26,9 @@ tolerance = 1e-10
 {contact_parameters().strip()}
 """
 
-#: How the bodies of a scene are put in contact: pairs, whose slave comes first; the same pairs,
-#: with nodes of both sides constrained; everything with everything.
-ONE, BOTH, ALL = SIDES = ("ONE", "BOTH", "ALL")
+#: How the bodies of a scene are put in contact: pairs, whose slave comes first; the same without
+#: guards; with nodes of both sides constrained; everything with everything.
+ONE, UNGUARDED, BOTH, ALL = ("ONE", "UNGUARDED", "BOTH", "ALL")
 
 REQUESTS = f"""
 *CONSTRAINT METHOD, TYPE=<method>
@@ -129,8 +129,7 @@ class Scene:
         names = list(self.part)
         pairs = self.pairs or [(a, b) for k, a in enumerate(names) for b in names[k + 1:]]
         card = "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=<formulation>"
-        if sides == BOTH:
-            card += ", SIDES=BOTH"
+        card += {BOTH: ", SIDES=BOTH", UNGUARDED: ", GUARD=NO"}.get(sides, "")
         lines = [f"{card}\n{slave}, {master}" for slave, master in pairs]
         if sides == ALL:
             lines = ["*CONTACT", "*CONTACT INCLUSIONS, ALL EXTERIOR"]

@@ -4,11 +4,16 @@ The scenes, twenty of them, and their runs are those of plain_scenes.py; all of 
 docs/verification.md, here are those that a fault shows in first.
 """
 
+import numpy as np
 import plain_scenes
 import pytest
-from plain_scenes import ALL, BOTH, SCENES, Outcome
+from plain_scenes import ALL, BOTH, ONE, SCENES, UNGUARDED, Outcome
+from scene_tools import EPSILON
 
-#: What bodies may be in each other where the nodes of one side alone are held: the mesh decides.
+#: What bodies may be in each other where the nodes of one side alone are held: guards let nodes in
+#: by a twentieth of an edge, and the judge cuts a step from 1.2 times that on.
+GUARDED = 1.2/20
+#: An overlap of this, also on the way, where squares that turn do not go straight, is a miss.
 MISSED = 0.5
 
 #: Rounding of positions, by an edge: lengths are 30 edges at most, some tens of operations.
@@ -48,3 +53,41 @@ def test_two_sided_contact_overlaps_nowhere(tmp_path, sides, name):
     assert done.run.history["active"].max() >= 1
     assert done.overlap.by_edge <= ROUNDING, done.overlap
     assert done.energy_error <= 1e-12
+
+
+@pytest.mark.parametrize("name", ["wedge", "ledge", "gears", "accordion", "slave floor"])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_guards_hold_what_pairs_do_not(tmp_path, formulation, name):
+    done = Outcome(SCENES[name](), tmp_path, ONE, formulation=formulation)
+    assert done.code == 0
+    assert done.overlap.by_edge <= GUARDED, done.overlap
+    assert done.energy_error <= 1e-12
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_without_guards_bodies_overlap(tmp_path, formulation):
+    """What the guards are there for: the test above can fail."""
+    done = Outcome(SCENES["ledge"](), tmp_path, UNGUARDED, formulation=formulation)
+    assert done.code == 3
+    assert done.overlap.by_edge > 0.3
+    assert done.run.verdict["guarded_increments"] == 0
+
+
+def test_guards_that_do_not_act_change_no_bit(tmp_path):
+    """The drop goes in nowhere: the same digits with guards and without."""
+    runs = [Outcome(SCENES["drop"](), tmp_path/sides, sides, formulation="NODE TO SURFACE").run
+            for sides in (ONE, UNGUARDED)]
+    assert runs[0].verdict["guarded_increments"] == 0
+    assert runs[0].digits() == runs[1].digits()
+
+
+def test_guards_keep_momenta_and_are_told(tmp_path):
+    """Two free squares that fly into each other, corner first."""
+    done = Outcome(plain_scenes.crossing(0.0, 0.05, 2), tmp_path, ONE, formulation="SEGMENT")
+    assert done.run.verdict["guarded_increments"] > 0
+    momentum = done.run.series("BODIES", "MOMENTUM")[1]          # (time, body, px py lz)
+    change = np.abs(momentum.sum(1) - momentum[0].sum(0)).max()
+    # 18 nodes and 20 increments, each with Newton's rounding of a few dozen operations.
+    assert change <= 1e3*EPSILON*np.abs(momentum).max()
+    assert "contact: guards hold nodes that the pairs do not" in done.run.log
+    assert "guards hold nodes in" in done.run.log
