@@ -33,6 +33,7 @@ module emcon_holding
       logical, allocatable :: is_loose(:)        !! (n_body) it has a motion that nothing holds
       logical :: is_pushed = .false.             !! a load works on what `text` tells of
       character(len=:), allocatable :: text      !! what nothing holds; not allocated: all is held
+      character(len=:), allocatable :: told      !! whose motion the user has been told of
       !> (n_constraint) this step has let them go as they pulled: what they prevent no load needs
       logical, allocatable :: has_pulled(:)
       !> (n_constraint) [L] gaps that were closed though no load closes them, and of which bodies

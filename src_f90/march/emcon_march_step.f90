@@ -8,6 +8,7 @@ module emcon_march_step
    use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
    use emcon_guards, only : guard_slack
+   use emcon_holding, only : holding_t
    use emcon_judge, only : judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -335,8 +336,7 @@ contains
             "over a gap of " // to_text(maxval(holding%brought, mask=self%active%is_active), 3) &
             // " onto the surface nearest to it")
          if (.not. allocated(holding%text)) return
-         call note_add(increment%warnings, holding%text // ", on which no load does work: the " // &
-            "smallest motion is taken, as STABILIZE asks for")
+         call tell_stabilized(self%active%holding, increment)
          do i = 1, size(self%du, 2)
             do a = 1, 2
                if (system%numbering%unknown(a, i) == 0) cycle
@@ -346,6 +346,21 @@ contains
          end do
       end associate
    end subroutine book_stabilization
+
+   !> Tell once in a step of a body that moves with nothing to hold it.
+   subroutine tell_stabilized(holding, increment)
+      type(holding_t), intent(inout) :: holding
+      type(increment_t), intent(inout) :: increment
+      integer :: n
+
+      n = index(holding%text, " free to ")
+      if (allocated(holding%told)) then
+         if (holding%told == holding%text(:n)) return
+      end if
+      holding%told = holding%text(:n)
+      call note_add(increment%warnings, holding%text // ", on which no load does work: the " // &
+         "smallest motion is taken, as STABILIZE asks for")
+   end subroutine tell_stabilized
 
    !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
    !> docs/theory.md, section 7); in statics forces are taken as linear over the step.
