@@ -4,7 +4,7 @@ import dataclasses
 import statistics
 
 import plain_scenes
-from plain_scenes import ALL, BOTH, ONE, SCENES, Outcome
+from plain_scenes import ALL, BOTH, ONE, SCENES, UNGUARDED, Outcome
 
 from .common import Chapter, size, table
 
@@ -50,26 +50,30 @@ def figures(runs, scene, sides, parameters):
 
 
 def start(runs):
-    return {(name, kind): figures(runs, scene(), *choice)
-            for name, scene in SCENES.items() for kind, choice in KINDS.items()}
+    """Each kind, and those of one side without their guards too."""
+    return {(name, kind, sides): figures(runs, scene(), sides, parameters)
+            for name, scene in SCENES.items() for kind, (given, parameters) in KINDS.items()
+            for sides in ([given, UNGUARDED] if given == ONE else [given])}
 
 
 def depth(value):
     return "0" if value <= ROUNDING else f"{value:.2g}"
 
 
-def cells(done):
+def cells(done, bare):
+    without = "" if bare is None else depth(bare.overlap) if bare.ends else "stops"
     if not done.ends:
-        return (f"stops at t = {done.time:.2g}", *4*("",), done.cuts, "")
-    return (size(done.energy), *map(depth, (done.own, done.overlap, done.way, done.stand_off)),
-            done.cuts, f"{1000*done.cpu:.1f}")
+        return (f"stops at t = {done.time:.2g}", *3*("",), without, "", done.cuts, "")
+    return (size(done.energy), *map(depth, (done.own, done.overlap, done.way)), without,
+            depth(done.stand_off), done.cuts, f"{1000*done.cpu:.1f}")
 
 
 def report(started, _):
     done = {key: future.result() for key, future in started.items()}
-    rows = [(name, kind, *cells(done[name, kind])) for name in SCENES for kind in KINDS]
+    rows = [(name, kind, *cells(done[name, kind, sides], done.get((name, kind, UNGUARDED))))
+            for name in SCENES for kind, (sides, _) in KINDS.items()]
     return table(["scene", "contact", "energy", "penetration", "overlap", "on the way",
-                  "stand-off", "cuts", "CPU [ms]"], rows)
+                  "without guards", "stand-off", "cuts", "CPU [ms]"], rows)
 
 
 # ---- ways that cross ----------------------------------------------------------------------------
