@@ -12,8 +12,9 @@ module emcon_chain
    use emcon_text, only : to_text
    implicit none
    private
-   public :: chain_t, chain_init, chain_number, chain_shortest, chain_thickness, chain_tributary, &
-      chain_distance, chain_is_joint, chain_touches, chain_corners, chain_crossing, surface_edges
+   public :: chain_t, chain_init, chain_number, chain_shorter, chain_shortest, chain_thickness, &
+      chain_tributary, chain_distance, chain_is_joint, chain_touches, chain_corners, &
+      chain_crossing, surface_edges
 
    type :: chain_t
       integer :: n_edge = 0
@@ -229,6 +230,21 @@ contains
          end do
       end do
    end subroutine chain_tributary
+
+   !> At either end of edge `e` the shorter one of the two edges there, in the reference.
+   pure function chain_shorter(self, e) result(length)
+      type(chain_t), intent(in) :: self
+      integer, intent(in) :: e
+      real(wp) :: length(2)
+      integer :: side
+
+      length = self%length(e)
+      associate (beside => [self%previous(e), self%next(e)])
+         do side = 1, 2
+            if (beside(side) > 0) length(side) = min(length(side), self%length(beside(side)))
+         end do
+      end associate
+   end function chain_shorter
 
    !> Where does the chain turn by more than `angle` in the reference configuration? A corner
    !> stands at the first node of its edge; an edge without a previous one has one too.

@@ -15,8 +15,8 @@
 !> curvature, errs by the first order there, and bends the surface at a plane of symmetry.
 !> Source: docs/theory.md, section 4.
 module emcon_hermite
-   use emcon_dgrad1, only : dg_clip, dg_constant, dg_negative_part, dg_t, dg_variable, &
-      operator(*), operator(+), operator(-)
+   use emcon_dgrad1, only : dg_constant, dg_negative_part, dg_t, dg_variable, operator(*), &
+      operator(+), operator(-)
    use emcon_kinds, only : wp
    implicit none
    private
@@ -34,6 +34,9 @@ module emcon_hermite
    real(wp), parameter :: focal_limit = 0.1_wp
    !> Smallest length of a tangent, squared, relative to the reference length.
    real(wp), parameter :: smallest_square = 1.0e-6_wp
+   !> The pieces change over within this part of an edge around a node. As their sum is one smooth
+   !> curve, that moves it by the square of it, below round-off.
+   real(wp), parameter :: at_end = sqrt(epsilon(1.0_wp))
    !> Step of the search for a bracket of the closest point, in s.
    real(wp), parameter :: search_step = 0.5_wp
 
@@ -240,8 +243,8 @@ contains
    end subroutine bracket
 
    !> The curve from `s0` to `s1`, exact also where that goes through several pieces; pieces outside
-   !> do not appear. A place at the end of a piece is in both: the slope there is their sum, as each
-   !> of the two has a kink.
+   !> do not appear. A place at the end of a piece is in both: where s comes to rest at a node,
+   !> rounding must not choose one of them.
    pure function hermite_weights(curve, s0, s1) result(w)
       type(hermite_curve_t), intent(in) :: curve
       real(wp), intent(in) :: s0, s1
@@ -250,8 +253,8 @@ contains
       integer :: e, i, e_last
 
       s = dg_variable(1, s0, s1 - s0)
-      w%base = piece_of(curve, 2 + ceiling(held(min(s0, s1))))
-      e_last = piece_of(curve, 3 + floor(held(max(s0, s1))))
+      w%base = piece_of(curve, 2 + ceiling(held(min(s0, s1) - at_end)))
+      e_last = piece_of(curve, 3 + floor(held(max(s0, s1) + at_end)))
       do i = max(1, w%base - 1), min(5, e_last + 1)
          if (.not. any(abs(curve%tangent(i, w%base:e_last + 1)) > 0.0_wp)) cycle
          w%n = w%n + 1
@@ -261,12 +264,12 @@ contains
       do e = w%base, e_last
          call add_piece(curve, e, s + real(3 - e, wp), w)
       end do
-      if (w%base == curve%first .and. min(s0, s1) <= real(w%base - 3, wp)) then
-         call add_straight(curve, w%base, dg_negative_part(s + real(3 - w%base, wp), 0.0_wp), w)
+      if (w%base == curve%first .and. min(s0, s1) <= real(w%base - 3, wp) + at_end) then
+         call add_straight(curve, w%base, dg_negative_part(s + real(3 - w%base, wp), at_end), w)
       end if
-      if (e_last == curve%last .and. max(s0, s1) >= real(e_last - 2, wp)) then
+      if (e_last == curve%last .and. max(s0, s1) >= real(e_last - 2, wp) - at_end) then
          call add_straight(curve, e_last + 1, &
-            -dg_negative_part(-(s + real(2 - e_last, wp)), 0.0_wp), w)
+            -dg_negative_part(-(s + real(2 - e_last, wp)), at_end), w)
       end if
    end function hermite_weights
 
@@ -294,7 +297,7 @@ contains
       real(wp) :: a, b, l
       integer :: i
 
-      z = dg_clip(eta, 0.0_wp)
+      z = (dg_negative_part(eta + (-1.0_wp), at_end) - dg_negative_part(eta, at_end)) + 1.0_wp
       square = z*z
       cube = square*z
       chord = z - square

@@ -17,6 +17,7 @@ module emcon_hermite_gap
       hermite_point_t, hermite_stencil_t, hermite_weights, hermite_weights_t, joined_pieces, &
       piece_after, piece_before
    use emcon_kinds, only : wp
+   use emcon_rounded, only : rounded_negative
    implicit none
    private
    public :: hermite_begin, hermite_gap, hermite_gap_value
@@ -108,21 +109,11 @@ contains
          call curve_gap_value(hermite_curve(stencil, 1 + side), edge, b, s(1 + side), other, &
             is_found)
          if (stencil%is_convex(side)) then
-            gap = gap - negative_part(gap - other)
+            gap = gap - rounded_negative(gap - other, stencil%rounding)
          else
-            gap = other + negative_part(gap - other)
+            gap = other + rounded_negative(gap - other, stencil%rounding)
          end if
       end do
-
-   contains
-
-      pure real(wp) function negative_part(a)
-         real(wp), intent(in) :: a
-
-         negative_part = 0.5_wp*(a - sqrt(a**2 + stencil%rounding**2))
-         if (.not. stencil%rounding > 0.0_wp) negative_part = min(a, 0.0_wp)
-      end function negative_part
-
    end subroutine hermite_gap_value
 
    !> Gap over one curve.

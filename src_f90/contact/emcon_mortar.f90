@@ -4,7 +4,7 @@
 !> Which edges make pairs is chosen once per step. Source: docs/theory.md, sections 4.5 and 4.6;
 !> paper eqs. (2) and (3).
 module emcon_mortar
-   use emcon_chain, only : chain_corners, chain_distance
+   use emcon_chain, only : chain_corners, chain_distance, chain_shorter
    use emcon_edge_form, only : form_begin
    use emcon_dgrad13, only : dg13_t => dg_t
    use emcon_dgrad17, only : dg17_t => dg_t, operator(*)
@@ -41,7 +41,8 @@ module emcon_mortar
       real(wp), allocatable :: point(:), weight(:)    !! quadrature on 0..1
       integer, allocatable :: start(:)                !! (n_edge + 1) pairs of each slave edge
       type(pair_stencil_t), allocatable :: pair(:)    !! (>= number of pairs)
-      integer, allocatable :: seen(:, :)              !! (n_point, n_edge) pair at a Gauss point; 0
+      integer, allocatable :: seen(:, :, :)           !! (2, n_point, n_edge) pair at a Gauss point,
+                                                      !! and the one beside it at a master node; 0
    contains
       procedure :: configure => mortar_configure
       procedure :: begin_step => mortar_begin_step
@@ -88,7 +89,7 @@ contains
       if (allocated(self%point)) deallocate(self%point, self%weight, self%seen)
       allocate(self%point(n), self%weight(n))
       call gauss_points(self%point, self%weight)
-      allocate(self%seen(n, self%slave%n_edge), source=0)
+      allocate(self%seen(2, n, self%slave%n_edge), source=0)
    end subroutine mortar_configure
 
    !> Choose the pairs of edges for the step.
@@ -103,7 +104,7 @@ contains
          self%start(e) = n + 1
          call choose_pairs(self, e, x, u0, du, n)
          if (self%options%integration == integration_elements) call pairs_seen(self%pair, &
-            self%master, self%start(e), n, self%point, x, u0, du, self%seen(:, e))
+            self%master, self%start(e), n, self%point, x, u0, du, self%seen(:, :, e))
       end do
       self%start(e) = n + 1
    end subroutine mortar_begin_step
@@ -132,7 +133,7 @@ contains
             end if
             call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
                is_wide, self%master_corner)
-            if (is_wide) stencil%rounding = self%rounding*self%master%length(m)
+            if (is_wide) stencil%rounding = self%rounding*chain_shorter(self%master, m)
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)
@@ -191,18 +192,27 @@ contains
       integer, intent(in) :: e, k
       type(frame_t), intent(in) :: frame
       real(wp) :: moment(n_moment)
-      real(wp) :: eta, gap, area
+      real(wp) :: eta, gap, area, weight
       integer :: i
 
       moment = 0.0_wp
       do i = 1, size(self%point)
-         if (self%seen(i, e) /= k) cycle
+         weight = share(self, i, e, k)
+         if (.not. weight > 0.0_wp) cycle
          call frame_point(frame, self%pair(k), self%point(i), eta, gap)
-         area = self%weight(i)*frame%length
-         moment = moment + [area*gap, area*gap*self%point(i), area, area*self%point(i), &
-            self%weight(i)]
+         area = weight*frame%length
+         moment = moment + [area*gap, area*gap*self%point(i), area, area*self%point(i), weight]
       end do
    end function point_moments
+
+   !> Weight of Gauss point `i` of edge `e` that belongs to pair `k`: all, half or none.
+   pure real(wp) function share(self, i, e, k)
+      type(mortar_t), intent(in) :: self
+      integer, intent(in) :: i, e, k
+
+      share = 0.0_wp
+      if (any(self%seen(:, i, e) == k)) share = self%weight(i)/count(self%seen(:, i, e) > 0)
+   end function share
 
    pure subroutine mortar_form_edge(self, e, x, u0, du)
       class(mortar_t), intent(inout) :: self
@@ -304,12 +314,14 @@ contains
       integer, intent(in) :: e, k, variable(:)
       real(wp), intent(in) :: local(:, :), dlocal(:, :)
       type(dg17_t) :: gap, length
+      real(wp) :: weight
       integer :: i
 
       do i = 1, size(self%point)
-         if (self%seen(i, e) /= k) cycle
+         weight = share(self, i, e, k)
+         if (.not. weight > 0.0_wp) cycle
          call point_gap(self%pair(k), local, dlocal, self%point(i), gap, length)
-         associate (xi => self%point(i), weight => self%weight(i))
+         associate (xi => self%point(i))
             gap = gap*length
             call add_part(self, e, moment_gap, weight, gap, variable)
             call add_part(self, e, moment_gap_xi, weight*xi, gap, variable)

@@ -19,6 +19,9 @@ module emcon_mortar_choice
    !> Of two master edges that cover the same part of a slave edge, more than this fraction of it,
    !> the nearer one is meant.
    real(wp), parameter :: same_part = 0.01_wp
+   !> A point looks at a master node if it meets an edge there within this fraction of it: far above
+   !> the round-off that a scene gathers.
+   real(wp), parameter :: at_node = 1.0e-4_wp
 
 contains
 
@@ -165,53 +168,62 @@ contains
 
    !> The pair, of those from `first` to `last`, that each point of a slave edge looks at, at the
    !> start of the step or else at its expected end; 0: none. A point that looks between the nodes
-   !> of a joint of the master sees one of the edges there.
+   !> of a joint of the master sees one of the edges there, one that looks at a master node the
+   !> edges on both sides of it: which of them comes first must not matter.
    pure subroutine pairs_seen(list, master, first, last, point, x, u0, du, seen)
       type(pair_stencil_t), intent(in) :: list(:)
       type(chain_t), intent(in) :: master
       integer, intent(in) :: first, last
       real(wp), intent(in) :: point(:)           !! (n_point) on 0..1
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      integer, intent(out) :: seen(:)            !! (n_point)
-      real(wp) :: beyond(2)
-      integer :: k
+      integer, intent(out) :: seen(:, :)         !! (2, n_point) pair, and the one beside it or 0
+      type(frame_t) :: frame
+      real(wp) :: local(2, n_place), dlocal(2, n_place), beyond(2)
+      integer :: pass, k
+      logical :: is_open(size(point))
 
       seen = 0
-      do k = first, last
-         call see_pair(list(k), k, [0.0_wp, 0.0_wp], point, x, u0, du, seen)
+      do pass = 0, 3                             ! start and end, then both up to joints
+         is_open = seen(1, :) == 0
+         if (.not. any(is_open)) exit
+         beyond = 0.0_wp
+         do k = first, last
+            if (pass > 1) then
+               beyond = joint_width(master, list(k)%edge, x, u0)
+               if (.not. any(beyond > 0.0_wp)) cycle
+            end if
+            call stencil_gather(list(k), x, u0, du, local, dlocal)
+            call frame_init(frame, list(k), local + mod(pass, 2)*dlocal)
+            call see_pair(frame, list(k), k, beyond, point, is_open, seen)
+         end do
+         where (seen(1, :) == 0) seen(2, :) = 0
       end do
-      seen = abs(seen)
-      if (all(seen > 0)) return
-      do k = first, last
-         beyond = joint_width(master, list(k)%edge, x, u0)
-         if (any(beyond > 0.0_wp)) call see_pair(list(k), k, beyond, point, x, u0, du, seen)
-      end do
-      seen = abs(seen)
+      seen = max(0, seen)
    end subroutine pairs_seen
 
-   !> Enter number `k` for the points that look at `stencil`, up to `beyond` past its ends: those of
-   !> the start over those of the end, which are entered as -k.
-   pure subroutine see_pair(stencil, k, beyond, point, x, u0, du, seen)
+   !> Enter number `k` for the open points that look at the edge of `stencil`, up to `beyond` past
+   !> its ends: first, or beside another one if they look at one of its nodes.
+   pure subroutine see_pair(frame, stencil, k, beyond, point, is_open, seen)
+      type(frame_t), intent(in) :: frame
       type(pair_stencil_t), intent(in) :: stencil
       integer, intent(in) :: k
       real(wp), intent(in) :: beyond(2), point(:)
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      integer, intent(inout) :: seen(:)
-      type(frame_t) :: frame(0:1)
-      real(wp) :: local(2, n_place), dlocal(2, n_place), eta, gap
-      integer :: time_level, i, p
+      logical, intent(in) :: is_open(:)
+      integer, intent(inout) :: seen(:, :)       !! (2, n_point); second -1: there is none
+      real(wp) :: eta, gap
+      logical :: is_at_node
+      integer :: i
 
-      call stencil_gather(stencil, x, u0, du, local, dlocal)
-      call frame_init(frame(0), stencil, local)
-      call frame_init(frame(1), stencil, local + dlocal)
-      do time_level = 0, 1
-         do i = 1, size(point)
-            p = seen(i)
-            if (abs(p) > 0 .and. (time_level == 1 .or. p > 0)) cycle
-            call frame_hit(frame(time_level), stencil, point(i), eta, gap)
-            if (.not. (eta >= -beyond(1) .and. eta <= 1.0_wp + beyond(2))) cycle
-            seen(i) = merge(k, -k, time_level == 0)
-         end do
+      do i = 1, size(point)
+         if (.not. is_open(i)) cycle
+         call frame_hit(frame, stencil, point(i), eta, gap)
+         is_at_node = min(abs(eta), abs(1.0_wp - eta)) <= at_node
+         if (seen(1, i) == 0 .and. eta >= -beyond(1) .and. eta <= 1.0_wp + beyond(2)) then
+            seen(1, i) = k
+            if (.not. is_at_node) seen(2, i) = -1
+         else if (is_at_node .and. seen(2, i) == 0) then
+            seen(2, i) = k
+         end if
       end do
    end subroutine see_pair
 

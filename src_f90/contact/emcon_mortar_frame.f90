@@ -5,7 +5,7 @@
 !> height (y - x) x t over the point. Source: docs/theory.md, section 4.
 module emcon_mortar_frame
    use emcon_kinds, only : wp
-   use emcon_rounded, only : rounded_clip, rounded_clip_slope
+   use emcon_rounded, only : rounded_clip, rounded_clip_slope, rounded_negative
    implicit none
    private
    public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_meet, frame_hit, &
@@ -31,7 +31,7 @@ module emcon_mortar_frame
       logical :: has_field = .false.             !! t1 and t2 differ: averaged normals
       integer :: tangent(2, 2) = 0               !! tip and tail of t1 and t2, local
       real(wp) :: weight(2) = 0.0_wp             !! factors that make t1 and t2 about 1 long [1/L]
-      real(wp) :: rounding = 0.0_wp              !! of the polygon's corners, for points [L]
+      real(wp) :: rounding(2) = 0.0_wp           !! of the polygon's corners, for points [L]
       logical :: is_smooth = .false.             !! cubic master, else a polygon
       real(wp) :: shape(0:3, 4) = 0.0_wp         !! its coefficients: power of eta, node
    end type pair_stencil_t
@@ -175,20 +175,12 @@ contains
       if (stencil%is_smooth .or. stencil%n_master < 4) return
       call look(self, xi, along, above, norm)
       slope = (above(2) - above(1))/(along(2) - along(1))
-      if (stencil%node(place_master(4)) > 0) gap = gap + negative_part(-along(2))/norm &
+      if (stencil%node(place_master(4)) > 0) gap = gap &
+         + rounded_negative(-along(2), stencil%rounding(2))/norm &
          *((above(4) - above(2))/(along(4) - along(2)) - slope)
-      if (stencil%node(place_master(3)) > 0) gap = gap - negative_part(along(1))/norm &
+      if (stencil%node(place_master(3)) > 0) gap = gap &
+         - rounded_negative(along(1), stencil%rounding(1))/norm &
          *((above(1) - above(3))/(along(1) - along(3)) - slope)
-
-   contains
-
-      pure real(wp) function negative_part(a)
-         real(wp), intent(in) :: a
-
-         negative_part = 0.5_wp*(a - sqrt(a**2 + stencil%rounding**2))
-         if (.not. stencil%rounding > 0.0_wp) negative_part = min(a, 0.0_wp)
-      end function negative_part
-
    end subroutine frame_point
 
    !> The root of `smooth_value`, which falls: by Newton's method between bounds, if it is in 0..1.

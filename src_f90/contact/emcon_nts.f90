@@ -5,18 +5,17 @@
 module emcon_nts
    use emcon_chain, only : chain_corners, chain_init, chain_shortest, chain_t, chain_thickness, &
       chain_tributary
-   use emcon_contact, only : constraint_resize, constraint_t, contact_t, gap_state_t
-   use emcon_dgrad10, only : dg10_t => dg_t
-   use emcon_dgrad15, only : dg15_t => dg_t
+   use emcon_contact, only : constraint_t, contact_t, gap_state_t
    use emcon_errors, only : error_t
    use emcon_facing, only : facing_allows
-   use emcon_hermite_gap, only : hermite_gap, hermite_gap_value
+   use emcon_hermite_gap, only : hermite_gap_value
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
-   use emcon_nts_gap, only : nts_gap, nts_gap_value
-   use emcon_nts_stencil, only : edge_distance, is_outside, most_nodes, polygon_stencil, &
-      smooth_stencil, smooth_stencil_t, stencil_gather, stencil_length
+   use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
+   use emcon_nts_gap, only : nts_gap_value
+   use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, most_nodes, &
+      polygon_stencil, polygon_stencil_t, smooth_stencil, smooth_stencil_t, stencil_gather, stencil_length
    use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite, &
       smoothing_none
    use emcon_self_contact, only : self_contact_is_apart
@@ -42,6 +41,8 @@ module emcon_nts
       integer, allocatable :: class(:)                !! (n_constraint) of bodies that it looks at
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
       real(wp), allocatable :: own_size(:)            !! (n_constraint) shortest slave edge there [L]
+      integer, allocatable :: other(:)                !! (n_constraint) the other one at a corner
+                                                      !! that the node stands over; 0: none
       type(near_list_t) :: near
       integer, allocatable :: near_item(:)            !! (n_constraint) its place in that list
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
@@ -90,7 +91,7 @@ contains
          if (has_twins) call add_twins(self)
       end if
       self%n_constraint = size(self%node)
-      allocate(self%edge(self%n_constraint), source=0)
+      allocate(self%edge(self%n_constraint), self%other(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint))
       self%deepest_start = touch_tol
       self%slack = pair%slack
@@ -193,14 +194,40 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
 
+      self%other(i) = 0
       if (self%edge(i) == 0) return
       if (self%is_self) then
-         if (.not. is_covered(self, i, x, u0)) self%edge(i) = 0
+         if (.not. is_covered(self, i, self%edge(i), x, u0)) self%edge(i) = 0
       end if
-      if (self%smoothing /= smoothing_hermite .or. self%edge(i) == 0) return
+      if (self%edge(i) == 0) return
+      if (self%smoothing /= smoothing_hermite) then
+         call take_sector(self, i, x, u0)
+         return
+      end if
       call smooth_stencil(self%smooth(i), self%master, self%is_corner, self%node(i), &
          self%edge(i), self%rounding, x, u0)
    end subroutine settle
+
+   !> Of the two edges at a corner take the one on whose side of the bisector constraint `i` is, or
+   !> both. What a surface must not touch of itself does not come in.
+   pure subroutine take_sector(self, i, x, u0)
+      type(nts_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      integer :: edge, other, new
+
+      edge = self%edge(i)
+      call edge_of_sector(self%master, self%node(i), x, u0, edge, other)
+      new = max(other, merge(edge, 0, edge /= self%edge(i)))
+      if (new == 0) return
+      if (.not. touch_rule_sees(self%rule, self%class(i), new)) return
+      if (.not. bears(self, i, new, x, u0)) return
+      if (self%is_self) then
+         if (.not. touch_rule_allows(self%rule, self%slave, self%chain_node(i), new, x, u0)) return
+      end if
+      self%edge(i) = edge
+      self%other(i) = other
+   end subroutine take_sector
 
    pure subroutine nts_measure(self, x, u0, du)
       class(nts_t), intent(inout) :: self
@@ -238,46 +265,54 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
-      integer :: n, node(5), before, after, k
+      type(polygon_stencil_t) :: stencil
       real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1
+      integer :: k
 
-      call stencil_of(self, i, x, u0, n, node, before, after)
-      call stencil_gather(x, u0, du, n, node, local, dlocal)
-      state%size = stencil_length(x, node)
+      call stencil_of(self, i, self%edge(i), x, u0, stencil)
+      associate (n => stencil%n, before => stencil%before, after => stencil%after)
+         call stencil_gather(x, u0, du, n, stencil%node, local, dlocal)
+         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap0, xi0)
+         do k = 1, n
+            local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
+         end do
+         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap1, xi1)
+      end associate
+      state%size = stencil_length(x, stencil%node)
       state%closed = -self%slack*min(state%size, self%own_size(i))
-      call nts_gap_value(local(:, :n), before, after, self%rounding*state%size, state%gap0, xi0)
-      do k = 1, n
-         local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
-      end do
-      call nts_gap_value(local(:, :n), before, after, self%rounding*state%size, state%gap1, xi1)
       state%is_near = .true.
-      state%is_over = is_over(state, xi0, xi1, [before > 0, after > 0])
+      state%is_over = is_over(state, xi0, xi1, [stencil%before > 0, stencil%after > 0])
       state%is_covered = .true.
-      if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, x, u0, du)
+      if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, self%edge(i), x, &
+         u0, du)
+      if (self%other(i) > 0 .and. state%is_covered) state%is_covered = is_covered(self, i, &
+         self%other(i), x, u0, du)
    end function polygon_state
 
    !> Nodes over the polygon: slave node, edge, and what is there before and after that may keep the
    !> node out.
-   pure subroutine stencil_of(self, i, x, u0, n, node, before, after)
+   pure subroutine stencil_of(self, i, edge, x, u0, stencil)
       type(nts_t), intent(in) :: self
-      integer, intent(in) :: i
+      integer, intent(in) :: i, edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      integer, intent(out) :: n, node(5), before, after
+      type(polygon_stencil_t), intent(out) :: stencil
 
-      call polygon_stencil(self%master, self%node(i), self%edge(i), x, u0, n, node, before, after)
-      if (after > 0) then
-         if (.not. bears(self, i, self%master%next(self%edge(i)), x, u0)) then
-            n = n - 1
-            after = 0
+      call polygon_stencil(stencil, self%master, self%node(i), edge, self%rounding, x, u0)
+      associate (n => stencil%n, before => stencil%before, after => stencil%after)
+         if (after > 0) then
+            if (.not. bears(self, i, self%master%next(edge), x, u0)) then
+               n = n - 1
+               after = 0
+            end if
          end if
-      end if
-      if (before == 0) return
-      if (bears(self, i, self%master%previous(self%edge(i)), x, u0)) return
-      n = n - 1
-      before = 0
-      if (after == 0) return
-      node(4) = node(5)
-      after = 4
+         if (before == 0) return
+         if (bears(self, i, self%master%previous(edge), x, u0)) return
+         n = n - 1
+         before = 0
+         if (after == 0) return
+         stencil%node(4) = stencil%node(5)
+         after = 4
+      end associate
    end subroutine stencil_of
 
    pure subroutine smooth_state(self, i, x, u0, du, state, is_found)
@@ -309,7 +344,7 @@ contains
          state%is_covered = (xi1 >= -1.0_wp .or. curve%node(1) == 0 .or. curve%is_corner(3)) .and. &
             (xi1 <= 2.0_wp .or. curve%node(6) == 0 .or. curve%is_corner(4))
          if (state%is_covered .and. (xi1 < 0.0_wp .or. xi1 > 1.0_wp)) then
-            state%is_covered = is_covered(self, i, x, u0, du)
+            state%is_covered = is_covered(self, i, self%edge(i), x, u0, du)
          end if
       end associate
    end subroutine smooth_state
@@ -329,20 +364,20 @@ contains
       is_over = (goes_on(1) .or. xi >= -end_tol) .and. (goes_on(2) .or. xi <= 1.0_wp + end_tol)
    end function is_over
 
-   !> Is the edge or one of its neighbours the nearest after the motion `du`, rather than the edges
+   !> Is `edge` or one of its neighbours the nearest after the motion `du`, rather than the edges
    !> after next?
-   pure logical function is_covered(self, i, x, u0, du)
+   pure logical function is_covered(self, i, edge, x, u0, du)
       type(nts_t), intent(in) :: self
-      integer, intent(in) :: i
+      integer, intent(in) :: i, edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       real(wp), intent(in), contiguous, optional :: du(:, :)
       real(wp) :: inside, outside
       integer :: e, k, side
 
-      inside = distance_of(self%edge(i))
+      inside = distance_of(edge)
       outside = huge(outside)
       do side = 1, 2
-         e = self%edge(i)
+         e = edge
          do k = 1, 2
             e = merge(self%master%previous(e), self%master%next(e), side == 1)
             if (e == 0) exit
@@ -380,7 +415,8 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), intent(in) :: target(:)
       type(constraint_t), intent(inout) :: item(:)
-      integer :: k
+      type(polygon_stencil_t) :: stencil(2)
+      integer :: k, n
       logical :: is_found
 
       do k = 1, size(wanted)
@@ -389,66 +425,26 @@ contains
             self%is_lost(wanted(k)) = .not. is_found
             if (is_found) cycle
          end if
-         call polygon_constraint(self, wanted(k), x, u0, du, target(k), item(k))
+         call polygons(self, wanted(k), x, u0, stencil, n)
+         call polygon_constraint(stencil(:n), x, u0, du, target(k), item(k))
       end do
    end subroutine nts_evaluate
 
-   pure subroutine polygon_constraint(self, i, x, u0, du, target, item)
+   !> The polygons that constraint `i` is made of: one, or two over a corner.
+   pure subroutine polygons(self, i, x, u0, stencil, n)
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: target
-      type(constraint_t), intent(inout) :: item
-      integer :: n, node(5), before, after
-      real(wp) :: local(2, 5), dlocal(2, 5)
-      type(dg10_t) :: gap
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      type(polygon_stencil_t), intent(out) :: stencil(2)
+      integer, intent(out) :: n
 
-      call stencil_of(self, i, x, u0, n, node, before, after)
-      call stencil_gather(x, u0, du, n, node, local, dlocal)
-      call begin_constraint(item, x, node(:n))
-      gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, self%rounding*item%size)
-      item%gap0 = gap%f0 - target
-      item%gap1 = gap%f1 - target
-      item%dgap = gap%df
-      item%g(:, :n) = reshape(gap%g(:2*n), [2, n])
-      item%c(:, :n) = reshape(gap%c(:2*n), [2, n])
-      item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
-   end subroutine polygon_constraint
-
-   pure subroutine smooth_constraint(smooth, x, u0, du, target, item, is_found)
-      type(smooth_stencil_t), intent(in) :: smooth
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: target
-      type(constraint_t), intent(inout) :: item
-      logical, intent(out) :: is_found
-      real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
-      type(dg15_t) :: gap
-
-      associate (n => smooth%n, node => smooth%node)
-         call stencil_gather(x, u0, du, n, node, local, dlocal)
-         call hermite_gap(smooth%curve, local(:, :n), dlocal(:, :n), smooth%place, gap, is_found)
-         if (.not. is_found) return
-         call begin_constraint(item, x, node(:n))
-         item%gap0 = gap%f0 - target
-         item%gap1 = gap%f1 - target
-         item%dgap = gap%df
-         item%g(:, :n) = reshape(gap%g(:2*n), [2, n])
-         item%c(:, :n) = reshape(gap%c(:2*n), [2, n])
-         item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+      associate (edge => [self%edge(i), self%other(i)])
+         do n = 1, count(edge > 0)
+            call stencil_of(self, i, edge(n), x, u0, stencil(n))
+         end do
+         n = count(edge > 0)
       end associate
-   end subroutine smooth_constraint
-
-   !> Nodes and size of a constraint over `node`: slave node, edge, further ones.
-   pure subroutine begin_constraint(item, x, node)
-      type(constraint_t), intent(inout) :: item
-      real(wp), intent(in) :: x(:, :)
-      integer, intent(in) :: node(:)
-
-      call constraint_resize(item, size(node))
-      item%n_slave = 1
-      item%node(:size(node)) = node
-      item%size = stencil_length(x, node)
-   end subroutine begin_constraint
+   end subroutine polygons
 
    pure subroutine nts_area(self, x, u, area, length)
       class(nts_t), intent(in) :: self

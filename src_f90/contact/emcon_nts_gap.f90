@@ -10,6 +10,7 @@ module emcon_nts_gap
    use emcon_dgrad10, only : dg_cross, dg_dot, dg_negative_part, dg_sqrt, dg_t, &
       difference, difference_t, operator(*), operator(+), operator(-), operator(/)
    use emcon_kinds, only : wp
+   use emcon_rounded, only : rounded_negative
    implicit none
    private
    public :: nts_gap, nts_gap_value
@@ -25,7 +26,7 @@ contains
       real(wp), intent(in) :: dx(:, :)           !! their motion
       integer, intent(in) :: before              !! local number of the node before the edge, or 0
       integer, intent(in) :: after               !! of the node after it, or 0
-      real(wp), intent(in) :: rounding           !! length over which corners are rounded [L]
+      real(wp), intent(in) :: rounding(2)        !! half widths of the rounded corners [L]
       type(dg_t) :: gap
       type(difference_t) :: a, b
       type(dg_t) :: length
@@ -35,9 +36,9 @@ contains
       length = dg_sqrt(dg_dot(a, a))
       gap = dg_cross(b, a)/length
       if (before > 0) gap = gap + corner_before(a, b, length, &
-         difference(first, before, x0, dx), rounding)
+         difference(first, before, x0, dx), rounding(1))
       if (after > 0) gap = gap + corner_after(a, length, difference(slave, last, x0, dx), &
-         difference(after, last, x0, dx), rounding)
+         difference(after, last, x0, dx), rounding(2))
    end function nts_gap
 
    !> kappa min(tau, 0): what the line of the edge before adds on its side of the bisector.
@@ -48,8 +49,8 @@ contains
       type(dg_t) :: part, other
 
       other = dg_sqrt(dg_dot(edge, edge))
-      part = dg_negative_part(dg_dot(b, edge)/other + dg_dot(b, a)/length, rounding)
-      part = bend(edge, a, other, length)*part
+      part = dg_dot(b, edge)/other + dg_dot(b, a)/length
+      part = bent_part(part, rounding, edge, a, other*length)
    end function corner_before
 
    !> -kappa max(tau, 0), with `b` from the last node of the edge to the slave node.
@@ -60,24 +61,29 @@ contains
       type(dg_t) :: part, other
 
       other = dg_sqrt(dg_dot(edge, edge))
-      part = dg_negative_part((-1.0_wp)*(dg_dot(b, a)/length + dg_dot(b, edge)/other), rounding)
-      part = bend(a, edge, length, other)*part
+      part = (-1.0_wp)*(dg_dot(b, a)/length + dg_dot(b, edge)/other)
+      part = bent_part(part, rounding, a, edge, length*other)
    end function corner_after
 
-   !> kappa = -tan(theta/2), theta the turn from edge `a` to edge `b` (> 0: convex corner).
-   pure function bend(a, b, length_a, length_b) result(kappa)
+   !> kappa min(tau, 0), 0 in front of the rounded corner. kappa = -tan(theta/2), theta the turn
+   !> from edge `a` to edge `b` (> 0: convex corner).
+   pure function bent_part(tau, rounding, a, b, length_product) result(part)
+      type(dg_t), intent(in) :: tau
+      real(wp), intent(in) :: rounding
       type(difference_t), intent(in) :: a, b
-      type(dg_t), intent(in) :: length_a, length_b
-      type(dg_t) :: kappa
+      type(dg_t), intent(in) :: length_product   !! |a| |b|
+      type(dg_t) :: part
 
-      kappa = (-1.0_wp)*(dg_cross(a, b)/(length_a*length_b + dg_dot(a, b)))
-   end function bend
+      if (min(tau%f0, tau%f1) >= rounding) return
+      part = (-1.0_wp)*(dg_cross(a, b)/(length_product + dg_dot(a, b)))
+      part = part*dg_negative_part(tau, rounding)
+   end function bent_part
 
    !> The same gap for one configuration, and the projection `xi` on the edge (0..1 inside).
    pure subroutine nts_gap_value(x, before, after, rounding, gap, xi)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
       integer, intent(in) :: before, after
-      real(wp), intent(in) :: rounding
+      real(wp), intent(in) :: rounding(2)
       real(wp), intent(out) :: gap, xi
       real(wp) :: a(2), b(2), edge(2), length, other, tau
 
@@ -90,25 +96,17 @@ contains
          edge = x(:, first) - x(:, before)
          other = sqrt(dot_product(edge, edge))
          tau = dot_product(b, edge)/other + dot_product(b, a)/length
-         gap = gap - negative_part(tau)*cross(edge, a)/(length*other + dot_product(edge, a))
+         gap = gap - rounded_negative(tau, rounding(1))*cross(edge, a) &
+            /(length*other + dot_product(edge, a))
       end if
       if (after > 0) then
          edge = x(:, after) - x(:, last)
          b = x(:, slave) - x(:, last)
          other = sqrt(dot_product(edge, edge))
          tau = dot_product(b, a)/length + dot_product(b, edge)/other
-         gap = gap - negative_part(-tau)*cross(a, edge)/(length*other + dot_product(a, edge))
+         gap = gap - rounded_negative(-tau, rounding(2))*cross(a, edge) &
+            /(length*other + dot_product(a, edge))
       end if
-
-   contains
-
-      pure real(wp) function negative_part(tau)
-         real(wp), intent(in) :: tau
-
-         negative_part = 0.5_wp*(tau - sqrt(tau**2 + rounding**2))
-         if (.not. rounding > 0.0_wp) negative_part = min(tau, 0.0_wp)
-      end function negative_part
-
    end subroutine nts_gap_value
 
    pure real(wp) function cross(a, b)

@@ -1,12 +1,12 @@
 !> Which nodes the gap of a slave node over a master edge depends on, and where they are.
 module emcon_nts_stencil
-   use emcon_chain, only : chain_t, chain_touches
+   use emcon_chain, only : chain_shorter, chain_t, chain_touches
    use emcon_hermite, only : hermite_stencil_t
    use emcon_hermite_gap, only : hermite_begin
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: smooth_stencil_t, polygon_stencil, smooth_stencil
+   public :: polygon_stencil_t, polygon_stencil, smooth_stencil_t, smooth_stencil, edge_of_sector
    public :: stencil_gather, stencil_length, edge_distance, is_outside
    public :: most_nodes
 
@@ -16,6 +16,18 @@ module emcon_nts_stencil
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
    !> Corners sharper than this (cosine of the turn) end the polygon: the bisector degenerates.
    real(wp), parameter :: sharpest_cosine = -0.9_wp
+
+   !> A slave node stands on the bisector of a corner if it is nearer to it than this fraction of
+   !> the edges there: far above the round-off that a scene gathers.
+   real(wp), parameter :: on_bisector = 1.0e-4_wp
+
+   !> A polygon near a slave node; chosen for a step. Slave node and edge come first.
+   type :: polygon_stencil_t
+      integer :: n = 0
+      integer :: node(5) = 0
+      integer :: before = 0, after = 0           !! local numbers of the neighbours' nodes; 0: none
+      real(wp) :: rounding(2) = 0.0_wp           !! half widths of the rounded corners [L]
+   end type polygon_stencil_t
 
    !> A smoothed surface near a slave node; chosen for a step. Slave node and edge come first.
    type :: smooth_stencil_t
@@ -27,37 +39,80 @@ module emcon_nts_stencil
 
 contains
 
-   !> Nodes over the polygon: slave, edge, and what is there before and after. At a joint, here as
-   !> in all stencils, the neighbour is taken to meet the edge at the edge's own node.
-   pure subroutine polygon_stencil(master, slave, edge, x, u0, n, node, before, after)
+   !> The polygon near a slave node over `edge`: the edge and what is there before and after. At a
+   !> joint, here as in all stencils, the neighbour is taken to meet the edge at its own node.
+   pure subroutine polygon_stencil(self, master, slave, edge, rounding, x, u0)
+      type(polygon_stencil_t), intent(out) :: self
       type(chain_t), intent(in) :: master
       integer, intent(in) :: slave, edge
+      real(wp), intent(in) :: rounding           !! of corners, as a fraction of an edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      integer, intent(out) :: n, node(:), before, after
       integer :: e
 
-      node(1) = slave
-      node(2:3) = master%edge(:, edge)
-      n = 3
-      before = 0
-      after = 0
+      self%node(1) = slave
+      self%node(2:3) = master%edge(:, edge)
+      self%n = 3
+      self%rounding = rounding*chain_shorter(master, edge)
       e = master%previous(edge)
       if (e > 0) then
-         if (is_blunt(x, u0, master%edge(1, e), node(2), node(3))) then
-            n = n + 1
-            before = n
-            node(n) = master%edge(1, e)
+         if (is_blunt(x, u0, master%edge(1, e), self%node(2), self%node(3))) then
+            self%n = self%n + 1
+            self%before = self%n
+            self%node(self%n) = master%edge(1, e)
          end if
       end if
       e = master%next(edge)
       if (e > 0) then
-         if (is_blunt(x, u0, node(2), node(3), master%edge(2, e))) then
-            n = n + 1
-            after = n
-            node(n) = master%edge(2, e)
+         if (is_blunt(x, u0, self%node(2), self%node(3), master%edge(2, e))) then
+            self%n = self%n + 1
+            self%after = self%n
+            self%node(self%n) = master%edge(2, e)
          end if
       end if
    end subroutine polygon_stencil
+
+   !> Of two edges that meet at the point nearest to a slave node the one on whose side of the
+   !> bisector it stands, in place of `edge`; 0 or, if it stands on the bisector, the other one.
+   pure subroutine edge_of_sector(master, slave, x, u, edge, other)
+      type(chain_t), intent(in) :: master
+      integer, intent(in) :: slave
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      integer, intent(inout) :: edge
+      integer, intent(out) :: other
+      real(wp) :: own(2), arm(2), to_slave(2), length(2), past
+      integer :: side, corner, beside(2)
+
+      other = 0
+      beside = [master%previous(edge), master%next(edge)]
+      do side = 1, 2
+         if (beside(side) == 0) cycle
+         corner = master%edge(side, edge)
+         own = way(corner, master%edge(3 - side, edge))
+         arm = way(corner, master%edge(side, beside(side)))
+         to_slave = way(corner, slave)
+         length = [sqrt(dot_product(own, own)), sqrt(dot_product(arm, arm))]
+         if (.not. dot_product(own, arm) < -sharpest_cosine*product(length)) cycle
+         past = dot_product(to_slave, arm)/length(2) - dot_product(to_slave, own)/length(1)
+         if (abs(past) <= on_bisector*minval(length)) then
+            other = beside(side)
+            return
+         else if (past > 0.0_wp .and. .not. dot_product(to_slave, own) > 0.0_wp) then
+            edge = beside(side)
+            return
+         end if
+      end do
+
+   contains
+
+      !> From node `p` to node `q`.
+      pure function way(p, q)
+         integer, intent(in) :: p, q
+         real(wp) :: way(2)
+
+         way = (x(:, q) - x(:, p)) + (u(:, q) - u(:, p))
+      end function way
+
+   end subroutine edge_of_sector
 
    !> Is the corner a-b-c blunt enough for a bisector?
    pure logical function is_blunt(x, u, a, b, c)

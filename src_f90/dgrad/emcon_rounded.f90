@@ -1,12 +1,16 @@
-!> max(a, 0) and the bounds 0 and 1 with their corners rounded on the inner side, by cubics.
+!> min(a, 0), max(a, 0) and the bounds 0 and 1 with their corners rounded.
 !>
-!> 0 and 1 are exact outside, so is a from the end of the band on; there is one tangent everywhere.
+!> max(a, 0) and the bounds: on the inner side, by cubics. 0 and 1 are exact outside, so is a from
+!> the end of the band on; there is one tangent everywhere. min(a, 0): to both sides alike, by a
+!> quartic, with one curvature everywhere; it is exact beyond the band, and added to its mirror
+!> image, rounded max(a, 0), it is a.
 !> Source: docs/theory.md, section 2, rounded corners.
 module emcon_rounded
    use emcon_kinds, only : wp
    implicit none
    private
    public :: rounded_part, rounded_part_slope, rounded_chord, rounded_clip, rounded_clip_slope
+   public :: rounded_negative, rounded_negative_slope, rounded_negative_chord
 
 contains
 
@@ -69,6 +73,69 @@ contains
       end function moment
 
    end subroutine rounded_chord
+
+   !> min(a, 0); with t = a/width, -width (1 - t)^3 (3 + t)/16 where |t| < 1.
+   elemental real(wp) function rounded_negative(a, width)
+      real(wp), intent(in) :: a, width
+
+      rounded_negative = min(a, 0.0_wp)
+      if (.not. abs(a) < width) return
+      associate (t => a/width)
+         rounded_negative = -width*(1.0_wp - t)**3*(3.0_wp + t)/16.0_wp
+      end associate
+   end function rounded_negative
+
+   !> Slope of `rounded_negative`, width > 0.
+   elemental real(wp) function rounded_negative_slope(a, width)
+      real(wp), intent(in) :: a, width
+
+      associate (t => max(-1.0_wp, min(1.0_wp, a/width)))
+         rounded_negative_slope = 0.25_wp*(1.0_wp - t)**2*(2.0_wp + t)
+      end associate
+   end function rounded_negative_slope
+
+   !> Divided difference of `rounded_negative` from `a0` to `a1` and its derivative by a1, as of
+   !> `rounded_chord`; width > 0.
+   pure subroutine rounded_negative_chord(a0, a1, width, slope, rate)
+      real(wp), intent(in) :: a0, a1, width
+      real(wp), intent(out) :: slope, rate
+      real(wp) :: total, low, high, first, last, within
+
+      total = abs(a1 - a0)
+      if (.not. total > 0.0_wp) then
+         slope = rounded_negative_slope(a1, width)
+         rate = 0.0_wp
+         if (abs(a1) < width) rate = 0.5_wp*curvature(a1)
+         return
+      end if
+      low = min(a0, a1)
+      high = max(a0, a1)
+      first = max(low, -width)
+      last = min(high, width)
+      within = max(0.0_wp, last - first)/total
+      associate (s => first/width, t => last/width)
+         slope = max(0.0_wp, min(high, -width) - low)/total &
+            + within*(0.5_wp - (s + t)*(6.0_wp - (s*s + t*t))/16.0_wp)
+      end associate
+      associate (middle => 0.5_wp*(first + last))
+         rate = within*(moment(first) + 4.0_wp*moment(middle) + moment(last))/6.0_wp
+      end associate
+
+   contains
+
+      pure real(wp) function curvature(a)
+         real(wp), intent(in) :: a
+
+         curvature = 0.75_wp*((a/width)**2 - 1.0_wp)/width
+      end function curvature
+
+      pure real(wp) function moment(a)
+         real(wp), intent(in) :: a
+
+         moment = curvature(a)*(abs(a - a0)/total)
+      end function moment
+
+   end subroutine rounded_negative_chord
 
    !> `a` held within 0..1, both corners rounded; width < 1/2.
    elemental real(wp) function rounded_clip(a, width)

@@ -121,7 +121,7 @@ contains
       real(wp), intent(inout) :: total
       type(dg10_t) :: gap
 
-      gap = nts_gap(x0(:, :5), dx(:, :5), 5, 4, 0.0_wp)
+      gap = nts_gap(x0(:, :5), dx(:, :5), 5, 4, [0.0_wp, 0.0_wp])
       total = total + gap%h(1, 1)
    end subroutine evaluate_node
 

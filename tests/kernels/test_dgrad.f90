@@ -21,7 +21,7 @@ module test_dgrad
       "log1p", "excess, expm1", "clip", "rounded clip", "composite"]
 
    !> Of the rounded corner, and of the rounded clip: some of the places drawn are in its bands.
-   real(wp), parameter :: width = 0.25_wp, clip_width = 0.375_wp
+   real(wp), parameter :: width = 1.0_wp, clip_width = 0.375_wp
 
 contains
 
@@ -38,6 +38,7 @@ contains
          test_case_t("second derivatives across a change of sign", test_second_across), &
          test_case_t("clip across its bounds", test_clip), &
          test_case_t("clip with rounded corners across its bounds", test_rounded_clip), &
+         test_case_t("negative part with a rounded corner", test_rounded_corner), &
          test_case_t("root of a polynomial", test_root), &
          test_case_t("second derivatives of a root", test_second_root), &
          test_case_t("constants and zeros", test_constants), &
@@ -119,7 +120,7 @@ contains
          case (10)
             f = min(a, 0.0_qp)
          case (11)
-            f = 0.5_qp*(a - sqrt(a*a + real(width, qp)**2))
+            f = bent_negative(a)
          case (12)
             f = log(1.0_qp + a)
          case (13)
@@ -144,6 +145,18 @@ contains
       end function bent
 
    end function expect
+
+   !> min(a, 0), in the band the quartic that joins it with slope and curvature: half of what an
+   !> even function leaves of a.
+   pure real(qp) function bent_negative(a)
+      real(qp), intent(in) :: a
+
+      bent_negative = min(a, 0.0_qp)
+      associate (t => a/real(width, qp))
+         if (abs(t) < 1.0_qp) bent_negative = 0.5_qp*(a - width*(3.0_qp + 6.0_qp*t**2 - t**4) &
+            /8.0_qp)
+      end associate
+   end function bent_negative
 
    !> Positive data of size 1, and an increment up to `largest` that keeps them so.
    subroutine draw(largest, x0, dx)
@@ -210,8 +223,7 @@ contains
          a0 = real(x0(1), qp)*real(x0(2), qp)
          a1 = (real(x0(1), qp) + real(dx(1), qp))*(real(x0(2), qp) + real(dx(2), qp))
          expected = real([abs(a1) - abs(a0), min(a1, 0.0_qp) - min(a0, 0.0_qp), &
-            0.5_qp*(a1 - a0 - sqrt(a1**2 + real(width, qp)**2) &
-            + sqrt(a0**2 + real(width, qp)**2))], wp)
+            bent_negative(a1) - bent_negative(a0)], wp)
          scale = sum(abs(a%g*dx))
          do k = 1, 3
             call check_near(error, dot_product(s(k)%g, dx), expected(k), 16.0_wp*eps, scale, &
@@ -400,6 +412,38 @@ contains
       call check_near(error, [s%f0, s%f1, s%c(1)], [0.0_wp, 1.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, &
          "exact at the bounds")
    end subroutine test_rounded_clip
+
+   !> Steps between all places below, in and above the band; exact beyond, and with its mirror image
+   !> it adds up to a.
+   subroutine test_rounded_corner(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: at(7) = [-2.5_wp, -1.3_wp, -0.7_wp, 0.0_wp, 0.4_wp, 1.2_wp, 3.0_wp]
+      type(dg_t) :: s, image
+      real(wp) :: x0(3), dx(3), expected
+      integer :: i, j
+
+      do i = 1, size(at)
+         do j = 1, size(at)
+            x0 = [at(i), 1.0_wp, 1.0_wp]
+            dx = [at(j) - at(i), 0.2_wp, 0.1_wp]
+            s = operate(11, x0, dx)
+            expected = increment_of(expect, 11, x0, dx)
+            call check_near(error, s%df, expected, 4.0_wp*eps, 4.0_wp, "df")
+            call check_near(error, s%f1 - s%f0, expected, 4.0_wp*eps, 4.0_wp, "values")
+            call check_near(error, s%c, slopes_of(expect, 11, x0 + dx), 40.0_wp*eps, 1.0_wp, &
+               "gradient")
+            call check_second(error, 11, x0, dx, "rounded corner, " // to_text(at(i)) // " to " &
+               // to_text(at(j)))
+            image = dg_negative_part(-dg_variable(1, x0(1), dx(1)), width)
+            call check_near(error, [s%f1 - image%f1, s%df - image%df, s%g(1) - image%g(1)], &
+               [at(j), dx(1), 1.0_wp], 4.0_wp*eps, 4.0_wp, "a, from both parts")
+            if (max(at(i), at(j)) < -width) &
+               call check_near(error, [s%f1, s%df], [at(j), dx(1)], 0.0_wp, 1.0_wp, "exact below")
+            if (min(at(i), at(j)) > width) &
+               call check_near(error, [s%f1, s%df], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "exact above")
+         end do
+      end do
+   end subroutine test_rounded_corner
 
    !> F = x^3 + p a b x - (a^2 + b) with the variables a, b and x as number 3; p > 0 makes it rise.
    pure function cubic(x0, dx) result(f)

@@ -115,7 +115,8 @@ def mirror_defect(run):
 
 def assert_symmetric(run, n_step):
     """Mirror symmetric, and the balances closed, without a cut. Each step leaves some
-    sixteen roundings of the positions, which the motion carries on."""
+    sixteen roundings of the positions, which the motion carries on: a few steps only, as a disc
+    on its lowest node is unstable, and falls off it by a factor of about two a step."""
     history = run.history
     size = np.abs(run.fields().x).max()
     assert mirror_defect(run) <= 16*EPSILON*size*n_step
@@ -127,21 +128,27 @@ def assert_symmetric(run, n_step):
 
 # ---- a disc dropped straight down ---------------------------------------------------------------
 
-MORTAR = [*itertools.product(["MORTAR"], ["NODAL", "EDGE"], ["SEGMENTS"], ["DUAL", "STANDARD"],
-                             ["NONE", "HERMITE"])]
+MORTAR = [*itertools.product(["MORTAR"], ["NODAL", "EDGE"], ["SEGMENTS", "ELEMENTS"],
+                             ["DUAL", "STANDARD"], ["NONE", "HERMITE"])]
+#: Options that a formulation does not read are left at their defaults.
+EVERY = [*MORTAR,
+         *itertools.product(["SEGMENT"], ["NODAL"], ["SEGMENTS"], ["DUAL", "STANDARD"],
+                            ["NONE", "HERMITE"]),
+         *itertools.product(["NODE TO SURFACE"], ["NODAL"], ["SEGMENTS"], ["DUAL"],
+                            ["NONE", "HERMITE"])]
+NAMES = ("formulation", "normal", "integration", "multiplier", "smoothing")
 
 
 @pytest.mark.parametrize("place", ["node over node", "node over edge"])
 @pytest.mark.parametrize("slave", ["UP", "LOW"])
-@pytest.mark.parametrize("choice", MORTAR, ids=", ".join)
+@pytest.mark.parametrize("choice", EVERY, ids=", ".join)
 def test_disc_on_block(tmp_path, choice, slave, place):
     above = disc(1.0, 1.0 + GAP)
-    below, faces = block(4.0, 1.0, (8 if place == "node over node" else 9, 3), -1.0)
+    below, faces = block(4.0, 1.0, (8 if place == "node over node" else 9, 2), -1.0)
     pair = ("UP", "LOW") if slave == "UP" else ("LOW", "UP")
-    h, n_step = 0.02, 12
+    h, n_step = 0.03, 6
     deck = scene((below, faces["T"]), above, pair, h, n_step*h)
-    names = ("formulation", "normal", "integration", "multiplier", "smoothing")
-    run = run_one_sided(deck, tmp_path, **dict(zip(names, choice, strict=True)))
+    run = run_one_sided(deck, tmp_path, **dict(zip(NAMES, choice, strict=True)))
     assert_symmetric(run, n_step)
 
 
@@ -160,52 +167,36 @@ def test_disc_and_block_in_one_surface(tmp_path, multiplier, normal, size):
     assert_symmetric(run, n_step)
 
 
-#: A node over a corner of a polygon belongs to one of its edges; over an edge there is no choice.
-OVER_EDGE = [("NODE TO SURFACE", "DUAL", "NONE"), ("NODE TO SURFACE", "DUAL", "HERMITE"),
-             *itertools.product(["SEGMENT"], ["DUAL", "STANDARD"], ["NONE", "HERMITE"])]
-
-
-@pytest.mark.parametrize("slave", ["UP", "LOW"])
-@pytest.mark.parametrize("choice", OVER_EDGE, ids=", ".join)
-def test_disc_on_edge_by_nodes(tmp_path, choice, slave):
-    below, faces = block(4.0, 1.0, (9, 3), -1.0)
-    pair = ("UP", "LOW") if slave == "UP" else ("LOW", "UP")
-    h, n_step = 0.02, 12
-    deck = scene((below, faces["T"]), disc(1.0, 1.0 + GAP), pair, h, n_step*h)
-    names = ("formulation", "multiplier", "smoothing")
-    assert_symmetric(run_one_sided(deck, tmp_path, **dict(zip(names, choice, strict=True))), n_step)
-
-
 # ---- corners and edges that coincide ------------------------------------------------------------
 
-BLOCKS = {
-    "flat punch, corners over nodes": (2.0, (4, 2)),
-    "square on its twin": (4.0, (8, 3)),
-}
-
-
-@pytest.mark.parametrize("name", BLOCKS)
 @pytest.mark.parametrize("slave", ["UP", "LOW"])
-@pytest.mark.parametrize("choice", MORTAR, ids=", ".join)
-def test_block_on_block(tmp_path, choice, slave, name):
-    width, cells = BLOCKS[name]
-    above, up = block(width, 1.0, cells, GAP, first=1001)
+@pytest.mark.parametrize("choice", EVERY, ids=", ".join)
+def test_punch_with_corners_over_nodes(tmp_path, choice, slave):
+    above, up = block(2.0, 1.0, (4, 2), GAP, first=1001)
     below, low = block(4.0, 1.0, (8, 3), -1.0)
     pair = ("UP", "LOW") if slave == "UP" else ("LOW", "UP")
-    h, n_step = 0.01, 20
+    h, n_step = 0.025, 8
     deck = scene((below, low["T"]), (above, up["B"]), pair, h, n_step*h)
-    names = ("formulation", "normal", "integration", "multiplier", "smoothing")
-    run = run_deck(deck, tmp_path, **dict(zip(names, choice, strict=True)))
-    assert_symmetric(run, n_step)
+    assert_symmetric(run_deck(deck, tmp_path, **dict(zip(NAMES, choice, strict=True))), n_step)
 
 
 @pytest.mark.parametrize("choice", MORTAR, ids=", ".join)
+def test_square_on_its_twin(tmp_path, choice):
+    """Of gaps of nodes the gradient jumps at every node here: Newton's method may need cuts."""
+    above, up = block(4.0, 1.0, (8, 3), GAP, first=1001)
+    below, low = block(4.0, 1.0, (8, 3), -1.0)
+    pair = ("UP", "LOW")
+    h, n_step = 0.01, 20
+    deck = scene((below, low["T"]), (above, up["B"]), pair, h, n_step*h)
+    assert_symmetric(run_deck(deck, tmp_path, **dict(zip(NAMES, choice, strict=True))), n_step)
+
+
+@pytest.mark.parametrize("choice", EVERY, ids=", ".join)
 def test_edge_along_edge(tmp_path, choice):
     """Edges in one line that slide along each other feel nothing, whatever passes whatever."""
     above, up = block(2.0, 1.0, (5, 2), 0.0, first=1001)
-    below, low = block(4.0, 1.0, (8, 3), -1.0)
-    deck = scene((below, low["T"]), (above, up["B"]), ("UP", "LOW"), 0.02, 0.4, (1.0, 0.0))
-    names = ("formulation", "normal", "integration", "multiplier", "smoothing")
-    history = run_deck(deck, tmp_path, **dict(zip(names, choice, strict=True))).history
+    below, low = block(4.0, 1.0, (8, 2), -1.0)
+    deck = scene((below, low["T"]), (above, up["B"]), ("UP", "LOW"), 0.04, 0.4, (1.0, 0.0))
+    history = run_deck(deck, tmp_path, **dict(zip(NAMES, choice, strict=True))).history
     assert history["cuts"].sum() == 0
     assert history["strain"].max() <= 1e-24*history["kinetic"][0]

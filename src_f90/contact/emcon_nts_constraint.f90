@@ -1,0 +1,117 @@
+!> Contact constraints made of the gaps of one slave node, with all their derivatives.
+!>
+!> Source: docs/theory.md, sections 4.2 and 4.3.
+module emcon_nts_constraint
+   use emcon_contact, only : constraint_resize, constraint_t
+   use emcon_dgrad10, only : dg10_t => dg_t
+   use emcon_dgrad15, only : dg15_t => dg_t
+   use emcon_hermite_gap, only : hermite_gap
+   use emcon_kinds, only : wp
+   use emcon_nts_gap, only : nts_gap
+   use emcon_nts_stencil, only : most_nodes, polygon_stencil_t, smooth_stencil_t, stencil_gather, &
+      stencil_length
+   implicit none
+   private
+   public :: polygon_constraint, smooth_constraint
+
+contains
+
+   !> The mean of the gaps over polygons, one, or two that give the same gap: from both edges at a
+   !> corner. The discrete gradient then does not depend on which of them comes first.
+   pure subroutine polygon_constraint(stencil, x, u0, du, target, item)
+      type(polygon_stencil_t), intent(in) :: stencil(:)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node)
+      real(wp), intent(in) :: target             !! gap to hold [L]
+      type(constraint_t), intent(inout) :: item
+      integer :: n, i, k, list(sum(stencil%n))
+
+      n = 0
+      do i = 1, size(stencil)
+         do k = 1, stencil(i)%n
+            if (any(list(:n) == stencil(i)%node(k))) cycle
+            n = n + 1
+            list(n) = stencil(i)%node(k)
+         end do
+      end do
+      call begin_constraint(item, x, list(:n))
+      item%gap0 = -target
+      item%gap1 = -target
+      item%dgap = 0.0_wp
+      item%g(:, :n) = 0.0_wp
+      item%c(:, :n) = 0.0_wp
+      item%h(:2*n, :2*n) = 0.0_wp
+      do i = 1, size(stencil)
+         call add_polygon(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
+      end do
+   end subroutine polygon_constraint
+
+   !> Add `share` of the gap over a polygon to a constraint.
+   pure subroutine add_polygon(stencil, share, x, u0, du, item)
+      type(polygon_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: share
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(constraint_t), intent(inout) :: item
+      real(wp) :: local(2, 5), dlocal(2, 5)
+      type(dg10_t) :: gap
+      integer :: k, j, at(10)
+
+      associate (n => stencil%n, node => stencil%node)
+         call stencil_gather(x, u0, du, n, node, local, dlocal)
+         gap = nts_gap(local(:, :n), dlocal(:, :n), stencil%before, stencil%after, &
+            stencil%rounding)
+         do k = 1, n
+            at(2*k) = 2*findloc(item%node(:item%n_node), node(k), 1)
+            at(2*k - 1) = at(2*k) - 1
+            associate (place => at(2*k)/2)
+               item%g(:, place) = item%g(:, place) + share*gap%g(2*k - 1:2*k)
+               item%c(:, place) = item%c(:, place) + share*gap%c(2*k - 1:2*k)
+            end associate
+         end do
+         do j = 1, 2*n
+            do k = 1, 2*n
+               item%h(at(k), at(j)) = item%h(at(k), at(j)) + share*gap%h(k, j)
+            end do
+         end do
+      end associate
+      item%gap0 = item%gap0 + share*gap%f0
+      item%gap1 = item%gap1 + share*gap%f1
+      item%dgap = item%dgap + share*gap%df
+   end subroutine add_polygon
+
+   !> The gap over a smoothed surface; `is_found`: there is a unique closest point.
+   pure subroutine smooth_constraint(smooth, x, u0, du, target, item, is_found)
+      type(smooth_stencil_t), intent(in) :: smooth
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target
+      type(constraint_t), intent(inout) :: item
+      logical, intent(out) :: is_found
+      real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
+      type(dg15_t) :: gap
+
+      associate (n => smooth%n, node => smooth%node)
+         call stencil_gather(x, u0, du, n, node, local, dlocal)
+         call hermite_gap(smooth%curve, local(:, :n), dlocal(:, :n), smooth%place, gap, is_found)
+         if (.not. is_found) return
+         call begin_constraint(item, x, node(:n))
+         item%gap0 = gap%f0 - target
+         item%gap1 = gap%f1 - target
+         item%dgap = gap%df
+         item%g(:, :n) = reshape(gap%g(:2*n), [2, n])
+         item%c(:, :n) = reshape(gap%c(:2*n), [2, n])
+         item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+      end associate
+   end subroutine smooth_constraint
+
+   !> Nodes and size of a constraint over `node`: slave node, edge, further ones.
+   pure subroutine begin_constraint(item, x, node)
+      type(constraint_t), intent(inout) :: item
+      real(wp), intent(in) :: x(:, :)
+      integer, intent(in) :: node(:)
+
+      call constraint_resize(item, size(node))
+      item%n_slave = 1
+      item%node(:size(node)) = node
+      item%size = stencil_length(x, node)
+   end subroutine begin_constraint
+
+end module emcon_nts_constraint
