@@ -15,7 +15,8 @@ module emcon_nts
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap, only : nts_gap_value
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, most_nodes, &
-      polygon_stencil, polygon_stencil_t, smooth_stencil, smooth_stencil_t, stencil_gather, stencil_length
+      polygon_stencil, polygon_stencil_t, smooth_stencil, smooth_stencil_t, stencil_gather, &
+      stencil_length
    use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite, &
       smoothing_none
    use emcon_self_contact, only : self_contact_is_apart

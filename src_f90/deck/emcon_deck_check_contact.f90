@@ -1,20 +1,15 @@
 !> The contact pairs, as far as they can be judged before anything moves.
 module emcon_deck_check_contact
+   use emcon_deck_check_sides, only : check_sides
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
-   use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
-      formulation_segment, multiplier_standard, scene_t, step_t, surface_t
+      formulation_segment, multiplier_standard, scene_t, step_t
    use emcon_surface_edges, only : surface_edges
-   use emcon_text, only : to_text
    implicit none
    private
    public :: check_pairs
-
-   !> A slave surface longer than this times its master gives a warning: force leaks where it
-   !> reaches beyond. The rest is room for curved surfaces on straight ones.
-   real(wp), parameter :: large_ratio = 1.25_wp
 
 contains
 
@@ -32,7 +27,7 @@ contains
          call check_common_nodes(reader, scene, scene%pair(i), has_common)
          call check_freedom(reader, scene, scene%pair(i))
          if (.not. (has_common .or. has_reverse(scene%pair, i))) then
-            call check_lengths(reader, scene, scene%pair(i))
+            call check_sides(reader, scene, scene%pair(i))
          end if
       end do
    end subroutine check_pairs
@@ -150,45 +145,5 @@ contains
 
       has_reverse = any(pair%slave == pair(i)%master .and. pair%master == pair(i)%slave)
    end function has_reverse
-
-   !> Warn of a slave surface that is longer than its master.
-   subroutine check_lengths(reader, scene, pair)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(in) :: pair
-      real(wp) :: slave, master
-      integer :: power
-
-      if (reader%doubt_positions) return
-      if (scene%surface(pair%slave)%is_nodal .or. scene%surface(pair%master)%is_nodal) return
-      ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
-      power = -exponent(maxval(abs(scene%x)))
-      slave = surface_length(scene, scene%surface(pair%slave), power)
-      master = surface_length(scene, scene%surface(pair%master), power)
-      if (master <= 0.0_wp .or. slave <= large_ratio*master) return
-      call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave surface " &
-         // scene%surface(pair%slave)%name // " is " // to_text(slave/master, 3) &
-         // " times as long as master surface " // scene%surface(pair%master)%name &
-         // "; the smaller one should be the slave: swap the two")
-   end subroutine check_lengths
-
-   !> Length of the faces in the reference configuration, times 2**`power` [L].
-   pure real(wp) function surface_length(scene, surface, power)
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      integer, intent(in) :: power
-      integer, allocatable :: edge(:, :)
-      integer :: i
-
-      surface_length = 0.0_wp
-      call surface_edges(scene, surface, edge)
-      do i = 1, size(edge, 2)
-         associate (node => edge(:, i))
-            if (any(node == 0)) cycle
-            surface_length = surface_length + norm2(scale(scene%x(:, node(2)), power) &
-               - scale(scene%x(:, node(1)), power))
-         end associate
-      end do
-   end function surface_length
 
 end module emcon_deck_check_contact

@@ -394,6 +394,21 @@ def slave_floor(floor=(8, 2)):
     return scene
 
 
+def disc_on_floor(ratio, place, slave="FLOOR"):
+    """A disc falls straight on a stiff floor whose edges are `ratio` times as long as its own,
+    `place` edges beside a node; nothing about it is symmetric."""
+    n = 8
+    edge = ratio*math.pi/(4*n)
+    cells = 2*math.ceil(0.4/edge)
+    scene = Scene(0.01, 0.5)
+    scene.disc("DISC", (0.0, 0.502), 0.5, (n, 2), turn=0.1, velocity=(0, -0.1))
+    scene.block("FLOOR", ((place - cells/2)*edge, -0.25), (cells*edge, 0.25), (cells, 2),
+                stiffness=1e4)
+    scene.hold("FLOOR", below(-0.25)).side("TOP", "FLOOR", lambda _, y: y > -1e-9)
+    scene.pairs = [("TOP", "DISC") if slave == "FLOOR" else ("DISC", "TOP")]
+    return scene
+
+
 def twin():
     """A square falls on its twin: all nodes of the sides on each other."""
     scene = Scene(0.02, 0.6)

@@ -197,3 +197,8 @@ def test_bar_rests_on_the_floor_for_twice_the_crossing_time(bar):
 def test_bar_keeps_its_energy(bar):
     total = bar.history["total"]
     np.testing.assert_allclose(total, 0, atol=1e-10*bar.history["kinetic"].max())
+
+
+@pytest.mark.parametrize("name", ["ring", "hertz", "ironing"])
+def test_slaves_are_the_right_ones(name):
+    assert "should be the slave" not in emcon("check", DECKS / f"{name}.inp").stderr

@@ -1,0 +1,51 @@
+"""A disc on a flat slave floor: how far it is pushed sideways, as the floor is refined."""
+
+import plain_scenes
+from plain_scenes import BOTH, ONE
+from scene_tools import run_deck
+
+from .common import Chapter, mortar, node, segment, table
+
+#: Lengths of the floor's edges by those of the disc.
+RATIOS = (1.93, 0.97, 0.48, 0.24)
+#: Where the disc falls, in edges from a node of the floor.
+PLACES = (0.2, 0.6)
+
+#: Slave, sides and parameters by what the table calls them.
+KINDS = {
+    "`MORTAR`, `DUAL`": ("FLOOR", ONE, mortar("NODAL", "DUAL")),
+    "`MORTAR`, `STANDARD`": ("FLOOR", ONE, mortar("NODAL", "STANDARD")),
+    "`SEGMENT`, `DUAL`": ("FLOOR", ONE, segment("DUAL")),
+    "`NODE TO SURFACE`": ("FLOOR", ONE, node()),
+    "`NODE TO SURFACE`, `SIDES=BOTH`": ("FLOOR", BOTH, node()),
+    "disc the slave: `MORTAR`, `DUAL`": ("DISC", ONE, mortar("NODAL", "DUAL")),
+    "disc the slave: `NODE TO SURFACE`": ("DISC", ONE, node()),
+}
+
+
+def slanted(run):
+    """Sideways momentum of the disc after the contact, by the momentum that it was given up."""
+    _, momentum = run.series("BODIES", "MOMENTUM")
+    disc = momentum[:, 0, :]
+    return abs(disc[-1, 0])/(disc[-1, 1] - disc[0, 1])
+
+
+def start(runs):
+    started = {}
+    for kind, (slave, sides, parameters) in KINDS.items():
+        for ratio in RATIOS:
+            for place in PLACES:
+                runs.count += 1
+                deck = plain_scenes.disc_on_floor(ratio, place, slave).deck(sides)
+                started.setdefault((kind, ratio), []).append(runs.pool.submit(
+                    run_deck, deck, runs.folder / f"run{runs.count}", **parameters))
+    return started
+
+
+def report(started, _):
+    rows = [(kind, *(f"{max(slanted(f.result()) for f in started[kind, ratio]):.4f}"
+                     for ratio in RATIOS)) for kind in KINDS]
+    return table(["slave floor, edges by those of the disc:", *map(str, RATIOS)], rows)
+
+
+CHAPTERS = [Chapter("slave_floor", start, report)]
