@@ -299,7 +299,7 @@ class Stepper(Queries, Conditions):
     def contact(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.int32]]:
         """Multipliers (contact forces, 0 where open), active flags, slave node numbers.
 
-        All of shape (n_constraint,).
+        All of shape (n_constraint,): of all pairs, then of their guards, whose nodes may come again.
         """
         lam, active, label = self._handle.call(_state.get_contact, self.n_constraint)
         return lam, active.astype(bool), label

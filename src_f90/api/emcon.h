@@ -51,7 +51,7 @@ typedef struct emcon_snapshot emcon_snapshot;
 typedef struct emcon_sizes {
    int n_node;
    int n_element;
-   int n_contact;    /* contacts possible: slave nodes over all pairs */
+   int n_contact;    /* contacts possible: slave nodes over all pairs, then those of guards */
    int n_pair;       /* contact pairs */
    int n_body;       /* connected meshes */
    int n_unknown;    /* in the present step of the deck */

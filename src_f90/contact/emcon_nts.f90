@@ -35,7 +35,6 @@ module emcon_nts
       type(chain_t) :: slave
       type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
-      logical :: has_both_sides = .false.             !! the nodes of the master are held elsewhere
       integer :: smoothing = smoothing_none
       type(touch_rule_t) :: rule                      !! only of such a surface
       integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
@@ -79,7 +78,6 @@ contains
       call chain_join(self%slave, scene)
       call chain_join(self%master, scene)
       self%is_self = pair%slave == pair%master
-      self%has_both_sides = pair%both_sides
       if (self%is_self) call touch_rule_init(self%rule, self%slave, scene, &
          pair%both_sides)
       associate (n => size(self%slave%node))
@@ -182,7 +180,7 @@ contains
       integer, intent(in) :: i, e
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
 
-      bears = .not. self%has_both_sides .or. self%smoothing == smoothing_hermite
+      bears = .not. self%both_sides .or. self%smoothing == smoothing_hermite
       if (.not. bears) bears = is_outside(x, u, self%node(i), self%master%edge(:, e))
       if (.not. bears) bears = facing_allows(self%slave, self%chain_node(i), &
          self%master%edge(:, e), x, u)

@@ -238,8 +238,7 @@ contains
       end associate
    end subroutine box_of
 
-   !> Is `node` behind the outline of which `other` are the edges within `reach`? At the end of an
-   !> outline that is open there is no behind.
+   !> Is `node` behind the outline of which `other` are the edges within `reach`?
    pure subroutine try_node(self, x, node, other, reach, overlap)
       type(judge_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
@@ -248,8 +247,7 @@ contains
       real(wp), intent(in) :: reach              !! [L]
       type(overlap_t), intent(inout) :: overlap
       type(nearest_t) :: nearest
-      real(wp) :: next_along(2)
-      integer :: k, next
+      integer :: k
 
       associate (edge => self%outline%edge)
          if (any(edge(:, other) == node)) return
@@ -257,14 +255,7 @@ contains
             call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
                between(x, self%u, edge(1, other(k)), edge(2, other(k))))
          end do
-         if (nearest%edge == 0 .or. nearest%square > reach**2) return
-         next_along = nearest%along
-         if (nearest%side > 0) then
-            next = self%outline%link(nearest%side, nearest%edge)
-            if (next == 0) return
-            next_along = between(x, self%u, edge(1, next), edge(2, next))
-         end if
-         call take_deeper(self, nearest, nearest_depth(nearest, next_along), node, overlap)
+         if (nearest%square <= reach**2) call take_deeper(self, x, nearest, node, overlap)
       end associate
    end subroutine try_node
 
@@ -355,25 +346,36 @@ contains
                   + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
             end associate
          end do
-         if (nearest%edge > 0) call take_deeper(self, nearest, sqrt(nearest%square), &
-            a(merge(1, 2, share < 0.5_wp)), overlap)
+         call take_deeper(self, x, nearest, a(merge(1, 2, share < 0.5_wp)), overlap)
       end associate
    end subroutine try_place
 
-   !> Keep what is `depth` behind the edge `nearest` if it is the deepest so far.
-   pure subroutine take_deeper(self, nearest, depth, node, overlap)
+   !> Keep what is behind the edge `nearest` if it is the deepest so far. At the end of an outline
+   !> that is open there is no behind.
+   pure subroutine take_deeper(self, x, nearest, node, overlap)
       type(judge_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
       type(nearest_t), intent(in) :: nearest
-      real(wp), intent(in) :: depth              !! [L]
       integer, intent(in) :: node
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: length
+      real(wp) :: depth, length, next_along(2)
+      integer :: next
 
-      length = length_of(nearest%along)
-      if (.not. depth > overlap%depth*length) return
-      if (self%is_passing .and. depth < min(passing*length, &
-         passing_thin*self%outline%thickness(nearest%edge))) return
-      overlap = overlap_t(depth/length, node, self%outline%edge(:, nearest%edge))
+      if (nearest%edge == 0) return
+      associate (edge => self%outline%edge)
+         next_along = nearest%along
+         if (nearest%side > 0) then
+            next = self%outline%link(nearest%side, nearest%edge)
+            if (next == 0) return
+            next_along = between(x, self%u, edge(1, next), edge(2, next))
+         end if
+         depth = nearest_depth(nearest, next_along)
+         length = length_of(nearest%along)
+         if (.not. depth > overlap%depth*length) return
+         if (self%is_passing .and. depth < min(passing*length, &
+            passing_thin*self%outline%thickness(nearest%edge))) return
+         overlap = overlap_t(depth/length, node, edge(:, nearest%edge))
+      end associate
    end subroutine take_deeper
 
 end module emcon_judge

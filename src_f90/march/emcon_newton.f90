@@ -43,7 +43,7 @@ module emcon_newton
    real(wp), parameter :: stall_gain = 0.9_wp
    integer, parameter :: most_stalls = 6, few_stalls = 2
    real(wp), parameter :: stall_floor = 1.0e4_wp*epsilon(1.0_wp)
-   !> Least part of a correction that is taken: at a kink whole ones lead to and fro.
+   !> Least part of a correction that is taken: at a kink of contact whole ones lead to and fro.
    real(wp), parameter :: least_damping = 0.125_wp
 
    !> What follows an evaluation.
@@ -268,7 +268,7 @@ contains
       call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
       if (allocated(error)) return
       self%n_solve = self%n_solve + 1
-      if (.not. self%is_polish) then
+      if (set%n > set%n_linear .and. .not. self%is_polish) then
          self%correction = self%damping*self%correction
          self%dlam = self%damping*self%dlam
       end if

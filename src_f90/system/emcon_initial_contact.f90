@@ -57,7 +57,7 @@ contains
             call nts_init(contact, scene, pair, error)
             if (allocated(error)) return
             call contact%configure(scene%x, options)
-            contact%has_both_sides = .false.         ! every face counts for what is behind at first
+            contact%both_sides = .false.             ! every face counts for what is behind at first
             if (.not. contact%is_self) then
                call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
                if (.not. allocated(error)) call check_crossing(scene, pair%master, &

@@ -83,11 +83,11 @@ def test_guards_that_do_not_act_change_no_bit(tmp_path):
 
 def test_guards_keep_momenta_and_are_told(tmp_path):
     """Two free squares that fly into each other, corner first."""
-    done = Outcome(plain_scenes.crossing(0.0, 0.05, 2), tmp_path, ONE, formulation="SEGMENT")
+    done = Outcome(plain_scenes.crossing(0.01, 0.04, 2), tmp_path, ONE, formulation="SEGMENT")
     assert done.run.verdict["guarded_increments"] > 0
     momentum = done.run.series("BODIES", "MOMENTUM")[1]          # (time, body, px py lz)
     change = np.abs(momentum.sum(1) - momentum[0].sum(0)).max()
-    # 18 nodes and 20 increments, each with Newton's rounding of a few dozen operations.
+    # 18 nodes and 25 increments, each with Newton's rounding of a few dozen operations.
     assert change <= 1e3*EPSILON*np.abs(momentum).max()
     assert "contact: guards hold nodes that the pairs do not" in done.run.log
     assert "guards hold nodes in" in done.run.log
