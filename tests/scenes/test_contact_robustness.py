@@ -184,7 +184,9 @@ def assert_sound(scene, run, initiation="PERSISTENT", deepest=0.5):
     for name, unit in (("px", scale), ("py", scale), ("lz", scale*reach)):
         assert np.abs(history[name] - history[name][0]).max() <= 1e-11*unit, name
     force = fields["contact_force"]
-    assert np.abs(force.sum(axis=1)).max() <= 256*EPSILON*np.abs(force).max()
+    # At a node that a pair and a guard hold in nearly one direction larger forces cancel.
+    rounding = 1e-11 if run.verdict["guarded_increments"] else 256*EPSILON
+    assert np.abs(force.sum(axis=1)).max() <= rounding*np.abs(force).max()
     assert depths(scene, run).max() <= deepest
 
 
