@@ -66,7 +66,8 @@ contains
       class(segment_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
 
-      self%nts%reach = self%reach
+      ! Weights ask which nodes are near: a list from earlier steps would make them depend on these.
+      self%nts%reach = 0.0_wp
       self%nts%rounding = self%rounding
       call self%nts%begin_step(x, u0, du)
       self%reach = self%nts%reach

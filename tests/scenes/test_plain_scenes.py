@@ -7,6 +7,7 @@ docs/verification.md, here are those that a fault shows in first.
 import numpy as np
 import plain_scenes
 import pytest
+from emcon import Stepper
 from plain_scenes import ALL, BOTH, ONE, SCENES, UNGUARDED, Outcome
 from scene_tools import EPSILON
 
@@ -91,3 +92,24 @@ def test_guards_keep_momenta_and_are_told(tmp_path):
     assert change <= 1e3*EPSILON*np.abs(momentum).max()
     assert "contact: guards hold nodes that the pairs do not" in done.run.log
     assert "guards hold nodes in" in done.run.log
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_what_was_near_before_changes_no_bit(tmp_path, formulation):
+    """A restart just before first contact, and a run that was asked for its gaps there."""
+    deck = plain_scenes.crossing(0.01, 0.04, 2).deck(ONE)
+    deck.set_parameter("formulation", formulation)
+    deck = deck.write(tmp_path/"scene.inp")
+    with Stepper(deck) as whole, Stepper(deck) as part:
+        whole.step()
+        whole.step()
+        whole.gaps()                             # looks for what is near, with nothing moving
+        whole.step()
+        part.step()
+        part.step()
+        part.write_restart(tmp_path/"rest.h5")
+        with Stepper.from_restart(tmp_path/"rest.h5") as again:
+            again.step()
+            assert whole.active.any()
+            assert np.array_equal(whole.u, again.u)
+            assert np.array_equal(whole.v, again.v)
