@@ -84,13 +84,14 @@ contains
 
    !> Eliminate the earlier rows from a new one and choose its pivot. A row without a fit pivot is
    !> not kept.
-   subroutine elimination_add(self, column, first, second, own, fate)
+   subroutine elimination_add(self, column, first, second, own, fate, made_of)
       type(row_elimination_t), intent(inout) :: self
       integer, intent(in) :: column(:)                  !! (entries) from 1
       real(hp), intent(in) :: first(:), second(:)       !! (entries) both kinds of the row
       integer, intent(in) :: own(:)                     !! columns to take with preference
       integer, intent(out) :: fate                      !! one of `row_`
-      real(hp) :: left(2)
+      real(hp), intent(in), optional :: made_of(2)      !! largest terms that the entries are sums of
+      real(hp) :: left(2), largest(2)
       integer :: from, k
 
       k = self%n_row + 1
@@ -100,7 +101,9 @@ contains
       call reduce(self, from, k - 1)
       left = largest_left(self)
       self%row_start(k + 1) = self%row_start(k)
-      if (any(left <= redundancy_tol*self%largest_term)) then
+      largest = self%largest_term
+      if (present(made_of)) largest = max(largest, made_of)
+      if (any(left <= redundancy_tol*largest)) then
          fate = row_redundant
          return
       end if

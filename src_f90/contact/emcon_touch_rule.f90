@@ -2,10 +2,11 @@
 !>
 !> With one side, the first along the surface of two that meet is the slave, and each node has one
 !> constraint. With both sides every node is held, also on bodies that the surface runs over; as it
-!> may touch several of them at once, it has a constraint for each class of bodies.
+!> may touch several of them at once, it has a constraint for each class of bodies. Pieces that are
+!> tied to each other are one body: they meet in the tie, and contact there would bear nothing.
 !> Source: docs/theory.md, section 4.
 module emcon_touch_rule
-   use emcon_bodies, only : bodies_find
+   use emcon_bodies, only : bodies_find_tied
    use emcon_chain, only : chain_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
@@ -36,12 +37,8 @@ contains
 
       self%both_sides = both_sides
       if (.not. both_sides) return
-      call bodies_find(scene%element_node, size(scene%x, 2), body, n_body)
+      call bodies_find_tied(scene, chain%edge, body, n_body)
       self%body = body(chain%edge(1, :))
-      if (any(self%body == 0)) then                    ! a surface of edges without elements
-         self%body = chain%part
-         n_body = size(chain%is_closed)
-      end if
       self%n_class = max(1, min(n_body, most_classes))
    end subroutine touch_rule_init
 

@@ -1,10 +1,44 @@
 !> Bodies: the parts of a mesh that hang together.
 module emcon_bodies
+   use emcon_scene, only : scene_t
    implicit none
    private
-   public :: bodies_find
+   public :: bodies_find, bodies_find_tied
 
 contains
+
+   !> Number the parts that elements, edges or ties, whose rows are frozen, hold together, in the
+   !> order of their first node.
+   pure subroutine bodies_find_tied(scene, edge, body, n_body)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: edge(:, :)                  !! (2, n_edge) of a surface
+      integer, allocatable, intent(out) :: body(:)       !! (n_node), 0: nothing hangs on it
+      integer, intent(out) :: n_body
+      integer, allocatable :: connected(:, :)
+      integer :: k, n, s, t
+
+      n = size(scene%element_node, 2) + size(edge, 2)
+      do t = 1, size(scene%tie)
+         if (allocated(scene%tie(t)%rows%slave)) n = n + size(scene%tie(t)%rows%node)
+      end do
+      allocate(connected(max(2, size(scene%element_node, 1)), n), source=0)
+      n = size(scene%element_node, 2)
+      connected(:size(scene%element_node, 1), :n) = scene%element_node
+      connected(:2, n + 1:n + size(edge, 2)) = edge
+      n = n + size(edge, 2)
+      do t = 1, size(scene%tie)
+         associate (rows => scene%tie(t)%rows)
+            if (.not. allocated(rows%slave)) cycle
+            do k = 1, size(rows%slave)
+               do s = rows%start(k) + 1, rows%start(k + 1)
+                  n = n + 1
+                  connected(:2, n) = [rows%slave(k), rows%node(s)]
+               end do
+            end do
+         end associate
+      end do
+      call bodies_find(connected(:, :n), size(scene%x, 2), body, n_body)
+   end subroutine bodies_find_tied
 
    !> Number the connected parts in the order of their first node.
    pure subroutine bodies_find(element_node, n_node, body, n_body)

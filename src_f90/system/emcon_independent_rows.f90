@@ -1,8 +1,9 @@
 !> Which constraints are independent, and for each an unknown that can be eliminated with it.
 !>
 !> The rows of discrete gradients and of gradients at the end are eliminated together, firm ones
-!> first, else in their order. What comes out depends on the present gradients only, not on earlier choices. Source:
-!> docs/theory.md, section 5.
+!> first, else in their order. What comes out depends on the present gradients only, not on earlier
+!> choices. A row is round-off also where its terms cancel before any elimination, between nodes of
+!> which one follows the other by a tie. Source: docs/theory.md, section 5.
 module emcon_independent_rows
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
@@ -34,24 +35,29 @@ contains
       type(independent_rows_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
+      real(hp) :: largest(2, set%n)
       integer :: own(2, set%n), k
 
       do k = 1, set%n
-         own(:, k) = numbering%unknown(:, set%item(k)%node(1))
+         associate (item => set%item(k), n => set%item(k)%n_node)
+            own(:, k) = numbering%unknown(:, item%node(1))
+            largest(:, k) = real([maxval(abs(item%g(:, :n))), maxval(abs(item%c(:, :n)))], hp)
+         end associate
       end do
-      call eliminate(self, set%force_rows, set%gap_rows, own, set%is_firm)
+      call eliminate(self, set%force_rows, set%gap_rows, own, largest, set%is_firm)
       ! Where no unknown serves both, only the forces tell what is redundant.
       if (.not. self%is_poor) return
-      call eliminate(self, set%force_rows, set%force_rows, own, set%is_firm)
+      call eliminate(self, set%force_rows, set%force_rows, own, largest([1, 1], :), set%is_firm)
       self%is_poor = .true.
    end subroutine independent_rows_find
 
    !> Eliminate all rows of `force` and `gap`, two matrices of one pattern, or those before the
    !> first without a good pivot; firm ones first.
-   subroutine eliminate(self, force, gap, own, is_firm)
+   subroutine eliminate(self, force, gap, own, largest, is_firm)
       type(independent_rows_t), intent(inout) :: self
       type(csr_t), intent(in) :: force, gap
       integer, intent(in) :: own(:, :)               !! (2, n) unknowns of the slave nodes
+      real(hp), intent(in) :: largest(:, :)          !! (2, n) of the terms of both, by all freedoms
       logical, intent(in) :: is_firm(:)              !! (n)
       integer :: order(size(is_firm)), i, k, fate
 
@@ -63,7 +69,8 @@ contains
          self%elimination%nearness = merge(0.0_hp, nearness, is_firm(k))
          associate (from => force%row_start(k) + 1, to => force%row_start(k + 1))
             call elimination_add(self%elimination, force%column(from:to) + 1, &
-               real(force%value(from:to), hp), real(gap%value(from:to), hp), own(:, k), fate)
+               real(force%value(from:to), hp), real(gap%value(from:to), hp), own(:, k), fate, &
+               largest(:, k))
          end associate
          self%dependent(k) = self%elimination%pivot(i)
          if (fate == row_redundant .or. fate == row_near) then

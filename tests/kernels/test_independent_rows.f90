@@ -5,6 +5,8 @@ module test_independent_rows
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find, independent_rows_t
    use emcon_kinds, only : dp, wp
+   use emcon_linear_rows, only : linear_rows_t
+   use linear_scenes, only : begin_rows, put_row
    use random_constraints, only : make_chain, make_problem, make_rows, problem_t
    implicit none
    private
@@ -22,6 +24,7 @@ contains
          test_case_t("nearly dependent is not dependent", test_nearly), &
          test_case_t("what is nearly dependent waits, unless it is firm", test_near), &
          test_case_t("a constraint without unknowns is redundant", test_prescribed), &
+         test_case_t("a constraint between tied nodes is redundant", test_tied), &
          test_case_t("a chain has the slave nodes' larger unknowns", test_chain), &
          test_case_t("entries equal by symmetry: the first", test_tie), &
          test_case_t("no unknown good for both gradients", test_no_common)]
@@ -155,6 +158,37 @@ contains
       call independent_rows_find(rows, problem%set, problem%numbering)
       call check_equal(error, rows%redundant(:rows%n_redundant), [3], "redundant constraints")
    end subroutine test_prescribed
+
+   !> Node 6 follows nodes 19 and 22, and may not move against the place between them: by their
+   !> freedoms nothing is left of row 6 but round-off.
+   subroutine test_tied(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: share = 0.1_wp, less = 0.3_wp - 0.2_wp
+      type(linear_rows_t) :: linear
+      type(problem_t) :: problem
+      type(independent_rows_t) :: rows
+      integer :: a
+
+      call begin_rows(linear)
+      do a = 1, 2
+         call put_row(linear, 10 + a, [10 + a, 36 + a, 42 + a], [1.0_wp, -share, share - 1.0_wp])
+      end do
+      call make_problem(problem, linear)
+      associate (item => problem%set%item(6))
+         call constraint_resize(item, 3)
+         item%node(:3) = [6, 19, 22]
+         item%g(:, 2) = -less*item%g(:, 1)
+         item%c(:, 2) = -less*item%c(:, 1)
+         item%g(:, 3) = (less - 1.0_wp)*item%g(:, 1)
+         item%c(:, 3) = (less - 1.0_wp)*item%c(:, 1)
+      end associate
+      call make_rows(problem)
+      associate (set => problem%set, from => problem%set%force_rows%row_start(6) + 1)
+         call check_true(error, any(abs(set%force_rows%value(from:)) > 0.0_dp), "not exactly 0")
+      end associate
+      call independent_rows_find(rows, problem%set, problem%numbering)
+      call check_equal(error, rows%redundant(:rows%n_redundant), [6], "redundant constraints")
+   end subroutine test_tied
 
    !> By x where the normal lies along x, by y where it lies along y, and always the own node.
    subroutine test_chain(error)

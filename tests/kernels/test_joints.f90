@@ -14,7 +14,8 @@ module test_joints
    use emcon_scene, only : contact_options_t, formulation_mortar, formulation_nts, &
       formulation_segment, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, scene_t, smoothing_hermite, smoothing_none
-   use emcon_text, only : to_text
+   use emcon_text, only : notes_t, to_text
+   use emcon_ties, only : ties_prepare
    use small_scenes, only : add_block, add_surface, bend_scene, block_t, bottom, left, &
       make_two_blocks, right, scene_begin, shake, top
    implicit none
@@ -40,6 +41,7 @@ contains
          test_case_t("two continuations", test_two_ways), &
          test_case_t("contact as in one piece", test_as_whole), &
          test_case_t("self-contact as in one piece", test_self), &
+         test_case_t("self-contact of both sides as in one piece", test_self_both), &
          test_case_t("nodes a little apart", test_apart), &
          test_case_t("forces of a uniform pressure", test_pressure), &
          test_case_t("identity and momenta, nodes apart", test_momenta), &
@@ -380,20 +382,41 @@ contains
       call check_true(error, n_near > 2*6*n_variant, "most are near: " // to_text(n_near))
    end subroutine test_as_whole
 
-   !> A strip bent into a U, its top inside; cut in one leg, in the bend or in the other leg.
    subroutine test_self(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: leg = 4.0_wp, radius = 0.65_wp, thickness = 0.5_wp
+
+      call compare_strips(.false., [1, n_variant], 0.65_wp, error)
+   end subroutine test_self
+
+   !> Node to segment: a node looks at nothing across the cut that it would not see in one piece.
+   subroutine test_self_both(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call compare_strips(.true., [17, 18], 0.6_wp, error)
+   end subroutine test_self_both
+
+   !> A strip bent into a U, its top inside; cut in one leg, in the bend or in the other leg.
+   subroutine compare_strips(both_sides, variants, radius, error)
+      logical, intent(in) :: both_sides
+      integer, intent(in) :: variants(2)         !! the first and the last
+      real(wp), intent(in) :: radius             !! of the bend, of the top [L]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: leg = 4.0_wp, thickness = 0.5_wp
       integer, parameter :: n = 24, n_first(3) = [4, 12, 20]
       type(scene_t) :: cut, whole
+      type(notes_t) :: notes
       real(wp) :: u(2, 2*n + 2), du(2, 2*n + 2)
       integer :: i, k, j, n_near
 
       n_near = 0
       call make_cut_strip(whole, n, n, [2.0_wp*leg + pi*radius, thickness])
+      whole%pair%both_sides = both_sides
       do k = 1, size(n_first)
          call make_cut_strip(cut, n, n_first(k), [2.0_wp*leg + pi*radius, thickness])
-         do i = 1, n_variant
+         cut%pair%both_sides = both_sides
+         call ties_prepare(cut, notes, error)
+         if (allocated(error)) return
+         do i = variants(1), variants(2)
             call shake(u, 0.01_wp)
             call shake(du, 0.02_wp)
             do j = 1, size(u, 2)
@@ -404,7 +427,8 @@ contains
             if (allocated(error)) return
          end do
       end do
-      call check_true(error, n_near > 3*6*n_variant, "a leg is near: " // to_text(n_near))
+      call check_true(error, n_near > 3*6*(1 + variants(2) - variants(1)), "a leg is near: " &
+         // to_text(n_near))
 
    contains
 
@@ -419,7 +443,7 @@ contains
          if (x(1) > leg + pi*radius) y(2) = x(1) - leg - pi*radius
       end function bent
 
-   end subroutine test_self
+   end subroutine compare_strips
 
    !> Flat surfaces; the nodes of the master's joint at x = 0 are apart along it, overlapping or
    !> with a crack between. The slave edge over it from -7/8 to 1/8 meets both sides and, but for
