@@ -129,6 +129,17 @@ def test_the_library_keeps_its_flags_below_the_kernel_tests(tree):
     assert " -O0 " in commands["main"]
 
 
+def test_the_kernel_tests_are_compiled_once(tree):
+    """With the checks of `debug`, and linked with the library of either mode."""
+    tree.make("kernels")
+    assert set(tree.make("MODE=debug", "kernels")) == {
+        "emcon_beside", "emcon_low", "emcon_middle", "emcon_top",
+    }  # fmt: skip
+    (tree.folder / "tests/kernels/main.f90").touch()
+    assert " -fcheck=all," in tree.make("MODE=debug", "kernels")["main"]
+    assert not tree.make("kernels")
+
+
 def test_a_dry_run_ends_and_makes_nothing(tmp_path):
     """Each file is told once: a recipe that calls make would tell it on every way through it."""
     tree = Tree(tmp_path)
