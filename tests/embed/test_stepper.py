@@ -79,12 +79,12 @@ def test_models_in_threads_give_the_bits_of_one_alone() -> None:
             return totals, ring.u
 
     formulations = ["NODE TO SURFACE", "MORTAR", "SEGMENT", "NODE TO SURFACE", "MORTAR"]
-    alone = [run(formulation) for formulation in formulations]
+    alone = {formulation: run(formulation) for formulation in set(formulations)}
     with ThreadPoolExecutor(len(formulations)) as pool:
         together = list(pool.map(run, formulations))
-    for (totals, u), (other_totals, other_u) in zip(alone, together):
-        assert totals == other_totals
-        assert np.array_equal(u, other_u)
+    for formulation, (totals, u) in zip(formulations, together):
+        assert totals == alone[formulation][0]
+        assert np.array_equal(u, alone[formulation][1])
 
 
 def test_closed_models_leave_no_memory(tmp_path: Path) -> None:
