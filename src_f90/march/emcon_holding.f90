@@ -8,14 +8,15 @@
 module emcon_holding
    use emcon_constraints, only : constraint_set_t
    use emcon_first_touch, only : touch_time
+   use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_holding_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, gaps_nearest, &
       gaps_next_to_close, gaps_that_can_act, in_the_way
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : loads_add
    use emcon_numbering, only : add_to_dofs
-   use emcon_rigid_bodies, only : find_assemblies, find_free_motions, rigid_bodies_find, &
-      rigid_bodies_t, rigid_field, rigid_force, rigid_rows_append, rigid_rows_find, rigid_rows_t
+   use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t, rigid_field, rigid_force
    use emcon_rigid_motion, only : describe_motion
+   use emcon_rigid_rows, only : rigid_rows_append, rigid_rows_find, rigid_rows_t
    use emcon_scene, only : scene_t
    use emcon_system, only : pose_t, system_stiffen, system_t
    implicit none

@@ -2,10 +2,11 @@
 module emcon_rigid_motion
    use emcon_bodies, only : bodies_find
    use emcon_errors, only : error_t
+   use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_null_space
-   use emcon_rigid_bodies, only : find_assemblies, find_free_motions, motions_as_one, &
-      rigid_bodies_find, rigid_bodies_t, rigid_rows_find, rigid_rows_t
+   use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t, rigid_motions_as_one
+   use emcon_rigid_rows, only : rigid_rows_find, rigid_rows_t
    use emcon_scene, only : prescribed_t, scene_t
    use emcon_system, only : system_t
    use emcon_text, only : joined, string_t, to_text
@@ -187,7 +188,7 @@ contains
       n = count(member <= bodies%n_mesh)
       if (n == 0) n = size(member)
       allocate(a(3*n, 3 + size(z, 2)))
-      a(:, :3) = motions_as_one(bodies, member(:n))/sqrt(real(n, dp))
+      a(:, :3) = rigid_motions_as_one(bodies, member(:n))/sqrt(real(n, dp))
       a(:, 4:) = -z(:3*n, :)
       text = "move"
       call find_null_space(a, tol, both, error)

@@ -2,10 +2,11 @@
 module test_rigid_bodies
    use check, only : check_equal, test_case_t
    use emcon_errors, only : error_t
+   use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_rank
-   use emcon_rigid_bodies, only : find_assemblies, find_free_motions, rigid_bodies_find, &
-      rigid_bodies_t, rigid_rows_t
+   use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t
+   use emcon_rigid_rows, only : rigid_rows_t
    use emcon_scene, only : scene_t
    use emcon_system, only : system_init, system_t
    use small_scenes, only : add_block, block_t, make_block
