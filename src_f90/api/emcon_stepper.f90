@@ -18,7 +18,8 @@ module emcon_stepper
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_append, notes_t, string_t, to_text
-   use emcon_ties, only : ties_move_nodes, ties_prepare
+   use emcon_tie_moves, only : ties_move_nodes
+   use emcon_ties, only : ties_prepare
    implicit none
    private
    public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &

@@ -2,9 +2,9 @@
 module emcon_deck_contact
    use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, drop_zeros, &
       get_real, next_line, refuse_lines
+   use emcon_deck_named, only : find_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
       option_name, reader_t, refuse_option
-   use emcon_deck_sets, only : find_set, set_names
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_kinds, only : wp

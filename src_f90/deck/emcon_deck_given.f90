@@ -1,7 +1,7 @@
 !> *GIVEN FORCES: nodes whose forces and mass come from the program that reads the deck.
 module emcon_deck_given
+   use emcon_deck_named, only : find_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
-   use emcon_deck_sets, only : find_set, set_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_scene, only : scene_t

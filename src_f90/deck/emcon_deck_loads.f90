@@ -4,9 +4,9 @@ module emcon_deck_loads
       put_prescribed
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, get_real, is_blank, next_line
+   use emcon_deck_named, only : get_elements, get_nodes
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
       refuse_option
-   use emcon_deck_sets, only : get_elements, get_nodes
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds

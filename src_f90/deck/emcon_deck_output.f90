@@ -3,9 +3,9 @@
 !> Requests carry over to later steps until a step has a request of the same kind.
 module emcon_deck_output
    use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, get_name, next_line
+   use emcon_deck_named, only : find_set, hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, reader_t, refuse_option
-   use emcon_deck_sets, only : find_set, hint_at_set, set_names
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_scene, only : named_set_t, output_contact_file, output_contact_print, &

@@ -1,17 +1,18 @@
-!> Node and element sets, and what stands for nodes or elements elsewhere: a label or a set.
+!> Node and element sets: all cards that make or fill them.
 module emcon_deck_sets
-   use emcon_deck_labels, only : find_label, label_map_t, label_range
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_label, next_line
+   use emcon_deck_labels, only : find_label, label_map_t, label_range
+   use emcon_deck_named, only : find_set, refuse_name, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_scene, only : named_set_t, scene_t
    use emcon_sort, only : unique_sorted
-   use emcon_text, only : string_t, to_text
+   use emcon_text, only : to_text
    implicit none
    private
-   public :: read_sets, find_set, set_names, hint_at_set, get_nodes, get_elements, get_lines
+   public :: read_sets
 
    !> A list that grows by doubling.
    type :: growing_t
@@ -305,147 +306,5 @@ contains
          end associate
       end do
    end subroutine finish
-
-   !> Index of the set called `name`, 0 if there is none.
-   pure integer function find_set(set, name)
-      type(named_set_t), intent(in) :: set(:)
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      do i = 1, size(set)
-         if (len(set(i)%name) /= len(name)) cycle
-         if (set(i)%name == name) then
-            find_set = i
-            return
-         end if
-      end do
-      find_set = 0
-   end function find_set
-
-   pure function set_names(set) result(list)
-      type(named_set_t), intent(in) :: set(:)
-      type(string_t) :: list(size(set))
-      integer :: i
-
-      do i = 1, size(set)
-         list(i)%text = set(i)%name
-      end do
-   end function set_names
-
-   !> What a message says of the unknown name of a set: it holds lines, or another is near to it.
-   subroutine hint_at_set(reader, what, name, known, hint)
-      type(reader_t), intent(in) :: reader
-      character(len=*), intent(in) :: what         !! "node set" or "element set"
-      character(len=*), intent(in) :: name
-      type(string_t), intent(in) :: known(:)
-      character(len=:), allocatable, intent(out) :: hint
-
-      hint = suggestion(name, known)
-      if (what /= "element set") return
-      if (find_set(reader%line_set, name) > 0) hint = &
-         ": it holds lines, which have no stiffness; only *SURFACE and *NSET may name it"
-   end subroutine hint_at_set
-
-   subroutine refuse_name(reader, data, what, name, known)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      character(len=*), intent(in) :: what, name
-      type(string_t), intent(in) :: known(:)
-      character(len=:), allocatable :: hint
-
-      if (reader%doubt_names) then
-         data%ok = .false.
-      else
-         call hint_at_set(reader, what, name, known, hint)
-         call data_error(reader, data, "unknown " // what // " " // quoted(name) // hint)
-      end if
-   end subroutine refuse_name
-
-   !> The nodes that field `k` names by label or set; none, with `data%ok` false, if it is wrong.
-   subroutine get_nodes(reader, data, k, scene, item)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      integer, intent(in) :: k
-      type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(out) :: item(:)
-
-      call get_items(reader, data, k, "node", scene%node_set, item)
-   end subroutine get_nodes
-
-   !> The elements that field `k` names by label or set.
-   subroutine get_elements(reader, data, k, scene, item)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      integer, intent(in) :: k
-      type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(out) :: item(:)
-
-      call get_items(reader, data, k, "element", scene%element_set, item)
-   end subroutine get_elements
-
-   !> The lines that field `k` names by label or set; none if it names none.
-   subroutine get_lines(reader, data, k, line)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      integer, intent(in) :: k
-      integer, allocatable, intent(out) :: line(:)
-      character(len=:), allocatable :: name
-      integer :: i
-
-      allocate(line(0))
-      if (is_label(data, k)) then
-         call get_integer(reader, data, k, "element label", i)
-         i = find_label(reader%element_map, i)
-         if (i < 0) line = [-i]
-      else
-         call get_name(reader, data, k, "element label or set", name)
-         i = find_set(reader%line_set, name)
-         if (i > 0) line = reader%line_set(i)%item
-      end if
-   end subroutine get_lines
-
-   subroutine get_items(reader, data, k, what, set, item)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      integer, intent(in) :: k
-      character(len=*), intent(in) :: what         !! "node" or "element"
-      type(named_set_t), intent(in) :: set(:)
-      integer, allocatable, intent(out) :: item(:)
-      character(len=:), allocatable :: name
-      integer :: label, i
-      logical :: is_doubted
-
-      allocate(item(0))
-      if (is_label(data, k)) then
-         call get_integer(reader, data, k, what // " label", label)
-         if (.not. data%ok) return
-         if (what == "node") then
-            i = find_label(reader%node_map, label)
-            is_doubted = reader%doubt_nodes
-         else
-            i = find_label(reader%element_map, label)
-            is_doubted = reader%doubt_elements
-         end if
-         if (i > 0) then
-            item = [i]
-         else if (i < 0) then
-            call data_error(reader, data, "element " // to_text(label) // " is a line: it bounds " &
-               // "surfaces and has no stiffness")
-         else if (is_doubted) then
-            data%ok = .false.
-         else
-            call data_error(reader, data, what // " " // to_text(label) // " does not exist")
-         end if
-      else
-         call get_name(reader, data, k, what // " label or set", name)
-         if (.not. data%ok) return
-         i = find_set(set, name)
-         if (i > 0) then
-            item = set(i)%item
-         else
-            call refuse_name(reader, data, what // " set", name, set_names(set))
-         end if
-      end if
-   end subroutine get_items
 
 end module emcon_deck_sets

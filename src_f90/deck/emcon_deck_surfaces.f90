@@ -4,9 +4,9 @@ module emcon_deck_surfaces
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_blank, next_line
    use emcon_deck_labels, only : find_label
+   use emcon_deck_named, only : get_elements, get_lines, get_nodes
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
-   use emcon_deck_sets, only : get_elements, get_lines, get_nodes
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
