@@ -70,7 +70,9 @@ contains
          do k = 1, size(scene%pair)
             call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact, how)
             call add("contact: " // scene%surface(scene%pair(k)%slave)%name // " (slave, " // &
-               to_text(system%contact(k)%contact%n_constraint) // " nodes) on " // &
+               to_text(system%contact(k)%contact%n_constraint) // " nodes" // &
+               trim(merge(", the rounder one", "                 ", &
+               scene%pair(k)%is_exchanged)) // ") on " // &
                scene%surface(scene%pair(k)%master)%name // ", " // how)
          end do
          if (system%n_pair < size(system%contact)) call add("contact: guards hold nodes that the " // &

@@ -5,7 +5,7 @@
 module emcon_deck
    use emcon_deck_cards, only : read_cards
    use emcon_deck_check, only : check_materials, check_nodes
-   use emcon_deck_check_contact, only : check_pairs
+   use emcon_deck_check_contact, only : check_pairs, choose_slaves
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
@@ -83,15 +83,16 @@ contains
       call read_pairs(reader, scene)
       call read_ties(reader, scene)
       call read_general_contact(reader, scene)
-      call guards_find(scene%pair, scene%surface, scene%guard)
       call read_equations(reader, scene)
       call read_steps(reader, scene)
       call check_shapes(reader, scene)
       call check_materials(reader, scene)
       call check_nodes(reader, scene)
       call check_surfaces(reader, scene)
+      call choose_slaves(reader, scene)
       call check_pairs(reader, scene)
       call check_ties(reader, scene)
+      call guards_find(scene%pair, scene%surface, scene%guard)
    end subroutine read_scene
 
    !> Keywords without data lines are followed by none.

@@ -1,6 +1,8 @@
 !> The contact pairs, as far as they can be judged before anything moves.
+!>
+!> Which surface is the slave: docs/theory.md, section 4.12.
 module emcon_deck_check_contact
-   use emcon_deck_check_sides, only : check_sides
+   use emcon_deck_check_sides, only : find_advice
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
@@ -9,9 +11,62 @@ module emcon_deck_check_contact
    use emcon_surface_edges, only : surface_edges
    implicit none
    private
-   public :: check_pairs
+   public :: choose_slaves, check_pairs
 
 contains
+
+   !> Exchange slave and master where the program may choose and the slave would push its master
+   !> sideways, unless more slave nodes than before could not follow. It is told if not asked for.
+   subroutine choose_slaves(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(contact_pair_t) :: other
+      character(len=:), allocatable :: advice
+      logical :: is_bent
+      integer :: i
+
+      if (reader%doubt_shapes .or. reader%log%n_errors > 0) return
+      do i = 1, size(scene%pair)
+         associate (pair => scene%pair(i))
+            if (.not. pair%may_exchange .or. pair%slave == 0 .or. pair%master == 0) cycle
+            if (pair%slave == pair%master .or. has_reverse(scene%pair, i)) cycle
+            call find_advice(scene, pair, advice, is_bent)
+            if (.not. is_bent) cycle
+            other = exchanged(pair)
+            if (n_stuck(scene, other) > n_stuck(scene, pair)) cycle
+            if (.not. pair%is_asked) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: " &
+               // "slave surface " // scene%surface(pair%slave)%name // advice &
+               // ", and is; SIDES=ONE keeps the order")
+            pair = other
+         end associate
+      end do
+   end subroutine choose_slaves
+
+   !> `pair` with its master as the slave.
+   pure type(contact_pair_t) function exchanged(pair)
+      type(contact_pair_t), intent(in) :: pair
+
+      exchanged = pair
+      exchanged%slave = pair%master
+      exchanged%master = pair%slave
+      exchanged%is_exchanged = .true.
+   end function exchanged
+
+   !> So many slave nodes cannot follow their master freely in some step.
+   pure integer function n_stuck(scene, pair)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      logical :: is_slave(size(scene%node_label)), is_stuck(size(scene%node_label))
+      integer :: i
+
+      is_slave = .false.
+      is_stuck = .false.
+      call mark_nodes(scene, scene%surface(pair%slave), is_slave)
+      do i = 1, size(scene%step)
+         is_stuck = is_stuck .or. constraint_freedom(scene, scene%step(i), pair) < scene%n_dim
+      end do
+      n_stuck = count(is_slave .and. is_stuck)
+   end function n_stuck
 
    !> The surfaces of contact pairs: without common nodes, free to move, the slave the smaller one.
    subroutine check_pairs(reader, scene)
@@ -26,11 +81,31 @@ contains
          if (scene%pair(i)%is_reverse) cycle
          call check_common_nodes(reader, scene, scene%pair(i), has_common)
          call check_freedom(reader, scene, scene%pair(i))
-         if (.not. (has_common .or. has_reverse(scene%pair, i))) then
-            call check_sides(reader, scene, scene%pair(i))
-         end if
+         if (has_common .or. has_reverse(scene%pair, i)) cycle
+         if (reader%log%n_errors == 0) call check_sides(reader, scene, scene%pair(i))
       end do
    end subroutine check_pairs
+
+   !> Warn of a slave surface that should be the master, or a finer one.
+   subroutine check_sides(reader, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable :: advice
+      logical :: is_bent
+
+      if (pair%both_sides .or. pair%is_exchanged .or. pair%slave == pair%master) return
+      call find_advice(scene, pair, advice, is_bent)
+      if (advice == "") return
+      if (n_stuck(scene, exchanged(pair)) > n_stuck(scene, pair)) then
+         advice = advice // ", but has nodes that cannot follow: refine " &
+            // scene%surface(pair%slave)%name
+      else
+         advice = advice // ": swap the two"
+      end if
+      call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave surface " &
+         // scene%surface(pair%slave)%name // advice)
+   end subroutine check_sides
 
    !> Two surfaces of a pair must not share nodes; a surface in contact with itself is one surface.
    subroutine check_common_nodes(reader, scene, pair, has_common)

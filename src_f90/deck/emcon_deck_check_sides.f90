@@ -1,23 +1,23 @@
-!> Which of two surfaces should be the slave: the smaller one, and the one that shows its shape.
+!> Which of two surfaces should be the slave: the one whose edges see less of the other's shape.
 !>
-!> Source: docs/verification.md, a slave surface that is too coarse.
+!> Source: docs/theory.md, section 4.12; docs/verification.md, a slave surface that is too coarse.
 module emcon_deck_check_sides
-   use emcon_deck_reader, only : reader_t
-   use emcon_diagnostics, only : add_warning
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, scene_t, surface_t
    use emcon_surface_edges, only : surface_edges
    use emcon_text, only : to_text
    implicit none
    private
-   public :: check_sides
+   public :: find_advice
 
-   !> A slave surface longer than this times its master gives a warning: force leaks where it
-   !> reaches beyond. The rest is room for curved surfaces on straight ones.
+   !> A slave surface longer than this times its master: force leaks where it reaches beyond. The
+   !> rest is room for curved surfaces on straight ones.
    real(wp), parameter :: large_ratio = 1.25_wp
-   !> Slave edges longer than this times those of the master, or that see it turn by more than this
-   !> angle, give one: they push along the surface.
-   real(wp), parameter :: coarse_ratio = 1.6_wp, seen_turn = 20.0_wp
+   !> Slave edges that see the master turn by more than this angle, and by this times as much as the
+   !> other way round, push along the surface; so do edges longer by this, at corners [degrees].
+   real(wp), parameter :: coarse_ratio = 1.6_wp, seen_turn = 10.0_wp
+   !> Surfaces whose edges see less of each other are flat to them [degrees].
+   real(wp), parameter :: flat_turn = 5.0_wp
    !> Where a surface turns by more, it has a corner [degrees].
    real(wp), parameter :: corner = 60.0_wp
 
@@ -31,16 +31,18 @@ module emcon_deck_check_sides
 
 contains
 
-   !> Warn of a slave surface that should be the master.
-   subroutine check_sides(reader, scene, pair)
-      type(reader_t), intent(inout) :: reader
+   !> Why the slave of `pair` should be the master, to follow on its name; empty if it should not.
+   subroutine find_advice(scene, pair, advice, is_bent)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable, intent(out) :: advice
+      logical, intent(out) :: is_bent            !! because the slave sees its master turn
       type(shape_t) :: slave, master
-      real(wp) :: ratio
+      real(wp) :: ratio, seen(2)
       integer :: power
 
-      if (reader%doubt_positions) return
+      advice = ""
+      is_bent = .false.
       if (scene%surface(pair%slave)%is_nodal .or. scene%surface(pair%master)%is_nodal) return
       ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
       power = -exponent(maxval(abs(scene%x)))
@@ -48,33 +50,25 @@ contains
       master = shape_of(scene, scene%surface(pair%master), power)
       if (master%length <= 0.0_wp .or. slave%length <= 0.0_wp) return
       ratio = min(slave%mean/master%mean, slave%shortest/master%shortest)
-      if (slave%length > large_ratio*master%length) then
-         if (coarse_ratio*slave%mean < master%mean) return
-         call warn(" is " // to_text(slave%length/master%length, 3) // " times as long as " &
-            // "master surface " // scene%surface(pair%master)%name // "; the smaller one should " &
-            // "be the slave: swap the two")
-      else if (pair%both_sides) then
-         return
-      else if (ratio > coarse_ratio) then
-         call warn(" has edges " // to_text(ratio, 3) // " times as long as those of master " &
-            // "surface " // scene%surface(pair%master)%name // " and would push it sideways; " &
-            // "the finer one should be the slave: swap the two")
-      else if (ratio*master%turn > seen_turn .and. ratio*slave%turn < seen_turn) then
-         call warn(" has edges over which master surface " // scene%surface(pair%master)%name &
-            // " turns by " // to_text(ratio*master%turn, 3) // " degrees and would push it " &
-            // "sideways; the rounder one should be the slave: swap the two")
-      end if
-
-   contains
-
-      subroutine warn(what)
-         character(len=*), intent(in) :: what
-
-         call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave surface " &
-            // scene%surface(pair%slave)%name // what)
-      end subroutine warn
-
-   end subroutine check_sides
+      seen = [ratio*master%turn, slave%turn/ratio]
+      if (seen(2) > max(seen(1), flat_turn)) return
+      is_bent = seen(1) > max(seen_turn, coarse_ratio*seen(2))
+      associate (name => scene%surface(pair%master)%name)
+         if (is_bent) then
+            advice = " has edges over which master surface " // name // " turns by " &
+               // to_text(seen(1), 3) // " degrees and would push it sideways; the rounder one " &
+               // "should be the slave"
+         else if (slave%length > large_ratio*master%length) then
+            if (coarse_ratio*slave%mean < master%mean) return
+            advice = " is " // to_text(slave%length/master%length, 3) // " times as long as " &
+               // "master surface " // name // "; the smaller one should be the slave"
+         else if (ratio > coarse_ratio) then
+            advice = " has edges " // to_text(ratio, 3) // " times as long as those of master " &
+               // "surface " // name // " and would push its corners sideways; the finer one " &
+               // "should be the slave"
+         end if
+      end associate
+   end subroutine find_advice
 
    !> The shape of `surface`, lengths times 2**`power`.
    pure function shape_of(scene, surface, power) result(shape)

@@ -90,8 +90,8 @@ contains
       type(contact_pair_t), allocatable :: pair(:)
       type(origin_t), allocatable :: line(:)       !! of each pair
       type(data_t) :: data
-      integer :: formulation, i, n, n_before, most
-      logical :: both_sides
+      type(contact_pair_t) :: common
+      integer :: i, n, n_before, most
 
       most = 0
       do i = 1, size(reader%card)
@@ -104,19 +104,18 @@ contains
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "CONTACTPAIR") cycle
          n_before = n
-         call read_formulation(reader, reader%card(i), formulation)
-         call read_sides(reader, reader%card(i), formulation, both_sides)
+         common = contact_pair_t(origin=reader%card(i)%origin)
+         call read_formulation(reader, reader%card(i), common%formulation)
+         call read_sides(reader, reader%card(i), common)
          call data_open(data, reader%card(i))
          do while (next_line(reader, data))
             n = n + 1
             line(n) = line_origin(reader, data%i_line)
-            pair(n)%origin = reader%card(i)%origin
-            pair(n)%formulation = formulation
-            pair(n)%both_sides = both_sides
+            pair(n) = common
             call get_surfaces(reader, data, scene, pair(n)%slave, pair(n)%master)
             call check_nodal(reader, data, scene, pair(n))
             call check_repeated(reader, data, scene, pair(:n), line)
-            if (.not. both_sides .or. pair(n)%slave == pair(n)%master) cycle
+            if (.not. common%both_sides .or. pair(n)%slave == pair(n)%master) cycle
             n = n + 1
             line(n) = line(n - 1)
             pair(n) = reversed(pair(n - 1))
@@ -149,26 +148,32 @@ contains
       end select
    end subroutine read_formulation
 
-   !> SIDES of a card: are the nodes of both surfaces held? Integrated gaps of both would hold the
-   !> same covered lengths twice.
-   subroutine read_sides(reader, card, formulation, both_sides)
+   !> SIDES of a card: are the nodes of both surfaces held, or of which one? Integrated gaps of both
+   !> would hold the same covered lengths twice. ADJUST speaks of the slave, and so names it.
+   subroutine read_sides(reader, card, common)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      integer, intent(in) :: formulation
-      logical, intent(out) :: both_sides
+      type(contact_pair_t), intent(inout) :: common
+      character(len=*), parameter :: known = "AUTO, ONE, BOTH"
 
-      both_sides = .false.
       select case (option_name(card, "SIDES"))
-      case ("", "ONE")
+      case ("")
+         common%may_exchange = .not. has_option(card, "ADJUST")
+      case ("AUTO")
+         common%may_exchange = .true.
+         common%is_asked = .true.
+         if (has_option(card, "ADJUST")) call refuse_option(reader, card, "SIDES", known, &
+            "ADJUST moves the nodes of the slave; say which one it is by SIDES=ONE")
+      case ("ONE")
          continue
       case ("BOTH")
-         both_sides = formulation == formulation_nts
-         if (any(formulation == [formulation_segment, formulation_mortar])) then
-            call refuse_option(reader, card, "SIDES", "ONE", "SEGMENT and MORTAR hold what lies " &
-               // "between the surfaces once; use TYPE=NODE TO SURFACE")
+         common%both_sides = common%formulation == formulation_nts
+         if (any(common%formulation == [formulation_segment, formulation_mortar])) then
+            call refuse_option(reader, card, "SIDES", "AUTO, ONE", "SEGMENT and MORTAR hold what " &
+               // "lies between the surfaces once; use TYPE=NODE TO SURFACE")
          end if
       case default
-         call refuse_option(reader, card, "SIDES", "ONE, BOTH", "")
+         call refuse_option(reader, card, "SIDES", known, "")
       end select
    end subroutine read_sides
 

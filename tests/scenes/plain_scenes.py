@@ -63,6 +63,7 @@ class Scene:
         self.h, self.t_end, self.gravity = h, t_end, gravity
         self.part, self.cards, self.held, self.alone = {}, [], [], set()
         self.pairs = []                # (slave, master); empty: each with all that come after it
+        self.keeps_order = False       # slaves are those of `pairs`, whatever their shapes
         self.n_node = self.n_element = 0
 
     # ---- bodies
@@ -130,6 +131,7 @@ class Scene:
         pairs = self.pairs or [(a, b) for k, a in enumerate(names) for b in names[k + 1:]]
         card = "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=<formulation>"
         card += {BOTH: ", SIDES=BOTH", UNGUARDED: ", GUARD=NO"}.get(sides, "")
+        card += ", SIDES=ONE" if self.keeps_order and sides != BOTH else ""
         lines = [f"{card}\n{slave}, {master}" for slave, master in pairs]
         if sides == ALL:
             lines = ["*CONTACT", "*CONTACT INCLUSIONS, ALL EXTERIOR"]
@@ -391,12 +393,13 @@ def slave_floor(floor=(8, 2)):
     scene.block("FLOOR", (-1.0, -0.5), (2.0, 0.5), floor).hold("FLOOR", below(-0.5))
     scene.side("TOP", "FLOOR", lambda _, y: y > -1e-9)
     scene.pairs = [("TOP", "DISC")]
+    scene.keeps_order = True
     return scene
 
 
-def disc_on_floor(ratio, place, slave="FLOOR"):
+def disc_on_floor(ratio, place, slave="TOP"):
     """A disc falls straight on a stiff floor whose edges are `ratio` times as long as its own,
-    `place` edges beside a node; nothing about it is symmetric."""
+    `place` edges beside a node; nothing about it is symmetric. Slave: TOP of the floor or DISC."""
     n = 8
     edge = ratio*math.pi/(4*n)
     cells = 2*math.ceil(0.4/edge)
@@ -405,7 +408,7 @@ def disc_on_floor(ratio, place, slave="FLOOR"):
     scene.block("FLOOR", ((place - cells/2)*edge, -0.25), (cells*edge, 0.25), (cells, 2),
                 stiffness=1e4)
     scene.hold("FLOOR", below(-0.25)).side("TOP", "FLOOR", lambda _, y: y > -1e-9)
-    scene.pairs = [("TOP", "DISC") if slave == "FLOOR" else ("DISC", "TOP")]
+    scene.pairs = [("TOP", "DISC") if slave == "TOP" else ("DISC", "TOP")]
     return scene
 
 
@@ -439,6 +442,13 @@ SCENES = {
     "drop": drop, "slave floor": slave_floor, "twin": twin, "punch": punch,
     "edge along edge": edge_along_edge,
 }
+
+
+def slanted(run):
+    """Sideways momentum of the first body after the contact, by that upwards it was given."""
+    _, momentum = run.series("BODIES", "MOMENTUM")
+    first = momentum[:, 0, :]
+    return abs(first[-1, 0])/(first[-1, 1] - first[0, 1])
 
 
 # ---- runs ---------------------------------------------------------------------------------------

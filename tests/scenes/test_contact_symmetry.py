@@ -96,7 +96,7 @@ def scene(lower, upper, pair, h, t_end, velocity=(0.0, -1.0)):
         "*INITIAL CONDITIONS, TYPE=VELOCITY",
         *(f"{k}, {axis}, {number(v)}" for k in above.x for axis, v in enumerate(velocity, 1) if v),
         "*SURFACE INTERACTION, NAME=SMOOTH",
-        "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=<formulation>", ", ".join(pair),
+        "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=<formulation>, SIDES=ONE", ", ".join(pair),
         "*STEP, NLGEOM", "*DYNAMIC, DIRECT", f"{number(h)}, {number(t_end)}",
         "*CONTACT INITIATION, TYPE=<initiation>",
         "*MORTAR, INTEGRATION=<integration>, MULTIPLIER=<multiplier>, NORMAL=<normal>",
