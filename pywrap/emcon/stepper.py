@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,13 +34,18 @@ _SAME_TIME = 64*np.finfo(float).eps
 
 @dataclass(frozen=True)
 class Increment:
-    """What one increment took: h and time in the deck's units, and counts."""
+    """What one increment took: h and time in the deck's units, and counts.
+
+    `penetration` is the deepest that geometry found at its end, per edge: both ways, nodes and
+    edges of all surfaces in contact.
+    """
 
     h: float
     time: float
     newton: int
     cuts: int
     active: int
+    penetration: float
 
 
 @dataclass(frozen=True)
@@ -151,10 +157,10 @@ class Stepper(Queries, Conditions):
         not help: with `h` the state is that before the call, else that of the last part.
         """
         if h is None:
-            counts, times = self._handle.change(_state.advance)
+            counts, values = self._handle.change(_state.advance)
         else:
-            counts, times = self._handle.change(_state.step, positive(h, "h"))
-        return Increment(float(times[0]), float(times[1]), *(int(count) for count in counts))
+            counts, values = self._handle.change(_state.step, positive(h, "h"))
+        return Increment(float(values[0]), float(values[1]), *map(int, counts), float(values[2]))
 
     def next_step(self) -> None:
         """Begin the next step of the deck at the present time, wherever that is."""
@@ -320,6 +326,18 @@ class Stepper(Queries, Conditions):
         total, active = self._handle.call(_state.get_pairs, self.n_pair)
         return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n))
                 for row, n in zip(total.T, active)]
+
+    def verdict(self) -> dict[str, Any]:
+        """The verdict on the increments that led to this state: `NAME.json` of a run of the deck.
+
+        "verdict" is "good" or "bad", "reasons" say why; with them stand the penetration that
+        geometry found, the stand-off, the largest residual accepted, the energy error, and
+        "warnings". A state that is restored has the verdict it had.
+        """
+        length = int(self._handle.call(_state.ask_verdict))
+        text = self._handle.call(_state.get_verdict, length)
+        verdict: dict[str, Any] = json.loads(text.decode("utf-8", "replace"))
+        return verdict
 
     @property
     def ledger(self) -> dict[str, float]:

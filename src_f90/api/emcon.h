@@ -25,7 +25,7 @@ extern "C" {
 /* Numbers follow semantic versioning: a program runs with every library of its major version (of
  * its minor version as long as the major one is 0) that is not older than the header it saw. */
 #define EMCON_VERSION_MAJOR 0
-#define EMCON_VERSION_MINOR 2
+#define EMCON_VERSION_MINOR 3
 #define EMCON_VERSION_PATCH 0
 
 /* What functions return; the same numbers as the exit codes of the program. */
@@ -67,6 +67,7 @@ typedef struct emcon_increment {
    int n_newton;     /* iterations, over all cuts and active sets */
    int n_cut;
    int n_active;     /* contacts */
+   double penetration;  /* the deepest that geometry found at its end, per edge */
 } emcon_increment;
 
 typedef struct emcon_ledger {
@@ -236,6 +237,12 @@ int emcon_get_sizes(emcon_model *model, emcon_sizes *sizes);
 
 int emcon_get_time(emcon_model *model, double *time);
 int emcon_get_ledger(emcon_model *model, emcon_ledger *ledger);
+
+/* The verdict on the increments that led to this state, of whichever function: is the balance
+ * closed, nothing behind a surface, every residual within the tolerance? `*json` is what a run of
+ * the deck leaves in NAME.json, one line; it belongs to the model and is valid until this is asked
+ * again, or the model is closed. A snapshot holds its verdict. */
+int emcon_get_verdict(emcon_model *model, int *is_good, const char **json);
 
 /* Labels of the nodes, n_node. */
 int emcon_get_labels(emcon_model *model, int n_node, int *label);

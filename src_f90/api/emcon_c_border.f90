@@ -208,6 +208,7 @@ contains
       as_increment%n_newton = made%n_newton
       as_increment%n_cut = made%n_cut
       as_increment%n_active = made%n_active
+      as_increment%penetration = real(made%overlap%depth, c_double)
    end function as_increment
 
    !> Let C see a matrix in its place.

@@ -1,15 +1,18 @@
 !> The C interface: what a model holds. What each function does is said in emcon.h.
 module emcon_c_state
-   use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_ptr
-   use emcon_c_border, only : check_count, find_built, find_read, put_field, put_numbers, put_values
+   use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, c_ptr
+   use emcon_c_border, only : c_string, check_count, find_built, find_read, put_field, put_number, &
+      put_numbers, put_values
    use emcon_c_types, only : ledger_c, sizes_c
    use emcon_errors, only : err_none, error_t
    use emcon_handle, only : handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_stepper_query, only : query_momenta
+   use emcon_verdict_file, only : verdict_so_far
    implicit none
    private
-   public :: emcon_get_sizes, emcon_get_time, emcon_get_ledger, emcon_get_labels
+   public :: emcon_get_sizes, emcon_get_time, emcon_get_ledger, emcon_get_verdict, &
+      emcon_get_labels
    public :: emcon_get_positions, emcon_get_state, emcon_get_multipliers, emcon_get_contact
    public :: emcon_get_pairs, emcon_get_momenta
 
@@ -68,6 +71,22 @@ contains
          to%stabilization = real(from%stabilization, c_double)
       end associate
    end function emcon_get_ledger
+
+   integer(c_int) function emcon_get_verdict(handle, is_good, json) bind(c)
+      type(c_ptr), value :: handle, is_good, json
+      type(model_t), pointer :: model
+      type(c_ptr), pointer :: place
+      logical :: holds
+
+      call find_built(handle, model, emcon_get_verdict)
+      if (emcon_get_verdict /= err_none) return
+      call verdict_so_far(model%stepper%verdict, model%stepper%march, model%verdict, holds)
+      call put_number(merge(1, 0, holds), is_good)
+      if (.not. c_associated(json)) return
+      model%c_verdict = c_string(model%verdict)
+      call c_f_pointer(json, place)
+      place = c_loc(model%c_verdict)
+   end function emcon_get_verdict
 
    integer(c_int) function emcon_get_labels(handle, n_node, label) bind(c)
       type(c_ptr), value :: handle, label

@@ -14,6 +14,7 @@ module emcon_c_types
    type, bind(c) :: increment_c
       real(c_double) :: h, time
       integer(c_int) :: n_newton, n_cut, n_active
+      real(c_double) :: penetration
    end type increment_c
 
    type, bind(c) :: ledger_c

@@ -12,19 +12,22 @@ module emcon_flat_state
    use emcon_stepper_conditions, only : conditions_load, conditions_save
    use emcon_stepper_free, only : snapshot_t, stepper_check_open, stepper_next_step, &
       stepper_restore, stepper_set_state, stepper_snapshot, stepper_step
+   use emcon_verdict_file, only : verdict_so_far
    implicit none
    private
    public :: advance, step, next_step, is_done, get_progress, get_field, set_state
    public :: get_contact, get_contact_values, get_pairs, get_ledger
+   public :: ask_verdict, get_verdict
    public :: save_state, restore_state, free_state, write_restart, read_restart
 
 contains
 
-   !> One increment. `counts`: Newton iterations, cuts, active constraints; `times`: h, time.
-   subroutine advance(handle, counts, times, ierr)
+   !> One increment. `counts`: Newton iterations, cuts, active constraints; `values`: h, time,
+   !> deepest penetration per edge.
+   subroutine advance(handle, counts, values, ierr)
       integer(c_int64_t), intent(in) :: handle
       integer(c_int), intent(out) :: counts(3)
-      real(c_double), intent(out) :: times(2)
+      real(c_double), intent(out) :: values(3)
       integer(c_int), intent(out) :: ierr
       type(model_t), pointer :: model
       type(increment_t) :: increment
@@ -32,7 +35,7 @@ contains
       !f2py threadsafe
 
       counts = 0
-      times = 0.0_c_double
+      values = 0.0_c_double
       call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       if (stepper_is_done(model%stepper)) then
@@ -42,15 +45,16 @@ contains
       call stepper_advance(model%stepper, increment, error)
       call handle_pass(model, error, ierr)
       counts = [increment%n_newton, increment%n_cut, increment%n_active]
-      times = [real(increment%h, c_double), real(model%stepper%march%state%time, c_double)]
+      values = [real(increment%h, c_double), real(model%stepper%march%state%time, c_double), &
+         real(increment%overlap%depth, c_double)]
    end subroutine advance
 
    !> One step of the size `h`; the rest as `advance`.
-   subroutine step(handle, h, counts, times, ierr)
+   subroutine step(handle, h, counts, values, ierr)
       integer(c_int64_t), intent(in) :: handle
       real(c_double), intent(in) :: h
       integer(c_int), intent(out) :: counts(3)
-      real(c_double), intent(out) :: times(2)
+      real(c_double), intent(out) :: values(3)
       integer(c_int), intent(out) :: ierr
       type(model_t), pointer :: model
       type(increment_t) :: increment
@@ -58,13 +62,14 @@ contains
       !f2py threadsafe
 
       counts = 0
-      times = 0.0_c_double
+      values = 0.0_c_double
       call handle_find(handle, model, ierr)
       if (.not. associated(model)) return
       call stepper_step(model%stepper, real(h, wp), increment, error)
       call handle_pass(model, error, ierr)
       counts = [increment%n_newton, increment%n_cut, increment%n_active]
-      times = [real(increment%h, c_double), real(model%stepper%march%state%time, c_double)]
+      values = [real(increment%h, c_double), real(model%stepper%march%state%time, c_double), &
+         real(increment%overlap%depth, c_double)]
    end subroutine step
 
    !> Begin the next step of the deck now.
@@ -259,6 +264,35 @@ contains
          values(8:) = [real(ledger%momentum, c_double), real(ledger%angular, c_double)]
       end associate
    end subroutine get_ledger
+
+   !> Pass the verdict on the increments so far; its text has `length` characters.
+   subroutine ask_verdict(handle, length, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      integer(c_int), intent(out) :: length
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+      logical :: is_good
+
+      length = 0
+      call handle_find(handle, model, ierr)
+      if (.not. associated(model)) return
+      call verdict_so_far(model%stepper%verdict, model%stepper%march, model%verdict, is_good)
+      length = len(model%verdict)
+   end subroutine ask_verdict
+
+   !> The verdict that was asked for, a line of JSON.
+   subroutine get_verdict(handle, length, text, ierr)
+      integer(c_int64_t), intent(in) :: handle
+      integer(c_int), intent(in) :: length
+      character(len=length), intent(out) :: text
+      integer(c_int), intent(out) :: ierr
+      type(model_t), pointer :: model
+
+      text = " "
+      call handle_find(handle, model, ierr)
+      if (.not. associated(model)) return
+      if (allocated(model%verdict)) text = model%verdict
+   end subroutine get_verdict
 
    !> Keep the present state: `snapshot` is a handle of its own, to be freed by `free_state`.
    subroutine save_state(handle, snapshot, ierr)

@@ -30,6 +30,8 @@ module emcon_handle
       type(contact_report_t) :: report           !! of the constraints asked for last
       character(len=:), allocatable :: message   !! of the last failure
       character(kind=c_char), allocatable :: c_text(:)   !! the same as C was given it
+      character(len=:), allocatable :: verdict   !! asked for last
+      character(kind=c_char), allocatable :: c_verdict(:)
       integer(c_int), allocatable :: c_place(:, :)       !! the numbers in `report`, from 0
       real(c_double), allocatable :: c_gap(:, :)         !! the gaps in it
    end type model_t

@@ -19,8 +19,8 @@ module emcon_run
    use emcon_text, only : notes_t, string_t, to_text
    use emcon_timer, only : cpu_seconds, wall_seconds
    use emcon_verdict, only : verdict_balance_lines, verdict_end, verdict_is_failure, &
-      verdict_is_good, verdict_line, verdict_start, verdict_t, verdict_update
-   use emcon_verdict_file, only : verdict_load, verdict_save, verdict_write
+      verdict_is_good, verdict_line
+   use emcon_verdict_file, only : verdict_write
    implicit none
    private
    public :: run_options_t, run_report_t, interrupt_interface
@@ -52,7 +52,6 @@ module emcon_run
       type(progress_t) :: progress
       character(len=:), allocatable :: base
       real(dp) :: wall_start = 0.0_dp
-      type(verdict_t) :: verdict
    end type run_t
 
 contains
@@ -149,7 +148,6 @@ contains
       call restart_read(restart, path, error)
       if (.not. allocated(error)) call restart_get(restart, "counts", counts, error)
       if (.not. allocated(error)) call stepper_load(run%stepper, restart, error)
-      if (.not. allocated(error)) call verdict_load(run%verdict, restart, error)
       if (.not. allocated(error)) call restart_get(restart, "build", build, error)
       if (allocated(error)) then
          if (error%code /= err_file) error%code = err_input
@@ -233,7 +231,6 @@ contains
       logical :: has_stopped
 
       has_stopped = .false.
-      if (run%stepper%march%state%increment == 0) call verdict_start(run%verdict, run%stepper)
       call march_watch(run%stepper%march, is_interrupted)
       call progress_start(run%progress, real(stepper_fraction(run%stepper), dp), options%is_quiet)
       do while (.not. allocated(error) .and. .not. stepper_is_done(run%stepper))
@@ -243,7 +240,6 @@ contains
          if (allocated(error)) has_stopped = error%code == err_interrupt
          if (has_stopped) exit
          call log_increment(run%log, run%stepper, increment)
-         call verdict_update(run%verdict, run%stepper, increment)
          if (allocated(error)) exit
          call recorder_write(run%recorder, run%stepper, increment, cpu_seconds(), error)
          if (.not. allocated(error)) call save_if_due(run, error)
@@ -285,7 +281,7 @@ contains
          call log_line(run%log, lines%item(i)%text)
       end do
       report%closing = lines%item(:lines%n)
-      call verdict_write(run%verdict, run%stepper, run%base // ".json", second)
+      call verdict_write(run%stepper%verdict, run%stepper%march, run%base // ".json", second)
       if (.not. allocated(error)) call move_alloc(second, error)
       call stepper_close(run%stepper)
       call log_close(run%log, second)
@@ -301,13 +297,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
 
-      associate (verdict => run%verdict)
+      associate (verdict => run%stepper%verdict)
          if (allocated(error)) then
             call verdict_end(verdict, error%message)
          else
             call verdict_end(verdict)
          end if
-         call verdict_balance_lines(verdict, run%stepper, lines)
+         call verdict_balance_lines(verdict, run%stepper%scene, run%stepper%march, lines)
          report%warnings = verdict%warnings
          report%is_bad = .not. verdict_is_good(verdict)
          if (allocated(error) .or. .not. verdict_is_failure(verdict, is_strict)) return
@@ -342,7 +338,6 @@ contains
       if (allocated(error)) return
       call stepper_save(run%stepper, restart)
       call restart_put(restart, "counts", [run%recorder%n_row, run%recorder%fields%n_frame])
-      call verdict_save(run%verdict, restart)
       call build_list(build)
       call restart_put(restart, "build", build)
       call restart_write(restart, run%base // ".rst.h5", error)

@@ -6,7 +6,7 @@ module emcon_stepper
    use emcon_deck, only : deck_read
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : err_input, err_interrupt, error_t, raise
    use emcon_given, only : given_count, given_t
    use emcon_given_check, only : given_check_scene
    use emcon_heap, only : heap_adapt
@@ -20,6 +20,8 @@ module emcon_stepper
    use emcon_text, only : notes_append, notes_t, string_t, to_text
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_ties, only : ties_prepare
+   use emcon_verdict, only : verdict_start, verdict_t, verdict_update
+   use emcon_verdict_file, only : verdict_load, verdict_save
    implicit none
    private
    public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &
@@ -37,6 +39,7 @@ module emcon_stepper
       logical :: is_read = .false.               !! `scene` is complete
       type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
       type(notes_t) :: notes                     !! what was done before the first step
+      type(verdict_t) :: verdict                 !! on the increments so far
    end type stepper_t
 
 contains
@@ -145,7 +148,9 @@ contains
       call march_init(self%march, self%scene, error, self%given)
       if (allocated(error)) return
       call march_begin_step(self%march, self%scene, 1, error)
-      if (.not. allocated(error)) call notes_append(self%notes, self%march%system%notes)
+      if (allocated(error)) return
+      call notes_append(self%notes, self%march%system%notes)
+      call verdict_start(self%verdict, self%march)
    end subroutine build
 
    !> Free what libraries hold for `self`; call it before the object goes, also after an error.
@@ -178,6 +183,10 @@ contains
       else
          call march_increment(self%march, self%scene, increment, error)
       end if
+      if (allocated(error)) then
+         if (error%code == err_interrupt) return
+      end if
+      call verdict_update(self%verdict, self%scene, self%march, increment)
    end subroutine stepper_advance
 
    !> Part of the analysis that is done, by time: 0..1.
@@ -253,6 +262,7 @@ contains
          call restart_put(restart, "is_active", merge(1, 0, state%is_active))
       end associate
       call save_pairs(self, restart)
+      call verdict_save(self%verdict, restart)
       n = given_count(self%given)
       if (any(n > 0)) call restart_put(restart, "given", n)
    end subroutine stepper_save
@@ -314,6 +324,7 @@ contains
       end associate
       call march_resume(self%march, self%scene, error)
       if (.not. allocated(error)) call load_measured(self, restart, error)
+      if (.not. allocated(error)) call verdict_load(self%verdict, restart, error)
    end subroutine stepper_load
 
    !> What the last increment has measured: measured anew it would differ by roundings.

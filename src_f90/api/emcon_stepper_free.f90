@@ -15,6 +15,7 @@ module emcon_stepper_free
    use emcon_stepper, only : stepper_t
    use emcon_system, only : pose_t, system_check_response, system_respond
    use emcon_text, only : to_text
+   use emcon_verdict, only : verdict_move, verdict_t, verdict_update
    implicit none
    private
    public :: stepper_step, stepper_next_step, stepper_set_state
@@ -29,6 +30,7 @@ module emcon_stepper_free
       logical :: is_taken = .false.
       type(state_t) :: state
       type(ledger_t) :: ledger
+      type(verdict_t) :: verdict
    end type snapshot_t
 
 contains
@@ -54,6 +56,8 @@ contains
       end if
       if (allocated(error)) return
       call march_free_increment(self%march, self%scene, h, increment, error)
+      if (.not. allocated(error)) call verdict_update(self%verdict, self%scene, self%march, &
+         increment)
    end subroutine stepper_step
 
    !> Begin the next step of the deck at the present time, wherever that is.
@@ -102,10 +106,12 @@ contains
       logical, intent(in), optional :: is_active(:)  !! (n_constraint) what acted in the last step
       real(wp), intent(in), optional :: time         !! total, not before the step's start [T]
       type(state_t) :: next
+      type(ledger_t) :: before
 
       call stepper_check_open(self, error)
       if (allocated(error)) return
       next = self%march%state
+      before = self%march%ledger
       if (present(u)) call take_field(self, u, "u", next%u, error)
       if (allocated(error)) return
       if (present(v)) call take_field(self, v, "v", next%v, error)
@@ -121,6 +127,7 @@ contains
       if (present(time)) call march_set_time(self%march, self%scene, &
          time - self%march%state%start_time)
       call ledger_measure(self%march%ledger, self%march%system, self%scene%x, self%march%state)
+      call verdict_move(self%verdict, before, self%march%ledger)
    end subroutine stepper_set_state
 
    !> Take over a nodal field called `name`.
@@ -248,6 +255,7 @@ contains
       snapshot%is_taken = allocated(self%march%scheme)
       snapshot%state = self%march%state
       snapshot%ledger = self%march%ledger
+      snapshot%verdict = self%verdict
    end subroutine stepper_snapshot
 
    !> Go back, or forward, to the state in `snapshot`: what follows has the same bits. The step of
@@ -279,6 +287,7 @@ contains
          self%march%state = snapshot%state
       end if
       self%march%ledger = snapshot%ledger
+      self%verdict = snapshot%verdict
       call forget_searches(self)
    end subroutine stepper_restore
 

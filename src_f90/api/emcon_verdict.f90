@@ -5,14 +5,15 @@
 module emcon_verdict
    use emcon_judge, only : overlap_t
    use emcon_kinds, only : wp
-   use emcon_march, only : increment_t
+   use emcon_ledger, only : ledger_t
+   use emcon_march, only : increment_t, march_t
+   use emcon_scene, only : scene_t
    use emcon_stand_off, only : stand_off_mean, stand_off_t
-   use emcon_stepper, only : stepper_t
    use emcon_text, only : note_add, notes_t, to_text
    implicit none
    private
-   public :: verdict_t, verdict_start, verdict_update, verdict_end, verdict_is_good, &
-      verdict_is_failure, verdict_balance_lines, verdict_line
+   public :: verdict_t, verdict_start, verdict_update, verdict_move, verdict_end, &
+      verdict_is_good, verdict_is_failure, verdict_balance_lines, verdict_line
 
    !> Error of the energy balance, relative to the largest energy, that is accepted.
    real(wp), parameter :: ten_digits = 1.0e-10_wp
@@ -53,36 +54,49 @@ module emcon_verdict
 
 contains
 
-   !> Begin with the first state of `stepper`.
-   pure subroutine verdict_start(self, stepper)
-      type(verdict_t), intent(inout) :: self
-      type(stepper_t), intent(in) :: stepper
+   !> Begin with the first state of `march`.
+   pure subroutine verdict_start(self, march)
+      type(verdict_t), intent(out) :: self
+      type(march_t), intent(in) :: march
 
-      self%total0 = stepper%march%ledger%total
+      self%total0 = march%ledger%total
       self%reference = self%total0
       self%largest_energy = abs(self%total0)
-      if (.not. allocated(self%largest_force)) then
-         allocate(self%largest_force(size(stepper%march%state%pairs%total)), source=0.0_wp)
-      end if
+      self%place = ""
+      self%message = ""
+      allocate(self%largest_force(size(march%state%pairs%total)), source=0.0_wp)
    end subroutine verdict_start
 
-   !> Take over what `increment` has found.
-   subroutine verdict_update(self, stepper, increment)
+   !> The state was set from outside, which turned `before` into `after`: what came in or went out
+   !> by that is no error of the balance.
+   pure subroutine verdict_move(self, before, after)
       type(verdict_t), intent(inout) :: self
-      type(stepper_t), intent(in) :: stepper
+      type(ledger_t), intent(in) :: before, after
+
+      associate (change => after%total - after%contact_work - before%total + before%contact_work)
+         self%total0 = self%total0 + change
+         self%reference = self%reference + change
+      end associate
+   end subroutine verdict_move
+
+   !> Take over what `increment` has found, which has led to the state of `march`.
+   subroutine verdict_update(self, scene, march, increment)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
       type(increment_t), intent(in) :: increment
       integer :: i
 
       self%n_newton = self%n_newton + increment%n_newton
       self%n_cut = self%n_cut + increment%n_cut
       if (increment%is_guarded) self%n_guarded = self%n_guarded + 1
-      associate (state => stepper%march%state)
+      associate (state => march%state)
          if (increment%overlap%depth > self%deepest) then
             self%deepest = increment%overlap%depth
             self%deepest_time = state%time
-            call place_text(stepper, increment%overlap, self%place)
+            call place_text(scene, march, increment%overlap, self%place)
          end if
-         self%stabilization = stepper%march%ledger%stabilization
+         self%stabilization = march%ledger%stabilization
          if (increment%unconverged > self%unconverged) then
             self%unconverged = increment%unconverged
             self%unconverged_time = state%time
@@ -98,16 +112,17 @@ contains
       do i = 1, increment%warnings%n
          call add_warning(self, increment%warnings%item(i)%text)
       end do
-      call follow_energy(self, stepper)
+      call follow_energy(self, march)
    end subroutine verdict_update
 
    !> The bodies and nodes of an overlap. Bodies count as in the history.
-   subroutine place_text(stepper, overlap, text)
-      type(stepper_t), intent(in) :: stepper
+   subroutine place_text(scene, march, overlap, text)
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
       type(overlap_t), intent(in) :: overlap
       character(len=:), allocatable, intent(out) :: text
 
-      associate (label => stepper%scene%node_label, body => stepper%march%system%body, &
+      associate (label => scene%node_label, body => march%system%body, &
             edge => overlap%edge)
          text = "node " // to_text(label(overlap%node)) // " of body " // &
             to_text(body(overlap%node)) // " behind the edge from node " // &
@@ -118,17 +133,17 @@ contains
 
    !> The energy balance. In statics the works are sums over increments, exact only in the limit of
    !> small ones: what they are off by is shown, not judged.
-   pure subroutine follow_energy(self, stepper)
+   pure subroutine follow_energy(self, march)
       type(verdict_t), intent(inout) :: self
-      type(stepper_t), intent(in) :: stepper
+      type(march_t), intent(in) :: march
       real(wp) :: kept
 
-      associate (ledger => stepper%march%ledger)
+      associate (ledger => march%ledger)
          kept = ledger%total - ledger%contact_work
          self%largest_energy = max(self%largest_energy, ledger%kinetic + ledger%strain)
          self%largest_drift = max(self%largest_drift, abs(kept - self%total0))
       end associate
-      if (stepper%march%scheme%has_inertia) then
+      if (march%scheme%has_inertia) then
          self%has_dynamics = .true.
          self%dynamic_drift = max(self%dynamic_drift, abs(kept - self%reference))
       else
@@ -159,7 +174,6 @@ contains
       self%message = ""
       if (present(message)) self%message = message
       self%reasons = notes_t()
-      if (.not. allocated(self%place)) self%place = ""
       if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
          "loads do work on motions that nothing holds: stabilization bears " // &
          to_text(self%stabilization, 3))
@@ -215,15 +229,16 @@ contains
    end subroutine verdict_line
 
    !> The closing balance, the warnings and the verdict.
-   subroutine verdict_balance_lines(self, stepper, lines)
+   subroutine verdict_balance_lines(self, scene, march, lines)
       type(verdict_t), intent(in) :: self
-      type(stepper_t), intent(in) :: stepper
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
       type(notes_t), intent(out) :: lines
       character(len=:), allocatable :: text
       real(wp) :: scale
       integer :: k
 
-      associate (state => stepper%march%state, ledger => stepper%march%ledger)
+      associate (state => march%state, ledger => march%ledger)
          if (state%increment > 0) then
             scale = max(self%largest_energy, tiny(scale))
             call note_add(lines, "increments " // to_text(state%increment) // ", time " // &
@@ -239,7 +254,7 @@ contains
                to_text(self%largest_drift/scale, 3) // &
                " of the largest energy, deepest penetration " // to_text(self%deepest, 3) // &
                " of an element")
-            call add_checked(stepper, lines)
+            call add_checked(march, lines)
             if (abs(self%stabilization) > 0.0_wp) call note_add(lines, &
                "work of what stabilization bears " // to_text(self%stabilization/scale, 3) // &
                " of the largest energy")
@@ -252,8 +267,8 @@ contains
                to_text(stand_off_mean(self%stand_off), 3))
             do k = 1, size(self%largest_force)
                call note_add(lines, "contact " // &
-                  stepper%scene%surface(stepper%scene%pair(k)%slave)%name // " on " // &
-                  stepper%scene%surface(stepper%scene%pair(k)%master)%name // ": " // &
+                  scene%surface(scene%pair(k)%slave)%name // " on " // &
+                  scene%surface(scene%pair(k)%master)%name // ": " // &
                   to_text(state%pairs%total(k)%n_active) // " active at end, largest force " // &
                   to_text(self%largest_force(k), 9))
             end do
@@ -264,11 +279,11 @@ contains
    end subroutine verdict_balance_lines
 
    !> What the judge looks at.
-   subroutine add_checked(stepper, lines)
-      type(stepper_t), intent(in) :: stepper
+   subroutine add_checked(march, lines)
+      type(march_t), intent(in) :: march
       type(notes_t), intent(inout) :: lines
 
-      associate (outline => stepper%march%judge%outline)
+      associate (outline => march%judge%outline)
          if (outline%n_piece == 0) return
          call note_add(lines, "penetration was looked for after every step, both ways, nodes and " &
             // "edges: " // to_text(outline%n_piece) // " bodies with " // &

@@ -1,34 +1,48 @@
-!> The verdict in files: NAME.json for scripts, and the running figures in a restart file.
+!> The verdict for scripts, as JSON, and its running figures in a restart file.
 module emcon_verdict_file
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : error_t
    use emcon_files, only : file_close, file_open, file_put, file_remove, file_rename, file_t
    use emcon_kinds, only : wp
+   use emcon_march, only : march_t
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
    use emcon_stand_off, only : stand_off_mean
-   use emcon_stepper, only : stepper_t
    use emcon_text, only : notes_t, string_t, to_text
-   use emcon_verdict, only : verdict_is_good, verdict_t
+   use emcon_verdict, only : verdict_end, verdict_is_good, verdict_t
    implicit none
    private
-   public :: verdict_write, verdict_save, verdict_load
+   public :: verdict_so_far, verdict_write, verdict_save, verdict_load
 
    !> Digits that are written of a number.
    integer, parameter :: n_digit = 9
 
 contains
 
-   !> Write the one line of the file `path`. It appears under its name when it is whole.
-   subroutine verdict_write(self, stepper, path, error)
+   !> The verdict on the increments so far, as `line` of JSON, as if the run ended here.
+   subroutine verdict_so_far(self, march, line, is_good)
       type(verdict_t), intent(in) :: self
-      type(stepper_t), intent(in) :: stepper
+      type(march_t), intent(in) :: march
+      character(len=:), allocatable, intent(out) :: line
+      logical, intent(out) :: is_good
+      type(verdict_t) :: ended
+
+      ended = self
+      call verdict_end(ended)
+      call compose(ended, march, line)
+      is_good = verdict_is_good(ended)
+   end subroutine verdict_so_far
+
+   !> Write the one line of the file `path`. It appears under its name when it is whole.
+   subroutine verdict_write(self, march, path, error)
+      type(verdict_t), intent(in) :: self
+      type(march_t), intent(in) :: march
       character(len=*), intent(in) :: path
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: second
       type(file_t) :: file
       character(len=:), allocatable :: line
 
-      call compose(self, stepper, line)
+      call compose(self, march, line)
       call file_open(file, path // ".tmp", "w", error)
       if (allocated(error)) return
       call file_put(file, line // achar(10), error)
@@ -39,9 +53,9 @@ contains
    end subroutine verdict_write
 
    !> All that is known, as one JSON object.
-   subroutine compose(self, stepper, line)
+   subroutine compose(self, march, line)
       type(verdict_t), intent(in) :: self
-      type(stepper_t), intent(in) :: stepper
+      type(march_t), intent(in) :: march
       character(len=:), allocatable, intent(out) :: line
 
       line = '{"verdict": "bad"'
@@ -52,7 +66,7 @@ contains
       call add_number(line, "warning_count", real(self%n_warning, wp))
       line = line // ', "message": '
       call add_quoted(line, self%message)
-      associate (state => stepper%march%state, ledger => stepper%march%ledger)
+      associate (state => march%state, ledger => march%ledger)
          call add_number(line, "increments", real(state%increment, wp))
          call add_number(line, "time", state%time)
          call add_number(line, "newton", real(self%n_newton, wp))
@@ -171,7 +185,6 @@ contains
       self%n_guarded = effort(5)
       self%n_warning = effort(3)
       self%has_dynamics = effort(4) == 1
-      allocate(self%largest_force(max(0, restart_size(restart, "pair_largest"))))
       call restart_get(restart, "pair_largest", self%largest_force, error)
       if (.not. allocated(error) .and. restart_size(restart, "deepest_place") > 0) then
          call restart_get(restart, "deepest_place", text, error)

@@ -267,7 +267,7 @@ contains
    pure subroutine format_text(text)
       character(len=:), allocatable, intent(out) :: text
 
-      text = "emcon restart 3, reals of " // to_text(storage_size(1.0_wp)) // " bits"
+      text = "emcon restart 4, reals of " // to_text(storage_size(1.0_wp)) // " bits"
    end subroutine format_text
 
    !> Index into `group`.

@@ -25,6 +25,7 @@ static void without_model(void)
    int i[2] = {0, 0};
    emcon_csr matrix;
    emcon_sizes sizes;
+   const char *json;
    emcon_ledger ledger;
    emcon_snapshot *snapshot;
    emcon_constraint_report report;
@@ -50,6 +51,7 @@ static void without_model(void)
    TELL(emcon_get_sizes(m, &sizes));
    TELL(emcon_get_time(m, x));
    TELL(emcon_get_ledger(m, &ledger));
+   TELL(emcon_get_verdict(m, i, &json));
    TELL(emcon_get_labels(m, 1, i));
    TELL(emcon_get_positions(m, 1, x));
    TELL(emcon_get_state(m, 1, x, x));
@@ -83,6 +85,7 @@ static void without_arrays(int n_node, int n_constraint)
    TELL(emcon_get_sizes(m, NULL));
    TELL(emcon_get_time(m, NULL));
    TELL(emcon_get_ledger(m, NULL));
+   TELL(emcon_get_verdict(m, NULL, NULL));
    TELL(emcon_get_labels(m, n_node, NULL));
    TELL(emcon_get_state(m, n_node, NULL, NULL));
    TELL(emcon_get_multipliers(m, n_constraint, NULL, NULL));

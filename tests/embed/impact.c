@@ -34,7 +34,8 @@ int main(int argc, char **argv)
    emcon_increment increment;
    emcon_ledger ledger;
    double *u, *v;
-   int n = 0, status;
+   const char *json = NULL;
+   int n = 0, status, is_good;
 
    if (argc < 2) return 2;
    status = emcon_open(argv[1], argc > 2 ? argv[2] : NULL, 0, &model);
@@ -46,6 +47,8 @@ int main(int argc, char **argv)
    u = malloc(2*sizeof *u*(size_t)sizes.n_node);
    v = malloc(2*sizeof *v*(size_t)sizes.n_node);
    require(emcon_get_state(model, sizes.n_node, u, v), model);
+   require(emcon_get_verdict(model, &is_good, &json), model);
+   printf("%d %s\n", is_good, json);
    printf("%d %.17g %.17g %.17g %.17g\n", n + 1, ledger.total, ledger.py, u[1], v[1]);
    if (emcon_advance(model, NULL) != EMCON_ERROR_INPUT) return 1;   /* it is at its end */
    if (emcon_get_state(model, sizes.n_node + 1, u, v) != EMCON_ERROR_INPUT) return 1;

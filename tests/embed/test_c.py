@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import re
 import subprocess
 import sys
@@ -30,13 +31,17 @@ def impact(installed: dict[str, str], tmp_path_factory: pytest.TempPathFactory) 
 
 
 def test_c_gives_the_bits_of_python(impact: Path, installed: dict[str, str]) -> None:
-    n, *values = run(impact, RING, "h=0.05\nt_end=1.5", env=installed).split()
+    verdict, line = run(impact, RING, "h=0.05\nt_end=1.5", env=installed).splitlines()
+    n, *values = line.split()
     with Stepper(RING, h=0.05, t_end=1.5) as ring:
         count = 0
         while not ring.is_done:
             ring.step()
             count += 1
+        found = ring.verdict()
         expected = [ring.energies()["total"], ring.momenta()["py"], ring.u[0, 1], ring.v[0, 1]]
+    is_good, json_text = verdict.split(maxsplit=1)
+    assert json.loads(json_text) == found and (is_good == "1") == (found["verdict"] == "good")
     assert int(n) == count
     assert [float(value) for value in values] == expected
 

@@ -20,7 +20,7 @@ HALF_MADE = [
     "path is NULL", "no scene", "has no seal",
     "state.h5 does not exist",
 ]
-WITHOUT_ARRAYS = [""]*9 + [
+WITHOUT_ARRAYS = [""]*10 + [
     "snapshot is NULL", "snapshot is NULL", "u1 is NULL", "u0 is NULL", "direction is NULL",
     "path is NULL",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import subprocess
 import sys
@@ -56,6 +57,24 @@ def test_stepper_gives_the_bits_of_the_batch_run(tmp_path: Path) -> None:
             for name, value in values.items():
                 assert value == float(row[name]), name
         assert ring.is_done
+        assert ring.verdict() == json.loads((tmp_path/"ring.json").read_text(encoding="utf-8"))
+
+
+def test_verdict_goes_with_the_state() -> None:
+    """Mean gaps let nodes in; what is set is no error of the balance, what is restored forgets."""
+    deck = ROOT/"input_decks"/"two_bodies.inp"
+    with Stepper(deck, h=0.01) as bodies:
+        start = bodies.save()
+        while bodies.time < 0.3:
+            increment = bodies.step()
+        found = bodies.verdict()
+        error = found["largest_energy_error"]/found["largest_energy"]
+        assert 0 < increment.penetration <= found["penetration"]
+        assert found["verdict"] == "bad" and "overlap" in found["reasons"][0]
+        bodies.set_state(v=2*bodies.v)
+        assert bodies.verdict()["largest_energy_error"] < 1e-12 and error < 1e-12
+        bodies.restore(start)
+        assert bodies.verdict()["verdict"] == "good" and bodies.verdict()["newton"] == 0
 
 
 def test_two_models_side_by_side_do_not_meet() -> None:
