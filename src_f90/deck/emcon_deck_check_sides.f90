@@ -13,8 +13,8 @@ module emcon_deck_check_sides
    !> A slave surface longer than this times its master: force leaks where it reaches beyond. The
    !> rest is room for curved surfaces on straight ones.
    real(wp), parameter :: large_ratio = 1.25_wp
-   !> Slave edges that see the master turn by more than this angle, and by this times as much as the
-   !> other way round, push along the surface; so do edges longer by this, at corners [degrees].
+   !> Slave edges that see the master turn by more than this angle [degrees], and by this times as
+   !> much as the other way round, push along the surface; those this times as long, at corners.
    real(wp), parameter :: coarse_ratio = 1.6_wp, seen_turn = 10.0_wp
    !> Surfaces whose edges see less of each other are flat to them [degrees].
    real(wp), parameter :: flat_turn = 5.0_wp
