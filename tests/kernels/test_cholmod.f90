@@ -48,6 +48,7 @@ contains
       call check_near(error, x, spread(1.0_wp, 1, 6), tol, 1.0_wp, "x")
       call check_equal(error, int(solver%n_factor), 11, "nonzeros of the factor")
       call check_true(error, solver%rcond > 0.1_dp .and. solver%rcond <= 1.0_dp, "rcond")
+      call solver%free()
    end subroutine test_bar
 
    subroutine test_random(error)
@@ -66,6 +67,7 @@ contains
       if (allocated(error)) return
       call dense_solve(dense_of(a), reshape(real(b, dp), [n, 1]), expected, is_singular)
       call check_near(error, x, real(expected(:, 1), wp), tol, maxval(abs(x)), "x")
+      call solver%free()
    end subroutine test_random
 
    subroutine test_large(error)
@@ -83,6 +85,7 @@ contains
       if (allocated(error)) return
       call csr_multiply(a, x, y)
       call check_near(error, y, b, tol, 1.0_wp, "A x")
+      call solver%free()
    end subroutine test_large
 
    subroutine test_powers_of_two(error)
@@ -106,6 +109,7 @@ contains
          call check_near(error, scale(y, powers(i_power)), x, 0.0_wp, 1.0_wp, "x of 2^k A")
          if (allocated(error)) return
       end do
+      call solver%free()
    end subroutine test_powers_of_two
 
    !> Indefinite, semi-definite, negative in the first and in the last row; then regular again.
@@ -145,6 +149,7 @@ contains
       end do
       a%value = good
       call solve(solver, a, spread(1.0_wp, 1, 6), x, error)
+      call solver%free()
    end subroutine test_indefinite
 
    subroutine test_nan(error)
@@ -160,6 +165,7 @@ contains
       call solver%factorise(a%value, error)
       if (allocated(error)) return
       call check_true(error, solver%is_singular, "a NaN makes it singular")
+      call solver%free()
    end subroutine test_nan
 
    subroutine test_reuse(error)
@@ -178,6 +184,7 @@ contains
       if (allocated(error)) return
       call check_near(error, 3.0_wp*y, x, tol, 1.0_wp, "x of 3 A")
       call check_equal(error, solver%n_analysis, 1, "analyses")
+      call solver%free()
    end subroutine test_reuse
 
    subroutine test_misuse(error)
@@ -193,6 +200,7 @@ contains
       call check_error(error, raised, err_internal, "no factorisation", "solve before factorise")
       call solver%analyse(empty, raised)
       call check_error(error, raised, err_internal, "0 x 0", "no rows")
+      call solver%free()
    end subroutine test_misuse
 
    subroutine test_free_twice(error)

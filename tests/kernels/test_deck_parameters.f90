@@ -251,9 +251,12 @@ contains
    subroutine test_overrides(error)
       type(error_t), allocatable, intent(out) :: error
       type(parameters_t) :: parameters
+      type(string_t) :: given(2)
       character(len=:), allocatable :: fault
 
-      call parameters_init(parameters, [string_t("H = 1/4"), string_t("typo=1")], fault)
+      given(1)%text = "H = 1/4"
+      given(2)%text = "typo=1"
+      call parameters_init(parameters, given, fault)
       call check_equal(error, fault, "", "well-formed")
       call parameter_define(parameters, "h = 0.1", fault)
       call parameter_define(parameters, "twice = 2*h", fault)
@@ -262,7 +265,8 @@ contains
       call check_equal(error, fault, "", "used")
       call unused_override(parameters, 2, fault)
       call check_true(error, fault /= "", "not used")
-      call parameters_init(parameters, [string_t("h")], fault)
+      given(1)%text = "h"
+      call parameters_init(parameters, given(:1), fault)
       call check_true(error, fault /= "", "no value")
    end subroutine test_overrides
 

@@ -52,6 +52,7 @@ contains
       call check_true(error, .not. solver%is_singular, "regular")
       call check_true(error, solver%rcond > 0.1_dp, "rcond > 0.1")
       call check_true(error, solver%n_factor >= 4, "factors have four entries")
+      call solver%free()
    end subroutine test_two
 
    subroutine test_random(error)
@@ -70,6 +71,7 @@ contains
       if (allocated(error)) return
       call dense_solve(dense_of(a), reshape(real(b, dp), [n, 1]), expected, is_singular)
       call check_near(error, x, real(expected(:, 1), wp), tol, maxval(abs(x)), "x")
+      call solver%free()
    end subroutine test_random
 
    !> (N G^T; G 0) with N in units 1e10 times those of G: no scale was chosen for it.
@@ -88,6 +90,7 @@ contains
       if (allocated(error)) return
       x(4) = x(4)/big
       call check_near(error, x, [1.0_wp, 2.0_wp, 3.0_wp, 5.0_wp], tol, 5.0_wp, "x")
+      call solver%free()
    end subroutine test_saddle_point
 
    subroutine test_metis(error)
@@ -105,6 +108,7 @@ contains
       if (allocated(error)) return
       call csr_multiply(a, x, y)
       call check_near(error, y, b, tol, 1.0_wp, "A x")
+      call solver%free()
    end subroutine test_metis
 
    !> On a long strip minimum degree fills much less.
@@ -151,6 +155,7 @@ contains
       if (allocated(error)) return
       call check_near(error, x, [1.0_wp, 2.0_wp], tol, 1.0_wp, "x of the diagonal")
       call check_equal(error, solver%n_analysis, 2, "analyses of two patterns")
+      call solver%free()
    end subroutine test_reuse
 
    subroutine test_same_bits(error)
@@ -170,6 +175,8 @@ contains
       call solve(first, a, b, y, error)
       if (allocated(error)) return
       call check_near(error, y, x, 0.0_wp, 1.0_wp, "x of a second factorisation")
+      call first%free()
+      call second%free()
    end subroutine test_same_bits
 
    !> 2^k A, and then every row by a power of its own, and the right-hand side with it.
@@ -203,6 +210,7 @@ contains
       call solve(solver, scaled, scaled_b, y, error)
       if (allocated(error)) return
       call check_near(error, y, x, 0.0_wp, 1.0_wp, "x of scaled rows")
+      call solver%free()
    end subroutine test_powers_of_two
 
    subroutine test_zero_pivot(error)
@@ -246,6 +254,7 @@ contains
       call solve(solver, a, [5.0_wp, 11.0_wp], x, error)
       if (allocated(error)) return
       call check_near(error, x, [1.0_wp, 2.0_wp], tol, 1.0_wp, "x")
+      call solver%free()
    end subroutine test_dependent_rows
 
    subroutine test_nan(error)
@@ -272,6 +281,7 @@ contains
       call solve(solver, a, b, x, error)
       if (allocated(error)) return
       call check_near(error, x, [1.0_wp, 2.0_wp], tol, 1.0_wp, "x")
+      call solver%free()
    end subroutine test_extremes
 
    subroutine test_misuse(error)
@@ -293,6 +303,7 @@ contains
       call random_sparse(2, 3, 2, a)
       call solver%analyse(a, raised)
       call check_error(error, raised, err_internal, "2 x 3", "not square")
+      call solver%free()
    end subroutine test_misuse
 
    subroutine test_free_twice(error)
@@ -348,6 +359,7 @@ contains
       call check_true(error, .not. allocated(raised), "factorise a singular matrix")
       call check_true(error, solver%is_singular, "the matrix is found singular")
       call check_near(error, real(solver%rcond, wp), 0.0_wp, 0.0_wp, 1.0_wp, "rcond")
+      call solver%free()
    end subroutine check_singular
 
 end module test_umfpack
