@@ -176,7 +176,7 @@ contains
       type(dg_t) :: number
 
       number = nts_gap(real(x0, wp), real(dx, wp), merge(4, 0, has_before /= 0), &
-         merge(5, 0, has_after /= 0), real([rounding, rounding], wp))
+         merge(5, 0, has_after /= 0), spread(spread(real(rounding, wp), 1, 2), 2, 2))
       gap = [real(number%f0, c_double), real(number%f1, c_double), real(number%df, c_double)]
       g = real(number%g, c_double)
       c = real(number%c, c_double)

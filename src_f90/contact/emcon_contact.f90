@@ -50,6 +50,8 @@ module emcon_contact
    type, abstract :: contact_t
       integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
+      logical :: may_sharpen = .false.                !! of polygons: convex corners are rounded
+      logical :: is_sharp = .false.                   !! but not in this step
       logical :: meets_statics = .false.              !! a step of the deck is static
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at minus this, by the edge

@@ -125,7 +125,8 @@ contains
 
       self%smoothing = options%smoothing
       if (self%slack > 0.0_wp) self%smoothing = smoothing_none       ! guards watch the mesh
-      if (self%smoothing /= smoothing_hermite) return
+      self%may_sharpen = self%smoothing /= smoothing_hermite
+      if (self%may_sharpen) return
       if (.not. allocated(self%smooth)) then
          allocate(self%is_corner(self%master%n_edge), self%smooth(self%n_constraint))
          allocate(self%is_lost(self%n_constraint), source=.false.)
@@ -296,7 +297,8 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       type(polygon_stencil_t), intent(out) :: stencil
 
-      call polygon_stencil(stencil, self%master, self%node(i), edge, self%rounding, x, u0)
+      call polygon_stencil(stencil, self%master, self%node(i), edge, &
+         self%rounding*[1.0_wp, merge(0.0_wp, 1.0_wp, self%is_sharp)], x, u0)
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then
             if (.not. bears(self, i, self%master%next(edge), x, u0)) then

@@ -4,19 +4,23 @@
 !> (b x a)/|a|. Where the node passes a corner to a neighbour the gap goes over to the neighbour's
 !> line, so that the gap is one continuous function over three edges: no event when a node slides
 !> over a master node, hence neither energy nor penetration is made there. In statics a node can
-!> come to rest in a dent, at a master node, where the gradient jumps: there corners are rounded.
+!> come to rest in a dent, at a master node, where the gradient jumps: there corners are rounded,
+!> all to the outside, so that a closed gap is no penetration.
 !> Source: docs/theory.md, section 4. Sign: gap > 0 is open.
 module emcon_nts_gap
-   use emcon_dgrad10, only : dg_cross, dg_dot, dg_negative_part, dg_sqrt, dg_t, &
-      difference, difference_t, operator(*), operator(+), operator(-), operator(/)
+   use emcon_dgrad10, only : dg_above_negative, dg_cross, dg_dot, dg_negative_part, dg_sqrt, &
+      dg_t, difference, difference_t, operator(*), operator(+), operator(-), operator(/)
    use emcon_kinds, only : wp
-   use emcon_rounded, only : rounded_negative
+   use emcon_rounded, only : above_negative, rounded_negative
    implicit none
    private
    public :: nts_gap, nts_gap_value
 
    !> Local numbers of the nodes; the neighbours' further nodes follow as they are present.
    integer, parameter :: slave = 1, first = 2, last = 3
+   !> Where |tan(theta/2)| is smaller, a corner is in between convex and concave. Times the width of
+   !> a rounded corner that is round-off of the gap.
+   real(wp), parameter :: flat = 1.0e-9_wp
 
 contains
 
@@ -26,7 +30,8 @@ contains
       real(wp), intent(in) :: dx(:, :)           !! their motion
       integer, intent(in) :: before              !! local number of the node before the edge, or 0
       integer, intent(in) :: after               !! of the node after it, or 0
-      real(wp), intent(in) :: rounding(2)        !! half widths of the rounded corners [L]
+      real(wp), intent(in) :: rounding(2, 2)     !! (concave and convex; corner before and after)
+                                                 !! half widths of the rounded corners [L]
       type(dg_t) :: gap
       type(difference_t) :: a, b
       type(dg_t) :: length
@@ -36,16 +41,16 @@ contains
       length = dg_sqrt(dg_dot(a, a))
       gap = dg_cross(b, a)/length
       if (before > 0) gap = gap + corner_before(a, b, length, &
-         difference(first, before, x0, dx), rounding(1))
+         difference(first, before, x0, dx), rounding(:, 1))
       if (after > 0) gap = gap + corner_after(a, length, difference(slave, last, x0, dx), &
-         difference(after, last, x0, dx), rounding(2))
+         difference(after, last, x0, dx), rounding(:, 2))
    end function nts_gap
 
    !> kappa min(tau, 0): what the line of the edge before adds on its side of the bisector.
    pure function corner_before(a, b, length, edge, rounding) result(part)
       type(difference_t), intent(in) :: a, b, edge
       type(dg_t), intent(in) :: length
-      real(wp), intent(in) :: rounding
+      real(wp), intent(in) :: rounding(2)
       type(dg_t) :: part, other
 
       other = dg_sqrt(dg_dot(edge, edge))
@@ -57,7 +62,7 @@ contains
    pure function corner_after(a, length, b, edge, rounding) result(part)
       type(difference_t), intent(in) :: a, b, edge
       type(dg_t), intent(in) :: length
-      real(wp), intent(in) :: rounding
+      real(wp), intent(in) :: rounding(2)
       type(dg_t) :: part, other
 
       other = dg_sqrt(dg_dot(edge, edge))
@@ -66,24 +71,33 @@ contains
    end function corner_after
 
    !> kappa min(tau, 0), 0 in front of the rounded corner. kappa = -tan(theta/2), theta the turn
-   !> from edge `a` to edge `b` (> 0: convex corner).
+   !> from edge `a` to edge `b` (> 0: convex corner). Rounded so that it is nowhere above the sharp
+   !> one, on either side of kappa = 0 with one tangent.
    pure function bent_part(tau, rounding, a, b, length_product) result(part)
       type(dg_t), intent(in) :: tau
-      real(wp), intent(in) :: rounding
+      real(wp), intent(in) :: rounding(2)        !! half widths, concave and convex [L]
       type(difference_t), intent(in) :: a, b
       type(dg_t), intent(in) :: length_product   !! |a| |b|
-      type(dg_t) :: part
+      type(dg_t) :: part, kappa, convex
 
-      if (min(tau%f0, tau%f1) >= rounding) return
-      part = (-1.0_wp)*(dg_cross(a, b)/(length_product + dg_dot(a, b)))
-      part = part*dg_negative_part(tau, rounding)
+      if (min(tau%f0, tau%f1) >= maxval(rounding)) return
+      kappa = (-1.0_wp)*(dg_cross(a, b)/(length_product + dg_dot(a, b)))
+      if (min(kappa%f0, kappa%f1) >= flat) then
+         part = kappa*dg_negative_part(tau, rounding(1))
+      else if (max(kappa%f0, kappa%f1) <= -flat) then
+         part = kappa*dg_above_negative(tau, rounding(2))
+      else
+         convex = dg_negative_part(kappa, flat)
+         part = convex*dg_above_negative(tau, rounding(2)) &
+            + (kappa - convex)*dg_negative_part(tau, rounding(1))
+      end if
    end function bent_part
 
    !> The same gap for one configuration, and the projection `xi` on the edge (0..1 inside).
    pure subroutine nts_gap_value(x, before, after, rounding, gap, xi)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
       integer, intent(in) :: before, after
-      real(wp), intent(in) :: rounding(2)
+      real(wp), intent(in) :: rounding(2, 2)  !! as in `nts_gap`
       real(wp), intent(out) :: gap, xi
       real(wp) :: a(2), b(2), edge(2), length, other, tau
 
@@ -96,18 +110,28 @@ contains
          edge = x(:, first) - x(:, before)
          other = sqrt(dot_product(edge, edge))
          tau = dot_product(b, edge)/other + dot_product(b, a)/length
-         gap = gap - rounded_negative(tau, rounding(1))*cross(edge, a) &
-            /(length*other + dot_product(edge, a))
+         gap = gap + bent_value(tau, rounding(:, 1), -cross(edge, a) &
+            /(length*other + dot_product(edge, a)))
       end if
       if (after > 0) then
          edge = x(:, after) - x(:, last)
          b = x(:, slave) - x(:, last)
          other = sqrt(dot_product(edge, edge))
          tau = dot_product(b, a)/length + dot_product(b, edge)/other
-         gap = gap - rounded_negative(-tau, rounding(2))*cross(a, edge) &
-            /(length*other + dot_product(a, edge))
+         gap = gap + bent_value(-tau, rounding(:, 2), -cross(a, edge) &
+            /(length*other + dot_product(a, edge)))
       end if
    end subroutine nts_gap_value
+
+   !> kappa min(tau, 0), rounded as in `bent_part`.
+   pure real(wp) function bent_value(tau, rounding, kappa)
+      real(wp), intent(in) :: tau, rounding(2), kappa
+      real(wp) :: convex
+
+      convex = rounded_negative(kappa, flat)
+      bent_value = convex*above_negative(tau, rounding(2)) &
+         + (kappa - convex)*rounded_negative(tau, rounding(1))
+   end function bent_value
 
    pure real(wp) function cross(a, b)
       real(wp), intent(in) :: a(2), b(2)

@@ -26,7 +26,8 @@ module emcon_nts_stencil
       integer :: n = 0
       integer :: node(5) = 0
       integer :: before = 0, after = 0           !! local numbers of the neighbours' nodes; 0: none
-      real(wp) :: rounding(2) = 0.0_wp           !! half widths of the rounded corners [L]
+      real(wp) :: rounding(2, 2) = 0.0_wp        !! (concave and convex; before and after) half
+                                                 !! widths of the rounded corners [L]
    end type polygon_stencil_t
 
    !> A smoothed surface near a slave node; chosen for a step. Slave node and edge come first.
@@ -45,14 +46,14 @@ contains
       type(polygon_stencil_t), intent(out) :: self
       type(chain_t), intent(in) :: master
       integer, intent(in) :: slave, edge
-      real(wp), intent(in) :: rounding           !! of corners, as a fraction of an edge
+      real(wp), intent(in) :: rounding(2)        !! of concave and convex corners, per edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       integer :: e
 
       self%node(1) = slave
       self%node(2:3) = master%edge(:, edge)
       self%n = 3
-      self%rounding = rounding*chain_shorter(master, edge)
+      self%rounding = spread(rounding, 2, 2)*spread(chain_shorter(master, edge), 1, 2)
       e = master%previous(edge)
       if (e > 0) then
          if (is_blunt(x, u0, master%edge(1, e), self%node(2), self%node(3))) then

@@ -60,6 +60,7 @@ contains
 
       self%is_dual = options%multiplier == multiplier_dual
       call self%nts%configure(x, options)
+      self%may_sharpen = self%nts%may_sharpen
    end subroutine segment_configure
 
    pure subroutine segment_begin_step(self, x, u0, du)
@@ -69,6 +70,7 @@ contains
       ! Weights ask which nodes are near: a list from earlier steps would make them depend on these.
       self%nts%reach = 0.0_wp
       self%nts%rounding = self%rounding
+      self%nts%is_sharp = self%is_sharp
       call self%nts%begin_step(x, u0, du)
       self%reach = self%nts%reach
    end subroutine segment_begin_step

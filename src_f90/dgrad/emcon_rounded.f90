@@ -3,7 +3,9 @@
 !> max(a, 0) and the bounds: on the inner side, by cubics. 0 and 1 are exact outside, so is a from
 !> the end of the band on; there is one tangent everywhere. min(a, 0): to both sides alike, by a
 !> quartic, with one curvature everywhere; it is exact beyond the band, and added to its mirror
-!> image, rounded max(a, 0), it is a.
+!> image, rounded max(a, 0), it is a. It is nowhere above min(a, 0). Of the same kind, but nowhere
+!> below min(a, 0) and exact at 0, is `above_negative`, of the sixth degree; its slope is outside
+!> 0..1 in parts of the band.
 !> Source: docs/theory.md, section 2, rounded corners.
 module emcon_rounded
    use emcon_kinds, only : wp
@@ -11,6 +13,7 @@ module emcon_rounded
    private
    public :: rounded_part, rounded_part_slope, rounded_chord, rounded_clip, rounded_clip_slope
    public :: rounded_negative, rounded_negative_slope, rounded_negative_chord
+   public :: above_negative, above_negative_slope, above_negative_chord
 
 contains
 
@@ -136,6 +139,79 @@ contains
       end function moment
 
    end subroutine rounded_negative_chord
+
+   !> min(a, 0), rounded to above; with t = a/width, width t (1 - t)^3 (8 + 9 t + 3 t^2)/16 where
+   !> |t| < 1.
+   elemental real(wp) function above_negative(a, width)
+      real(wp), intent(in) :: a, width
+
+      above_negative = min(a, 0.0_wp)
+      if (.not. abs(a) < width) return
+      associate (t => a/width)
+         above_negative = a*((1.0_wp - t)**3*(8.0_wp + t*(9.0_wp + 3.0_wp*t))/16.0_wp)
+      end associate
+   end function above_negative
+
+   !> Slope of `above_negative`, width > 0.
+   elemental real(wp) function above_negative_slope(a, width)
+      real(wp), intent(in) :: a, width
+
+      associate (t => max(-1.0_wp, min(1.0_wp, a/width)))
+         above_negative_slope = 0.125_wp*(1.0_wp - t)**2 &
+            *(4.0_wp - t*(7.0_wp + t*(18.0_wp + 9.0_wp*t)))
+      end associate
+   end function above_negative_slope
+
+   !> Divided difference of `above_negative` from `a0` to `a1` and its derivative by a1, as of
+   !> `rounded_chord`; width > 0.
+   pure subroutine above_negative_chord(a0, a1, width, slope, rate)
+      real(wp), intent(in) :: a0, a1, width
+      real(wp), intent(out) :: slope, rate
+      real(wp) :: total, low, high, first, last, way(2), within, reach
+
+      total = abs(a1 - a0)
+      if (.not. total > 0.0_wp) then
+         slope = above_negative_slope(a1, width)
+         rate = 0.0_wp
+         if (abs(a1) < width) rate = 0.5_wp*curvature(a1)
+         return
+      end if
+      low = min(a0, a1)
+      high = max(a0, a1)
+      first = max(low, -width)
+      last = min(high, width)
+      within = max(0.0_wp, last - first)/total
+      associate (s => first/width, t => last/width)
+         slope = max(0.0_wp, min(high, -width) - low)/total &
+            + within*(0.5_wp - (s + t)*(15.0_wp - 10.0_wp*(s*s + t*t) &
+            + 3.0_wp*(s**4 + (s*t)**2 + t**4))/16.0_wp)
+      end associate
+      ! Gauss's rule of three points, by parts of the way, is exact for the fifth degree.
+      way = abs(max(-width, min(width, [a0, a1])) - a0)/total
+      reach = 0.5_wp*sqrt(0.6_wp)*(way(2) - way(1))
+      associate (middle => 0.5_wp*(way(1) + way(2)))
+         rate = within*(5.0_wp*moment(middle - reach) + 8.0_wp*moment(middle) &
+            + 5.0_wp*moment(middle + reach))/18.0_wp
+      end associate
+
+   contains
+
+      pure real(wp) function curvature(a)
+         real(wp), intent(in) :: a
+
+         associate (square => (a/width)**2)
+            curvature = -1.875_wp*(1.0_wp - square)*(1.0_wp - 3.0_wp*square)/width
+         end associate
+      end function curvature
+
+      !> `part`: of the way from a0 to a1.
+      pure real(wp) function moment(part)
+         real(wp), intent(in) :: part
+
+         moment = curvature(a0 + part*(a1 - a0))*part
+      end function moment
+
+   end subroutine above_negative_chord
 
    !> `a` held within 0..1, both corners rounded; width < 1/2.
    elemental real(wp) function rounded_clip(a, width)

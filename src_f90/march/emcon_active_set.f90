@@ -5,8 +5,8 @@
 !> constraints are only added from then on: at once for persistent contact, which makes no energy
 !> if it is held too long; else only where the step cannot be cut any more. Of constraints that say
 !> nearly the same one acts until the other is needed too. Where Newton's method does not converge,
-!> what pulls is let go before the step is cut. Linear constraints that are not eliminated act
-!> always. Source: docs/theory.md, section 6.
+!> what pulls is let go before the step is cut; in statics, where no set stands, the step is tried
+!> with sharp convex corners before. Linear constraints that are not eliminated act always. Source: docs/theory.md, section 6.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
    use emcon_contact, only : deepest_arrival, gap_state_t
@@ -61,6 +61,8 @@ module emcon_active_set
       logical, allocatable :: is_put_off(:)      !! (n_constraint) nearly so: they waited once
       logical, allocatable :: is_let_go(:)       !! (n_constraint) they pulled where Newton failed
       real(wp), allocatable :: before(:, :)      !! (2, n_node) first guess of the present set
+      real(wp), allocatable :: first(:, :)       !! (2, n_node) and of the first set of the step,
+      real(wp), allocatable :: driven(:, :)      !! (2, n_node) with the prescribed motion in it
       !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
@@ -129,6 +131,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical :: is_done, is_held
 
+      self%first = du
+      self%driven = newton%driven
       call stopwatch_start(system%contact_clock)
       call active_set_begin(self, system, scene, state, du)
       call stopwatch_stop(system%contact_clock)
@@ -153,6 +157,7 @@ contains
          end if
          if (status == newton_diverged) then
             call let_go_pulling(self, state%lam, du, is_done)
+            if (is_done) call begin_sharp(self, system, scene, newton, state, du, is_done)
             if (is_done) return
             cycle
          end if
@@ -166,9 +171,42 @@ contains
             if (.not. is_held) status = step_not_held
          end if
          call stopwatch_stop(system%contact_clock)
+         if (status == step_cycling) call begin_sharp(self, system, scene, newton, state, du, &
+            is_done)
          if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> Begin the step again with convex corners that are not rounded: in statics, where a node that is
+   !> pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.
+   subroutine begin_sharp(self, system, scene, newton, state, du, is_done)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(state_t), intent(in) :: state
+      real(wp), intent(inout), contiguous :: du(:, :)    !! (2, n_node)
+      logical, intent(out) :: is_done
+      integer :: pair, n_newton
+
+      is_done = self%has_inertia
+      if (is_done) return
+      is_done = .true.
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact)
+            if (contact%may_sharpen .and. .not. contact%is_sharp) is_done = .false.
+         end associate
+      end do
+      if (is_done) return
+      n_newton = self%n_newton
+      du = self%first
+      newton%driven = self%driven
+      do pair = 1, size(system%contact)
+         system%contact(pair)%contact%is_sharp = system%contact(pair)%contact%may_sharpen
+      end do
+      call begin_sets(self, system, scene, state, du)
+      self%n_newton = n_newton
+   end subroutine begin_sharp
 
    !> Take in what holds the bodies that would be free with the present set. The prescribed motion
    !> `driven` in `du`, which the first correction of Newton's method meets, is left out on the way.
@@ -196,6 +234,21 @@ contains
       type(scene_t), intent(in) :: scene
       type(state_t), intent(in) :: state
       real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
+      integer :: pair
+
+      do pair = 1, size(system%contact)
+         system%contact(pair)%contact%is_sharp = .false.
+      end do
+      call begin_sets(self, system, scene, state, du)
+   end subroutine active_set_begin
+
+   !> Stencils and the first set, as the step began.
+   subroutine begin_sets(self, system, scene, state, du)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(state_t), intent(in) :: state
+      real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
 
       call begin_contact(self, system, scene, state, du)
       call holding_forget(self%holding)
@@ -208,7 +261,7 @@ contains
       self%is_dropped = .false.
       self%is_put_off = .false.
       self%is_let_go = .false.
-   end subroutine active_set_begin
+   end subroutine begin_sets
 
    !> The next set from the motion `du` and the multipliers that solve the step with the present
    !> one; `is_done` if that one stands, or if `status` tells of a failure.

@@ -19,6 +19,7 @@ program bench_pair
    use emcon_mortar_stencil, only : stencil_master, stencil_slave
    use emcon_nts_gap, only : nts_gap
    implicit none
+   real(wp), parameter :: sharp(2, 2) = 0.0_wp
    integer, parameter :: n_case = 200, n_run = 15, n_kind = 9
    character(len=40), parameter :: name(n_kind) = [character(len=40) :: "node over polygon edge", &
       "node over smoothed edge", "segment, edge normal", "segment, averaged normal", &
@@ -121,7 +122,7 @@ contains
       real(wp), intent(inout) :: total
       type(dg10_t) :: gap
 
-      gap = nts_gap(x0(:, :5), dx(:, :5), 5, 4, [0.0_wp, 0.0_wp])
+      gap = nts_gap(x0(:, :5), dx(:, :5), 5, 4, sharp)
       total = total + gap%h(1, 1)
    end subroutine evaluate_node
 

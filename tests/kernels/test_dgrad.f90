@@ -3,6 +3,7 @@ module test_dgrad
    use check, only : check_near, check_true, test_case_t
    use emcon_dgrad10, only : dg10_t => dg_t, dg_cross, dg_dot, difference
    use emcon_dgrad3, only : dg_abs, dg_clip, dg_constant, dg_excess, dg_expm1, dg_log1p, &
+      dg_above_negative, &
       dg_negative_part, dg_root, dg_sqrt, dg_t, dg_variable, operator(*), operator(+), &
       operator(-), operator(/)
    use emcon_errors, only : error_t
@@ -15,10 +16,10 @@ module test_dgrad
 
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Operations under test; the last one chains most of the others.
-   integer, parameter :: n_operation = 16
+   integer, parameter :: n_operation = 17
    character(len=14), parameter :: name(n_operation) = [character(len=14) :: "a + b", "a + 1", &
       "-a", "a - b", "3 a", "a b", "a/b", "sqrt", "abs", "negative part", "rounded corner", &
-      "log1p", "excess, expm1", "clip", "rounded clip", "composite"]
+      "log1p", "excess, expm1", "clip", "rounded clip", "from above", "composite"]
 
    !> Of the rounded corner, and of the rounded clip: some of the places drawn are in its bands.
    real(wp), parameter :: width = 1.0_wp, clip_width = 0.375_wp
@@ -39,6 +40,7 @@ contains
          test_case_t("clip across its bounds", test_clip), &
          test_case_t("clip with rounded corners across its bounds", test_rounded_clip), &
          test_case_t("negative part with a rounded corner", test_rounded_corner), &
+         test_case_t("on which side of a sharp corner the round ones are", test_sides), &
          test_case_t("root of a polynomial", test_root), &
          test_case_t("second derivatives of a root", test_second_root), &
          test_case_t("constants and zeros", test_constants), &
@@ -86,6 +88,8 @@ contains
          s = dg_clip(a, 0.0_wp)
       case (15)
          s = dg_clip(a, clip_width)
+      case (16)
+         s = dg_above_negative(a, width)
       case default
          s = dg_log1p(a*b)*dg_sqrt(b + c)/(a + dg_expm1(c)) + dg_excess(c)
       end select
@@ -129,6 +133,8 @@ contains
             f = max(0.0_qp, min(1.0_qp, a))
          case (15)
             f = bent(a) + (1.0_qp - a) - bent(1.0_qp - a)
+         case (16)
+            f = from_above(a)
          case default
             f = log(1.0_qp + a*b)*sqrt(b + c)/(a + exp(c) - 1.0_qp) + c - log(1.0_qp + c)
          end select
@@ -158,6 +164,17 @@ contains
       end associate
    end function bent_negative
 
+   !> The same with an even function of the sixth degree that is 0 at a = 0.
+   pure real(qp) function from_above(a)
+      real(qp), intent(in) :: a
+
+      from_above = min(a, 0.0_qp)
+      associate (t => a/real(width, qp))
+         if (abs(t) < 1.0_qp) from_above = 0.5_qp*(a - width*(15.0_qp*t**2 - 10.0_qp*t**4 &
+            + 3.0_qp*t**6)/8.0_qp)
+      end associate
+   end function from_above
+
    !> Positive data of size 1, and an increment up to `largest` that keeps them so.
    subroutine draw(largest, x0, dx)
       real(wp), intent(in) :: largest
@@ -178,7 +195,7 @@ contains
       real(wp), intent(in) :: dx(3)
 
       scale_of = sum(abs(s%g*dx))
-      if (which == 11 .or. which == 14 .or. which == 15) scale_of = abs(dx(1))
+      if (any(which == [11, 14, 15, 16])) scale_of = abs(dx(1))
    end function scale_of
 
    subroutine test_identity(error)
@@ -236,7 +253,7 @@ contains
    end subroutine test_change_of_sign
 
    !> `df` stays relatively exact and g.dx equal to it down to the smallest numbers. All functions
-   !> rise with each of their increments but those of case 4, 7 and 16, where terms cancel.
+   !> rise with each of their increments but those of case 4, 7, 16 and 17, where terms cancel.
    subroutine test_small_increments(error)
       type(error_t), allocatable, intent(out) :: error
       type(dg_t) :: s
@@ -417,6 +434,14 @@ contains
    !> it adds up to a.
    subroutine test_rounded_corner(error)
       type(error_t), allocatable, intent(out) :: error
+
+      call check_corner(error, 11)
+      call check_corner(error, 16)
+   end subroutine test_rounded_corner
+
+   subroutine check_corner(error, which)
+      type(error_t), allocatable, intent(inout) :: error
+      integer, intent(in) :: which
       real(wp), parameter :: at(7) = [-2.5_wp, -1.3_wp, -0.7_wp, 0.0_wp, 0.4_wp, 1.2_wp, 3.0_wp]
       type(dg_t) :: s, image
       real(wp) :: x0(3), dx(3), expected
@@ -426,16 +451,16 @@ contains
          do j = 1, size(at)
             x0 = [at(i), 1.0_wp, 1.0_wp]
             dx = [at(j) - at(i), 0.2_wp, 0.1_wp]
-            s = operate(11, x0, dx)
-            expected = increment_of(expect, 11, x0, dx)
+            s = operate(which, x0, dx)
+            expected = increment_of(expect, which, x0, dx)
             call check_near(error, s%df, expected, 4.0_wp*eps, 4.0_wp, "df")
             call check_near(error, s%f1 - s%f0, expected, 4.0_wp*eps, 4.0_wp, "values")
-            call check_near(error, s%c, slopes_of(expect, 11, x0 + dx), 40.0_wp*eps, 1.0_wp, &
+            call check_near(error, s%c, slopes_of(expect, which, x0 + dx), 40.0_wp*eps, 1.0_wp, &
                "gradient")
-            call check_second(error, 11, x0, dx, "rounded corner, " // to_text(at(i)) // " to " &
+            call check_second(error, which, x0, dx, trim(name(which)) // ", " // to_text(at(i)) // " to " &
                // to_text(at(j)))
-            image = dg_negative_part(-dg_variable(1, x0(1), dx(1)), width)
-            call check_near(error, [s%f1 - image%f1, s%df - image%df, s%g(1) - image%g(1)], &
+            image = operate(which, [-x0(1), x0(2:)], [-dx(1), dx(2:)])
+            call check_near(error, [s%f1 - image%f1, s%df - image%df, s%g(1) + image%g(1)], &
                [at(j), dx(1), 1.0_wp], 4.0_wp*eps, 4.0_wp, "a, from both parts")
             if (max(at(i), at(j)) < -width) &
                call check_near(error, [s%f1, s%df], [at(j), dx(1)], 0.0_wp, 1.0_wp, "exact below")
@@ -443,7 +468,25 @@ contains
                call check_near(error, [s%f1, s%df], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "exact above")
          end do
       end do
-   end subroutine test_rounded_corner
+   end subroutine check_corner
+
+   !> Of min(a, 0) the one is nowhere above and the other nowhere below, and at 0 equal.
+   subroutine test_sides(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(dg_t) :: below, above
+      real(wp) :: at
+      integer :: i
+
+      do i = -120, 120
+         at = 0.01_wp*width*real(i, wp)
+         below = dg_negative_part(dg_variable(1, at, 0.0_wp), width)
+         above = dg_above_negative(dg_variable(1, at, 0.0_wp), width)
+         call check_true(error, below%f0 <= min(at, 0.0_wp), "below at " // to_text(at))
+         call check_true(error, above%f0 >= min(at, 0.0_wp) - eps*width, "above at " &
+            // to_text(at))
+         if (i == 0) call check_near(error, above%f0, 0.0_wp, 0.0_wp, 1.0_wp, "at the corner")
+      end do
+   end subroutine test_sides
 
    !> F = x^3 + p a b x - (a^2 + b) with the variables a, b and x as number 3; p > 0 makes it rise.
    pure function cubic(x0, dx) result(f)

@@ -15,8 +15,10 @@ module test_nts_gap
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Some 50 roundings of quantities of size 1.
    real(wp), parameter :: tol = 64.0_wp*eps
-   !> Sharp corners, and corners rounded over these lengths before and after the edge.
-   real(wp), parameter :: sharp(2) = 0.0_wp, round(2) = [0.05_wp, 0.04_wp]
+   !> Sharp corners, and corners rounded over these lengths: concave and convex, before the edge and
+   !> after it.
+   real(wp), parameter :: sharp(2, 2) = 0.0_wp, round(2, 2) = reshape([0.05_wp, 0.06_wp, &
+      0.04_wp, 0.03_wp], [2, 2])
    !> Slave node, edge, node before it, node after it; the body is below the edge.
    real(wp), parameter :: flat(2, 5) = reshape([0.3_wp, 0.4_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
       2.1_wp, 0.0_wp, -0.9_wp, 0.0_wp], [2, 5])
@@ -124,22 +126,37 @@ contains
       end do
    end subroutine test_continuity
 
-   !> A rounded corner stays within half the rounding, times the bend, of the sharp one.
+   !> A rounded corner stays within half the rounding, times the bend, of the sharp one, outside of
+   !> the body: a closed gap is no penetration.
    subroutine test_rounded(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: x(2, 5), dx(2, 5), exact, bent, xi
-      integer :: i
+      real(wp) :: x(2, 5), dx(2, 5), exact, bent, xi, way(2), turn
+      integer :: i, n_within
 
+      n_within = 0
       do i = 1, 200
          call draw(x, dx)
          call nts_gap_value(x, 4, 5, sharp, exact, xi)
          call nts_gap_value(x, 4, 5, round, bent, xi)
          call check_near(error, bent, exact, 0.5_wp, 2.0_wp*maxval(round), "gap")
+         call check_true(error, bent <= exact + tol, "outside")
+         call random_number(way)
+         x(:, 1) = x(:, 2) + 0.1_wp*(way - 0.5_wp)
+         call nts_gap_value(x, 4, 5, sharp, exact, xi)
+         call nts_gap_value(x, 4, 5, round, bent, xi)
+         if (bent < exact) n_within = n_within + 1
+         call check_true(error, bent <= exact + tol, "outside, near the corner")
+         x(:, 1) = x(:, 2)
+         call nts_gap_value(x, 4, 5, round, bent, xi)
+         turn = (x(1, 2) - x(1, 4))*(x(2, 3) - x(2, 2)) - (x(2, 2) - x(2, 4))*(x(1, 3) - x(1, 2))
+         if (turn > 0.0_wp) call check_near(error, bent, 0.0_wp, tol, 1.0_wp, "convex corner")
          x = flat
          call random_number(x(:, 1))
          call nts_gap_value(x, 4, 5, round, bent, xi)
-         call check_near(error, bent, x(2, 1), tol, 1.0_wp, "nothing to round on a flat surface")
+         call check_near(error, bent, x(2, 1), tol + 1.0e-9_wp*maxval(round), 1.0_wp, &
+            "nothing to round on a flat surface")
       end do
+      call check_true(error, n_within > 100, "in the band")
    end subroutine test_rounded
 
    !> Over a corner the gap does not depend on which of its edges is the chosen one.
@@ -151,8 +168,8 @@ contains
       n_within = 0
       do i = 1, 200
          call draw(x, dx)
-         x(:, 1) = x(:, 3) + round(1)*(x(:, 1) - 0.5_wp)
-         call nts_gap_value(x(:, [1, 2, 3, 5]), 0, 4, round([2, 1]), gap(1), xi)
+         x(:, 1) = x(:, 3) + round(1, 1)*(x(:, 1) - 0.5_wp)
+         call nts_gap_value(x(:, [1, 2, 3, 5]), 0, 4, round(:, [2, 1]), gap(1), xi)
          if (xi > 1.0_wp) n_within = n_within + 1
          call nts_gap_value(x(:, [1, 3, 5, 2]), 4, 0, round, gap(2), xi)
          call check_near(error, gap(1), gap(2), tol, 1.0_wp, "gap")
@@ -175,7 +192,7 @@ contains
 
    subroutine test_identity(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), gap(2), xi(2), width(2)
+      real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), gap(2), xi(2), width(2, 2)
       type(dg_t) :: a
       integer :: i, n_crossed
 
@@ -275,7 +292,7 @@ contains
    !> difference to compare with.
    subroutine test_derivatives(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: x0(2, 5), dx(2, 5), way(2, 5), step, bound, gap(2), xi, width(2)
+      real(wp) :: x0(2, 5), dx(2, 5), way(2, 5), step, bound, gap(2), xi, width(2, 2)
       type(dg_t) :: a, up, down
       integer :: i, k, n, j
 
