@@ -10,6 +10,7 @@ module emcon_newton
       correction_solve, correction_t
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_kinds, only : wp
+   use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_system, only : pose_t, system_respond, system_tangent_times, system_t
@@ -65,6 +66,7 @@ module emcon_newton
       real(wp), allocatable :: history(:)        !! relative residuals of the last solve
       real(wp), allocatable :: residual(:), scale(:), correction(:)   !! (n_unknown)
       real(wp), allocatable :: dlam(:)
+      real(wp), allocatable :: way(:)            !! (n_unknown) the correction that is searched along
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
       !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
@@ -74,6 +76,8 @@ module emcon_newton
       real(wp) :: best = 0.0_wp
       integer :: n_stall = 0                     !! iterations since the best one
       real(wp) :: damping = 1.0_wp               !! part of a correction that is taken
+      real(wp) :: work = 0.0_wp                  !! of the correction at its start; 0: no search
+      type(line_search_t) :: line
       integer :: n_polish = 0                    !! corrections with the old tangent
       logical :: is_polish = .false.             !! within tolerance: down to round-off from here
       logical :: is_idle = .false.               !! no load: all forces are round-off
@@ -90,7 +94,8 @@ contains
 
       self%tolerance = tolerance
       self%maximum = maximum
-      allocate(self%residual(n_unknown), self%scale(n_unknown), self%correction(n_unknown))
+      allocate(self%residual(n_unknown), self%scale(n_unknown), self%correction(n_unknown), &
+         self%way(n_unknown))
       allocate(self%contact(2, n_node), self%driven(2, n_node), source=0.0_wp)
       allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
    end subroutine newton_init
@@ -110,7 +115,7 @@ contains
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: norm, defect
-      logical :: is_rounding, is_driven
+      logical :: is_rounding, is_driven, goes_on
       integer :: next
 
       call begin(self, set%n)
@@ -132,6 +137,8 @@ contains
             is_driven = .false.
             cycle
          end if
+         call search(self, system, set, pose, du, goes_on)
+         if (goes_on) cycle
          call judge(self, max(norm, defect), is_rounding, next)
          select case (next)
          case (next_done)
@@ -151,6 +158,32 @@ contains
          end if
       end do
    end subroutine newton_solve
+
+   !> In statics, go back on the last correction if contact forces turned on the way.
+   subroutine search(self, system, set, pose, du, goes_on)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(inout), contiguous :: du(:, :)
+      logical, intent(out) :: goes_on            !! there is another place to look at
+
+      goes_on = .false.
+      if (.not. pose%is_end .or. set%n == set%n_linear) return
+      if (self%line%is_on) then
+         call line_search_take(self%line, dot_product(self%way, self%residual))
+      else
+         call line_search_begin(self%line, [self%work, dot_product(self%correction, &
+            self%residual)])
+         if (self%line%is_on) self%way = self%correction
+         self%work = 0.0_wp
+      end if
+      goes_on = self%line%is_on
+      if (.not. goes_on) return
+      self%correction = self%line%step*self%way
+      call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
+      set%lam = set%lam + self%line%step*self%dlam
+   end subroutine search
 
    !> An error if the user has asked to stop: an increment may take thousands of iterations.
    subroutine check_interrupt(self, status, error)
@@ -186,6 +219,8 @@ contains
       self%n_polish = 0
       self%n_stall = 0
       self%damping = 1.0_wp
+      self%work = 0.0_wp
+      self%line%is_on = .false.
       self%best = huge(self%best)
       self%last = huge(self%last)
       self%is_polish = .false.
@@ -271,6 +306,7 @@ contains
       if (set%n > set%n_linear .and. .not. self%is_polish) then
          self%correction = self%damping*self%correction
          self%dlam = self%damping*self%dlam
+         self%work = dot_product(self%correction, self%residual)
       end if
       call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
       set%lam = set%lam + self%dlam
@@ -302,6 +338,7 @@ contains
       call factorise(self, system, correction, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return
       call correct(self, system, correction, set, du, error)
+      self%work = 0.0_wp
       du = du + self%driven
    end subroutine start_driven
 
@@ -334,6 +371,8 @@ contains
          if (.not. allocated(system%refusal)) exit
          if (i == most_halvings .or. self%n_solve == 0) return
          self%correction = 0.5_wp*self%correction
+         self%work = 0.5_wp*self%work
+         self%line%is_on = .false.
          call add_to_dofs(system%numbering, self%correction, -1.0_wp, du)
       end do
       status = newton_converged

@@ -35,6 +35,7 @@ program main
    use test_judge, only : collect_judge
    use test_law, only : collect_law
    use test_linear_rows, only : collect_linear_rows
+   use test_line_search, only : collect_line_search
    use test_links, only : collect_links
    use test_loads, only : collect_loads
    use test_march, only : collect_march
@@ -139,6 +140,7 @@ program main
    call run("correction", collect_correction)
    call run("reduction", collect_reduction)
    call run("system", collect_system)
+   call run("line_search", collect_line_search)
    call run("newton", collect_newton)
    call run("velocity_update", collect_velocity_update)
    call run("verdict", collect_verdict)

@@ -169,6 +169,19 @@ def test_ironing_works_on_the_block_only(tmp_path):
     assert abs(work - energy) <= error
 
 
+def test_ironing_with_nodes_of_both_sides_held(tmp_path):
+    """Nodes fall into dents and are pushed over corners, up to t = 2.9: no cuts down to the smallest.
+
+    Both sides are held by one geometry, so that what is closed is closed to round-off.
+    """
+    deck = Deck.read(DECKS / "ironing.inp")
+    deck.replace("TYPE=<formulation>", "TYPE=NODE TO SURFACE, SIDES=BOTH")
+    run = run_deck(deck, tmp_path, path=1.9)
+    size = 16                                    # of the scene, on the safe side
+    assert run.verdict["penetration"] <= 16*EPSILON*size
+    assert run.history["cuts"].sum() <= 12
+
+
 # ---- free bodies --------------------------------------------------------------------------------
 
 #: Time by which the bodies have parted, and increment.

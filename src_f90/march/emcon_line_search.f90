@@ -1,0 +1,66 @@
+!> How much of a correction to take, from what the residual does along it.
+!>
+!> A correction c from the residual r0 leaves c.r = 0 at its end to first order, c.r0 < 0 being the
+!> work at its start. Where a node passes a kink of a surface on the way, the force turns at once,
+!> and the work at the end is large and of the other sign: the state that is looked for is on the
+!> way, where the work vanishes. Source: docs/theory.md, section 8.
+module emcon_line_search
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: line_search_t, line_search_begin, line_search_take
+
+   !> Work below this part of that at the start is small.
+   real(wp), parameter :: small = 0.5_wp
+   !> Places looked at: enough to meet a rounded corner, 1e-4 of an edge, in a way of many edges.
+   integer, parameter :: most_places = 24
+
+   type :: line_search_t
+      logical :: is_on = .false.
+      real(wp) :: step = 0.0_wp                  !! from the last place to the next one
+      real(wp) :: start = 0.0_wp                 !! work at the start
+      real(wp) :: at = 1.0_wp                    !! the next place: part of the correction
+      real(wp) :: low = 0.0_wp, high = 1.0_wp    !! places with work below and above 0
+      integer :: n_place = 0
+   end type line_search_t
+
+contains
+
+   !> Begin at the end of a correction, if it went too far; `work`: at its start and its end.
+   pure subroutine line_search_begin(self, work)
+      type(line_search_t), intent(out) :: self
+      real(wp), intent(in) :: work(2)            !! c.r [F L]
+
+      self%is_on = work(1) < 0.0_wp .and. work(2) > small*abs(work(1))
+      if (.not. self%is_on) return
+      self%start = work(1)
+      call choose(self)
+   end subroutine line_search_begin
+
+   !> Go on from the place chosen last, where the work is `work`; the search ends if it is small.
+   pure subroutine line_search_take(self, work)
+      type(line_search_t), intent(inout) :: self
+      real(wp), intent(in) :: work               !! [F L]
+
+      self%is_on = abs(work) > small*abs(self%start) .and. self%n_place < most_places
+      if (.not. self%is_on) return
+      if (work < 0.0_wp) then
+         self%low = self%at
+      else
+         self%high = self%at
+      end if
+      call choose(self)
+   end subroutine line_search_take
+
+   !> The next place, in the middle: across a corner the work is a step, on which a secant is slower.
+   pure subroutine choose(self)
+      type(line_search_t), intent(inout) :: self
+      real(wp) :: from
+
+      from = self%at
+      self%n_place = self%n_place + 1
+      self%at = 0.5_wp*(self%low + self%high)
+      self%step = self%at - from
+   end subroutine choose
+
+end module emcon_line_search
