@@ -33,7 +33,7 @@ PARTS = {
 }
 
 
-def environment(folder, leaks=True):
+def environment(folder):
     """What makes the programs of the tests those of MODE=sanitize; reports go to `folder`."""
     options = f"log_path={folder}/report:print_stacktrace=1"
     known = pathlib.Path(__file__).with_name("undefined.supp")
@@ -42,7 +42,7 @@ def environment(folder, leaks=True):
         "EMCON": str(BUILD / "emcon"),
         "EMCON_PATIENCE": "10",
         "EMCON_OPENS": os.environ.get("EMCON_OPENS", "20000"),
-        "ASAN_OPTIONS": f"{options}:detect_leaks={leaks:d}",
+        "ASAN_OPTIONS": f"{options}:detect_leaks=1",
         "UBSAN_OPTIONS": f"{options}:halt_on_error=1:suppressions={known}",
     }  # fmt: skip
 
@@ -63,9 +63,7 @@ def main():
         for part in options.part or PARTS:
             begin = time.monotonic()
             workers = [f"-n{options.jobs}"] if "pytest" in PARTS[part] else []
-            # The kernel tests leave factors of matrices to the end of the program.
-            env = environment(folder, leaks=part != "kernels")
-            done = subprocess.run([*PARTS[part], *workers], cwd=ROOT, env=env)
+            done = subprocess.run([*PARTS[part], *workers], cwd=ROOT, env=environment(folder))
             if done.returncode != 0:
                 failed.append(f"{part} ended with code {done.returncode}")
             print(f"{part}: {time.monotonic() - begin:.0f} s", flush=True)
