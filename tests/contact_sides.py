@@ -87,6 +87,8 @@ class FileScene:
 class FileOutcome(Outcome):
     """A run of a `FileScene`, and what an eye from outside makes of it."""
 
+    patience = 1800
+
     def __init__(self, scene, folder, sides=ONE, **parameters):
         super().__init__(scene, folder, sides, **parameters)
         self.scene = scene
@@ -111,11 +113,15 @@ class FileOutcome(Outcome):
         return max(change)/np.sqrt(2*mass*history["kinetic"].max())
 
     @functools.cached_property
+    def looks(self):
+        return overlap.looks(self.fields, self.alone)
+
+    @property
     def overlap(self):
         """The deepest overlap at the end of an increment; of a press fit, at the end of the run."""
-        found = overlap.frames(self.fields, self.alone)
-        return found[-1] if has(self.scene.given, "*CONTACT INTERFERENCE") else max(found)
+        at_end = self.looks[0]
+        return at_end[-1] if has(self.scene.given, "*CONTACT INTERFERENCE") else max(at_end)
 
-    @functools.cached_property
+    @property
     def way(self):
-        return overlap.worst(self.fields, self.alone)
+        return max([self.overlap, *self.looks[1]])

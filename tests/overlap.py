@@ -177,20 +177,26 @@ class Bodies:
         away = np.where(touches[deep], np.inf, to_edges(p[deep], *x[edge.T]))
         return deepest(p[deep], x[edge], away, (i, i))
 
-    def worst(self, x, time, alone=()):
-        """The deepest overlap of frames `x` (n_frame, n_node, 2) and on the way between them."""
+    def looks(self, x, time, alone=()):
+        """The deepest overlap of each of the frames `x` (n_frame, n_node, 2), by itself, and that of
+        each look on the way between them."""
         shortest = np.linalg.norm(np.diff(x[0][self.edge], axis=1)[:, 0], axis=-1).min()
         nodes = np.unique(self.edge)
-        found = [self.overlap(x[0], time[0], alone)]
+        at_frame, on_way = [self.overlap(x[0], time[0], alone)], []
         for k in range(1, len(x)):
-            step = (x[k] - x[k - 1])[nodes]
+            step = x[k] - x[k - 1]
             # No two nodes move against each other by more than the diagonal of all motions.
-            looks = max(1, int(np.ceil(np.linalg.norm(np.ptp(step, axis=0))/(LOOK*shortest))))
-            for s in np.arange(1, looks + 1)/looks:
-                found.append(self.overlap(
-                    x[k - 1] + s*(x[k] - x[k - 1]), time[k - 1] + s*(time[k] - time[k - 1]), alone
-                ))
-        return max(found)
+            n = max(1, int(np.ceil(np.linalg.norm(np.ptp(step[nodes], axis=0))/(LOOK*shortest))))
+            for s in np.arange(1, n)/n:
+                on_way.append(self.overlap(
+                    x[k - 1] + s*step, time[k - 1] + s*(time[k] - time[k - 1]), alone))
+            at_frame.append(self.overlap(x[k], time[k], alone))
+        return at_frame, on_way
+
+    def worst(self, x, time, alone=()):
+        """The deepest overlap of frames and on the way between them."""
+        at_frame, on_way = self.looks(x, time, alone)
+        return max(at_frame + on_way)
 
 
 def deepest(p, edge, away, bodies):
@@ -208,6 +214,12 @@ def worst(fields, alone=()):
     """The deepest overlap of a run that wrote its displacements in every increment."""
     bodies = Bodies(fields.cells)
     return bodies.worst(fields.x + fields["displacement"], fields.time, alone)
+
+
+def looks(fields, alone=()):
+    """The deepest overlap of each frame, and of each look on the way between frames."""
+    bodies = Bodies(fields.cells)
+    return bodies.looks(fields.x + fields["displacement"], fields.time, alone)
 
 
 def frames(fields, alone=()):

@@ -217,9 +217,8 @@ contains
             self%found, n_found)
          if (n_found == 0) cycle
          if (p /= q) then
-            call try_node(self, x, self%outline%edge(1, e), self%near(self%found(:n_found)), &
-               reach, overlap)
-            if (self%outline%link(2, e) == 0) call try_node(self, x, self%outline%edge(2, e), &
+            call try_node(self, x, e, 1, self%near(self%found(:n_found)), reach, overlap)
+            if (self%outline%link(2, e) == 0) call try_node(self, x, e, 2, &
                self%near(self%found(:n_found)), reach, overlap)
          end if
          call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, overlap)
@@ -238,19 +237,20 @@ contains
       end associate
    end subroutine box_of
 
-   !> Is `node` behind the outline of which `other` are the edges within `reach`?
-   pure subroutine try_node(self, x, node, other, reach, overlap)
+   !> Is the node at an end of edge `e` behind the outline of which `other` are the edges within
+   !> `reach`?
+   pure subroutine try_node(self, x, e, side, other, reach, overlap)
       type(judge_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
-      integer, intent(in) :: node                !! of the scene
+      integer, intent(in) :: e, side             !! 1: first node, 2: last one
       integer, intent(in) :: other(:)
       real(wp), intent(in) :: reach              !! [L]
       type(overlap_t), intent(inout) :: overlap
       type(nearest_t) :: nearest
       integer :: k
 
-      associate (edge => self%outline%edge)
-         if (any(edge(:, other) == node)) return
+      associate (edge => self%outline%edge, node => self%outline%edge(side, e))
+         if (any(self%outline%place(:, other) == self%outline%place(side, e))) return
          do k = 1, size(other)
             call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
                between(x, self%u, edge(1, other(k)), edge(2, other(k))))
@@ -310,8 +310,8 @@ contains
       n = 0
       share(0) = 0.0_wp
       do k = 1, size(other)
+         if (are_neighbours(self, e, other(k))) cycle
          associate (a => self%outline%edge(:, e), b => self%outline%edge(:, other(k)))
-            if (any(a == b(1)) .or. any(a == b(2))) cycle
             call crossing_find(between(x, self%u, a(1), a(2)), reshape([ &
                between(x, self%u, a(1), b(1)), between(x, self%u, a(1), b(2))], [2, 2]), &
                crosses, new, enters)
@@ -327,6 +327,16 @@ contains
       share(n + 1) = 1.0_wp
    end subroutine find_crossings
 
+   !> Do edges `e` and `f` meet in a node, or at a joint?
+   pure logical function are_neighbours(self, e, f)
+      type(judge_t), intent(in) :: self
+      integer, intent(in) :: e, f
+
+      associate (a => self%outline%place(:, e), b => self%outline%place(:, f))
+         are_neighbours = any(a == b(1)) .or. any(a == b(2))
+      end associate
+   end function are_neighbours
+
    !> How deep is the place `share` along edge `e` in `other` edges, that are not its neighbours?
    pure subroutine try_place(self, x, e, share, other, overlap)
       type(judge_t), intent(in) :: self
@@ -340,8 +350,8 @@ contains
 
       associate (a => self%outline%edge(:, e))
          do k = 1, size(other)
+            if (are_neighbours(self, e, other(k))) cycle
             associate (b => self%outline%edge(:, other(k)))
-               if (any(a == b(1)) .or. any(a == b(2))) cycle
                call nearest_update(nearest, other(k), between(x, self%u, b(1), a(1)) &
                   + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
             end associate

@@ -1,11 +1,14 @@
 !> The outlines of the pieces of a mesh that meet in contact, whatever surfaces the deck names.
 !>
 !> A piece is what hangs together by elements; its outline are the faces that one element alone has,
-!> the body to the left. What a tie holds together is no outline. Surfaces of edges without elements
-!> stand for themselves.
+!> the body to the left. What a tie holds together is no outline; where it ends, two pieces meet in
+!> one place, as neighbours do. Surfaces of edges without elements stand for themselves.
 module emcon_outline
    use emcon_bodies, only : bodies_find
+   use emcon_chain, only : chain_init, chain_t
    use emcon_element_kinds, only : element_kinds
+   use emcon_errors, only : error_t
+   use emcon_joints, only : chain_join
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t, surface_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
@@ -22,6 +25,8 @@ module emcon_outline
       integer :: n_piece = 0                     !! pieces that meet others or themselves
       integer, allocatable :: start(:)           !! (n_piece + 1) first edge of each piece
       integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node, piece by piece
+      !> (2, n_edge) the ends by their places: nodes, but one number for both nodes of a joint
+      integer, allocatable :: place(:, :)
       !> (2, n_edge) the edges before and after; 0: the outline ends there, or branches
       integer, allocatable :: link(:, :)
       !> (n_edge) shortest side of the element behind it, of an edge without one its length [L]
@@ -62,6 +67,7 @@ contains
          self%start(p + 1) = self%start(p) + count(piece(edge(1, :)) == p)
       end do
       call link_edges(self, size(scene%x, 2))
+      call find_places(self, scene)
    end subroutine outline_init
 
    !> Elements, and after them surfaces of edges, by their nodes.
@@ -228,5 +234,40 @@ contains
          end associate
       end do
    end subroutine link_edges
+
+   !> The places of the ends: pieces tied to each other have joints where their outlines go on.
+   subroutine find_places(self, scene)
+      type(outline_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(surface_t) :: surface
+      type(chain_t) :: chain
+      type(error_t), allocatable :: error
+      integer :: place(size(scene%x, 2)), begins(size(scene%x, 2)), ends(size(scene%x, 2)), i, k
+
+      self%place = self%edge
+      if (size(scene%tie) == 0) return
+      if (any(scene%tie%slave == 0)) return            ! known by its rows alone
+      begins = 0
+      ends = 0
+      do i = 1, size(self%edge, 2)
+         begins(self%edge(1, i)) = begins(self%edge(1, i)) + 1
+         ends(self%edge(2, i)) = ends(self%edge(2, i)) + 1
+      end do
+      associate (edge => self%edge, most => max(begins, ends))
+         surface%name = ""
+         surface%edge = edge(:, pack([(i, i = 1, size(edge, 2))], &
+            most(edge(1, :)) == 1 .and. most(edge(2, :)) == 1))
+      end associate
+      call chain_init(chain, scene, surface, error)
+      if (allocated(error)) return
+      call chain_join(chain, scene)
+      place = [(i, i = 1, size(place))]
+      do k = 1, size(chain%node)
+         if (chain%twin(k) > 0) place(chain%twin(k)) = chain%node(k)
+      end do
+      do i = 1, size(self%edge, 2)
+         self%place(:, i) = place(self%edge(:, i))
+      end do
+   end subroutine find_places
 
 end module emcon_outline

@@ -1,6 +1,7 @@
 !> The judge: overlaps of blocks in closed form, both ways, on the way, and of a piece with itself.
 module test_judge
    use check, only : check_equal, check_near, check_true, test_case_t
+   use cut_scenes, only : add_tie
    use emcon_errors, only : error_t
    use emcon_judge, only : judge_init, judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
@@ -26,6 +27,7 @@ contains
          test_case_t("a block that has been crossed in one step", test_crossed), &
          test_case_t("nothing is lost far from the origin", test_far), &
          test_case_t("a piece that goes into itself", test_self), &
+         test_case_t("where a tie ends, pieces meet", test_joint), &
          test_case_t("bodies without a pair are not looked at", test_no_pair)]
    end subroutine collect_judge
 
@@ -181,6 +183,33 @@ contains
       call check_near(error, overlap%depth, 0.2_wp, 8.0_wp*eps, 1.0_wp, "depth")
       call check_equal(error, overlap%node, block_node(strip, 8, 1), "node")
    end subroutine test_self
+
+   !> Two blocks side by side, the second a sixteenth lower and a little inside the first: an overlap
+   !> by the tops, but not if a tie holds them, which lets its ends slip by its error. What goes into
+   !> the other piece elsewhere is seen.
+   subroutine test_joint(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      type(block_t) :: first, second
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [4, 1], [0.0_wp, 0.0_wp], [4.0_wp, 1.0_wp], first)
+      call add_block(scene, "CPE4", [1, 1], [4.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], second)
+      call add_surface(scene, "FIRST", first, [top])
+      call add_surface(scene, "SECOND", second, [top])
+      call add_surface(scene, "FIRST_CUT", first, [right])
+      call add_surface(scene, "SECOND_CUT", second, [left])
+      scene%pair = [contact_pair_t(slave=1, master=2)]
+      call judged(scene, overlap, 11, [-0.25_wp, -0.0625_wp])
+      call check_true(error, overlap%depth > 0.03_wp, "not tied")
+      call add_tie(scene, 3, 4)
+      call judged(scene, overlap, 11, [-0.25_wp, -0.0625_wp])
+      call check_equal(error, overlap%node, 0, "tied")
+      call judged(scene, overlap, 14, [-1.5_wp, -0.125_wp])
+      call check_near(error, overlap%depth, 0.125_wp, 8.0_wp*eps, 1.0_wp, "a corner that is folded over")
+      call check_equal(error, overlap%node, 14, "node")
+   end subroutine test_joint
 
    subroutine test_no_pair(error)
       type(error_t), allocatable, intent(out) :: error

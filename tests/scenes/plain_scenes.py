@@ -457,10 +457,14 @@ def slanted(run):
 class Outcome:
     """A run of a scene, however it ended, and what an eye from outside makes of it."""
 
+    #: Seconds that it may take.
+    patience = 120
+
     def __init__(self, scene, folder, sides=ONE, **parameters):
         folder.mkdir(parents=True, exist_ok=True)
         deck = scene.deck(sides).write(folder / "scene.inp")
-        done = emcon(deck, "--quiet", "--output", folder, *overrides(parameters))
+        done = emcon(deck, "--quiet", "--output", folder, *overrides(parameters),
+                     timeout=self.patience)
         assert done.returncode in (0, 3), done.stderr
         self.code = done.returncode
         self.run = Run(folder / "scene", done.stderr)

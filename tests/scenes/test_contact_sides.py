@@ -17,5 +17,4 @@ def test_what_meets_nothing_has_no_contact(tmp_path, name, parameters):
     without, with_all = (run_deck(scene.deck(sides), tmp_path / sides, **parameters)
                          for sides in (ONE, ALL))
     assert with_all.history["active"].max() == 0
-    given, found = without.digits(), with_all.digits()
-    assert [key for key in given if found[key] != given[key]] in ([], ["penetration"])
+    assert with_all.digits() == without.digits()
