@@ -77,11 +77,16 @@ class FileScene:
         return not any(has(self.given, name) for name in ("*BOUNDARY", "*CLOAD", "*DLOAD"))
 
     def alone(self, n_body):
-        """Pairs of bodies, numbers from 0, that a tie holds together."""
-        if not has(self.given, "*TIE"):
-            return set()
-        return {(i, j) for group in TIED.get(self.given.name, [range(n_body)])
-                for i in group for j in group if i < j}
+        """Pairs of bodies, numbers from 0, that are not looked at: what a tie holds together, and a
+        body with itself unless its surface is in contact with itself."""
+        pairs = [line.split(",") for head, data in self.given.card
+                 if keyword(head) == "*CONTACT PAIR" for line in data]
+        folds = any(slave.strip() == master.strip() for slave, master in pairs)
+        alone = set() if folds else {(i, i) for i in range(n_body)}
+        if has(self.given, "*TIE"):
+            alone |= {(i, j) for group in TIED.get(self.given.name, [range(n_body)])
+                      for i in group for j in group if i < j}
+        return alone
 
 
 class FileOutcome(Outcome):

@@ -67,8 +67,9 @@ contains
                if (allocated(error)) return
             end if
             call adjust_pair(scene, pair, contact, notes)
-            if (contact%is_self) call check_crossing(scene, pair%slave, contact%slave, &
-               is_checked, error)
+            ! Bodies of one surface may cross each other where their overlap is to be resolved.
+            if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) &
+               call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
             if (is_meant .and. .not. allocated(error)) cycle
             if (.not. allocated(error)) call check_penetration(scene, pair, contact, error)
             if (.not. allocated(error)) call check_corners(scene, pair, options, error)
