@@ -28,7 +28,8 @@ contains
       if (reader%doubt_shapes .or. reader%log%n_errors > 0) return
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
-            if (.not. pair%may_exchange .or. pair%slave == 0 .or. pair%master == 0) cycle
+            if (.not. pair%may_choose .or. pair%slave == 0 .or. pair%master == 0) cycle
+            if (pair%both_sides .or. pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0) cycle
             if (pair%slave == pair%master .or. has_reverse(scene%pair, i)) cycle
             call find_advice(scene, pair, advice, is_bent)
             if (.not. is_bent) cycle

@@ -6,7 +6,7 @@ module emcon_deck_contact
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
-   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
       formulation_segment, origin_t, scene_t, where_text
@@ -99,7 +99,7 @@ contains
             most = most + reader%card(i)%last - reader%card(i)%first + 1
          end if
       end do
-      allocate(pair(2*most), line(2*most))
+      allocate(pair(most), line(most))
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "CONTACTPAIR") cycle
@@ -113,17 +113,13 @@ contains
             line(n) = line_origin(reader, data%i_line)
             pair(n) = common
             call get_surfaces(reader, data, scene, pair(n)%slave, pair(n)%master)
+            call set_sides(scene, pair(n))
             call check_nodal(reader, data, scene, pair(n))
             call check_repeated(reader, data, scene, pair(:n), line)
-            if (.not. common%both_sides .or. pair(n)%slave == pair(n)%master) cycle
-            n = n + 1
-            line(n) = line(n - 1)
-            pair(n) = reversed(pair(n - 1))
-            if (pair(n - 1)%master > 0) call check_repeated(reader, data, scene, pair(:n), line)
          end do
          call read_pair_options(reader, reader%card(i), scene, pair(n_before + 1:n))
       end do
-      scene%pair = pair(:n)
+      call add_reverses(reader, pair(:n), line(:n), scene)
    end subroutine read_pairs
 
    !> TYPE of a card; 0 if it is refused.
@@ -148,22 +144,18 @@ contains
       end select
    end subroutine read_formulation
 
-   !> SIDES of a card: are the nodes of both surfaces held, or of which one? Integrated gaps of both
-   !> would hold the same covered lengths twice. ADJUST speaks of the slave, and so names it.
+   !> SIDES of a card: are the nodes of both surfaces held, of the first, or is it left to the
+   !> program? Integrated gaps of both would hold the same covered lengths twice.
    subroutine read_sides(reader, card, common)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(contact_pair_t), intent(inout) :: common
       character(len=*), parameter :: known = "AUTO, ONE, BOTH"
 
+      common%is_asked = has_option(card, "SIDES")
       select case (option_name(card, "SIDES"))
-      case ("")
-         common%may_exchange = .not. has_option(card, "ADJUST")
-      case ("AUTO")
-         common%may_exchange = .true.
-         common%is_asked = .true.
-         if (has_option(card, "ADJUST")) call refuse_option(reader, card, "SIDES", known, &
-            "ADJUST moves the nodes of the slave; say which one it is by SIDES=ONE")
+      case ("", "AUTO")
+         common%may_choose = .true.
       case ("ONE")
          continue
       case ("BOTH")
@@ -177,6 +169,49 @@ contains
       end select
    end subroutine read_sides
 
+   !> Where the program may choose: both sides node to surface, if the slave has edges; one of them
+   !> if gaps are integrated. ADJUST speaks of the slave, and so names it.
+   pure subroutine set_sides(scene, pair)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair
+
+      if (.not. pair%may_choose .or. pair%slave == 0) return
+      if (pair%formulation == formulation_nts) then
+         pair%both_sides = .not. scene%surface(pair%slave)%is_nodal
+      end if
+   end subroutine set_sides
+
+   !> All pairs of the scene: behind each that holds both sides its reverse, unless lines of the
+   !> deck say both. Then what they say together counts.
+   subroutine add_reverses(reader, pair, line, scene)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(origin_t), intent(in) :: line(:)
+      type(scene_t), intent(inout) :: scene
+      type(contact_pair_t) :: all(2*size(pair))
+      integer :: i, j, n
+
+      n = 0
+      do i = 1, size(pair)
+         n = n + 1
+         all(n) = pair(i)
+         if (.not. pair(i)%both_sides .or. pair(i)%slave == pair(i)%master) cycle
+         j = findloc(pair%slave == pair(i)%master .and. pair%master == pair(i)%slave, .true., 1)
+         if (j == 0) then
+            n = n + 1
+            all(n) = reversed(pair(i))
+         else if (pair(i)%may_choose) then
+            all(n)%both_sides = pair(j)%both_sides
+         else
+            call add_error(reader%log, line(j), "*CONTACT PAIR: the pair of slave surface " // &
+               quoted(scene%surface(pair(j)%slave)%name) // " and master surface " // &
+               quoted(scene%surface(pair(j)%master)%name) // " is given twice; SIDES=BOTH holds " &
+               // "it at " // where_text(scene, line(i)))
+         end if
+      end do
+      scene%pair = all(:n)
+   end subroutine add_reverses
+
    !> The other half of a pair with both sides.
    pure function reversed(pair) result(other)
       type(contact_pair_t), intent(in) :: pair
@@ -186,6 +221,9 @@ contains
       other%slave = pair%master
       other%master = pair%slave
       other%is_reverse = .true.
+      if (.not. pair%may_choose) return
+      other%adjust_distance = -1.0_wp                ! it speaks of the slave
+      other%adjust_set = 0
    end function reversed
 
    !> A surface of nodes has no edges: it may only be the slave of another one, node to surface.
@@ -287,7 +325,7 @@ contains
          call refuse_option(reader, card, "GUARD", "YES, NO", "")
       end select
       if (both_sides .and. has_option(card, "GUARD")) call card_error(reader, card, "GUARD has no " &
-         // "meaning with SIDES=BOTH, which holds the nodes of both surfaces; take it out")
+         // "meaning where the nodes of both surfaces are held; take it out, or say SIDES=ONE")
    end subroutine read_guard
 
    !> ADJUST= a distance or a node set.

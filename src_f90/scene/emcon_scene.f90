@@ -96,8 +96,8 @@ module emcon_scene
       integer :: formulation = formulation_nts
       logical :: both_sides = .false.                !! nodes of both surfaces are held
       logical :: is_reverse = .false.                !! the second half of a pair with both sides
-      logical :: may_exchange = .false.              !! the rounder surface becomes the slave
-      logical :: is_asked = .false.                  !! so says the deck, by SIDES=AUTO
+      logical :: may_choose = .false.                !! both sides or one, and which one
+      logical :: is_asked = .false.                  !! the deck says so, or which
       logical :: is_exchanged = .false.              !! the deck names what is the master first
       logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
