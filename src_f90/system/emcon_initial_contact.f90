@@ -5,6 +5,7 @@ module emcon_initial_contact
    use emcon_chain, only : chain_corners, chain_crossing, chain_t
    use emcon_contact, only : constraint_t, gap_state_t
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_guards, only : guard_slack
    use emcon_kinds, only : wp
    use emcon_nts, only : nts_init, nts_nearest, nts_t
    use emcon_scene, only : contact_options_t, contact_pair_t, formulation_nts, scene_t, &
@@ -71,12 +72,31 @@ contains
             if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) &
                call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
             if (is_meant .and. .not. allocated(error)) cycle
-            if (.not. allocated(error)) call check_penetration(scene, pair, contact, error)
+            if (allocated(error)) return
+            call check_penetration(scene, pair, contact, error)
+            if (allocated(error) .and. pair%is_reverse .and. pair%may_choose) then
+               deallocate(error)                     ! `check_corners` has let the nodes pass
+               call become_guard(scene, pair, notes)
+               cycle
+            end if
             if (.not. allocated(error)) call check_corners(scene, pair, options, error)
             if (allocated(error)) return
          end associate
       end do
    end subroutine initial_contact_prepare
+
+   !> Nodes that begin behind an edge of the slave, as polygons of one curve dip into each other,
+   !> cannot be held at it: they are kept from going in farther than guards allow.
+   subroutine become_guard(scene, pair, notes)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair
+      type(notes_t), intent(inout) :: notes
+
+      pair%slack = guard_slack
+      call note_add(notes, where_text(scene, pair%origin) // ": surface " // &
+         scene%surface(pair%slave)%name // " dips into edges of " // &
+         scene%surface(pair%master)%name // " at the start: its nodes are guarded, not held")
+   end subroutine become_guard
 
    !> A surface that crosses itself has no outside. Each surface is looked at once.
    subroutine check_crossing(scene, number, chain, is_checked, error)
@@ -274,7 +294,10 @@ contains
       character(len=:), allocatable :: found
       integer :: k, n
 
-      if (pair%formulation == formulation_nts .or. pair%slave == pair%master) return
+      if (pair%slave == pair%master .or. pair%is_reverse) return
+      if (pair%formulation == formulation_nts) then
+         if (.not. (pair%both_sides .and. pair%may_choose)) return
+      end if
       call nts_init(contact, scene, reversed(pair), error)
       if (allocated(error)) return
       call measure_start(scene, contact)
