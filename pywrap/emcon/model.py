@@ -344,9 +344,9 @@ class Model(Cards):
 
         interaction   default one of its own, frictionless
         type          NODE TO SURFACE, SEGMENT or MORTAR
-        sides         ONE: nodes of the slave are held; AUTO: of the rounder surface, where the
-                      slave would push it sideways; BOTH: of the master too. Default AUTO, ONE
-                      with `adjust`
+        sides         ONE: nodes of the slave are held; BOTH: of the master too, NODE TO SURFACE
+                      only; AUTO (default): both there, else those of the rounder surface where
+                      the slave would push it sideways, of the slave with `adjust`
         guard         YES (default): nodes that the pair does not hold go in by a twentieth of an
                       edge at most; NO: they may go in
         adjust        distance [L] up to which slave nodes are moved onto the master, or a node set

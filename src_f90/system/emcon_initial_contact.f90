@@ -136,7 +136,7 @@ contains
          to_text(scene%node_label(chain%edge(2, e))) // ")"
    end subroutine face_text
 
-   !> The same pair with slave and master exchanged.
+   !> The same pair with slave and master exchanged; every face counts for what is behind at first.
    pure function reversed(pair) result(other)
       type(contact_pair_t), intent(in) :: pair
       type(contact_pair_t) :: other
@@ -144,6 +144,7 @@ contains
       other = pair
       other%slave = pair%master
       other%master = pair%slave
+      other%both_sides = .false.
    end function reversed
 
    !> Master nodes are all behind the slave surface.

@@ -563,7 +563,7 @@ def test_notes_tell_what_the_deck_reader_doubts() -> None:
                             + block((0.5, 1.0), (1.0, 1.0), (2, 2), "UPPER"))
     model.material("RUBBER", elastic=(100.0, 0.3), density=1.0)
     model.section("RUBBER", "LOWER").section("RUBBER", "UPPER")
-    model.contact_pair("LOWER_TOP", "UPPER_BOTTOM")
+    model.contact_pair("LOWER_TOP", "UPPER_BOTTOM", sides="ONE")
     model.contact_pair("UPPER_LEFT", "LOWER_TOP")
     model.step("DYNAMIC", 0.1, 0.1, nlgeom=True)
     with model.stepper() as stepper:

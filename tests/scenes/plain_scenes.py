@@ -27,8 +27,8 @@ tolerance = 1e-10
 """
 
 #: How the bodies of a scene are put in contact: pairs, whose slave comes first; the same without
-#: guards; with nodes of both sides constrained; everything with everything.
-ONE, UNGUARDED, BOTH, ALL = ("ONE", "UNGUARDED", "BOTH", "ALL")
+#: guards; with nodes of both sides constrained; as the program chooses; everything with everything.
+ONE, UNGUARDED, BOTH, AUTO, ALL = ("ONE", "UNGUARDED", "BOTH", "AUTO", "ALL")
 
 REQUESTS = f"""
 *CONSTRAINT METHOD, TYPE=<method>
@@ -63,7 +63,6 @@ class Scene:
         self.h, self.t_end, self.gravity = h, t_end, gravity
         self.part, self.cards, self.held, self.alone = {}, [], [], set()
         self.pairs = []                # (slave, master); empty: each with all that come after it
-        self.keeps_order = False       # slaves are those of `pairs`, whatever their shapes
         self.n_node = self.n_element = 0
 
     # ---- bodies
@@ -130,8 +129,8 @@ class Scene:
         names = list(self.part)
         pairs = self.pairs or [(a, b) for k, a in enumerate(names) for b in names[k + 1:]]
         card = "*CONTACT PAIR, INTERACTION=SMOOTH, TYPE=<formulation>"
-        card += {BOTH: ", SIDES=BOTH", UNGUARDED: ", GUARD=NO"}.get(sides, "")
-        card += ", SIDES=ONE" if self.keeps_order and sides != BOTH else ""
+        card += {ONE: ", SIDES=ONE", UNGUARDED: ", SIDES=ONE, GUARD=NO",
+                 BOTH: ", SIDES=BOTH"}.get(sides, "")
         lines = [f"{card}\n{slave}, {master}" for slave, master in pairs]
         if sides == ALL:
             lines = ["*CONTACT", "*CONTACT INCLUSIONS, ALL EXTERIOR"]
@@ -393,7 +392,6 @@ def slave_floor(floor=(8, 2)):
     scene.block("FLOOR", (-1.0, -0.5), (2.0, 0.5), floor).hold("FLOOR", below(-0.5))
     scene.side("TOP", "FLOOR", lambda _, y: y > -1e-9)
     scene.pairs = [("TOP", "DISC")]
-    scene.keeps_order = True
     return scene
 
 

@@ -7,7 +7,7 @@ One-sided node to surface contact lets corners of the master into the slave in s
 import numpy as np
 import pytest
 from overlap import worst
-from plain_scenes import ALL, BOTH, ONE, SCENES, UNGUARDED, Scene
+from plain_scenes import ALL, AUTO, BOTH, ONE, SCENES, UNGUARDED, Scene
 from scene_tools import EPSILON, run_deck
 
 #: Coordinates of the scenes are below 4, edges above 0.1: rounding of what is seen, by the edge.
@@ -35,13 +35,15 @@ def test_one_side_is_not_enough(name, least, tmp_path):
 
 
 def test_sides_both_is_the_pair_in_both_orders(tmp_path):
-    """The same digits as of a deck that lists the pair twice."""
+    """The same digits as of decks that list the pair twice, or leave it to the program."""
     scene = SCENES["crossing"]()
     scene.pairs = [("EAST", "NORTH")]
-    both = run_deck(scene.deck(BOTH), tmp_path / "both", formulation="NODE TO SURFACE")
+    both, free = (run_deck(scene.deck(sides), tmp_path / sides, formulation="NODE TO SURFACE")
+                  for sides in (BOTH, AUTO))
     scene.pairs = [("EAST", "NORTH"), ("NORTH", "EAST")]
-    twice = run_deck(scene.deck(ONE), tmp_path / "twice", formulation="NODE TO SURFACE")
-    assert both.digits() == twice.digits()
+    twice, each = (run_deck(scene.deck(sides), tmp_path / f"{sides} twice",
+                            formulation="NODE TO SURFACE") for sides in (ONE, AUTO))
+    assert both.digits() == twice.digits() == free.digits() == each.digits()
     assert both.history["active"].max() > 0
 
 

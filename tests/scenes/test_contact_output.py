@@ -89,7 +89,8 @@ RIGHT, S2
     lines += ["*SURFACE INTERACTION, NAME=FRICTIONLESS"]
     lines += ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD"]
     for master in ("FLOOR_TOP", "WALL_SIDE"):
-        lines += [f"*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE={formulation}", f"EDGE, {master}"]
+        lines += [f"*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE={formulation}, SIDES=ONE",
+                  f"EDGE, {master}"]
     step = "*NODE FILE\nU\n*CONTACT FILE\nCDIS, CSTR, CF\n*CONTACT PRINT, TOTALS=YES\n"
     step += "CDIS, CSTR, CF\n*RESTART, WRITE, FREQUENCY=1"
     if procedure == "DYNAMIC":

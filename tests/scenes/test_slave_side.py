@@ -5,17 +5,16 @@ edges are twice as long as its own, off its nodes.
 """
 
 import pytest
-from plain_scenes import BOTH, ONE, disc_on_floor, slanted
+from plain_scenes import AUTO, BOTH, ONE, disc_on_floor, slanted
 from scene_tools import run_deck
 
 MORTAR = {"formulation": "MORTAR"}
 CHOICES = [MORTAR, {"formulation": "MORTAR", "multiplier": "STANDARD", "normal": "EDGE"},
-           {"formulation": "SEGMENT"}, {"formulation": "NODE TO SURFACE"}]
+           {"formulation": "SEGMENT"}]
 
 
-def run(folder, choice, slave="TOP", keeps_order=False, sides="", contact=ONE):
+def run(folder, choice, slave="TOP", contact=AUTO, sides=""):
     scene = disc_on_floor(1.93, 0.6, slave)
-    scene.keeps_order = keeps_order
     deck = scene.deck(contact)
     deck.card = [(head + sides*head.startswith("*CONTACT PAIR"), data) for head, data in deck.card]
     return run_deck(deck, folder, **choice)
@@ -25,7 +24,7 @@ def run(folder, choice, slave="TOP", keeps_order=False, sides="", contact=ONE):
 def test_the_rounder_surface_becomes_the_slave(tmp_path, choice):
     """Left to the program, the pair is the one that names the disc first, to the bit."""
     free = run(tmp_path / "free", choice)
-    disc = run(tmp_path / "disc", choice, "DISC", keeps_order=True)
+    disc = run(tmp_path / "disc", choice, "DISC", contact=ONE)
     assert free.digits() == disc.digits()
     assert "DISC (slave, 32 nodes, the rounder one) on TOP" in free.log
     assert "DISC (slave, 32 nodes) on TOP" in disc.log
@@ -35,7 +34,7 @@ def test_the_rounder_surface_becomes_the_slave(tmp_path, choice):
 def test_the_floor_as_the_slave_pushes_sideways(tmp_path, formulation):
     """At least five times as much as what is left with the disc as the slave."""
     choice = {"formulation": formulation}
-    kept = run(tmp_path / "kept", choice, keeps_order=True)
+    kept = run(tmp_path / "kept", choice, contact=ONE)
     free = run(tmp_path / "free", choice)
     assert "TOP (slave, " in kept.log
     assert slanted(kept) > 5*slanted(free)

@@ -4,14 +4,14 @@ import dataclasses
 import statistics
 
 import plain_scenes
-from plain_scenes import ALL, BOTH, ONE, SCENES, UNGUARDED, Outcome
+from plain_scenes import ALL, AUTO, ONE, SCENES, UNGUARDED, Outcome
 
 from .common import Chapter, size, table
 
 #: Kinds of contact by what the table calls them: sides, parameters of the deck.
 KINDS = {
-    "`NODE TO SURFACE`": (ONE, {"formulation": "NODE TO SURFACE"}),
-    "the same, `SIDES=BOTH`": (BOTH, {"formulation": "NODE TO SURFACE"}),
+    "`NODE TO SURFACE`, `SIDES=ONE`": (ONE, {"formulation": "NODE TO SURFACE"}),
+    "`NODE TO SURFACE`": (AUTO, {"formulation": "NODE TO SURFACE"}),
     "`ALL EXTERIOR`": (ALL, {}),
     "`SEGMENT`": (ONE, {"formulation": "SEGMENT"}),
     "`MORTAR`": (ONE, {"formulation": "MORTAR"}),

@@ -1,7 +1,7 @@
 """A disc on a flat slave floor: how far it is pushed sideways, as the floor is refined."""
 
 import plain_scenes
-from plain_scenes import BOTH, ONE, slanted
+from plain_scenes import AUTO, ONE, slanted
 from scene_tools import run_deck
 
 from .common import Chapter, mortar, node, segment, table
@@ -11,31 +11,28 @@ RATIOS = (1.93, 0.97, 0.48, 0.24)
 #: Where the disc falls, in edges from a node of the floor.
 PLACES = (0.2, 0.6)
 
-#: Slave that the pair names, whether that is left to the program, sides and parameters, by what
-#: the table calls them.
+#: Slave that the pair names, sides and parameters, by what the table calls them.
 KINDS = {
-    "`MORTAR`, `DUAL`, `SIDES=ONE`": ("TOP", False, ONE, mortar("NODAL", "DUAL")),
-    "`MORTAR`, `STANDARD`, `SIDES=ONE`": ("TOP", False, ONE, mortar("NODAL", "STANDARD")),
-    "`SEGMENT`, `DUAL`, `SIDES=ONE`": ("TOP", False, ONE, segment("DUAL")),
-    "`NODE TO SURFACE`, `SIDES=ONE`": ("TOP", False, ONE, node()),
-    "`MORTAR`, `DUAL`": ("TOP", True, ONE, mortar("NODAL", "DUAL")),
-    "`MORTAR`, `STANDARD`": ("TOP", True, ONE, mortar("NODAL", "STANDARD")),
-    "`SEGMENT`, `DUAL`": ("TOP", True, ONE, segment("DUAL")),
-    "`NODE TO SURFACE`": ("TOP", True, ONE, node()),
-    "`NODE TO SURFACE`, `SIDES=BOTH`": ("TOP", True, BOTH, node()),
-    "disc named as the slave: `MORTAR`, `DUAL`": ("DISC", True, ONE, mortar("NODAL", "DUAL")),
-    "disc named as the slave: `NODE TO SURFACE`": ("DISC", True, ONE, node()),
+    "`MORTAR`, `DUAL`, `SIDES=ONE`": ("TOP", ONE, mortar("NODAL", "DUAL")),
+    "`MORTAR`, `STANDARD`, `SIDES=ONE`": ("TOP", ONE, mortar("NODAL", "STANDARD")),
+    "`SEGMENT`, `DUAL`, `SIDES=ONE`": ("TOP", ONE, segment("DUAL")),
+    "`NODE TO SURFACE`, `SIDES=ONE`": ("TOP", ONE, node()),
+    "`MORTAR`, `DUAL`": ("TOP", AUTO, mortar("NODAL", "DUAL")),
+    "`MORTAR`, `STANDARD`": ("TOP", AUTO, mortar("NODAL", "STANDARD")),
+    "`SEGMENT`, `DUAL`": ("TOP", AUTO, segment("DUAL")),
+    "`NODE TO SURFACE`": ("TOP", AUTO, node()),
+    "disc named as the slave: `MORTAR`, `DUAL`": ("DISC", ONE, mortar("NODAL", "DUAL")),
+    "disc named as the slave: `NODE TO SURFACE`": ("DISC", ONE, node()),
 }
 
 
 def start(runs):
     started = {}
-    for kind, (slave, is_free, sides, parameters) in KINDS.items():
+    for kind, (slave, sides, parameters) in KINDS.items():
         for ratio in RATIOS:
             for place in PLACES:
                 runs.count += 1
                 scene = plain_scenes.disc_on_floor(ratio, place, slave)
-                scene.keeps_order = not is_free
                 deck = scene.deck(sides)
                 started.setdefault((kind, ratio), []).append(runs.pool.submit(
                     run_deck, deck, runs.folder / f"run{runs.count}", **parameters))
