@@ -8,6 +8,7 @@ module stepper_scenes
    use emcon_scene, only : amplitude_t, formulation_mortar, load_point, load_t, scene_t
    use emcon_stepper, only : stepper_t
    use emcon_ties, only : ties_prepare
+   use emcon_verdict, only : verdict_start
    use small_scenes, only : add_load, add_step, block_t, clamp, make_two_blocks
    implicit none
    private
@@ -30,6 +31,7 @@ contains
       call march_init(stepper%march, stepper%scene, error)
       if (allocated(error)) return
       call march_begin_step(stepper%march, stepper%scene, 1, error)
+      if (.not. allocated(error)) call verdict_start(stepper%verdict, stepper%march)
    end subroutine open_scene
 
    !> A block that is thrown on a clamped one, aslant, and pulled by a force that grows with time.
