@@ -100,10 +100,14 @@ MATERIALS = f"""
 1.
 """
 
+PAIR = "*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=<formulation>"
+#: For a rim that is finer than the flat top below it.
+ONE_SIDE = f"""** One side is enough: no node of the flat top comes into the finer rim, says the verdict.
+{PAIR}, SIDES=ONE"""
 CONTACT = f"""
 *SURFACE INTERACTION, NAME=FRICTIONLESS
 *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD
-*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=<formulation>
+{PAIR}
 RING_OUTER, BLOCK_TOP
 *BOUNDARY
 BOTTOM, 1, 2
@@ -161,7 +165,8 @@ def main() -> None:
                      "the bottom up".format(*options.block))
     lines += block.node_lines() + block.element_lines()
     lines += model_lines(block_grid, ring_grid)
-    for title, text in (("Materials", MATERIALS), ("Contact, supports, start", CONTACT),
+    contact = CONTACT.replace(PAIR, ONE_SIDE)
+    for title, text in (("Materials", MATERIALS), ("Contact, supports, start", contact),
                         ("The run", STEP)):
         lines += comment(title) + text.strip().splitlines()
     write_deck(lines, options.output)

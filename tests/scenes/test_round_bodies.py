@@ -239,7 +239,7 @@ def test_hertz_by_load_without_support(tmp_path, formulation):
     """Free to roll on the lower cylinder: with STABILIZE as if it were guided."""
     held, width, peak = pressed(tmp_path / "held", formulation, 3)
     run, free_width, free_peak = pressed(tmp_path, formulation, 3, is_free=True)
-    assert "free to rotate, on which no load does work" in run.errors
+    assert "rotate, on which no load does work" in run.errors
     assert (free_width, free_peak) == pytest.approx((width, peak), abs=1e-8)
     u = held.fields()["displacement"][-1]
     assert np.allclose(run.fields()["displacement"][-1], u, rtol=0, atol=1e-8*np.abs(u).max())
