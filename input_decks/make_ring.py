@@ -50,7 +50,9 @@ velocity ({VELOCITY[0]:g}, {VELOCITY[1]:g}), time.
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2), thickness 1 L).
 
 What to look at: the ring flattens while it slides along the foundation, and rebounds.
-With CONTACT INITIATION=PERSISTENT the total energy is held through contact and release.
+With CONTACT INITIATION=PERSISTENT the total energy is held through contact and release. The nodes
+of one side are enough (sides = ONE): none of the flat top comes into the finer rim, as the verdict
+tells, and px is kept better than with both, which lean on the chords of the rim.
 
 Expected: total energy {energy:.6g} throughout; ring mass {mass:.6g};
           ring momentum ({px:.6g}, {py:.6g}) before contact;
@@ -71,7 +73,7 @@ frame = 0.1
 method = NULL SPACE
 initiation = PERSISTENT
 tolerance = 1e-10
-{contact_parameters("NODE TO SURFACE").strip()}
+{contact_parameters("NODE TO SURFACE", "ONE").strip()}
 """
 
 
@@ -100,14 +102,10 @@ MATERIALS = f"""
 1.
 """
 
-PAIR = "*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=<formulation>"
-#: For a rim that is finer than the flat top below it.
-ONE_SIDE = f"""** One side is enough: no node of the flat top comes into the finer rim, says the verdict.
-{PAIR}, SIDES=ONE"""
 CONTACT = f"""
 *SURFACE INTERACTION, NAME=FRICTIONLESS
 *SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD
-{PAIR}
+*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=<formulation>, SIDES=<sides>
 RING_OUTER, BLOCK_TOP
 *BOUNDARY
 BOTTOM, 1, 2
@@ -165,8 +163,7 @@ def main() -> None:
                      "the bottom up".format(*options.block))
     lines += block.node_lines() + block.element_lines()
     lines += model_lines(block_grid, ring_grid)
-    contact = CONTACT.replace(PAIR, ONE_SIDE)
-    for title, text in (("Materials", MATERIALS), ("Contact, supports, start", contact),
+    for title, text in (("Materials", MATERIALS), ("Contact, supports, start", CONTACT),
                         ("The run", STEP)):
         lines += comment(title) + text.strip().splitlines()
     write_deck(lines, options.output)

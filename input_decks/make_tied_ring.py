@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 from deckwriter import (Point, arguments, comment, heading, set_lines, surface_lines, write_deck)
-from make_ring import (BLOCK_CORNER, BLOCK_SIZE, CONTACT, DENSITY, GAP, MATERIALS, ONE_SIDE, PAIR,
-                       PARAMETERS, R_INNER, R_OUTER, STEP, VELOCITY)
+from make_ring import (BLOCK_CORNER, BLOCK_SIZE, CONTACT, DENSITY, GAP, MATERIALS, PARAMETERS,
+                       R_INNER, R_OUTER, STEP, VELOCITY)
 from tied_parts import Body, Curve, line
 
 #: Elements around and through each piece of the ring; the first stands on the lowest point.
@@ -120,8 +120,7 @@ def main() -> None:
                      "bottom up") + ground.mesh_lines()
     lines += comment("Sets and surfaces") + model_lines(wheel, ground)
     lines += comment("Ties") + wheel.tie_lines() + ground.tie_lines()
-    contact = CONTACT.replace(PAIR, ONE_SIDE)
-    for title, text in (("Materials", MATERIALS), ("Contact, supports, start", contact),
+    for title, text in (("Materials", MATERIALS), ("Contact, supports, start", CONTACT),
                         ("The run", STEP)):
         lines += comment(title) + text.strip().splitlines()
     write_deck(lines, options.output)

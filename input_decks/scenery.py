@@ -38,10 +38,11 @@ CF
 """
 
 
-def contact_parameters(formulation: str = "MORTAR") -> str:
+def contact_parameters(formulation: str = "MORTAR", sides: str = "AUTO") -> str:
     """Lines of `*PARAMETER` that choose the formulation of contact; see docs/deck.md."""
     return f"""
 formulation = {formulation}
+sides = {sides}
 multiplier = DUAL
 normal = NODAL
 integration = SEGMENTS

@@ -1,5 +1,6 @@
 """The decks of input_decks/ with contact of both sides, and of everything with everything."""
 
+import math
 import subprocess
 import sys
 
@@ -7,7 +8,8 @@ import numpy as np
 import overlap
 import pytest
 from contact_sides import ALL, BOTH, NODES, ONE, FileOutcome, FileScene, with_sides
-from scene_tools import DECKS, EPSILON, Deck, run_deck
+from plain_scenes import AUTO, Scene
+from scene_tools import DECKS, EPSILON, Deck, attempt, run_deck
 
 #: Decks with contact in short runs in which bodies meet; all of them, and whole: the book.
 SHORT = {
@@ -48,6 +50,26 @@ def test_bodies_of_one_surface_may_overlap_at_first(tmp_path):
     done = FileOutcome(FileScene(path), tmp_path / "run", ALL)
     assert done.code == 0 and done.run.history["active"].max() > 0
     assert done.overlap.by_edge <= rounding(done.fields)
+
+
+def journal(sides):
+    """A disc in a ring of the same radius: its nodes begin behind the chords of the ring."""
+    scene = Scene(0.02, 0.1)
+    scene.disc("DISC", (0.0, 0.0), 0.5, (3, 2), velocity=(0, -1))
+    scene.ring("RING", lambda angle, share: ((0.8 - 0.3*share)*math.cos(angle),
+                                             (0.8 - 0.3*share)*math.sin(angle)), (20, 2))
+    scene.pairs = [("RING", "DISC")]
+    return scene.deck(sides)
+
+
+def test_polygons_of_one_curve_are_guarded(tmp_path):
+    """The nodes of the ring are held; those of the disc cannot be, unless that is asked for."""
+    run = run_deck(journal(AUTO), tmp_path / "free", formulation=NODES)
+    assert "surface DISC dips into edges of RING at the start: its nodes are guarded" in run.log
+    one = run_deck(journal(ONE), tmp_path / "one", formulation=NODES)
+    assert run.history["total"].tolist() == one.history["total"].tolist()
+    asked = attempt(journal(BOTH), tmp_path / "both", (), {"formulation": NODES})[0]
+    assert asked.returncode == 2 and "penetrate surface RING" in asked.stderr
 
 
 def test_an_overlap_is_found(tmp_path):

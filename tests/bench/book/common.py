@@ -19,7 +19,8 @@ def mortar(normal, multiplier, **more):
 
 
 def node(**more):
-    return {"formulation": "NODE TO SURFACE", **more}
+    """The nodes of one side; the decks' own choice is both."""
+    return {"formulation": "NODE TO SURFACE", "sides": "ONE", **more}
 
 
 def segment(multiplier):
@@ -53,10 +54,10 @@ class Runs:
         self.pool = concurrent.futures.ThreadPoolExecutor(2)
         self.count = 0
 
-    def start(self, deck, **parameters):
+    def start(self, deck, run=run_deck, **parameters):
         self.count += 1
         folder = self.folder / f"run{self.count}"
-        return self.pool.submit(run_deck, deck, folder, **parameters)
+        return self.pool.submit(run, deck, folder, **parameters)
 
     def generated(self, generator, *options):
         """A deck made by a generator of input_decks/."""

@@ -1,7 +1,7 @@
 """Free bodies that collide and part, and a strip that folds onto itself: what is conserved."""
 
 import numpy as np
-from scene_tools import DECKS
+from scene_tools import DECKS, run_one_sided
 
 from .common import FORMULATIONS, Chapter, drift, size, table
 
@@ -15,14 +15,16 @@ COLUMNS = ("total", "px", "py", "lz")
 
 def start(runs):
     return {
-        (scene, name): runs.start(DECKS / f"{scene}.inp", frame=1, **choice)
+        (scene, name): runs.start(DECKS / f"{scene}.inp", run_one_sided, frame=1,
+                                  **(choice | {"sides": "AUTO"}))
         for scene in SCENES
         for name, choice in FORMULATIONS.items()
     }
 
 
 def report(started, _):
-    done = {key: future.result().history for key, future in started.items()}
+    ended = {key: future.result() for key, future in started.items()}
+    done = {key: run.history for key, run in ended.items()}
     drifts = {key: [drift(h[column]) for column in COLUMNS] for key, h in done.items()}
     by_scene = []
     for scene, title in SCENES.items():
@@ -39,8 +41,8 @@ def report(started, _):
             )
         )
     by_formulation = [
-        (name, *(f"{size(max(drifts[scene, name]))}, {touching(done[scene, name])}"
-                 for scene in SCENES))
+        (name, *(f"{size(max(drifts[scene, name]))}, {touching(done[scene, name])}, "
+                 f"{depth(ended[scene, name].verdict['penetration'])}" for scene in SCENES))
         for name in FORMULATIONS
     ]
     return [
@@ -48,6 +50,11 @@ def report(started, _):
         "",
         *table(["formulation", *SCENES.values()], by_formulation),
     ]
+
+
+def depth(penetration):
+    """0 for what is rounding of positions."""
+    return "0" if penetration <= 1e-13 else f"{penetration:.2g}"
 
 
 def touching(history):

@@ -4,25 +4,26 @@ import plain_scenes
 from plain_scenes import AUTO, ONE, slanted
 from scene_tools import run_deck
 
-from .common import Chapter, mortar, node, segment, table
+from .common import Chapter, mortar, segment, table
 
 #: Lengths of the floor's edges by those of the disc.
 RATIOS = (1.93, 0.97, 0.48, 0.24)
 #: Where the disc falls, in edges from a node of the floor.
 PLACES = (0.2, 0.6)
 
+NODES = {"formulation": "NODE TO SURFACE"}
 #: Slave that the pair names, sides and parameters, by what the table calls them.
 KINDS = {
     "`MORTAR`, `DUAL`, `SIDES=ONE`": ("TOP", ONE, mortar("NODAL", "DUAL")),
     "`MORTAR`, `STANDARD`, `SIDES=ONE`": ("TOP", ONE, mortar("NODAL", "STANDARD")),
     "`SEGMENT`, `DUAL`, `SIDES=ONE`": ("TOP", ONE, segment("DUAL")),
-    "`NODE TO SURFACE`, `SIDES=ONE`": ("TOP", ONE, node()),
+    "`NODE TO SURFACE`, `SIDES=ONE`": ("TOP", ONE, NODES),
     "`MORTAR`, `DUAL`": ("TOP", AUTO, mortar("NODAL", "DUAL")),
     "`MORTAR`, `STANDARD`": ("TOP", AUTO, mortar("NODAL", "STANDARD")),
     "`SEGMENT`, `DUAL`": ("TOP", AUTO, segment("DUAL")),
-    "`NODE TO SURFACE`": ("TOP", AUTO, node()),
+    "`NODE TO SURFACE`": ("TOP", AUTO, NODES),
     "disc named as the slave: `MORTAR`, `DUAL`": ("DISC", ONE, mortar("NODAL", "DUAL")),
-    "disc named as the slave: `NODE TO SURFACE`": ("DISC", ONE, node()),
+    "disc named as the slave: `NODE TO SURFACE`": ("DISC", ONE, NODES),
 }
 
 
