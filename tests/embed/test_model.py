@@ -44,7 +44,8 @@ def ring_by_calls(h: float, formulation: str) -> Model:
         model.material(name, coupled_neo_hooke=(modulus, 0.1), density=0.01)
         model.section(name, elements_of, thickness=1.0)
     model.interaction("FRICTIONLESS")
-    model.contact_pair("RING_OUTER", "BLOCK_TOP", interaction="FRICTIONLESS", type=formulation)
+    model.contact_pair("RING_OUTER", "BLOCK_TOP", interaction="FRICTIONLESS", type=formulation,
+                       sides="ONE")
     model.boundary("BOTTOM")
     model.initial("VELOCITY", "RING", (1, 2), (2.0, -3.0))
     step = model.step("DYNAMIC", h, 8.0, direct=True, nlgeom=True, increments=1000000)
