@@ -322,7 +322,10 @@ class Stepper(Queries, Conditions):
         return self._handle.call(_state.get_contact_values, 2, self.n_constraint)
 
     def pairs(self) -> list[PairTotal]:
-        """Totals of the last increment, one for each contact pair in the order of the deck."""
+        """Totals of the last increment, one for each contact pair in the order of the deck.
+
+        A pair that holds both sides counts twice: behind it stands its reverse.
+        """
         total, active = self._handle.call(_state.get_pairs, self.n_pair)
         return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n))
                 for row, n in zip(total.T, active)]

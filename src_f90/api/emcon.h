@@ -52,7 +52,7 @@ typedef struct emcon_sizes {
    int n_node;
    int n_element;
    int n_contact;    /* contacts possible: slave nodes over all pairs, then those of guards */
-   int n_pair;       /* contact pairs */
+   int n_pair;       /* contact pairs; one that holds both sides is two, its reverse behind it */
    int n_body;       /* connected meshes */
    int n_unknown;    /* in the present step of the deck */
    int n_step;       /* steps of the deck */

@@ -80,6 +80,16 @@ def test_nothing_penetrates(ring, initiation, h):
     assert run.closing(r"deepest penetration (\S+) of an element") <= limit
 
 
+def test_one_side_keeps_the_momentum_along_the_floor(ring, tmp_path):
+    """Ten times better than both, as the heading says: the floor leans on the chords of the rim."""
+    def change(run):
+        px = run.series("BODIES", "MOMENTUM")[1][:, 0, 0]
+        return abs(px[-1] - px[0])
+
+    both = run_deck(DECK, tmp_path, h=0.02, t_end=5, frame=1, sides="BOTH")
+    assert change(both) > 10*change(ring("PERSISTENT", 0.02))
+
+
 @ALL
 def test_figures_of_the_heading(ring, initiation, h):
     run = ring(initiation, h)
