@@ -36,6 +36,7 @@ module emcon_nts
       type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
       integer :: smoothing = smoothing_none
+      logical :: every_face = .false.                 !! also one that does not bear on the node
       type(touch_rule_t) :: rule                      !! only of such a surface
       integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
       integer, allocatable :: class(:)                !! (n_constraint) of bodies that it looks at
@@ -173,15 +174,15 @@ contains
       self%edge(i) = e
    end subroutine choose_nearer
 
-   !> May edge `e` keep the node of constraint `i` out? With both sides held, a face that does not
-   !> bear on the node counts only from outside: where corners meet, a node behind it is not to slide
-   !> past the face that bears.
+   !> May edge `e` keep the node of constraint `i` out? A face that does not bear on the node counts
+   !> only from outside: where corners meet, a node behind it is not to slide past the face that
+   !> bears.
    pure logical function bears(self, i, e, x, u)
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i, e
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
 
-      bears = .not. self%both_sides .or. self%smoothing == smoothing_hermite
+      bears = self%every_face .or. self%smoothing == smoothing_hermite
       if (.not. bears) bears = is_outside(x, u, self%node(i), self%master%edge(:, e))
       if (.not. bears) bears = facing_allows(self%slave, self%chain_node(i), &
          self%master%edge(:, e), x, u)

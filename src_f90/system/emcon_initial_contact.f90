@@ -55,10 +55,9 @@ contains
       is_checked = .false.
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
-            call nts_init(contact, scene, pair, error)
+            call init_check(contact, scene, pair, error)
             if (allocated(error)) return
             call contact%configure(scene%x, options)
-            contact%both_sides = .false.             ! every face counts for what is behind at first
             if (.not. contact%is_self) then
                call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
                if (.not. allocated(error)) call check_crossing(scene, pair%master, &
@@ -136,7 +135,18 @@ contains
          to_text(scene%node_label(chain%edge(2, e))) // ")"
    end subroutine face_text
 
-   !> The same pair with slave and master exchanged; every face counts for what is behind at first.
+   !> Contact of a pair in which every face counts: what is behind at first has no way in.
+   subroutine init_check(contact, scene, pair, error)
+      type(nts_t), intent(out) :: contact
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+
+      call nts_init(contact, scene, pair, error)
+      contact%every_face = .true.
+   end subroutine init_check
+
+   !> The same pair with slave and master exchanged.
    pure function reversed(pair) result(other)
       type(contact_pair_t), intent(in) :: pair
       type(contact_pair_t) :: other
@@ -144,7 +154,6 @@ contains
       other = pair
       other%slave = pair%master
       other%master = pair%slave
-      other%both_sides = .false.
    end function reversed
 
    !> Master nodes are all behind the slave surface.
@@ -155,7 +164,7 @@ contains
       type(nts_t) :: contact
 
       if (scene%surface(pair%slave)%is_nodal) return
-      call nts_init(contact, scene, reversed(pair), error)
+      call init_check(contact, scene, reversed(pair), error)
       if (allocated(error)) return
       call check_sides(scene, reversed(pair), contact, "slave", error)
    end subroutine check_slave_sides
@@ -299,7 +308,7 @@ contains
       if (pair%formulation == formulation_nts) then
          if (.not. (pair%both_sides .and. pair%may_choose)) return
       end if
-      call nts_init(contact, scene, reversed(pair), error)
+      call init_check(contact, scene, reversed(pair), error)
       if (allocated(error)) return
       call measure_start(scene, contact)
       allocate(is_corner(contact%slave%n_edge))

@@ -56,12 +56,25 @@ def test_two_sided_contact_overlaps_nowhere(tmp_path, sides, name):
     assert done.energy_error <= 1e-12
 
 
-@pytest.mark.parametrize("name", ["wedge", "ledge", "gears", "accordion", "slave floor"])
+@pytest.mark.parametrize("name", ["wedge", "ledge", "gears", "accordion", "slave floor",
+                                  "slide off"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_guards_hold_what_pairs_do_not(tmp_path, formulation, name):
     done = Outcome(SCENES[name](), tmp_path, ONE, formulation=formulation)
     assert done.code == 0
     assert done.overlap.by_edge <= GUARDED, done.overlap
+    assert done.energy_error <= 1e-12
+
+
+@pytest.mark.parametrize("sides", [ONE, UNGUARDED])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_corners_on_corners_do_not_slip_in(tmp_path, formulation, sides):
+    """Side faces in one line: the nearer way out of a corner is sideways, by round-off."""
+    done = Outcome(SCENES["twin"](), tmp_path, sides, formulation=formulation)
+    assert done.code == 0
+    assert done.run.history["active"].max() >= 5
+    assert done.run.history["cuts"].sum() == 0
+    assert done.overlap.by_edge <= ROUNDING, done.overlap
     assert done.energy_error <= 1e-12
 
 
