@@ -13,6 +13,7 @@ module emcon_tie
    use emcon_scene, only : multiplier_dual, scene_t, tie_rows_t, tie_t
    use emcon_sort, only : find_sorted, sort_order
    use emcon_tie_check, only : tie_check_partners, tie_check_surfaces
+   use emcon_tie_cover, only : tie_cover_find
    use emcon_tie_partner, only : polygon, tie_partners_find, tie_partners_frame, tie_partners_t
    implicit none
    private
@@ -52,6 +53,7 @@ contains
       call measure_segments(partners, scene%x, tie%multiplier == multiplier_dual, moment)
       call order_rows(partners%slave, rows)
       call fill_rows(partners, tie%multiplier == multiplier_dual, moment, rows)
+      call tie_cover_find(partners, scene%x, rows)
    end subroutine tie_measure
 
    !> Integrals of psi times a master shape function over each segment.

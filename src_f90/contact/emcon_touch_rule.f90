@@ -11,6 +11,7 @@ module emcon_touch_rule
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_self_contact, only : self_contact_may_touch
+   use emcon_tied_edges, only : tied_ends_find
    implicit none
    private
    public :: touch_rule_t, touch_rule_init, touch_rule_sees, touch_rule_allows
@@ -22,6 +23,8 @@ module emcon_touch_rule
       logical :: both_sides = .false.
       integer :: n_class = 1
       integer, allocatable :: body(:)            !! (n_edge) only with both sides
+      integer, allocatable :: host(:)            !! (n_node) edge that a tied end stands on; 0: none
+      logical, allocatable :: is_buried(:)       !! (n_node) under a tied piece
    end type touch_rule_t
 
 contains
@@ -32,10 +35,14 @@ contains
       type(chain_t), intent(in) :: chain
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: both_sides
-      integer, allocatable :: body(:)
+      integer, allocatable :: body(:), host(:)
+      logical, allocatable :: is_buried(:)
       integer :: n_body
 
       self%both_sides = both_sides
+      call tied_ends_find(scene, chain%edge, host, is_buried)
+      self%host = host(chain%node)
+      self%is_buried = is_buried(chain%node)
       if (.not. both_sides) return
       call bodies_find_tied(scene, chain%edge, body, n_body)
       self%body = body(chain%edge(1, :))
@@ -53,6 +60,7 @@ contains
 
    !> May node `k` of the chain touch edge `e` at x + u? On another body any edge that is the
    !> nearest one; on its own never that of another closed boundary: the body lies between them.
+   !> What a tie ends on an edge does not touch it, and what is under a tied piece nothing.
    pure logical function touch_rule_allows(self, chain, k, e, x, u) result(allows)
       type(touch_rule_t), intent(in) :: self
       type(chain_t), intent(in) :: chain
@@ -60,6 +68,8 @@ contains
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
       integer :: own
 
+      allows = .not. self%is_buried(k) .and. self%host(k) /= e
+      if (.not. allows) return
       if (self%both_sides) then
          own = maxval(chain%node_edge(:, k))
          allows = self%body(own) /= self%body(e)

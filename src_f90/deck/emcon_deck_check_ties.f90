@@ -89,6 +89,7 @@ contains
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
             if (pair%slave == 0 .or. pair%master == 0) cycle
+            if (scene%surface(pair%slave)%is_exterior) cycle     ! without what the tie covers
             if (.not. (meets(pair%slave, pair%master) .or. meets(pair%master, pair%slave))) cycle
             call add_error(reader%log, tie%origin, title(scene, tie) // " are also in contact by " &
                // "*CONTACT PAIR at " // where_text(scene, pair%origin) &

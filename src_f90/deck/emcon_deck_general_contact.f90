@@ -1,7 +1,8 @@
 !> *CONTACT, *CONTACT INCLUSIONS and *CONTACT PROPERTY ASSIGNMENT: all with all.
 !>
 !> What is included becomes pairs with both sides held: a surface with itself, on one body or on
-!> many, or with another one. All exterior is one surface, of every free face that is not tied.
+!> many, or with another one. All exterior is one surface, of every free face; those that ties cover
+!> go out of it when the ties are known (`emcon_ties`).
 module emcon_deck_general_contact
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
@@ -147,7 +148,7 @@ contains
       scene%pair = [scene%pair, pair]
    end subroutine append_pair
 
-   !> Every free face that is not tied, in contact with every other.
+   !> Every free face, in contact with every other.
    subroutine include_exterior(reader, card, scene)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -176,7 +177,7 @@ contains
       call append_pair(scene, card, size(scene%surface), size(scene%surface), is_reverse=.false.)
    end subroutine include_exterior
 
-   !> The free faces of all elements that are on no surface of a tie.
+   !> The free faces of all elements.
    subroutine find_exterior(scene, surface)
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(out) :: surface
@@ -192,29 +193,12 @@ contains
             is_in(f, e) = n_neighbours(scene, adjacency, e, f) == 0
          end do
       end do
-      do i = 1, size(scene%tie)
-         call leave_out(scene%tie(i)%slave)
-         call leave_out(scene%tie(i)%master)
-      end do
       associate (all => [(i, i = 0, size(is_in) - 1)], n => size(is_in, 1))
          surface%element = 1 + pack(all, reshape(is_in, [size(is_in)]))/n
          surface%face = 1 + mod(pack(all, reshape(is_in, [size(is_in)])), n)
       end associate
       allocate(surface%node(0))
-
-   contains
-
-      subroutine leave_out(tied)
-         integer, intent(in) :: tied              !! surface; 0: it was wrong
-         integer :: k
-
-         if (tied == 0) return
-         if (.not. allocated(scene%surface(tied)%element)) return
-         do k = 1, size(scene%surface(tied)%element)
-            is_in(scene%surface(tied)%face(k), scene%surface(tied)%element(k)) = .false.
-         end do
-      end subroutine leave_out
-
+      surface%is_exterior = .true.
    end subroutine find_exterior
 
    !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions

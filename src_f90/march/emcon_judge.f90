@@ -251,6 +251,7 @@ contains
 
       associate (edge => self%outline%edge, node => self%outline%edge(side, e))
          if (any(self%outline%place(:, other) == self%outline%place(side, e))) return
+         if (self%outline%is_buried(node) .or. any(other == self%outline%host(node))) return
          do k = 1, size(other)
             call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
                between(x, self%u, edge(1, other(k)), edge(2, other(k))))
@@ -327,13 +328,17 @@ contains
       share(n + 1) = 1.0_wp
    end subroutine find_crossings
 
-   !> Do edges `e` and `f` meet in a node, or at a joint?
+   !> Do edges `e` and `f` meet in a node, at a joint, or where a tied piece ends on one of them?
    pure logical function are_neighbours(self, e, f)
       type(judge_t), intent(in) :: self
       integer, intent(in) :: e, f
 
       associate (a => self%outline%place(:, e), b => self%outline%place(:, f))
          are_neighbours = any(a == b(1)) .or. any(a == b(2))
+      end associate
+      associate (edge => self%outline%edge, host => self%outline%host)
+         are_neighbours = are_neighbours .or. any(host(edge(:, e)) == f) &
+            .or. any(host(edge(:, f)) == e)
       end associate
    end function are_neighbours
 

@@ -58,6 +58,7 @@ module emcon_scene
       character(len=:), allocatable :: name
       type(origin_t) :: origin
       logical :: is_nodal = .false.
+      logical :: is_exterior = .false.               !! every free face that no tie covers
       integer, allocatable :: element(:)             !! (n_face)
       integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind
       integer, allocatable :: node(:)                !! (n_node), only if `is_nodal`
@@ -116,6 +117,10 @@ module emcon_scene
       integer, allocatable :: node(:)                !! entries; the first is the slave node
       real(wp), allocatable :: weight(:)             !! [L]; the weights of a row sum up to 0
       real(wp), allocatable :: size(:)               !! (n) int psi_k, > 0 [L]
+      integer, allocatable :: covered(:, :)          !! (2, any) master edges under slave ones, whole
+      integer, allocatable :: buried(:)              !! master nodes with the slave on both sides
+      !> (3, any) ends of the slave: the node, first and last node of the master edge under it
+      integer, allocatable :: ending(:, :)
    end type tie_rows_t
 
    !> Two surfaces that stay together, whatever their meshes.

@@ -1,8 +1,8 @@
 !> The outlines of the pieces of a mesh that meet in contact, whatever surfaces the deck names.
 !>
 !> A piece is what hangs together by elements; its outline are the faces that one element alone has,
-!> the body to the left. What a tie holds together is no outline; where it ends, two pieces meet in
-!> one place, as neighbours do. Surfaces of edges without elements stand for themselves.
+!> the body to the left. What a tie covers is no outline; where it ends, two pieces meet in one
+!> place, as neighbours do. Surfaces of edges without elements stand for themselves.
 module emcon_outline
    use emcon_bodies, only : bodies_find
    use emcon_chain, only : chain_init, chain_t
@@ -13,6 +13,7 @@ module emcon_outline
    use emcon_scene, only : scene_t, surface_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
    use emcon_surface_edges, only : surface_edges
+   use emcon_tied_edges, only : tied_edges_find, tied_ends_find
    implicit none
    private
    public :: outline_t, outline_init, outline_meets
@@ -29,6 +30,8 @@ module emcon_outline
       integer, allocatable :: place(:, :)
       !> (2, n_edge) the edges before and after; 0: the outline ends there, or branches
       integer, allocatable :: link(:, :)
+      integer, allocatable :: host(:)            !! (n_node) edge that a tied end stands on; 0: none
+      logical, allocatable :: is_buried(:)       !! (n_node) under a tied piece
       !> (n_edge) shortest side of the element behind it, of an edge without one its length [L]
       real(wp), allocatable :: thickness(:)
       type(pieces_t), allocatable :: on(:)       !! (n_surface) pieces that it is on
@@ -42,7 +45,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable :: connected(:, :), piece(:), number(:), edge(:, :), order(:)
       real(wp), allocatable :: thickness(:)
-      logical, allocatable :: is_meant(:)
+      logical, allocatable :: is_tied(:), is_meant(:)
       integer :: n_body, p
 
       call connect(scene, connected)
@@ -56,8 +59,8 @@ contains
       end if
       ! From here on the piece of a node is its place among those that meet; 0: none of them.
       piece = [(find_sorted(number, piece(p)), p = 1, size(piece))]
-      call find_untied(scene, edge, is_meant)
-      is_meant = is_meant .and. piece(edge(1, :)) > 0
+      call tied_edges_find(scene, edge, is_tied)
+      is_meant = .not. is_tied .and. piece(edge(1, :)) > 0
       edge = edge(:, pack([(p, p = 1, size(edge, 2))], is_meant))
       thickness = pack(thickness, is_meant)
       order = sort_order(piece(edge(1, :)))
@@ -68,6 +71,7 @@ contains
       end do
       call link_edges(self, size(scene%x, 2))
       call find_places(self, scene)
+      call tied_ends_find(scene, self%edge, self%host, self%is_buried)
    end subroutine outline_init
 
    !> Elements, and after them surfaces of edges, by their nodes.
@@ -146,7 +150,7 @@ contains
       end if
    end subroutine pieces_of
 
-   !> Faces that one element alone has, and the edges of surfaces without elements.
+   !> Faces that one element alone has, and edges of surfaces that no element has.
    subroutine find_edges(scene, edge, thickness)
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: edge(:, :)  !! (2, n)
@@ -154,7 +158,7 @@ contains
       integer, allocatable :: order(:)
       real(dp), allocatable :: key(:)
       logical, allocatable :: is_free(:)
-      integer :: e, f, n, s
+      integer :: e, f, n
 
       n = 0
       allocate(edge(2, sum(element_kinds(scene%element_kind)%n_face)))
@@ -177,13 +181,29 @@ contains
       end do
       edge = edge(:, pack([(e, e = 1, n)], is_free))
       thickness = pack(thickness, is_free)
+      call add_lone_edges(scene, edge, thickness)
+   end subroutine find_edges
+
+   !> Append the edges of surfaces of edges that are no faces of elements.
+   pure subroutine add_lone_edges(scene, edge, thickness)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(inout) :: edge(:, :)      !! (2, n)
+      real(wp), allocatable, intent(inout) :: thickness(:)   !! (n) [L]
+      integer, allocatable :: lone(:, :)
+      integer :: follower(size(scene%x, 2)), s, i
+
+      follower = 0
+      follower(edge(1, :)) = edge(2, :)
       do s = 1, size(scene%surface)
          if (.not. allocated(scene%surface(s)%edge)) cycle
-         thickness = [thickness, lengths(scene, scene%surface(s)%edge)]
-         edge = reshape([edge, scene%surface(s)%edge], &
-            [2, size(edge, 2) + size(scene%surface(s)%edge, 2)])
+         associate (all => scene%surface(s)%edge)
+            lone = all(:, pack([(i, i = 1, size(all, 2))], follower(all(1, :)) /= all(2, :)))
+         end associate
+         follower(lone(1, :)) = lone(2, :)
+         thickness = [thickness, lengths(scene, lone)]
+         edge = reshape([edge, lone], [2, size(edge, 2) + size(lone, 2)])
       end do
-   end subroutine find_edges
+   end subroutine add_lone_edges
 
    pure function lengths(scene, edge) result(length)
       type(scene_t), intent(in) :: scene
@@ -192,25 +212,6 @@ contains
 
       length = sqrt(sum((scene%x(:, edge(2, :)) - scene%x(:, edge(1, :)))**2, dim=1))
    end function lengths
-
-   !> Which edges are on no surface of a tie?
-   pure subroutine find_untied(scene, edge, is_untied)
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: edge(:, :)          !! (2, n)
-      logical, allocatable, intent(out) :: is_untied(:)    !! (n)
-      integer, allocatable :: tied(:, :)
-      integer :: follower(size(scene%x, 2)), k
-
-      follower = 0
-      do k = 1, size(scene%tie)
-         if (scene%tie(k)%slave == 0) cycle          ! known by its rows alone
-         call surface_edges(scene, scene%surface(scene%tie(k)%slave), tied)
-         follower(tied(1, :)) = tied(2, :)
-         call surface_edges(scene, scene%surface(scene%tie(k)%master), tied)
-         follower(tied(1, :)) = tied(2, :)
-      end do
-      is_untied = follower(edge(1, :)) /= edge(2, :)
-   end subroutine find_untied
 
    !> Find the neighbours of each edge. Where two outlines meet in a node, neither goes on.
    pure subroutine link_edges(self, n_node)

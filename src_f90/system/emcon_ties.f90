@@ -13,6 +13,7 @@ module emcon_ties
    use emcon_tie_balance, only : tie_balance, tie_balance_report_t, tie_is_balanced
    use emcon_tie_ends, only : tie_ends_merge, tie_ends_take
    use emcon_tie_moves, only : ties_move_nodes
+   use emcon_tied_edges, only : tied_edges_find
    implicit none
    private
    public :: ties_prepare, find_crosspoints
@@ -22,7 +23,7 @@ module emcon_ties
 contains
 
    !> Find the constraint rows of all ties and move their slave nodes so that D x_s = M x_m; the
-   !> notes tell how far.
+   !> notes tell how far. What they cover is no exterior any more.
    subroutine ties_prepare(scene, notes, error)
       type(scene_t), intent(inout) :: scene
       type(notes_t), intent(inout) :: notes
@@ -40,6 +41,7 @@ contains
       end do
       call check_repeated(scene, error)
       if (allocated(error)) return
+      call uncover_exterior(scene)
       call count_ties(scene, n_tie)
       call find_held(scene, is_held)
       do t = 1, size(scene%tie)
@@ -49,6 +51,24 @@ contains
       if (.not. allocated(error)) call ties_move_nodes(scene, notes, error)
       if (.not. allocated(error)) call note_unbalanced(scene, notes, error)
    end subroutine ties_prepare
+
+   !> Take the faces that ties cover out of all exterior.
+   pure subroutine uncover_exterior(scene)
+      type(scene_t), intent(inout) :: scene
+      logical, allocatable :: is_tied(:)
+      integer, allocatable :: edge(:, :)
+      integer :: s
+
+      do s = 1, size(scene%surface)
+         if (.not. scene%surface(s)%is_exterior) cycle
+         call surface_edges(scene, scene%surface(s), edge)
+         call tied_edges_find(scene, edge, is_tied)
+         associate (surface => scene%surface(s))
+            surface%element = pack(surface%element, .not. is_tied)
+            surface%face = pack(surface%face, .not. is_tied)
+         end associate
+      end do
+   end subroutine uncover_exterior
 
    !> A slave node in the middle of one tie cannot be a slave node of another.
    subroutine check_repeated(scene, error)

@@ -6,6 +6,8 @@ module test_judge
    use emcon_judge, only : judge_init, judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_scene, only : contact_pair_t, scene_t
+   use emcon_text, only : notes_t
+   use emcon_ties, only : ties_prepare
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, right, &
       scene_begin, top
    implicit none
@@ -190,6 +192,7 @@ contains
    subroutine test_joint(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
+      type(notes_t) :: notes
       type(overlap_t) :: overlap
       type(block_t) :: first, second
 
@@ -204,6 +207,8 @@ contains
       call judged(scene, overlap, 11, [-0.25_wp, -0.0625_wp])
       call check_true(error, overlap%depth > 0.03_wp, "not tied")
       call add_tie(scene, 3, 4)
+      call ties_prepare(scene, notes, error)
+      if (allocated(error)) return
       call judged(scene, overlap, 11, [-0.25_wp, -0.0625_wp])
       call check_equal(error, overlap%node, 0, "tied")
       call judged(scene, overlap, 14, [-1.5_wp, -0.125_wp])

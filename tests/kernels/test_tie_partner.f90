@@ -1,6 +1,6 @@
 !> Which points are tied: joints, layers, ends, tolerances, and what is refused.
 module test_tie_partner
-   use check, only : check_error, check_near, check_true, test_case_t
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_scene, only : multiplier_dual, multiplier_standard, scene_t, tie_rows_t
@@ -24,6 +24,7 @@ contains
          test_case_t("steep face beside the end", test_steep), &
          test_case_t("end past the master", test_overhang), &
          test_case_t("master larger", test_larger), &
+         test_case_t("what is free of a larger master", test_free), &
          test_case_t("given tolerance", test_tolerance), &
          test_case_t("tolerance at nodes only", test_coarse), &
          test_case_t("error: no faces", test_no_faces), &
@@ -155,6 +156,37 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_larger
+
+   !> The master runs from 6 to 0 in edges of 1, nodes 9 to 15; the slave is in two parts, from 0.5
+   !> to 3, past that or short of it, and, on one edge, from 4.25 to 4.75.
+   subroutine test_free(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(tie_rows_t) :: rows
+      real(wp), parameter :: past(3) = [0.0_wp, 0.05_wp, -0.05_wp]
+      integer :: k
+
+      do k = 1, 3
+         call scene_begin(scene)
+         call add_line(scene, "LONG", along_x(even(2, 0.5_wp, 3.0_wp + past(k))))
+         call add_line(scene, "SHORT", along_x(even(1, 4.25_wp, 4.75_wp)))
+         scene%surface(1)%element = [scene%surface(1)%element, scene%surface(2)%element]
+         scene%surface(1)%face = [scene%surface(1)%face, scene%surface(2)%face]
+         call add_line(scene, "LOWER", along_x(even(6, 6.0_wp, 0.0_wp)))
+         scene%surface(2) = scene%surface(3)
+         call measure(scene, multiplier_dual, rows, error)
+         if (allocated(error)) return
+         call check_equal(error, reshape(rows%covered, [size(rows%covered)]), [12, 13, 13, 14], &
+            "covered")
+         call check_equal(error, rows%buried, [13, 14], "buried")
+         call check_equal(error, reshape(rows%ending, [size(rows%ending)]), [1, 14, 15, &
+            3, merge(11, 12, k == 2), merge(12, 13, k == 2), 6, 10, 11, 7, 10, 11], "ends")
+      end do
+      ! With a tolerance no joint bridges more than that.
+      call measure(scene, multiplier_dual, rows, error, tolerance=0.01_wp)
+      if (allocated(error)) return
+      call check_equal(error, reshape(rows%covered, [size(rows%covered)]), [13, 14], "not bridged")
+   end subroutine test_free
 
    !> A gap above the default tolerance is tied when the deck says so; with none, what touches is.
    subroutine test_tolerance(error)
