@@ -44,6 +44,7 @@ module emcon_nts
       real(wp), allocatable :: own_size(:)            !! (n_constraint) shortest slave edge there [L]
       integer, allocatable :: other(:)                !! (n_constraint) the other one at a corner
                                                       !! that the node stands over; 0: none
+      type(polygon_stencil_t), allocatable :: polygon(:, :)   !! (2, n_constraint) over these
       type(near_list_t) :: near
       integer, allocatable :: near_item(:)            !! (n_constraint) its place in that list
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
@@ -92,7 +93,7 @@ contains
       end if
       self%n_constraint = size(self%node)
       allocate(self%edge(self%n_constraint), self%other(self%n_constraint), source=0)
-      allocate(self%state(self%n_constraint))
+      allocate(self%state(self%n_constraint), self%polygon(2, self%n_constraint))
       self%deepest_start = touch_tol
       self%slack = pair%slack
       self%both_sides = pair%both_sides
@@ -188,8 +189,8 @@ contains
          self%master%edge(:, e), x, u)
    end function bears
 
-   !> Finish the choice for constraint `i`: a node beside its edge, over others of its own surface
-   !> that it must not touch, has none.
+   !> Finish the choice for constraint `i`, with the stencils: a node beside its edge, over others of
+   !> its own surface that it must not touch, has none.
    pure subroutine settle(self, i, x, u0)
       type(nts_t), intent(inout) :: self
       integer, intent(in) :: i
@@ -201,12 +202,14 @@ contains
          if (.not. is_covered(self, i, self%edge(i), x, u0)) self%edge(i) = 0
       end if
       if (self%edge(i) == 0) return
-      if (self%smoothing /= smoothing_hermite) then
+      if (self%smoothing == smoothing_hermite) then
+         call smooth_stencil(self%smooth(i), self%master, self%is_corner, self%node(i), &
+            self%edge(i), self%rounding, x, u0)
+      else
          call take_sector(self, i, x, u0)
-         return
       end if
-      call smooth_stencil(self%smooth(i), self%master, self%is_corner, self%node(i), &
-         self%edge(i), self%rounding, x, u0)
+      call stencil_of(self, i, self%edge(i), x, u0, self%polygon(1, i))
+      if (self%other(i) > 0) call stencil_of(self, i, self%other(i), x, u0, self%polygon(2, i))
    end subroutine settle
 
    !> Of the two edges at a corner take the one on whose side of the bisector constraint `i` is, or
@@ -266,23 +269,22 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
-      type(polygon_stencil_t) :: stencil
       real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1
       integer :: k
 
-      call stencil_of(self, i, self%edge(i), x, u0, stencil)
-      associate (n => stencil%n, before => stencil%before, after => stencil%after)
+      associate (stencil => self%polygon(1, i), n => self%polygon(1, i)%n, &
+            before => self%polygon(1, i)%before, after => self%polygon(1, i)%after)
          call stencil_gather(x, u0, du, n, stencil%node, local, dlocal)
          call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap0, xi0)
          do k = 1, n
             local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
          end do
          call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap1, xi1)
+         state%size = stencil_length(x, stencil%node)
+         state%is_over = is_over(state, xi0, xi1, [before > 0, after > 0])
       end associate
-      state%size = stencil_length(x, stencil%node)
       state%closed = -self%slack*min(state%size, self%own_size(i))
       state%is_near = .true.
-      state%is_over = is_over(state, xi0, xi1, [stencil%before > 0, stencil%after > 0])
       state%is_covered = .true.
       if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, self%edge(i), x, &
          u0, du)
@@ -417,8 +419,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), intent(in) :: target(:)
       type(constraint_t), intent(inout) :: item(:)
-      type(polygon_stencil_t) :: stencil(2)
-      integer :: k, n
+      integer :: k
       logical :: is_found
 
       do k = 1, size(wanted)
@@ -427,26 +428,12 @@ contains
             self%is_lost(wanted(k)) = .not. is_found
             if (is_found) cycle
          end if
-         call polygons(self, wanted(k), x, u0, stencil, n)
-         call polygon_constraint(stencil(:n), x, u0, du, target(k), item(k))
+         ! One polygon, or two over a corner.
+         associate (n => merge(2, 1, self%other(wanted(k)) > 0))
+            call polygon_constraint(self%polygon(:n, wanted(k)), x, u0, du, target(k), item(k))
+         end associate
       end do
    end subroutine nts_evaluate
-
-   !> The polygons that constraint `i` is made of: one, or two over a corner.
-   pure subroutine polygons(self, i, x, u0, stencil, n)
-      type(nts_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      type(polygon_stencil_t), intent(out) :: stencil(2)
-      integer, intent(out) :: n
-
-      associate (edge => [self%edge(i), self%other(i)])
-         do n = 1, count(edge > 0)
-            call stencil_of(self, i, edge(n), x, u0, stencil(n))
-         end do
-         n = count(edge > 0)
-      end associate
-   end subroutine polygons
 
    pure subroutine nts_area(self, x, u, area, length)
       class(nts_t), intent(in) :: self
