@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from contact_sides import ALL, with_sides
 from scene_tools import DECKS, EPSILON, Deck, figures, run_deck, run_one_sided
 
 #: Names of what a step can choose; the rest of a choice is what the decks say.
@@ -77,6 +78,18 @@ def test_nodes_of_both_sides_pass_the_patch_test(tmp_path, variant):
     deck = made("contact_patch", tmp_path, *PATCH[variant])
     yy, xx = figures(deck, r"stress yy = (\S+), xx = (\S+), xy = 0 everywhere")
     stress, _ = patch(deck, tmp_path, formulation="NODE TO SURFACE")
+    np.testing.assert_allclose(stress[:, [1, 0, 3]], [[yy, xx, 0]]*len(stress), rtol=0,
+                               atol=10*ROUND_OFF)
+
+
+@pytest.mark.parametrize("variant", ["inclined", "inclined, swapped"])
+def test_sides_of_blocks_do_not_come_into_the_patch_test(tmp_path, variant):
+    """With all exterior: their corners meet, and in an iteration stand beside each other's side."""
+    made("contact_patch", tmp_path, *PATCH[variant])
+    deck = with_sides(Deck.read(tmp_path / "contact_patch.inp"), ALL)
+    deck.insert("*EL FILE\nS\n*CONTACT FILE\nCSTR\n")
+    yy, xx = figures(tmp_path / "contact_patch.inp", r"stress yy = (\S+), xx = (\S+), xy = 0 every")
+    stress, _ = patch(deck, tmp_path / "all")
     np.testing.assert_allclose(stress[:, [1, 0, 3]], [[yy, xx, 0]]*len(stress), rtol=0,
                                atol=10*ROUND_OFF)
 

@@ -1,7 +1,8 @@
 """Contact patch test: how far each formulation is from the uniform state."""
 
 import numpy as np
-from scene_tools import DECKS, figures
+from contact_sides import ALL, with_sides
+from scene_tools import DECKS, Deck, figures
 
 from .common import (COLOURS, MORTAR, Chapter, axes, mortar, node, save, segment, size, table)
 
@@ -22,8 +23,9 @@ VARIANTS = {
     "master longer": ("--overhang", 0.7, "--lateral", "HELD"),
 }
 NODE, SMOOTH = "`NODE TO SURFACE`", "`MORTAR`, `HERMITE`"
+BOTH, EXTERIOR = "`SIDES=BOTH`: stress", "`ALL EXTERIOR`: stress"
 SEGMENT = {f"`SEGMENT`, `{basis}`": segment(basis) for basis in ("STANDARD", "DUAL")}
-OTHERS = {NODE: node(), **SEGMENT, SMOOTH: mortar("EDGE", "DUAL", smoothing="HERMITE")}
+OTHERS = {NODE: node(), BOTH: {**node(), "sides": "BOTH"}, **SEGMENT, SMOOTH: mortar("EDGE", "DUAL", smoothing="HERMITE")}
 POINTS = (1, 2, 3, 4, 5, 6, 8, 10)
 
 
@@ -46,13 +48,21 @@ def shown(value):
 # ---- meshes -------------------------------------------------------------------------------------
 
 
+def all_exterior(path):
+    deck = with_sides(Deck.read(path), ALL)
+    deck.insert("*EL FILE\nS\n*CONTACT FILE\nCSTR\n")
+    return deck
+
+
 def start_meshes(runs):
     decks = {name: runs.generated("contact_patch", *options) for name, options in VARIANTS.items()}
-    return {
+    started = {
         (name, choice): (deck, runs.start(deck, **parameters))
         for name, deck in decks.items()
         for choice, parameters in {**MORTAR, **OTHERS}.items()
     }
+    return started | {(name, EXTERIOR): (deck, runs.start(all_exterior(deck)))
+                      for name, deck in decks.items()}
 
 
 def meshes(started, _):
@@ -61,10 +71,11 @@ def meshes(started, _):
     for name in VARIANTS:
         best = np.max([done[name, choice] for choice in MORTAR], axis=0)
         between = max(abs(done[name, choice][1] - done[name, NODE][1]) for choice in SEGMENT)
-        rows.append((name, *map(size, best), *map(shown, done[name, NODE]), shown(between),
+        sides = [size(done[name, choice][1]) for choice in (BOTH, EXTERIOR)]
+        rows.append((name, *map(size, best), *map(shown, done[name, NODE]), *sides, shown(between),
                      shown(done[name, SMOOTH][1])))
     return table(
-        ["meshes", "`MORTAR`: pressure", "stress", f"{NODE}: pressure", "stress",
+        ["meshes", "`MORTAR`: pressure", "stress", f"{NODE}: pressure", "stress", BOTH, EXTERIOR,
          "`SEGMENT`: difference of the stress", f"{SMOOTH}: stress"],
         rows,
     )
