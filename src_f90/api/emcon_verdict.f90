@@ -7,13 +7,13 @@ module emcon_verdict
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_t
-   use emcon_scene, only : scene_t
+   use emcon_scene, only : contact_pair_t, formulation_nts, scene_t
    use emcon_stand_off, only : stand_off_mean, stand_off_t
    use emcon_text, only : note_add, notes_t, to_text
    implicit none
    private
    public :: verdict_t, verdict_start, verdict_update, verdict_move, verdict_end, &
-      verdict_is_good, verdict_is_failure, verdict_balance_lines, verdict_line
+      verdict_is_good, verdict_is_failure, verdict_balance_lines, verdict_line, guard_advice
 
    !> Error of the energy balance, relative to the largest energy, that is accepted.
    real(wp), parameter :: ten_digits = 1.0e-10_wp
@@ -258,9 +258,11 @@ contains
             if (abs(self%stabilization) > 0.0_wp) call note_add(lines, &
                "work of what stabilization bears " // to_text(self%stabilization/scale, 3) // &
                " of the largest energy")
-            if (self%n_guarded > 0) call note_add(lines, "guards hold nodes in " // &
-               to_text(self%n_guarded) // " increments: SIDES=BOTH, the other surface as slave or " &
-               // "a finer mesh there make them needless")
+            if (self%n_guarded > 0) then
+               call guard_advice(scene%pair, text)
+               call note_add(lines, "guards hold nodes in " // to_text(self%n_guarded) // &
+                  " increments: " // text // " would make them needless")
+            end if
             if (self%stand_off%impulse > 0.0_wp) call note_add(lines, &
                "largest stand-off of contact " // to_text(self%stand_off%largest, 3) // &
                " of an element, mean over the impulse " // &
@@ -277,6 +279,26 @@ contains
       call verdict_line(self, text)
       call note_add(lines, text)
    end subroutine verdict_balance_lines
+
+   !> What these pairs can do to need no guards.
+   pure subroutine guard_advice(pair, advice)
+      type(contact_pair_t), intent(in) :: pair(:)
+      character(len=:), allocatable, intent(out) :: advice
+      logical :: is_nodes(size(pair)), is_one_sided, is_integrated
+
+      is_nodes = pair%formulation == formulation_nts
+      is_one_sided = any(pair%is_guarded .and. is_nodes .and. .not. pair%both_sides)
+      is_integrated = any(pair%is_guarded .and. .not. is_nodes)
+      advice = "a finer mesh there"
+      if (is_one_sided .or. is_integrated) advice = "the other surface as slave or " // advice
+      if (is_integrated .and. is_one_sided) then
+         advice = "TYPE=NODE TO SURFACE with SIDES=BOTH, " // advice
+      else if (is_integrated) then
+         advice = "TYPE=NODE TO SURFACE, " // advice
+      else if (is_one_sided) then
+         advice = "SIDES=BOTH, " // advice
+      end if
+   end subroutine guard_advice
 
    !> What the judge looks at.
    subroutine add_checked(march, lines)

@@ -3,8 +3,9 @@ module test_verdict
    use check, only : check_equal, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good, verdict_line, &
-      verdict_t
+   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_segment
+   use emcon_verdict, only : guard_advice, verdict_end, verdict_is_failure, verdict_is_good, &
+      verdict_line, verdict_t
    implicit none
    private
    public :: collect_verdict
@@ -18,7 +19,8 @@ contains
          test_case_t("a clean run is good", test_good), &
          test_case_t("what is bad is named", test_bad), &
          test_case_t("a tenth of an edge is a failure", test_deep), &
-         test_case_t("a run that failed is not good", test_failed)]
+         test_case_t("a run that failed is not good", test_failed), &
+         test_case_t("what pairs can do to need no guards", test_advice)]
    end subroutine collect_verdict
 
    subroutine test_good(error)
@@ -73,5 +75,29 @@ contains
       call verdict_line(verdict, line)
       call check_equal(error, line, "verdict: NOT COMPLETED", "line")
    end subroutine test_failed
+
+   !> Pairs with integrated gaps take no SIDES=BOTH; those that hold both sides have guards only
+   !> where nodes cannot be held; those without guards do not count.
+   subroutine test_advice(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_pair_t) :: one, both, segment, mortar
+      character(len=:), allocatable :: advice
+      character(len=*), parameter :: mesh = "a finer mesh there", &
+         swap = ", the other surface as slave or " // mesh
+
+      both%both_sides = .true.
+      segment%formulation = formulation_segment
+      mortar%formulation = formulation_mortar
+      call guard_advice([one, both], advice)
+      call check_equal(error, advice, "SIDES=BOTH" // swap, "one side")
+      call guard_advice([mortar, both], advice)
+      call check_equal(error, advice, "TYPE=NODE TO SURFACE" // swap, "integrated")
+      call guard_advice([one, segment], advice)
+      call check_equal(error, advice, "TYPE=NODE TO SURFACE with SIDES=BOTH" // swap, "either")
+      one%is_guarded = .false.
+      segment%is_guarded = .false.
+      call guard_advice([one, segment, both], advice)
+      call check_equal(error, advice, mesh, "both sides")
+   end subroutine test_advice
 
 end module test_verdict
