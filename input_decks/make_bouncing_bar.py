@@ -39,7 +39,7 @@ t_end = 5.5
 frame = 0.05
 method = NULL SPACE
 initiation = PERSISTENT
-{contact_parameters("NODE TO SURFACE").strip()}
+{contact_parameters("NODE TO SURFACE", points=3).strip()}
 """
 
 MODEL = """

@@ -73,7 +73,7 @@ frame = 0.1
 method = NULL SPACE
 initiation = PERSISTENT
 tolerance = 1e-10
-{contact_parameters("NODE TO SURFACE", "ONE").strip()}
+{contact_parameters("NODE TO SURFACE", "ONE", points=3).strip()}
 """
 
 

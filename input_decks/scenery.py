@@ -38,7 +38,7 @@ CF
 """
 
 
-def contact_parameters(formulation: str = "MORTAR", sides: str = "AUTO") -> str:
+def contact_parameters(formulation: str = "MORTAR", sides: str = "AUTO", points: int = 4) -> str:
     """Lines of `*PARAMETER` that choose the formulation of contact; see docs/deck.md."""
     return f"""
 formulation = {formulation}
@@ -46,7 +46,7 @@ sides = {sides}
 multiplier = DUAL
 normal = NODAL
 integration = SEGMENTS
-points = 4
+points = {points}
 smoothing = NONE
 """
 

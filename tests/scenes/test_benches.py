@@ -33,8 +33,14 @@ def test_chapter_of_the_book(chapter):
 
 @pytest.mark.parametrize("generator", sorted(p.name for p in DECKS.glob("make_*.py")))
 def test_generator_of_decks(generator, tmp_path):
-    """What it makes by default is a deck that the program accepts."""
+    """What it makes by default is the deck of its name, one that the program accepts."""
     deck = tmp_path / "made.inp"
     run(DECKS / generator, "--output", deck)
+    assert deck.read_text() == (DECKS / f"{generator[5:-3]}.inp").read_text()
     done = emcon("check", deck, "--quiet")
     assert done.returncode == 0, done.stderr
+
+
+def test_every_deck_has_a_generator():
+    made = {f"make_{p.stem}.py" for p in DECKS.glob("*.inp")}
+    assert made == {p.name for p in DECKS.glob("make_*.py")}
