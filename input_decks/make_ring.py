@@ -65,7 +65,9 @@ with mortar contact: --set formulation=MORTAR
 """
 
 
-PARAMETERS = f"""
+def parameter_lines(points: int) -> list[str]:
+    """The parameters, with Gauss points of segment and mortar contact."""
+    return f"""
 *PARAMETER
 h = 0.01
 t_end = 8.
@@ -73,8 +75,8 @@ frame = 0.1
 method = NULL SPACE
 initiation = PERSISTENT
 tolerance = 1e-10
-{contact_parameters("NODE TO SURFACE", "ONE", points=3).strip()}
-"""
+{contact_parameters("NODE TO SURFACE", "ONE", points).strip()}
+""".strip().splitlines()
 
 
 def model_lines(block: Grid, ring: Grid) -> list[str]:
@@ -155,7 +157,7 @@ def main() -> None:
                           first=(len(ring.node) + 1, len(ring.element) + 1))
     area = 0.5*n_around*math.sin(2.0*math.pi/n_around)*(R_OUTER**2 - R_INNER**2)
 
-    lines = heading(heading_text(area)) + ["**"] + PARAMETERS.strip().splitlines()
+    lines = heading(heading_text(area)) + ["**"] + parameter_lines(points=3)
     lines += comment(f"Ring: {n_around} x {n_through} elements, radial line by radial line from "
                      "the bottom,\ncounter-clockwise, each from the rim inwards")
     lines += ring.node_lines() + ring.element_lines()

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 from deckwriter import (Point, arguments, comment, heading, set_lines, surface_lines, write_deck)
-from make_ring import (BLOCK_CORNER, BLOCK_SIZE, CONTACT, DENSITY, GAP, MATERIALS, PARAMETERS,
-                       R_INNER, R_OUTER, STEP, VELOCITY)
+from make_ring import (BLOCK_CORNER, BLOCK_SIZE, CONTACT, DENSITY, GAP, MATERIALS, R_INNER,
+                       R_OUTER, STEP, VELOCITY, parameter_lines)
 from tied_parts import Body, Curve, line
 
 #: Elements around and through each piece of the ring; the first stands on the lowest point.
@@ -112,7 +112,7 @@ def main() -> None:
     wheel = ring()
     ground = foundation((max(wheel.places()) + 1,
                          1 + sum(len(part.element) for part in wheel.parts())))
-    lines = heading(heading_text(wheel, ground)) + ["**"] + PARAMETERS.strip().splitlines()
+    lines = heading(heading_text(wheel, ground)) + ["**"] + parameter_lines(points=4)
     lines += ["tie_multiplier = DUAL"]
     lines += comment("Ring: six pieces, radial line by radial line, counter-clockwise, each from "
                      "the rim inwards") + wheel.mesh_lines()
