@@ -11,12 +11,13 @@ module emcon_recorder
    use emcon_march, only : increment_t
    use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
    use emcon_quantities, only : contact_field, element_quantity, field_names, node_quantity
+   use emcon_run_mark, only : run_mark
    use emcon_scene, only : output_contact_file, scene_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : string_t
    use emcon_version, only : version
    use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
-      vtkhdf_end_frame, vtkhdf_publish, vtkhdf_resume, vtkhdf_t, vtkhdf_write
+      vtkhdf_end_frame, vtkhdf_publish, vtkhdf_put_run, vtkhdf_resume, vtkhdf_t, vtkhdf_write
    implicit none
    private
    public :: recorder_t, recorder_open, recorder_resume, recorder_write, recorder_publish, &
@@ -51,16 +52,19 @@ contains
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: base
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: run
 
+      call run_mark(stepper, run)
       call choose_fields(self, stepper%scene)
       if (self%has_fields) then
          call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), &
             stepper%scene%element_node, stepper%scene%element_kind, fields_of(self), error)
          if (allocated(error)) return
+         call vtkhdf_put_run(self%fields, run)
       end if
       call history_create(self%history, base, columns(), error)
       if (allocated(error)) return
-      call history_put_run(self%history, stepper%source%line, version, error)
+      call history_put_run(self%history, run, stepper%source%line, version, error)
       if (allocated(error)) return
       call define_sets(self, stepper, error)
       if (allocated(error)) return
@@ -74,13 +78,15 @@ contains
       character(len=*), intent(in) :: base
       integer, intent(in) :: n_row, n_frame
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: run
 
+      call run_mark(stepper, run)
       call choose_fields(self, stepper%scene)
       if (self%has_fields) then
-         call vtkhdf_resume(self%fields, base // ".vtkhdf", fields_of(self), n_frame, error)
+         call vtkhdf_resume(self%fields, base // ".vtkhdf", run, fields_of(self), n_frame, error)
          if (allocated(error)) return
       end if
-      call history_resume(self%history, base, columns(), n_row, error)
+      call history_resume(self%history, base, run, columns(), n_row, error)
       if (allocated(error)) return
       self%n_row = n_row
       self%last_time = stepper%march%state%time

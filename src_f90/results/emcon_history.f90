@@ -77,15 +77,16 @@ contains
    !> Go on after the first `n_row` rows; later ones are dropped.
    !>
    !> Sets are defined again by the caller; what they hold of later times is dropped then.
-   subroutine history_resume(self, base, columns, n_row, error)
+   subroutine history_resume(self, base, run, columns, n_row, error)
       type(history_t), intent(out) :: self
       character(len=*), intent(in) :: base
+      character(len=*), intent(in) :: run            !! that the history is of
       type(column_t), intent(in) :: columns(:)       !! as the history was created with
       integer, intent(in) :: n_row
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
-      call published_resume(self%store, base // ".h5", error)
+      call published_resume(self%store, base // ".h5", run, error)
       if (.not. allocated(error)) call begin_series(self, columns, error)
       do i = 1, size(columns)
          if (allocated(error)) exit
@@ -358,13 +359,15 @@ contains
    end subroutine history_set_append
 
    !> Keep with the results what made them: the text of the deck and the version of the program.
-   subroutine history_put_run(self, deck, version, error)
+   subroutine history_put_run(self, run, deck, version, error)
       type(history_t), intent(inout) :: self
+      character(len=*), intent(in) :: run            !! a line that names the run, for the seal
       type(string_t), intent(in) :: deck(:)          !! (n_line)
       character(len=*), intent(in) :: version
       type(error_t), allocatable, intent(out) :: error
       type(string_t) :: version_text(1)
 
+      self%store%run = run
       version_text(1)%text = version
       call hdf5_make_group(self%store%file, "/run", error)
       if (.not. allocated(error)) then

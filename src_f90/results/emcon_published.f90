@@ -20,6 +20,7 @@ module emcon_published
    type :: published_t
       type(hdf5_file_t) :: file                      !! the working copy
       logical :: is_changed = .false.                !! since the last publication; set by the user
+      character(len=:), allocatable :: run           !! the run that it is of; set by the user
       character(len=:), allocatable, private :: path
       logical, private :: is_published = .false.
       real(dp), private :: time_published = 0.0_dp   !! wall clock [s]
@@ -41,6 +42,7 @@ contains
       type(error_t), allocatable :: ignored
 
       self%path = path
+      self%run = ""
       call remove_stale(self, error)
       if (allocated(error)) return
       call hdf5_create(self%file, path // ".part", .false., error)
@@ -48,19 +50,20 @@ contains
       self%is_changed = .true.
    end subroutine published_create
 
-   !> Go on with the published file `path`.
-   subroutine published_resume(self, path, error)
+   !> Go on with the published file `path` of `run`.
+   subroutine published_resume(self, path, run, error)
       type(published_t), intent(out) :: self
-      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: path, run
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: ignored
 
       self%path = path
+      self%run = run
       if (.not. file_exists(path)) then
          call raise(error, err_file, path // " does not exist: the run cannot be continued there")
          return
       end if
-      call seal_check(path, error)
+      call seal_check(path, run, error)
       if (.not. allocated(error)) call remove_stale(self, error)
       if (.not. allocated(error)) call file_copy(path, path // ".part", error)
       if (.not. allocated(error)) call hdf5_open(self%file, path // ".part", .true., error)
@@ -98,7 +101,7 @@ contains
 
       start = wall_seconds()
       call hdf5_flush(self%file, error)
-      if (.not. allocated(error)) call seal_put(self%path // ".part", error)
+      if (.not. allocated(error)) call seal_put(self%path // ".part", self%run, error)
       if (.not. allocated(error)) then
          call file_copy(self%path // ".part", self%path // ".tmp", error)
          if (.not. allocated(error)) call file_rename(self%path // ".tmp", self%path, error)
@@ -121,7 +124,7 @@ contains
       if (self%file%id < 0) return
       call hdf5_close(self%file, error)
       if (.not. allocated(error) .and. .not. self%file%has_failed) then
-         call seal_put(self%path // ".part", error)
+         call seal_put(self%path // ".part", self%run, error)
          if (.not. allocated(error)) call file_open(part, self%path // ".part", "r", error)
          if (.not. allocated(error)) call file_sync(part, error)
          call file_close(part, ignored)

@@ -230,7 +230,7 @@ contains
       if (.not. allocated(error)) call write_entries(self, file, error)
       call hdf5_close(file, close_error)
       if (.not. allocated(error)) call move_alloc(close_error, error)
-      if (.not. allocated(error)) call seal_put(path // ".tmp", error)
+      if (.not. allocated(error)) call seal_put(path // ".tmp", "", error)
       if (.not. allocated(error)) call file_open(written, path // ".tmp", "r", error)
       if (.not. allocated(error)) call file_sync(written, error)
       call file_close(written, close_error)
@@ -305,7 +305,7 @@ contains
       character(len=:), allocatable :: needed
       type(error_t), allocatable :: ignored
 
-      call seal_check(path, error)
+      call seal_check(path, "", error)
       if (.not. allocated(error)) call hdf5_open(file, path, .false., error)
       if (.not. allocated(error)) call hdf5_read_texts(file, "/format", found, error)
       if (.not. allocated(error)) then

@@ -1,5 +1,6 @@
-!> Seals: a file tells in its first bytes how long the rest is and what it adds up to. So damage is
-!> found before a library reads it, which may never come back from that.
+!> Seals: a file tells in its first bytes how long the rest is, what it adds up to and, if it is of
+!> several, of which run it is. So damage is found before a library reads it, which may never come
+!> back from that, and files of other runs are not gone on with.
 !>
 !> The seal stands in the user block that HDF5 keeps for its users: readers pass over it.
 module emcon_sealed_file
@@ -18,8 +19,9 @@ module emcon_sealed_file
 contains
 
    !> Seal the file at `path`, whose first `seal_size` bytes are free.
-   subroutine seal_put(path, error)
+   subroutine seal_put(path, run, error)
       character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: run                !! one line, the run it is of; may be empty
       type(error_t), allocatable, intent(out) :: error
       character(len=seal_size) :: found, seal
       type(file_t) :: file
@@ -28,14 +30,16 @@ contains
       call file_open(file, path, "r+", error)
       if (allocated(error)) return
       call read_seals(file, found, seal, error)
+      call add_run(seal, run)
       if (.not. allocated(error)) call file_put_at_start(file, seal, error)
       call file_close(file, close_error)
       if (.not. allocated(error)) call move_alloc(close_error, error)
    end subroutine seal_put
 
-   !> An error unless the file at `path` is as it was sealed.
-   subroutine seal_check(path, error)
+   !> An error unless the file at `path` is as it was sealed, as one of `run`.
+   subroutine seal_check(path, run, error)
       character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: run                !! as for `seal_put`
       type(error_t), allocatable, intent(out) :: error
       character(len=seal_size) :: found, seal
       type(file_t) :: file
@@ -51,11 +55,24 @@ contains
          call raise(error, err_file, path // " has no seal: it was not written by this version " &
             // "of EMCON, or its beginning is damaged. Bring it back from a copy, or run the " &
             // "deck again")
-      else if (found /= seal) then
+      else if (index(found, trim(seal)) /= 1) then
          call raise(error, err_file, path // " is damaged, or was changed since the run wrote " &
             // "it: its bytes do not add up. Bring it back from a copy, or run the deck again")
+      else
+         call add_run(seal, run)
+         if (found /= seal) call raise(error, err_file, path // " is of another run, of another " &
+            // "deck or with other --set, or its beginning is damaged. Bring it back from a " &
+            // "copy, or run the deck again")
       end if
    end subroutine seal_check
+
+   !> Append the line that names the run.
+   pure subroutine add_run(seal, run)
+      character(len=seal_size), intent(inout) :: seal
+      character(len=*), intent(in) :: run
+
+      if (run /= "") seal(len_trim(seal) + 1:) = run // line_end
+   end subroutine add_run
 
    !> The seal that stands in the file, and the one that fits the bytes behind it.
    subroutine read_seals(file, found, seal, error)

@@ -14,7 +14,7 @@ module emcon_vtkhdf
    implicit none
    private
    public :: field_t, vtkhdf_t, vtkhdf_create, vtkhdf_resume, vtkhdf_begin_frame, vtkhdf_write
-   public :: vtkhdf_end_frame, vtkhdf_publish, vtkhdf_close
+   public :: vtkhdf_put_run, vtkhdf_end_frame, vtkhdf_publish, vtkhdf_close
 
    !> What a field is called, and where it lives.
    type :: field_t
@@ -78,15 +78,16 @@ contains
    end subroutine vtkhdf_create
 
    !> Go on with the published file `path` after its first `n_frame` frames; later ones are dropped.
-   subroutine vtkhdf_resume(self, path, fields, n_frame, error)
+   subroutine vtkhdf_resume(self, path, run, fields, n_frame, error)
       type(vtkhdf_t), intent(out) :: self
       character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: run            !! that the file is of
       type(field_t), intent(in) :: fields(:)         !! as the file was created with
       integer, intent(in) :: n_frame
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: n_point(:), n_cell(:)
 
-      call published_resume(self%store, path, error)
+      call published_resume(self%store, path, run, error)
       if (.not. allocated(error)) then
          call hdf5_read_integers(self%store%file, "/VTKHDF/NumberOfPoints", n_point, error)
       end if
@@ -97,6 +98,14 @@ contains
       if (.not. allocated(error)) call drop_frames(self, n_frame, error)
       if (allocated(error)) call published_abandon(self%store)
    end subroutine vtkhdf_resume
+
+   !> Name the run that the file is of.
+   pure subroutine vtkhdf_put_run(self, run)
+      type(vtkhdf_t), intent(inout) :: self
+      character(len=*), intent(in) :: run
+
+      self%store%run = run
+   end subroutine vtkhdf_put_run
 
    !> Keep the first `n_frame` frames.
    subroutine drop_frames(self, n_frame, error)

@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -327,10 +328,28 @@ def seal_of(rest):
     return seal.ljust(512).encode()
 
 
-@pytest.mark.parametrize("suffix", [".rst.h5", ".h5", ".vtkhdf"])
-def test_the_seal_is_the_sum_of_the_bytes(whole, suffix):
-    data = whole[0].file(suffix).read_bytes()
-    assert data[:512] == seal_of(data[512:])
+def test_the_seal_is_the_sum_of_the_bytes(whole):
+    """Behind it in the files of results a line that names the run, the same in both."""
+    lines = []
+    for suffix in (".rst.h5", ".h5", ".vtkhdf"):
+        data = whole[0].file(suffix).read_bytes()
+        sums = seal_of(data[512:]).rstrip(b" ")
+        assert data.startswith(sums)
+        lines.append(data[len(sums):512].rstrip(b" "))
+    assert lines[0] == b"" and lines[1] == lines[2]
+    assert re.fullmatch(rb"run \d+ [0-9A-F]{16}\n", lines[1])
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".vtkhdf"])
+def test_files_of_another_run_are_refused(deck, stopped, tmp_path, suffix):
+    """Whole ones, of the same deck with another --set: their seals fit, but not this run."""
+    other = run_deck(deck, tmp_path / "other", h=0.04)
+    shutil.copy(other.file(suffix), stopped.file(suffix))
+    before = {p: p.read_bytes() for p in stopped.base.parent.glob("ring.*") if p.suffix != ".log"}
+    done = emcon("restart", stopped.file(".rst.h5"), "--quiet")
+    assert done.returncode == 4 and f"ring{suffix} is of another run" in done.stderr
+    for path, data in before.items():
+        assert path.read_bytes() == data, f"{path.name} was changed"
 
 
 def test_another_build_is_told(stopped):

@@ -103,7 +103,7 @@ contains
       deck(1)%text = "*HEADING"
       deck(2)%text = " blanks around "
       call history_create(history, base, columns, error)
-      if (.not. allocated(error)) call history_put_run(history, deck, "1.0", error)
+      if (.not. allocated(error)) call history_put_run(history, "run 1", deck, "1.0", error)
       if (.not. allocated(error)) call append_rows(history, 0, 100, error)
       if (.not. allocated(error)) call history_close(history, error)
       if (.not. allocated(error)) call check_history(base, 100, error)
@@ -122,11 +122,12 @@ contains
       deck(1)%text = "*HEADING"
       deck(2)%text = " blanks around "
       call history_create(killed, base, columns, error)
-      if (.not. allocated(error)) call history_put_run(killed, deck, "1.0", error)
+      if (.not. allocated(error)) call history_put_run(killed, "run 1", deck, "1.0", error)
       if (.not. allocated(error)) call append_rows(killed, 0, 60, error)
       if (.not. allocated(error)) call history_publish(killed, .true., error)
       if (.not. allocated(error)) call history_append(killed, [61.0_dp, 6.1_dp, 0.0_dp], error)
-      if (.not. allocated(error)) call history_resume(history, base, columns, 51, error)
+      if (.not. allocated(error)) call history_resume(history, base, "run 1", columns, &
+         51, error)
       if (.not. allocated(error)) call append_rows(history, 51, 100, error)
       if (.not. allocated(error)) call history_close(history, error)
       if (.not. allocated(error)) call check_history(base, 100, error)
@@ -227,8 +228,8 @@ contains
       call create_sample(vtk, base, error)
       if (.not. allocated(error)) call write_frames(vtk, 1, 5, error)
       if (.not. allocated(error)) call vtkhdf_close(vtk, error)
-      if (.not. allocated(error)) call vtkhdf_resume(vtk, base // ".vtkhdf", sample_fields(), 2, &
-         error)
+      if (.not. allocated(error)) call vtkhdf_resume(vtk, base // ".vtkhdf", "", &
+         sample_fields(), 2, error)
       if (.not. allocated(error)) call write_frames(vtk, 3, 3, error)
       if (.not. allocated(error)) call vtkhdf_close(vtk, error)
       if (.not. allocated(error)) call hdf5_open(file, base // ".vtkhdf", .false., error)

@@ -1,0 +1,53 @@
+!> What tells the files of one run from those of others: a checksum of all that the run is made of.
+module emcon_run_mark
+   use emcon_checksum, only : checksum_add, checksum_t, checksum_text
+   use emcon_stepper, only : stepper_t
+   use emcon_text, only : string_t
+   implicit none
+   private
+   public :: run_mark
+
+   !> Behind each line, so that lines cannot run into each other.
+   character(len=*), parameter :: line_end = achar(10)
+
+contains
+
+   !> One line for the deck, included files and all, and the parameters given beside it: equal for
+   !> runs that differ in nothing.
+   pure subroutine run_mark(stepper, mark)
+      type(stepper_t), intent(in) :: stepper
+      character(len=:), allocatable, intent(out) :: mark
+      type(checksum_t) :: sum
+      character(len=40) :: digits
+
+      call add_lines(sum, stepper%source%line)
+      call add_lines(sum, stepper%override)
+      if (stepper%is_lenient) call checksum_add(sum, "lenient ")
+      call checksum_text(sum, digits)
+      mark = "run " // trim(digits)
+   end subroutine run_mark
+
+   !> Add `line` as one piece, filled up with blanks to words of the checksum.
+   pure subroutine add_lines(sum, line)
+      type(checksum_t), intent(inout) :: sum
+      type(string_t), intent(in) :: line(:)
+      character(len=:), allocatable :: text
+      integer :: i, n
+
+      n = 0
+      do i = 1, size(line)
+         n = n + len(line(i)%text) + len(line_end)
+      end do
+      allocate(character(len=4*(n/4 + 1)) :: text)
+      text(:) = ""
+      n = 0
+      do i = 1, size(line)
+         associate (here => line(i)%text // line_end)
+            text(n + 1:n + len(here)) = here
+            n = n + len(here)
+         end associate
+      end do
+      call checksum_add(sum, text)
+   end subroutine add_lines
+
+end module emcon_run_mark
