@@ -46,7 +46,7 @@ module emcon_judge
       type(extent_t), allocatable :: extent(:)   !! (n_piece) of the step
       real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement at a look [L]
       real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges at a look [L]
-      integer, allocatable :: near(:), found(:)  !! work space for lists of edges
+      integer, allocatable :: near(:), found(:), around(:)     !! work space for lists of edges
       integer, allocatable :: other(:)           !! and of pieces
       logical :: is_passing = .false.            !! at a look on the way
    end type judge_t
@@ -61,7 +61,7 @@ contains
 
       call outline_init(self%outline, scene)
       n = size(self%outline%edge, 2)
-      allocate(self%extent(self%outline%n_piece), self%near(n), self%found(n))
+      allocate(self%extent(self%outline%n_piece), self%near(n), self%found(n), self%around(n))
       allocate(self%other(self%outline%n_piece))
       allocate(self%low(2, n), self%high(2, n), source=0.0_wp)
       allocate(self%u(2, size(scene%x, 2)), source=0.0_wp)
@@ -221,7 +221,8 @@ contains
             if (self%outline%link(2, e) == 0) call try_node(self, x, e, 2, &
                self%near(self%found(:n_found)), reach, overlap)
          end if
-         call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, overlap)
+         call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, reach, &
+            overlap)
       end do
    end subroutine look_one_way
 
@@ -260,26 +261,37 @@ contains
       end associate
    end subroutine try_node
 
-   !> Is a part of edge `e`, between its crossings with `other`, inside? Looked at is its middle,
-   !> and with `has_ends` the node where it ends. Neighbours do not cross.
-   pure subroutine try_edge(self, x, e, other, has_ends, overlap)
-      type(judge_t), intent(in) :: self
+   !> Is a part of edge `e`, between its crossings with `other`, inside? Looked at is its middle, and
+   !> of a piece in itself the node where it ends: the nearest edge is looked for along the outline
+   !> from the crossings, past what lies behind the piece's own surface. Neighbours do not cross.
+   pure subroutine try_edge(self, x, e, other, is_own, reach, overlap)
+      type(judge_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
-      logical, intent(in) :: has_ends
+      logical, intent(in) :: is_own              !! edges of the same piece
+      real(wp), intent(in) :: reach              !! [L]
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: share(0:most_crossings + 1)
       logical :: goes_in(most_crossings)
-      integer :: k, n
+      integer :: crossed(most_crossings), k, n, n_around
 
-      call find_crossings(self, x, e, other, n, share, goes_in)
+      call find_crossings(self, x, e, other, n, share, goes_in, crossed)
+      if (n == 0) return
+      if (is_own) call find_around(self, e, crossed(:n), reach, n_around)
       do k = 0, n
          if (.not. is_inside(k)) cycle
-         call try_place(self, x, e, 0.5_wp*(share(k) + share(k + 1)), other, overlap)
-         if (.not. has_ends) cycle
-         if (k == 0) call try_place(self, x, e, 0.0_wp, other, overlap)
-         if (k == n) call try_place(self, x, e, 1.0_wp, other, overlap)
+         associate (middle => 0.5_wp*(share(k) + share(k + 1)))
+            if (.not. is_own) then
+               call try_place(self, x, e, middle, other, overlap)
+               cycle
+            end if
+            associate (around => self%around(:n_around))
+               call try_place(self, x, e, middle, around, overlap)
+               if (k == 0) call try_place(self, x, e, 0.0_wp, around, overlap)
+               if (k == n) call try_place(self, x, e, 1.0_wp, around, overlap)
+            end associate
+         end associate
       end do
 
    contains
@@ -295,8 +307,34 @@ contains
 
    end subroutine try_edge
 
+   !> The edges `crossed`, and those along the outline on either side of them within `reach` of edge
+   !> `e`: `self%around`.
+   pure subroutine find_around(self, e, crossed, reach, n)
+      type(judge_t), intent(inout) :: self
+      integer, intent(in) :: e, crossed(:)
+      real(wp), intent(in) :: reach              !! [L]
+      integer, intent(out) :: n
+      integer :: f, k, side
+
+      n = 0
+      do k = 1, size(crossed)
+         do side = 1, 2
+            f = crossed(k)
+            if (side == 2) f = self%outline%link(side, f)
+            do while (f > 0)
+               if (any(self%around(:n) == f) .or. are_neighbours(self, e, f)) exit
+               if (any(self%low(:, f) > self%high(:, e) + reach) &
+                  .or. any(self%high(:, f) < self%low(:, e) - reach)) exit
+               n = n + 1
+               self%around(n) = f
+               f = self%outline%link(side, f)
+            end do
+         end do
+      end do
+   end subroutine find_around
+
    !> Where edge `e` crosses `other` edges, in order, from 0 before the first to 1 after the last.
-   pure subroutine find_crossings(self, x, e, other, n, share, goes_in)
+   pure subroutine find_crossings(self, x, e, other, n, share, goes_in, crossed)
       type(judge_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
@@ -304,6 +342,7 @@ contains
       integer, intent(out) :: n
       real(wp), intent(out) :: share(0:)
       logical, intent(out) :: goes_in(:)
+      integer, intent(out) :: crossed(:)
       real(wp) :: new
       logical :: crosses, enters
       integer :: k, i
@@ -323,6 +362,8 @@ contains
          goes_in(i + 2:n + 1) = goes_in(i + 1:n)
          share(i + 1) = new
          goes_in(i + 1) = enters
+         crossed(i + 2:n + 1) = crossed(i + 1:n)
+         crossed(i + 1) = other(k)
          n = n + 1
       end do
       share(n + 1) = 1.0_wp

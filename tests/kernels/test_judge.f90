@@ -29,6 +29,7 @@ contains
          test_case_t("a block that has been crossed in one step", test_crossed), &
          test_case_t("nothing is lost far from the origin", test_far), &
          test_case_t("a piece that goes into itself", test_self), &
+         test_case_t("a piece in itself past a crossing", test_self_past), &
          test_case_t("where a tie ends, pieces meet", test_joint), &
          test_case_t("bodies without a pair are not looked at", test_no_pair)]
    end subroutine collect_judge
@@ -155,36 +156,72 @@ contains
       call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
    end subroutine test_far
 
-   !> A strip whose end is put into its middle.
-   subroutine test_self(error)
-      type(error_t), allocatable, intent(out) :: error
-      type(scene_t) :: scene
-      type(overlap_t) :: overlap
-      type(block_t) :: strip
-      !> Places of the last four pairs of nodes, below and above.
-      real(wp), parameter :: bent(2, 2, 5:8) = reshape([5.5_wp, 0.5_wp, 4.5_wp, 1.5_wp, &
-         5.5_wp, 2.5_wp, 4.5_wp, 2.0_wp, 4.5_wp, 3.5_wp, 4.0_wp, 2.5_wp, &
-         2.0_wp, 1.5_wp, 2.5_wp, 0.8_wp], [2, 2, 4])
-      integer :: i, j
+   !> A strip of elements 1 x 1 on [0, 8] x [0, 1], in contact with itself.
+   subroutine make_strip(scene, strip)
+      type(scene_t), intent(out) :: scene
+      type(block_t), intent(out) :: strip
 
       call scene_begin(scene)
       call add_block(scene, "CPE4", [8, 1], [0.0_wp, 0.0_wp], [8.0_wp, 1.0_wp], strip)
       call add_surface(scene, "SKIN", strip, [bottom, right, top, left])
       scene%pair = [contact_pair_t(slave=1, master=1)]
-      call judged(scene, overlap)
-      call check_equal(error, overlap%node, 0, "straight")
-      ! Bent back above itself, and the lower corner of its end 0.2 below the top.
+   end subroutine make_strip
+
+   !> Bend the strip back above itself, its last two nodes to the places `tip`.
+   pure subroutine bend(scene, strip, tip)
+      type(scene_t), intent(inout) :: scene
+      type(block_t), intent(in) :: strip
+      real(wp), intent(in) :: tip(2, 2)          !! below and above at first
+      !> Of the pairs of nodes before.
+      real(wp), parameter :: bent(2, 2, 5:7) = reshape([5.5_wp, 0.5_wp, 4.5_wp, 1.5_wp, &
+         5.5_wp, 2.5_wp, 4.5_wp, 2.0_wp, 4.5_wp, 3.5_wp, 4.0_wp, 2.5_wp], [2, 2, 3])
+      integer :: i, j
+
       do i = 5, 8
          do j = 0, 1
             associate (node => block_node(strip, i, j))
-               scene%u0(:, node) = bent(:, j + 1, i) - scene%x(:, node)
+               if (i < 8) scene%u0(:, node) = bent(:, j + 1, i) - scene%x(:, node)
+               if (i == 8) scene%u0(:, node) = tip(:, j + 1) - scene%x(:, node)
             end associate
          end do
       end do
+   end subroutine bend
+
+   !> A strip whose end is put into its middle: its lower corner 0.2 below the top.
+   subroutine test_self(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      type(block_t) :: strip
+
+      call make_strip(scene, strip)
+      call judged(scene, overlap)
+      call check_equal(error, overlap%node, 0, "straight")
+      call bend(scene, strip, reshape([2.0_wp, 1.5_wp, 2.5_wp, 0.8_wp], [2, 2]))
       call judged(scene, overlap)
       call check_near(error, overlap%depth, 0.2_wp, 8.0_wp*eps, 1.0_wp, "depth")
       call check_equal(error, overlap%node, block_node(strip, 8, 1), "node")
    end subroutine test_self
+
+   !> The end goes in by one edge of a slope and lies behind the next, whose box is apart from its
+   !> own: the depth is that from the next.
+   subroutine test_self_past(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      type(block_t) :: strip
+      integer :: i
+
+      call make_strip(scene, strip)
+      do i = 0, 4
+         scene%u0(2, block_node(strip, i, 1)) = 0.25_wp*real(i, wp)
+      end do
+      call bend(scene, strip, reshape([1.5_wp, 1.49_wp, 2.2_wp, 1.45_wp], [2, 2]))
+      call judged(scene, overlap)
+      ! 0.1 below a slope of 1/4, by the edge: 0.1 cos^2.
+      call check_near(error, overlap%depth, 0.1_wp/1.0625_wp, 8.0_wp*eps, 1.0_wp, "depth")
+      call check_equal(error, overlap%node, block_node(strip, 8, 1), "node")
+   end subroutine test_self_past
 
    !> Two blocks side by side, the second a sixteenth lower and a little inside the first: an overlap
    !> by the tops, but not if a tie holds them, which lets its ends slip by its error. What goes into
