@@ -32,6 +32,8 @@ def test_runs(deck, tmp_path):
     found = run.verdict
     assert found["verdict"] == ("good" if found["penetration"] <= 1e-3 else "bad")
     assert found["penetration"] <= ONE_SIDED and len(found["reasons"]) <= 1
+    if found["verdict"] == "bad":
+        assert "** Verdict: bad" in deck.read_text(), "the heading does not say so"
     told = "".join(f"emcon: verdict: BAD: {reason}\n" for reason in found["reasons"])
     assert run.errors == told
     for suffix in (".csv", ".h5", ".log", ".vtkhdf"):
