@@ -43,6 +43,8 @@ module emcon_verdict
       integer :: n_newton = 0
       integer :: n_cut = 0
       integer :: n_guarded = 0                   !! increments in which guards act
+      integer :: n_held = 0                      !! increments in which contacts that come and go
+      integer :: most_held = 0                   !! are held closed, and the most of these in one
       real(wp), allocatable :: largest_force(:)  !! (n_pair) on the slave side
       logical :: has_dynamics = .false.          !! a step keeps energy
       integer :: n_warning = 0
@@ -90,6 +92,8 @@ contains
       self%n_newton = self%n_newton + increment%n_newton
       self%n_cut = self%n_cut + increment%n_cut
       if (increment%is_guarded) self%n_guarded = self%n_guarded + 1
+      if (increment%n_held > 0) self%n_held = self%n_held + 1
+      self%most_held = max(self%most_held, increment%n_held)
       associate (state => march%state)
          if (increment%overlap%depth > self%deepest) then
             self%deepest = increment%overlap%depth
@@ -263,6 +267,9 @@ contains
                call note_add(lines, "guards hold nodes in " // to_text(self%n_guarded) // &
                   " increments: " // text // " would make them needless")
             end if
+            if (self%n_held > 0) call note_add(lines, "contacts that open and close in turn " // &
+               "are held closed in " // to_text(self%n_held) // " increments, " // &
+               to_text(self%most_held) // " at most in one")
             if (self%stand_off%impulse > 0.0_wp) call note_add(lines, &
                "largest stand-off of contact " // to_text(self%stand_off%largest, 3) // &
                " of an element, mean over the impulse " // &

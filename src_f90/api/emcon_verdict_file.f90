@@ -72,6 +72,8 @@ contains
          call add_number(line, "newton", real(self%n_newton, wp))
          call add_number(line, "cuts", real(self%n_cut, wp))
          call add_number(line, "guarded_increments", real(self%n_guarded, wp))
+         call add_number(line, "held_increments", real(self%n_held, wp))
+         call add_number(line, "held_contacts", real(self%most_held, wp))
          call add_number(line, "kinetic", ledger%kinetic)
          call add_number(line, "strain", ledger%strain)
          call add_number(line, "external_work", ledger%external_work)
@@ -146,7 +148,7 @@ contains
          self%deepest_time, self%unconverged, self%unconverged_time, self%stand_off%largest, &
          self%stand_off%impulse, self%stand_off%impulse_gap])
       call restart_put(restart, "effort", [self%n_newton, self%n_cut, self%n_warning, &
-         merge(1, 0, self%has_dynamics), self%n_guarded])
+         merge(1, 0, self%has_dynamics), self%n_guarded, self%n_held, self%most_held])
       call restart_put(restart, "pair_largest", self%largest_force)
       if (allocated(self%place)) then
          place(1)%text = self%place
@@ -163,7 +165,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(string_t), allocatable :: text(:)
       real(wp) :: figure(12)
-      integer :: effort(5)
+      integer :: effort(7)
 
       call restart_get(restart, "verdict", figure, error)
       if (.not. allocated(error)) call restart_get(restart, "effort", effort, error)
@@ -183,6 +185,8 @@ contains
       self%n_newton = effort(1)
       self%n_cut = effort(2)
       self%n_guarded = effort(5)
+      self%n_held = effort(6)
+      self%most_held = effort(7)
       self%n_warning = effort(3)
       self%has_dynamics = effort(4) == 1
       call restart_get(restart, "pair_largest", self%largest_force, error)

@@ -42,6 +42,7 @@ module emcon_march_step
       integer :: n_cut = 0
       integer :: n_active = 0
       logical :: is_guarded = .false.            !! guards act in it
+      integer :: n_held = 0                      !! contacts held closed that come and go
       type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge
       type(stand_off_t) :: stand_off             !! air across which contact forces act
       real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
@@ -105,10 +106,7 @@ contains
       if (status /= step_done) return
       call judge(self, scene, h, may_cut, increment, status)
       if (status /= step_done) return
-      if (any(self%active%comes_and_goes)) then
-         call cycling_text(self, scene, text)
-         call note_add(increment%notes, text // ": held closed in this step")
-      end if
+      if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
       if (any(self%active%is_dropped)) then
          call nodes_text(self, scene, self%active%is_dropped, text)
          call note_add(increment%notes, "contact is left out, as it follows from that of other " &
@@ -178,6 +176,24 @@ contains
       call judge_step(self%judge, scene%x, self%state%u, self%system%zero, before)
       goes_in = overlap%depth > before%depth + 0.1_wp*deepest_new
    end function goes_in
+
+   !> Tell of contacts that are held closed because they open and close in turn. Where the gap of
+   !> the start is held that makes no energy; else what pulls there is an error of the forces.
+   subroutine tell_held(self, scene, increment)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(increment_t), intent(inout) :: increment
+      character(len=:), allocatable :: text
+
+      increment%n_held = max(increment%n_held, count(self%active%comes_and_goes))
+      call cycling_text(self, scene, text)
+      if (self%active%holds_gap) then
+         call note_add(increment%notes, text // ": held closed in this step")
+      else
+         call note_add(increment%warnings, text // ": held closed in this step, the smallest " // &
+            "allowed, where they may pull")
+      end if
+   end subroutine tell_held
 
    !> The contacts of the last step that opened and closed in turn, by their slave nodes.
    subroutine cycling_text(self, scene, text)
