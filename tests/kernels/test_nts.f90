@@ -32,7 +32,9 @@ contains
          test_case_t("smoothed: lost near the centre of curvature", test_lost), &
          test_case_t("smoothed surface ends at its own slave node", test_own_node), &
          test_case_t("a strip in contact with itself", test_self), &
-         test_case_t("corners that meet are held by the faces that bear", test_corners)]
+         test_case_t("corners that meet are held by the faces that bear", test_corners), &
+         test_case_t("faces stay chosen where gaps are evaluated at the end", test_faces_stay), &
+         test_case_t("sharp corners are the polygon, round ones stand out", test_sharp)]
    end subroutine collect_nts
 
    !> A gap of 1/4 that closes by 3/8 in the middle of the step.
@@ -103,6 +105,76 @@ contains
             1.0_wp, "corner behind, both sides held: " // to_text(k))
       end do
    end subroutine test_corners
+
+   !> A square right on its twin goes in by a tenth and aside by as much. Statics evaluate gaps there
+   !> with no motion left: the corner, which the side does not bear, is still held by the top.
+   subroutine test_faces_stay(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way(2) = [-0.1_wp, -0.1_wp]
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(contact_pair_t) :: pair
+      type(nts_t) :: nts
+      type(constraint_t) :: item(1)
+      real(wp), allocatable :: zero(:, :), u(:, :)
+      integer :: i, own
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], lower)
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, 1.0_wp], [1.0_wp, 1.0_wp], upper)
+      call add_surface(scene, "LOWER", lower, [bottom, right, top, left])
+      call add_surface(scene, "UPPER", upper, [bottom, right, top, left])
+      pair = contact_pair_t(slave=2, master=1, both_sides=.true.)
+      call nts_init(nts, scene, pair, error)
+      if (allocated(error)) return
+      allocate(zero, u, source=0.0_wp*scene%x)
+      u(:, 5:) = spread(way, 2, size(u, 2) - 4)
+      call nts%begin_step(scene%x, zero, u)
+      own = findloc(nts%node, block_node(upper, 0, 0), 1)
+      call nts%evaluate([own], scene%x, u, zero, [0.0_wp], item)
+      call check_near(error, item(1)%gap1, way(2), tol, 1.0_wp, "gap")
+      i = findloc(item(1)%node(:item(1)%n_node), nts%node(own), 1)
+      call check_near(error, item(1)%c(:, i), [0.0_wp, 1.0_wp], tol, 1.0_wp, "its gradient")
+   end subroutine test_faces_stay
+
+   !> A node beside the bisector of a corner of a right angle, by half of the width over which the
+   !> corner is rounded: with `is_sharp` the gap is that over the polygon, else it is smaller, by a
+   !> part of that width.
+   subroutine test_sharp(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: width = 1.0e-4_wp, up = 0.01_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(nts_t) :: nts
+      type(constraint_t) :: item(1)
+      real(wp), allocatable :: u(:, :), zero(:, :)
+      real(wp) :: gap(2)
+      integer :: k
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], lower)
+      call add_block(scene, "CPE4", [1, 1], [1.0_wp, 1.0_wp], [1.0_wp, 1.0_wp], upper)
+      call add_surface(scene, "LOWER", lower, [bottom, right, top, left])
+      call add_surface(scene, "UPPER", upper, [bottom, right, top, left])
+      call nts_init(nts, scene, contact_pair_t(slave=2, master=1, both_sides=.true.), error)
+      if (allocated(error)) return
+      call nts%configure(scene%x, contact_options_t())
+      call check_true(error, nts%may_sharpen, "polygons may be sharp")
+      call nts%suit_steps(.true.)
+      allocate(u, zero, source=0.0_wp*scene%x)
+      u(1, 5:) = up - 0.5_wp*width
+      u(2, 5:) = up
+      do k = 1, 2
+         nts%is_sharp = k == 1
+         call nts%begin_step(scene%x, u, zero)
+         call nts%evaluate([findloc(nts%node, block_node(upper, 0, 0), 1)], scene%x, u, zero, &
+            [0.0_wp], item)
+         gap(k) = item(1)%gap1
+      end do
+      call check_near(error, gap(1), up, tol, 1.0_wp, "sharp: the distance from the top")
+      call check_true(error, gap(2) < gap(1) - tol .and. gap(2) > gap(1) - 0.08_wp*width, &
+         "round: smaller by " // to_text(gap(1) - gap(2)))
+   end subroutine test_sharp
 
    !> Over the side of the lower block no constraint may act; at its corner one may.
    subroutine test_past_end(error)
