@@ -78,7 +78,7 @@ contains
          user_start(i) = user_start(i) + user_start(i - 1)
       end do
       allocate(user(user_start(n + 1)))
-      last = user_start
+      allocate(last(n + 1), source=user_start)
       do e = 1, size(list_start) - 1
          do k = list_start(e), list_start(e + 1) - 1
             i = dof(k)

@@ -94,7 +94,7 @@ contains
          n = n + 1
          sorted(n) = sorted(i)
       end do
-      unique = sorted(:n)
+      allocate(unique(n), source=sorted(:n))
    end function unique_sorted
 
 end module emcon_sort

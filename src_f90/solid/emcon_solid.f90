@@ -15,7 +15,7 @@ module emcon_solid
    use emcon_text, only : to_text
    implicit none
    private
-   public :: solid_t, solid_init, solid_respond, solid_response_t, solid_tangent_times
+   public :: solid_t, solid_init, solid_respond, solid_response_t, solid_round, solid_tangent_times
    public :: solid_evaluate_given, obstacle_text
 
    type :: solid_t
@@ -209,9 +209,8 @@ contains
 
    !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
    !> to the matrix entries `value` (slot > 0) and `side` (slot < 0). What a displacement is rounded
-   !> by, a force is too: `u0` is exact, as what the step starts from, unless it was computed as a
-   !> change of `before`.
-   subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side, before)
+   !> by, a force is too: `u0` is exact here, as what the step starts from; see `solid_round`.
+   subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
@@ -219,7 +218,6 @@ contains
       real(wp), intent(in), optional :: factor
       integer, intent(in), contiguous, optional :: slot(:)       !! element matrices by columns
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
-      real(wp), intent(in), contiguous, optional :: before(:, :)         !! (2, n_node) [L]
       type(element_response_t) :: part
       real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
       logical :: with_tangent
@@ -241,8 +239,6 @@ contains
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
-         if (present(before)) largest = max(largest, maxval(abs(u0(:, self%node(:n, e)))), &
-            maxval(abs(before(:, self%node(:n, e)))))
          call respond_element(self, e, response%given, local0, dlocal, nlgeom, with_tangent, part)
          if (part%is_inverted) then
             response%inverted_element = e
@@ -261,6 +257,30 @@ contains
          end if
       end do
    end subroutine solid_respond
+
+   !> What the forces of a step of no length from `u` are rounded by, where `u` was computed as a
+   !> change of `before`.
+   pure subroutine solid_round(self, u, before, rounding)
+      type(solid_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: u(:, :), before(:, :)          !! (2, n_node) [L]
+      real(wp), intent(inout), contiguous :: rounding(:, :)              !! (2, n_node) [M L/T^2]
+      real(wp) :: largest
+      integer :: e, i
+
+      rounding = 0.0_wp
+      do e = 1, self%n_element
+         associate (node => self%node(:self%geometry(e)%n_node, e))
+            largest = 0.0_wp
+            do i = 1, size(node)
+               largest = max(largest, maxval(abs(u(:, node(i)) - u(:, node(1)))), &
+                  maxval(abs(u(:, node(i)))), maxval(abs(before(:, node(i)))))
+            end do
+            do i = 1, size(node)
+               rounding(:, node(i)) = rounding(:, node(i)) + largest*self%stiffness(i, e)
+            end do
+         end associate
+      end do
+   end subroutine solid_round
 
    !> Response of element `e`, by its law or from what the given laws have answered.
    pure subroutine respond_element(self, e, given, local0, dlocal, nlgeom, with_tangent, part)

@@ -19,8 +19,8 @@ module emcon_system
    use emcon_point_function, only : point_failed
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
    use emcon_scene, only : contact_pair_t, law_linear, method_null_space, procedure_dynamic, scene_t
-   use emcon_solid, only : obstacle_text, solid_init, solid_respond, solid_response_t, solid_t, &
-      solid_tangent_times
+   use emcon_solid, only : obstacle_text, solid_init, solid_respond, solid_response_t, solid_round, &
+      solid_t, solid_tangent_times
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_timer, only : stopwatch_t
    implicit none
@@ -174,7 +174,8 @@ contains
       end if
       call mass_place(self%solid, self%given, self%slot, freedom_numbers(self%numbering), &
          self%reduction, self%matrix)
-      self%mass_value = self%matrix%value
+      if (allocated(self%mass_value)) deallocate(self%mass_value)
+      allocate(self%mass_value(size(self%matrix%value)), source=self%matrix%value)
       if (self%given%is_any) call begin_given(self, scene, error)
       if (allocated(error)) return
       call loads_init(self%loads, scene, scene%step(i_step), self%numbering, self%matrix, &
@@ -246,7 +247,7 @@ contains
       if (with_tangent) self%matrix%value = real(pose%mass_scale*pose%rate, dp)*self%mass_value
       if (pose%is_end) then
          self%u_work = u0 + du
-         call respond_at(self%u_work, self%zero, 2.0_wp, 1.0_wp, before=u0)
+         call respond_at(self%u_work, self%zero, 2.0_wp, 1.0_wp)
       else
          self%u_work = u0 + 0.5_wp*du
          call respond_at(u0, du, 1.0_wp, 0.5_wp)
@@ -274,26 +275,25 @@ contains
    contains
 
       !> Internal forces from `start` by `step`, loads at `u_work`.
-      subroutine respond_at(start, step, solid_factor, load_factor, before)
+      subroutine respond_at(start, step, solid_factor, load_factor)
          real(wp), intent(in), contiguous :: start(:, :), step(:, :)
          real(wp), intent(in) :: solid_factor, load_factor
-         real(wp), intent(in), contiguous, optional :: before(:, :)  !! that `start` is a change of
 
          if (with_tangent) then
             call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
-               solid_factor, self%slot, self%matrix%value, self%reduction%side%value, before=before)
+               solid_factor, self%slot, self%matrix%value, self%reduction%side%value)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external, load_factor, self%matrix%value, self%reduction%side%value)
-            if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
-            call reduction_add(self%reduction, self%matrix)
-            if (self%is_stiffened) call add_stiffening(self)
          else
-            call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
-               before=before)
+            call solid_respond(self%solid, start, step, self%nlgeom, self%response)
             call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
                self%external)
-            if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
          end if
+         if (pose%is_end) call solid_round(self%solid, start, u0, self%response%rounding)
+         if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
+         if (.not. with_tangent) return
+         call reduction_add(self%reduction, self%matrix)
+         if (self%is_stiffened) call add_stiffening(self)
       end subroutine respond_at
 
    end subroutine system_respond
