@@ -56,8 +56,8 @@ contains
       n = size(scene%x, 2)
       allocate(self%du(2, n), self%v1(2, n), self%offset(2, n), source=0.0_wp)
       associate (state => self%state)
-         state%u = scene%u0
-         state%v = scene%v0
+         allocate(state%u(2, n), source=scene%u0)
+         allocate(state%v(2, n), source=scene%v0)
          allocate(state%u_start(2, n), state%contact(2, n), state%reaction(2, n), source=0.0_wp)
          allocate(state%internal(2, n), source=0.0_wp)
          allocate(state%is_active(self%system%n_constraint), source=.false.)
