@@ -6,8 +6,9 @@
  * discrete gradient of their energy; so is what the library gives for contact, and the sum of all
  * energies stays what it is. What contact adds to the host is marked by `emcon`.
  *
- * For each formulation a line is printed: steps, steps in contact, relative drift of the energy,
- * smallest gap, largest pressure, mean vertical velocity of the falling truss before and after.
+ * For each formulation a line is printed, of 400 steps or as many as are asked for: steps, steps in
+ * contact, relative drift of the energy, smallest gap, largest pressure, mean vertical velocity of
+ * the falling truss before and after.
  *
  * cc interface_bars.c $(pkg-config --cflags --libs emcon) -lm */
 #include <emcon_interface.h>
@@ -17,7 +18,7 @@
 #include <string.h>
 
 enum { N_LOWER = 10, N_NODE = 16, N_BAR = 32, N_DOF = 2*N_NODE, MAX_CONTACT = 8,
-       N_MAX = N_DOF + MAX_CONTACT, N_STEP = 400 };
+       N_MAX = N_DOF + MAX_CONTACT };
 
 typedef struct host {
    double x[N_DOF], u[N_DOF], v[N_DOF];   /* positions, displacements, velocities; masses are 1 */
@@ -270,8 +271,9 @@ static void advance(host *h, double dt, double *gap, double *pressure)
    }
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+   const int n_step = argc > 1 ? atoi(argv[1]) : 400;
    int formulation, step, i;
 
    for (formulation = EMCON_NODE_TO_SEGMENT; formulation <= EMCON_MORTAR; formulation++) {
@@ -287,7 +289,7 @@ int main(void)
       make_interface(&h, formulation);
       start = energy(&h);
       before = h.v[N_DOF - 1];
-      for (step = 0; step < N_STEP; step++) {
+      for (step = 0; step < n_step; step++) {
          int touches = 0;
 
          advance(&h, 0.01, &gap, &pressure);
@@ -296,7 +298,7 @@ int main(void)
          n_touch += touches;
       }
       for (i = 2*N_LOWER + 1; i < N_DOF; i += 2) after += h.v[i]/(N_NODE - N_LOWER);
-      printf("%d %d %.3e %.3e %.3e %.3f %.3f\n", N_STEP, n_touch, drift, gap, pressure, before,
+      printf("%d %d %.3e %.3e %.3e %.3f %.3f\n", n_step, n_touch, drift, gap, pressure, before,
              after);
       emcon_interface_free(h.face);
    }

@@ -147,7 +147,8 @@ int main(void)
 
 
 def test_memory_of_a_host_in_c(bars: Path, installed: dict[str, str]) -> None:
-    check_memory(installed, bars)
+    """The impact is over after 100 steps."""
+    check_memory(installed, bars, "100")
 
 
 def test_bad_calls_from_c_are_told_in_words(installed: dict[str, str], tmp_path: Path) -> None:
