@@ -266,14 +266,18 @@ def test_arrays_are_copied_once_at_most() -> None:
         u, v = ring.u, ring.v
         assert u.T.flags.f_contiguous and not u.T.flags.owndata
 
-        def peak(call: Callable[[], object]) -> float:
-            call()                         # what is cached is there
+        def peak_once(call: Callable[[], object]) -> float:
             tracemalloc.start()
             kept = call()
             most = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
             del kept
             return most/u.nbytes
+
+        def peak(call: Callable[[], object]) -> float:
+            """The least of some: what the interpreter allocates beside the call comes and goes."""
+            call()                         # what is cached is there
+            return min(peak_once(call) for _ in range(3))
 
         small = 0.25                       # a flag each for what is finite, and small objects
         assert peak(lambda: ring.u) < 1 + small and peak(lambda: ring.v) < 1 + small
