@@ -191,7 +191,7 @@ kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/ker
 PY_READY := .venv/run.stamp
 P := $(BUILD)/py
 PACKAGE := pywrap/emcon
-FLAT := $(wildcard src_f90/api/emcon_flat*.f90)
+FLAT := $(wildcard src_f90/border/emcon_flat*.f90)
 
 # One run writes both files. A kind that f2py does not know becomes C float without an error.
 $(P)/_coremodule.c $(P)/_core-f2pywrappers2.f90 $(P)/fortranobject.c $(P)/include.txt &: \
@@ -271,7 +271,7 @@ install: app lib  ## program, library, modules, header and emcon.pc below PREFIX
 	ln -sf $(SHARED) $(TO)/lib/libemcon.so
 	install -m 644 $(BUILD)/libemcon.a $(TO)/lib
 	install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(basename $(notdir $(LIB_SRC)))) \
-		$(wildcard src_f90/api/*.h) $(TO)/include/emcon
+		$(wildcard src_f90/border/*.h) $(TO)/include/emcon
 	printf '%s\n' 'prefix=$(abspath $(PREFIX))' 'Name: emcon' 'Version: $(VERSION)' \
 		'Description: energy-momentum conserving contact dynamics' \
 		'Cflags: -I$${prefix}/include/emcon' \

@@ -6,7 +6,8 @@ module emcon_chain
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_scene, only : scene_t, surface_t, where_text
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
    use emcon_surface_edges, only : surface_edges
    use emcon_text, only : to_text

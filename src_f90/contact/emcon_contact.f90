@@ -3,8 +3,8 @@
 !> A formulation chooses, once per step, what each constraint is made of (its stencil), and gives
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
+   use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_options_t
    implicit none
    private
    public :: contact_t, contact_box_t, constraint_t, constraint_resize, gap_state_t

@@ -2,9 +2,10 @@
 module emcon_contact_registry
    use emcon_contact, only : contact_t
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_segment
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_nts, only : nts_init, nts_t
-   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_segment, scene_t
+   use emcon_scene, only : scene_t
    use emcon_segment, only : segment_init, segment_t
    implicit none
    private

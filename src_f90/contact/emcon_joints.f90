@@ -7,8 +7,10 @@
 !> Source: docs/theory.md, section 4.
 module emcon_joints
    use emcon_chain, only : chain_number, chain_t, surface_edges
+   use emcon_couplings, only : tie_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : scene_t, surface_t, tie_t
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
    implicit none
    private
    public :: chain_join

@@ -5,12 +5,14 @@
 !> paper eqs. (2) and (3).
 module emcon_mortar
    use emcon_chain, only : chain_corners, chain_distance, chain_shorter
-   use emcon_edge_form, only : form_begin
    use emcon_dgrad13, only : dg13_t => dg_t
    use emcon_dgrad17, only : dg17_t => dg_t, operator(*)
    use emcon_dgrad_wide, only : wide_add_part
+   use emcon_edge_form, only : form_begin
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
+   use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
+      multiplier_dual, normal_nodal, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_mortar_choice, only : pair_append, pair_comes_near, pair_cut_corners, pair_is_meant, &
       pairs_drop_far, pairs_seen
@@ -21,8 +23,7 @@ module emcon_mortar
    use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
    use emcon_mortar_stencil, only : stencil_gather, stencil_master, stencil_slave
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
-   use emcon_scene, only : contact_options_t, contact_pair_t, integration_elements, &
-      multiplier_dual, normal_nodal, scene_t, smoothing_hermite
+   use emcon_scene, only : scene_t
    use emcon_weighted, only : weighted_init, weighted_t
    implicit none
    private

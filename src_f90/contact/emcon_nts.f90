@@ -9,6 +9,8 @@ module emcon_nts
    use emcon_errors, only : error_t
    use emcon_facing, only : facing_allows
    use emcon_hermite_gap, only : hermite_gap_value
+   use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
+      smoothing_none
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
@@ -17,8 +19,7 @@ module emcon_nts
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, most_nodes, &
       polygon_stencil, polygon_stencil_t, smooth_stencil, smooth_stencil_t, stencil_gather, &
       stencil_length
-   use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite, &
-      smoothing_none
+   use emcon_scene, only : scene_t
    use emcon_self_contact, only : self_contact_is_apart
    use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_sees, touch_rule_t
    implicit none

@@ -9,11 +9,12 @@ module emcon_segment
    use emcon_dgrad_wide, only : wide_add, wide_add_part, wide_add_product, wide_clear
    use emcon_edge_form, only : form_begin
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : moment_area, moment_area_xi, moment_cover, moment_gap, &
       moment_gap_xi, n_moment
    use emcon_nts, only : nts_init, nts_t
-   use emcon_scene, only : contact_options_t, contact_pair_t, multiplier_dual, scene_t
+   use emcon_scene, only : scene_t
    use emcon_weighted, only : weighted_init, weighted_measure, weighted_t
    implicit none
    private

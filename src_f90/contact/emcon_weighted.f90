@@ -9,9 +9,10 @@ module emcon_weighted
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_form, only : edge_form_t, form_constraint, form_share
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, scene_t
+   use emcon_scene, only : scene_t
    implicit none
    private
    public :: weighted_t, weighted_init, weighted_measure

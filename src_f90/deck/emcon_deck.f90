@@ -9,14 +9,14 @@ module emcon_deck
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
-   use emcon_deck_general_contact, only : read_general_contact
    use emcon_deck_equations, only : read_equations
-   use emcon_deck_given, only : read_given
+   use emcon_deck_fields, only : data_open, data_t, next_line, refuse_lines
+   use emcon_deck_general_contact, only : read_general_contact
    use emcon_deck_geometry, only : check_shapes
+   use emcon_deck_given, only : read_given
+   use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
-   use emcon_deck_fields, only : data_open, data_t, next_line, refuse_lines
-   use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_reader, only : reader_t
    use emcon_deck_sets, only : read_sets
    use emcon_deck_source, only : deck_open, deck_source_t

@@ -8,7 +8,7 @@ module emcon_deck_cards
       substitute_parameters, unused_override
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, option_t, reader_t
    use emcon_diagnostics, only : add_error, quoted, suggestion
-   use emcon_scene, only : origin_t
+   use emcon_origin, only : origin_t
    use emcon_text, only : squeezed, string_t, stripped, to_text
    implicit none
    private

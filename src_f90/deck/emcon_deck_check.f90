@@ -5,7 +5,8 @@ module emcon_deck_check
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
-   use emcon_scene, only : load_gravity, load_point, procedure_dynamic, scene_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : load_gravity, load_point, procedure_dynamic
    implicit none
    private
    public :: check_materials, check_nodes

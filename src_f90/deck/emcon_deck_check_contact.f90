@@ -6,9 +6,11 @@ module emcon_deck_check_contact
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
+      formulation_segment, multiplier_standard
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
-      formulation_segment, multiplier_standard, scene_t, step_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : step_t
    use emcon_surface_edges, only : surface_edges
    implicit none
    private

@@ -2,8 +2,10 @@
 !>
 !> Source: docs/theory.md, section 4.12; docs/verification.md, a slave surface that is too coarse.
 module emcon_deck_check_sides
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, scene_t, surface_t
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
    use emcon_surface_edges, only : surface_edges
    use emcon_text, only : to_text
    implicit none

@@ -3,7 +3,8 @@ module emcon_deck_check_surfaces
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, label_list
-   use emcon_scene, only : scene_t, surface_t
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
    use emcon_surface_edges, only : surface_edges
    implicit none
    private

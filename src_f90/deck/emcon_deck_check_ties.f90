@@ -1,9 +1,10 @@
 !> The ties, as far as they can be judged by their meshes alone.
 module emcon_deck_check_ties
+   use emcon_couplings, only : tie_t
    use emcon_deck_check_surfaces, only : find_common_edges, mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, label_list
-   use emcon_scene, only : scene_t, tie_t, where_text
+   use emcon_scene, only : scene_t, where_text
    use emcon_surface_edges, only : surface_edges
    implicit none
    private

@@ -8,10 +8,11 @@
 !> What carries over keeps its value. An amplitude over step time has ended with its step: its
 !> last value stays. A load dropped in a static step runs to zero over that step.
 module emcon_deck_conditions
+   use emcon_amplitudes, only : amplitude_t, find_amplitude_value
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
-   use emcon_scene, only : amplitude_t, find_amplitude_value, load_point, load_t, prescribed_t, &
-      procedure_static, scene_t, step_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : load_point, load_t, prescribed_t, procedure_static, step_t
    implicit none
    private
    public :: conditions_t, conditions_init, conditions_carry, conditions_store

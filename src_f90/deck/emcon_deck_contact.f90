@@ -7,9 +7,11 @@ module emcon_deck_contact
       option_name, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : add_error, quoted, suggestion
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
+      formulation_segment
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
-      formulation_segment, origin_t, scene_t, where_text
+   use emcon_origin, only : origin_t
+   use emcon_scene, only : scene_t, where_text
    use emcon_text, only : read_real, to_text
    implicit none
    private

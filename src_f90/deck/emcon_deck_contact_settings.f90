@@ -1,13 +1,14 @@
 !> Settings of contact in a step: how it begins, what overlaps at the start, what nothing holds.
 module emcon_deck_contact_settings
+   use emcon_amplitudes, only : amplitude_t, find_amplitude_value
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_name, &
       option_real, reader_t, refuse_option
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : quoted, suggestion
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : amplitude_t, contact_pair_t, find_amplitude_value, &
-      initiation_admissible, initiation_persistent, initiation_velocity_update, &
-      procedure_dynamic, step_t
+   use emcon_steps, only : initiation_admissible, initiation_persistent, &
+      initiation_velocity_update, procedure_dynamic, step_t
    use emcon_text, only : to_text
    implicit none
    private

@@ -1,12 +1,14 @@
 !> *EQUATION: sums of coefficient times displacement that are zero in all steps.
 module emcon_deck_equations
+   use emcon_couplings, only : equation_t
    use emcon_deck_fields, only : data_error, data_open, data_t, get_integer, get_name, get_real, &
       is_blank, is_label, next_line
    use emcon_deck_named, only : get_nodes
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, option_name, reader_t
    use emcon_diagnostics, only : add_error, quoted
    use emcon_kinds, only : wp
-   use emcon_scene, only : equation_t, origin_t, scene_t
+   use emcon_origin, only : origin_t
+   use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
    use emcon_text, only : to_text
    implicit none

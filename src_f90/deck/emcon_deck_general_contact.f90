@@ -11,7 +11,9 @@ module emcon_deck_general_contact
    use emcon_deck_surfaces, only : find_surface, surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_element_kinds, only : element_kinds
-   use emcon_scene, only : contact_pair_t, formulation_nts, scene_t, surface_t, where_text
+   use emcon_interactions, only : contact_pair_t, formulation_nts
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t, where_text
    implicit none
    private
    public :: read_general_contact

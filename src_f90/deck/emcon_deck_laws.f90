@@ -1,7 +1,7 @@
 !> The registry of constitutive laws that a deck can name. A new law is one row here.
 module emcon_deck_laws
    use emcon_kinds, only : wp
-   use emcon_scene, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
+   use emcon_materials, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
    implicit none
    private
    public :: law_row_t, law_rows, law_variants, constant_fault

@@ -11,7 +11,8 @@ module emcon_deck_loads
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
-   use emcon_scene, only : load_gravity, load_point, load_pressure, load_t, prescribed_t, scene_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
    use emcon_text, only : to_text
    implicit none
    private

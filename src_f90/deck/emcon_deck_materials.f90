@@ -1,14 +1,15 @@
 !> *MATERIAL with its cards, and *SOLID SECTION.
 module emcon_deck_materials
-   use emcon_deck_laws, only : constant_fault, law_rows
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, is_blank, next_line
+   use emcon_deck_laws, only : constant_fault, law_rows
    use emcon_deck_named, only : find_set, hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
       option_count, option_name, reader_t, refuse_option
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
-   use emcon_scene, only : law_given, law_neo_hooke, material_t, scene_t, where_text
+   use emcon_materials, only : law_given, law_neo_hooke, material_t
+   use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private

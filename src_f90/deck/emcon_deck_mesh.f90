@@ -1,14 +1,15 @@
 !> *NODE and *ELEMENT.
 module emcon_deck_mesh
-   use emcon_deck_labels, only : find_label, label_map_init
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       drop_zeros, get_integer, get_real, next_line
+   use emcon_deck_labels, only : find_label, label_map_init
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, need_name, &
       option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
    use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
    use emcon_kinds, only : wp
-   use emcon_scene, only : origin_t, scene_t, where_text
+   use emcon_origin, only : origin_t
+   use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private

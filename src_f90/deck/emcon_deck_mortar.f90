@@ -5,7 +5,7 @@
 module emcon_deck_mortar
    use emcon_deck_reader, only : card_t, card_warning, has_option, option_angle, &
       option_count, option_name, reader_t, refuse_option
-   use emcon_scene, only : contact_options_t, contact_pair_t, formulation_mortar, &
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       formulation_segment, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
    implicit none

@@ -5,7 +5,8 @@ module emcon_deck_named
    use emcon_deck_labels, only : find_label
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : quoted, suggestion
-   use emcon_scene, only : named_set_t, scene_t
+   use emcon_mesh, only : named_set_t
+   use emcon_scene, only : scene_t
    use emcon_text, only : string_t, to_text
    implicit none
    private

@@ -8,9 +8,10 @@ module emcon_deck_output
       option_name, reader_t, refuse_option
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : quoted, suggestion
-   use emcon_scene, only : named_set_t, output_contact_file, output_contact_print, &
-      output_element_file, output_element_print, output_energy_print, output_node_file, &
-      output_node_print, output_t, scene_t
+   use emcon_mesh, only : named_set_t
+   use emcon_requests, only : output_contact_file, output_contact_print, output_element_file, &
+      output_element_print, output_energy_print, output_node_file, output_node_print, output_t
+   use emcon_scene, only : scene_t
    use emcon_text, only : string_t
    implicit none
    private

@@ -1,9 +1,11 @@
 !> What all readers of cards share: the cards with their parameters, the doubts, the messages.
 module emcon_deck_reader
+   use emcon_amplitudes, only : amplitude_t
    use emcon_deck_labels, only : label_map_t
    use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted, suggestion
    use emcon_kinds, only : wp
-   use emcon_scene, only : amplitude_t, named_set_t, origin_t
+   use emcon_mesh, only : named_set_t
+   use emcon_origin, only : origin_t
    use emcon_text, only : read_integer, read_real, squeezed, string_t, to_text
    implicit none
    private

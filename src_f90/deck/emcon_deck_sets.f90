@@ -7,7 +7,8 @@ module emcon_deck_sets
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_element_kinds, only : element_kinds
-   use emcon_scene, only : named_set_t, scene_t
+   use emcon_mesh, only : named_set_t
+   use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
    use emcon_text, only : to_text
    implicit none

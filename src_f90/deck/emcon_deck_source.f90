@@ -2,7 +2,7 @@
 !> that know their origin.
 module emcon_deck_source
    use emcon_diagnostics, only : add_error, diagnostics_t, quoted
-   use emcon_scene, only : origin_t
+   use emcon_origin, only : origin_t
    use emcon_text, only : squeezed, string_t, stripped, to_text
    use emcon_text_file, only : text_file_read
    implicit none

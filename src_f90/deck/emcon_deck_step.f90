@@ -3,21 +3,25 @@
 !> Settings (constraint method, contact initiation, mortar, smoothing, Newton, restart) stay until a
 !> later step changes them.
 module emcon_deck_step
+   use emcon_amplitudes, only : amplitude_t
    use emcon_deck_conditions, only : conditions_carry, conditions_init, conditions_store, &
       conditions_t
    use emcon_deck_contact_settings, only : check_statics, read_controls, read_initiation, &
       read_interference
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
+      next_line
    use emcon_deck_loads, only : read_boundary, read_cload, read_dload
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
-   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
-      next_line
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : amplitude_t, contact_pair_t, method_null_space, method_saddle_point, &
-      origin_t, procedure_dynamic, procedure_static, scene_t, step_t
+   use emcon_origin, only : origin_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : method_null_space, method_saddle_point, procedure_dynamic, &
+      procedure_static, step_t
    use emcon_text, only : to_text
    implicit none
    private

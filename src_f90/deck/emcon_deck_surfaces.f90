@@ -10,7 +10,8 @@ module emcon_deck_surfaces
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
-   use emcon_scene, only : scene_t, surface_t, where_text
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private

@@ -1,12 +1,13 @@
 !> *AMPLITUDE and *TIME POINTS: tables over time; *INITIAL CONDITIONS.
 module emcon_deck_tables
+   use emcon_amplitudes, only : amplitude_t
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
       get_real, next_line
    use emcon_deck_named, only : get_nodes
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t, &
       refuse_option
    use emcon_kinds, only : wp
-   use emcon_scene, only : amplitude_t, scene_t, where_text
+   use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private

@@ -1,11 +1,13 @@
 !> *TIE: surfaces that stay together.
 module emcon_deck_ties
+   use emcon_couplings, only : tie_t
    use emcon_deck_fields, only : data_error, data_open, data_t, next_line
    use emcon_deck_reader, only : card_error, card_t, line_origin, need_name, option_name, &
       option_real, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : quoted
-   use emcon_scene, only : multiplier_dual, multiplier_standard, scene_t, tie_t, where_text
+   use emcon_interactions, only : multiplier_dual, multiplier_standard
+   use emcon_scene, only : scene_t, where_text
    implicit none
    private
    public :: read_ties

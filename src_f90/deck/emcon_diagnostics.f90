@@ -1,7 +1,7 @@
 !> What is wrong with a deck: errors and warnings with file and line, collected, then told sorted.
 module emcon_diagnostics
    use emcon_kinds, only : dp
-   use emcon_scene, only : origin_t
+   use emcon_origin, only : origin_t
    use emcon_sort, only : sort_order
    use emcon_text, only : joined, nearest_word, string_t, to_text
    implicit none

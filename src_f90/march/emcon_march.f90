@@ -17,11 +17,12 @@ module emcon_march
    use emcon_overclosure, only : overclosure_check
    use emcon_pair_record, only : pair_record_init
    use emcon_rigid_motion, only : free_motion_text
-   use emcon_scene, only : initiation_persistent, method_saddle_point, procedure_dynamic, &
-      procedure_static, scene_t, step_t
+   use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
    use emcon_state, only : state_t
+   use emcon_steps, only : initiation_persistent, method_saddle_point, procedure_dynamic, &
+      procedure_static, step_t
    use emcon_system, only : pose_t, system_begin_step, system_check_response, system_init, &
       system_respond
    use emcon_text, only : note_add, to_text

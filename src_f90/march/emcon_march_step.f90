@@ -4,6 +4,7 @@
 module emcon_march_step
    use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_overlaps, &
       step_refused
+   use emcon_amplitudes, only : find_amplitude_value
    use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason, correction_t
    use emcon_errors, only : error_t
@@ -16,10 +17,11 @@ module emcon_march_step
    use emcon_newton, only : interrupt_interface, newton_t
    use emcon_numbering, only : gather_dependent, spread_dependent
    use emcon_pair_record, only : pair_record_measure
-   use emcon_scene, only : find_amplitude_value, initiation_velocity_update, scene_t
+   use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_t
    use emcon_stand_off, only : stand_off_add, stand_off_t
    use emcon_state, only : state_t
+   use emcon_steps, only : initiation_velocity_update
    use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t

@@ -1,7 +1,8 @@
 !> Overclosure that a step resolves: is it that of the bodies, or of the edges that stand for arcs?
 module emcon_overclosure
+   use emcon_interactions, only : formulation_nts, smoothing_hermite
    use emcon_kinds, only : wp
-   use emcon_scene, only : formulation_nts, scene_t, smoothing_hermite
+   use emcon_scene, only : scene_t
    use emcon_surface_edges, only : surface_edges
    use emcon_system, only : system_t
    use emcon_text, only : note_add, notes_t, to_text

@@ -5,8 +5,9 @@
 !> small depth on.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guards
+   use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, formulation_nts, surface_t
+   use emcon_mesh, only : surface_t
    implicit none
    private
    public :: guards_find, guard_slack

@@ -1,7 +1,8 @@
 !> The edges of a surface, whatever it is made of.
 module emcon_surface_edges
    use emcon_element_kinds, only : element_kinds
-   use emcon_scene, only : scene_t, surface_t
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
    implicit none
    private
    public :: surface_edges

@@ -5,9 +5,10 @@ module emcon_given_law
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_t
+   use emcon_materials, only : material_t
    use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
       point_response_t
-   use emcon_scene, only : material_t, scene_t, where_text
+   use emcon_scene, only : scene_t, where_text
    use emcon_text, only : to_text
    implicit none
    private

@@ -5,7 +5,7 @@ module emcon_law_registry
    use emcon_law_coupled_neo_hooke, only : law_coupled_neo_hooke_t
    use emcon_law_linear, only : lame_constants, law_linear_t
    use emcon_law_neo_hooke, only : law_neo_hooke_t
-   use emcon_scene, only : law_coupled_neo_hooke, law_linear, law_neo_hooke, material_t
+   use emcon_materials, only : law_coupled_neo_hooke, law_linear, law_neo_hooke, material_t
    implicit none
    private
    public :: law_create

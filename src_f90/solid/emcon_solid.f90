@@ -9,8 +9,9 @@ module emcon_solid
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create
+   use emcon_materials, only : law_given
    use emcon_point_function, only : point_failed, point_gradient, point_ok
-   use emcon_scene, only : law_given, scene_t
+   use emcon_scene, only : scene_t
    use emcon_shape, only : shape_create, shape_t
    use emcon_text, only : to_text
    implicit none

@@ -10,17 +10,20 @@ module emcon_system
    use emcon_given, only : given_t
    use emcon_given_sum, only : given_sum_add_tangent, given_sum_init, given_sum_is_symmetric, &
       given_sum_massless, given_sum_place, given_sum_respond, given_sum_t, given_sum_tangent_times
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
    use emcon_layout, only : layout_bodies, layout_pattern
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
    use emcon_mass, only : mass_init, mass_place
+   use emcon_materials, only : law_linear
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_point_function, only : point_failed
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
-   use emcon_scene, only : contact_pair_t, law_linear, method_null_space, procedure_dynamic, scene_t
+   use emcon_scene, only : scene_t
    use emcon_solid, only : obstacle_text, solid_init, solid_respond, solid_response_t, solid_round, &
       solid_t, solid_tangent_times
+   use emcon_steps, only : method_null_space, procedure_dynamic
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_timer, only : stopwatch_t
    implicit none

@@ -16,9 +16,9 @@ program ties_condition
    use emcon_kinds, only : dp
    use emcon_lapack, only : dense_eigen, dense_singular_values, dense_solve
    use emcon_march, only : increment_t
-   use emcon_scene, only : method_saddle_point
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_is_done, stepper_open, &
       stepper_t
+   use emcon_steps, only : method_saddle_point
    use emcon_text, only : string_t
    implicit none
    type(stepper_t) :: stepper

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
-API = ROOT/"src_f90"/"api"
+API = ROOT/"src_f90"/"border"
 #: The library has the address sanitizer in it (`make sanitize`), and so must programs have.
 SANITIZED = os.environ.get("MODE") == "sanitize"
 WARNINGS = ["-pedantic", "-Wall", "-Wextra", "-Werror"]

@@ -1,7 +1,10 @@
 !> Scenes whose contact surfaces run over tied pieces, and the same scenes in one piece.
 module cut_scenes
+   use emcon_couplings, only : tie_t
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, scene_t, surface_t, tie_t
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
    use small_scenes, only : add_block, add_surface, block_t, bottom, left, right, scene_begin, top
    implicit none
    private

@@ -1,9 +1,10 @@
 !> Linear constraints made by hand: equations, ties of straight lines, rows, and what they give.
 module linear_scenes
+   use emcon_couplings, only : equation_t, tie_rows_t, tie_t
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : numbering_t
-   use emcon_scene, only : equation_t, scene_t, tie_rows_t, tie_t
+   use emcon_scene, only : scene_t
    implicit none
    private
    public :: add_equation, add_node, put_row, begin_rows, make_random_rows, dense_terms

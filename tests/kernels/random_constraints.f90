@@ -7,7 +7,7 @@ module random_constraints
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t
-   use emcon_scene, only : prescribed_t
+   use emcon_steps, only : prescribed_t
    use small_scenes, only : shake
    implicit none
    private

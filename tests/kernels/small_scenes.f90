@@ -1,9 +1,13 @@
 !> Scenes of a few elements for the tests, made by hand.
 module small_scenes
    use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, law_coupled_neo_hooke, load_t, origin_t, prescribed_t, &
-      procedure_dynamic, procedure_static, scene_t, step_t, surface_t
+   use emcon_materials, only : law_coupled_neo_hooke
+   use emcon_mesh, only : surface_t
+   use emcon_origin, only : origin_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : load_t, prescribed_t, procedure_dynamic, procedure_static, step_t
    implicit none
    private
    public :: block_t, scene_begin, add_block, block_node, add_surface, add_step, prescribe, clamp

@@ -2,11 +2,14 @@
 module stepper_scenes
    use check, only : check_near
    use cut_scenes, only : make_cut_blocks
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : error_t
+   use emcon_interactions, only : formulation_mortar
    use emcon_kinds, only : wp
    use emcon_march, only : march_begin_step, march_init
-   use emcon_scene, only : amplitude_t, formulation_mortar, load_point, load_t, scene_t
+   use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
+   use emcon_steps, only : load_point, load_t
    use emcon_ties, only : ties_prepare
    use emcon_verdict, only : verdict_start
    use small_scenes, only : add_load, add_step, block_t, clamp, make_two_blocks

@@ -7,8 +7,9 @@ module test_active_set
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
-   use emcon_scene, only : initiation_admissible, initiation_persistent, &
-      initiation_velocity_update, method_null_space, method_saddle_point, scene_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : initiation_admissible, initiation_persistent, &
+      initiation_velocity_update, method_null_space, method_saddle_point
    use emcon_text, only : to_text
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks
    implicit none

@@ -6,7 +6,8 @@ module test_chain
    use emcon_element_kinds, only : find_element_kind, max_element_nodes
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
-   use emcon_scene, only : scene_t, surface_t
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_surface, block_t, bottom, left, make_block, right, &

@@ -3,12 +3,12 @@ module test_correction
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_correction, only : correction_factorise, correction_free, correction_lay_out, &
       correction_multipliers, correction_reason, correction_reset, correction_solve, correction_t
+   use emcon_csr, only : csr_multiply, csr_multiply_transposed
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
-   use emcon_scene, only : method_null_space, method_saddle_point
+   use emcon_steps, only : method_null_space, method_saddle_point
    use emcon_system, only : system_t
-   use emcon_csr, only : csr_multiply, csr_multiply_transposed
    use linear_scenes, only : make_random_rows
    use random_constraints, only : make_chain, make_problem, make_rows, problem_t, tol_dp
    implicit none

@@ -3,8 +3,9 @@ module test_deck_ties
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_deck, only : deck_read, deck_source_t, diagnostics_t
    use emcon_errors, only : error_t
+   use emcon_interactions, only : multiplier_dual, multiplier_standard
    use emcon_kinds, only : wp
-   use emcon_scene, only : multiplier_dual, multiplier_standard, scene_t
+   use emcon_scene, only : scene_t
    use emcon_text, only : string_t
    implicit none
    private

@@ -1,17 +1,19 @@
 !> Forces and mass from outside: a host's solid, chains of springs, and what can go wrong.
 module test_given_force
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_couplings, only : equation_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, err_input, error_t
+   use emcon_interactions, only : formulation_mortar, formulation_nts
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
-   use emcon_scene, only : equation_t, formulation_mortar, formulation_nts, &
-      initiation_velocity_update, scene_t
+   use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_is_done, &
       stepper_t
-   use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
    use emcon_stepper_free, only : stepper_set_state
+   use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
    use emcon_stepper_query, only : query_evaluate, query_free, query_residual, query_t
+   use emcon_steps, only : initiation_velocity_update
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : eps => given_eps, lump, make_line, open_both, open_given, run_conserving

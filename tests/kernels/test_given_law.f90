@@ -8,9 +8,10 @@ module test_given_law
    use emcon_kinds, only : dp, wp
    use emcon_law_linear, only : lame_constants
    use emcon_march, only : increment_t
+   use emcon_materials, only : law_coupled_neo_hooke, law_given, law_linear
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_restart, only : restart_t
-   use emcon_scene, only : law_coupled_neo_hooke, law_given, law_linear, scene_t
+   use emcon_scene, only : scene_t
    use emcon_solid, only : solid_respond, solid_response_t, solid_tangent_times
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_load, &
       stepper_read_source, stepper_save, stepper_t

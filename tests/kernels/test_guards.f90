@@ -3,8 +3,9 @@ module test_guards
    use check, only : check_equal, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_guards, only : guard_slack, guards_find
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, surface_t
+   use emcon_mesh, only : surface_t
    implicit none
    private
    public :: collect_guards

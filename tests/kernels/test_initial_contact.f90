@@ -3,8 +3,9 @@ module test_initial_contact
    use check, only : check_error, check_near, check_true, test_case_t
    use emcon_errors, only : err_input, error_t
    use emcon_initial_contact, only : initial_contact_prepare
+   use emcon_interactions, only : formulation_mortar, formulation_nts, formulation_segment
    use emcon_kinds, only : wp
-   use emcon_scene, only : formulation_mortar, formulation_nts, formulation_segment, scene_t
+   use emcon_scene, only : scene_t
    use emcon_text, only : notes_t, to_text
    use small_scenes, only : add_surface, block_t, bottom, left, make_two_blocks, right, top
    implicit none

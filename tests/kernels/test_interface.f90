@@ -6,6 +6,8 @@ module test_interface
    use emcon_contact, only : constraint_t, gap_state_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t
+   use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
+      formulation_segment, multiplier_dual, multiplier_standard, smoothing_hermite, smoothing_none
    use emcon_interface, only : interface_add_pair, interface_add_surface, interface_add_tie, &
       interface_follow, interface_init, interface_links, interface_prepare, interface_t, &
       interface_tie_matrices
@@ -16,9 +18,7 @@ module test_interface
       interface_curvature, interface_evaluate, interface_gaps, interface_second_times, &
       interface_select, interface_slave_nodes
    use emcon_kinds, only : dp, wp
-   use emcon_scene, only : contact_options_t, formulation_mortar, formulation_nts, &
-      formulation_segment, multiplier_dual, multiplier_standard, scene_t, smoothing_hermite, &
-      smoothing_none
+   use emcon_scene, only : scene_t
    use emcon_system, only : system_init, system_t
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare

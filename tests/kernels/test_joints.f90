@@ -7,13 +7,14 @@ module test_joints
    use emcon_contact, only : constraint_t, contact_t
    use emcon_contact_registry, only : new_contact
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
+      formulation_segment, integration_elements, integration_segments, multiplier_dual, &
+      multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_frame, only : moment_cover
-   use emcon_scene, only : contact_options_t, formulation_mortar, formulation_nts, &
-      formulation_segment, integration_elements, integration_segments, multiplier_dual, &
-      multiplier_standard, normal_edge, normal_nodal, scene_t, smoothing_hermite, smoothing_none
+   use emcon_scene, only : scene_t
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
    use small_scenes, only : add_block, add_surface, bend_scene, block_t, bottom, left, &

@@ -3,9 +3,10 @@ module test_judge
    use check, only : check_equal, check_near, check_true, test_case_t
    use cut_scenes, only : add_tie
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t
    use emcon_judge, only : judge_init, judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, scene_t
+   use emcon_scene, only : scene_t
    use emcon_text, only : notes_t
    use emcon_ties, only : ties_prepare
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, right, &

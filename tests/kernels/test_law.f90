@@ -8,7 +8,7 @@ module test_law
    use emcon_law_linear, only : law_linear_t
    use emcon_law_neo_hooke, only : law_neo_hooke_t
    use emcon_law_registry, only : law_create
-   use emcon_scene, only : law_coupled_neo_hooke, law_linear, law_neo_hooke, material_t
+   use emcon_materials, only : law_coupled_neo_hooke, law_linear, law_neo_hooke, material_t
    use emcon_text, only : to_text
    use referee, only : increment_of, qp, slopes_of
    implicit none

@@ -1,12 +1,14 @@
 !> Marches of scenes with linear constraints: energy, momenta, reactions, messages, units.
 module test_links
    use check, only : check_error, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
-   use emcon_scene, only : amplitude_t, initiation_velocity_update, load_point, load_t, &
-      method_null_space, method_saddle_point, scene_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : initiation_velocity_update, load_point, load_t, method_null_space, &
+      method_saddle_point
    use emcon_text, only : notes_t, to_text
    use linear_scenes, only : add_equation, add_node, add_tie_by_hand
    use small_scenes, only : add_block, add_load, add_step, block_node, block_t, clamp, &

@@ -1,12 +1,13 @@
 !> Loads and prescribed motion over time and configuration.
 module test_loads
    use check, only : check_near, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_find
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : instant_t, loads_add, prescribed_motion
-   use emcon_scene, only : amplitude_t, load_gravity, load_point, load_pressure, load_t, &
-      prescribed_t, scene_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
    use emcon_system, only : system_begin_step, system_init, system_t
    use small_scenes, only : add_load, add_step, add_surface, block_t, bottom, clamp, left, &
       make_block, right, shake, top

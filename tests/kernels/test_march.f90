@@ -1,12 +1,14 @@
 !> The march: patch test, grid and cuts, limits, driven motion and loads in the ledger.
 module test_march
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : err_analysis, error_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_t
-   use emcon_scene, only : amplitude_t, load_gravity, load_t, scene_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : load_gravity, load_t
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, prescribe, shake, young
    implicit none

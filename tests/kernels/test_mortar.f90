@@ -5,12 +5,13 @@ module test_mortar
    use emcon_contact, only : constraint_t
    use emcon_edge_form, only : form_share
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
+      integration_segments, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
+      smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_frame, only : moment_cover, moment_gap
-   use emcon_scene, only : contact_options_t, contact_pair_t, integration_elements, &
-      integration_segments, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
-      scene_t, smoothing_hermite, smoothing_none
+   use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_surface, bend_scene, block_node, block_t, bottom, left, &
       make_two_blocks, right, scene_begin, shake, top

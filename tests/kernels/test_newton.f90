@@ -8,8 +8,9 @@ module test_newton
    use emcon_loads, only : instant_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_refused, &
       newton_singular, newton_solve, newton_t
-   use emcon_scene, only : load_point, load_t, method_null_space, method_saddle_point, scene_t
+   use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_steps, only : load_point, load_t, method_null_space, method_saddle_point
    use emcon_system, only : pose_t, system_begin_step, system_init, system_t
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, &

@@ -3,10 +3,11 @@ module test_nts
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_contact, only : constraint_t, gap_state_t
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_nts, only : nts_init, nts_nearest, nts_t
    use emcon_nts_stencil, only : smooth_stencil, smooth_stencil_t
-   use emcon_scene, only : contact_options_t, contact_pair_t, scene_t, smoothing_hermite
+   use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, &
       make_two_blocks, right, scene_begin, shake, top

@@ -6,7 +6,7 @@ module test_numbering
    use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : add_to_dofs, gather_dependent, numbering_init, numbering_t, &
       pick_magnitudes, pick_unknowns, spread_dependent, unresolved_t
-   use emcon_scene, only : step_t
+   use emcon_steps, only : step_t
    use linear_scenes, only : begin_rows, dense_terms, make_random_rows, put_row
    use random_constraints, only : make_problem, problem_t
    use small_scenes, only : clamp, prescribe, shake

@@ -1,6 +1,7 @@
 !> The matrix assembled over the unknowns is T^T N T of the one over all freedoms.
 module test_reduction
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -8,10 +9,10 @@ module test_reduction
    use emcon_loads, only : instant_t
    use emcon_numbering, only : numbering_init, numbering_t, pick_unknowns
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
-   use emcon_scene, only : amplitude_t, load_pressure, load_t, method_saddle_point, prescribed_t, &
-      scene_t
+   use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
+   use emcon_steps, only : load_pressure, load_t, method_saddle_point, prescribed_t
    use emcon_system, only : pose_t, system_begin_step, system_init, system_respond, system_t
    use emcon_text, only : to_text
    use linear_scenes, only : add_equation, add_node, add_tie_by_hand, begin_rows, dense_terms, &

@@ -7,13 +7,14 @@ module test_stepper_free
    use emcon_march, only : increment_t
    use emcon_numbering, only : spread_dependent
    use emcon_restart, only : restart_t
-   use emcon_scene, only : load_point, load_t, scene_t
+   use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_is_done, stepper_t
    use emcon_stepper_conditions, only : conditions_load, conditions_save, &
       stepper_add_prescribed, stepper_find_load, stepper_remove_prescribed, &
       stepper_set_load, stepper_set_prescribed
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
+   use emcon_steps, only : load_point, load_t
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, prescribe, shake, young
    use stepper_scenes, only : check_same_state, drop_h, make_drop, make_tied_drop, open_scene

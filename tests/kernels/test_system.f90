@@ -6,14 +6,15 @@ module test_system
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : instant_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
-   use emcon_scene, only : load_pressure, load_t, scene_t
+   use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
+   use emcon_steps, only : load_pressure, load_t
    use emcon_system, only : mass_times, pose_t, system_begin_step, system_init, system_respond, &
       system_t, system_tangent_times
    use emcon_text, only : to_text
-   use sparse_samples, only : dense_of
    use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, shake, young
+   use sparse_samples, only : dense_of
    implicit none
    private
    public :: collect_system

@@ -1,9 +1,11 @@
 !> Constraint rows of ties: closed forms, linear fields, curved surfaces, invariance.
 module test_tie
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_couplings, only : tie_rows_t
    use emcon_errors, only : error_t
+   use emcon_interactions, only : multiplier_dual, multiplier_standard
    use emcon_kinds, only : wp
-   use emcon_scene, only : multiplier_dual, multiplier_standard, scene_t, tie_rows_t
+   use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use small_scenes, only : scene_begin
    use tie_scenes, only : add_line, check_positions, check_rows, entry, even, make_disc, &

@@ -1,10 +1,10 @@
 !> Balanced ties: constant stress is in equilibrium across curved, unlike chains.
 module test_tie_balance
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_couplings, only : tie_rows_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
-   use emcon_scene, only : tie_rows_t
    use emcon_tie_balance, only : tie_balance, tie_balance_report_t
    implicit none
    private

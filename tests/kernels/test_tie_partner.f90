@@ -1,9 +1,11 @@
 !> Which points are tied: joints, layers, ends, tolerances, and what is refused.
 module test_tie_partner
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_couplings, only : tie_rows_t
    use emcon_errors, only : err_input, error_t
+   use emcon_interactions, only : multiplier_dual, multiplier_standard
    use emcon_kinds, only : wp
-   use emcon_scene, only : multiplier_dual, multiplier_standard, scene_t, tie_rows_t
+   use emcon_scene, only : scene_t
    use small_scenes, only : scene_begin
    use tie_scenes, only : add_line, along_x, check_positions, check_rows, entry, even, make_disc, &
       make_straight, measure, multipliers, rotate, row_sum, tol

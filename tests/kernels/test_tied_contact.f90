@@ -2,16 +2,18 @@
 module test_tied_contact
    use check, only : check_equal, check_near, check_true, test_case_t
    use cut_scenes, only : add_tie, merge_surfaces
+   use emcon_couplings, only : tie_rows_t
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
+      formulation_segment, multiplier_dual, multiplier_standard, normal_edge, normal_nodal
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_t
    use emcon_quantities, only : contact_field
-   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_nts, &
-      formulation_segment, method_null_space, method_saddle_point, multiplier_dual, &
-      multiplier_standard, normal_edge, normal_nodal, scene_t, tie_rows_t
+   use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
+   use emcon_steps, only : method_null_space, method_saddle_point
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_step, add_surface, block_node, block_t, bottom, left, &
       prescribe, right, scene_begin, top, young

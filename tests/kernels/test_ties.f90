@@ -1,11 +1,13 @@
 !> Ties before the first step: crosspoints, moved slave nodes, what cannot be.
 module test_ties
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_couplings, only : tie_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
-   use emcon_scene, only : prescribed_t, scene_t, tie_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : prescribed_t
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, prescribe, &

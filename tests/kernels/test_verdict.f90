@@ -2,8 +2,8 @@
 module test_verdict
    use check, only : check_equal, check_true, test_case_t
    use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_segment
    use emcon_kinds, only : wp
-   use emcon_scene, only : contact_pair_t, formulation_mortar, formulation_segment
    use emcon_verdict, only : guard_advice, verdict_end, verdict_is_failure, verdict_is_good, &
       verdict_line, verdict_t
    implicit none

@@ -1,11 +1,13 @@
 !> Lines and circles of edges to be tied, and what holds for the rows of every tie.
 module tie_scenes
    use check, only : check_equal, check_near, check_true
+   use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_element_kinds, only : find_element_kind, max_element_nodes
    use emcon_errors, only : error_t
+   use emcon_interactions, only : multiplier_dual, multiplier_standard
    use emcon_kinds, only : wp
-   use emcon_scene, only : multiplier_dual, multiplier_standard, scene_t, surface_t, tie_rows_t, &
-      tie_t
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use emcon_tie, only : tie_measure
    use small_scenes, only : scene_begin

@@ -1,0 +1,92 @@
+!> All that a Fortran program needs of EMCON: `use emcon_api, only : ...` and nothing else.
+!>
+!> Handles are derived types that the program owns: any number live side by side, each used from one
+!> thread at a time. What can fail has `type(error_t), allocatable, intent(out) :: error`: allocated
+!> means failed, with `error%code` (0 never; the exit codes of the program) and `error%message`.
+!> Reals have the kind `wp`, matrices are `csr_t` with the indices counted from 0. Nodes, steps and
+!> constraints are counted from 1; labels are those of the deck. Fields are (2, n_node).
+!>
+!> **A model and its steps.** In this order:
+!>
+!> 1. `stepper_open`: read a deck, with parameters as `string_t("NAME=VALUE")`, and build its model;
+!>    or `stepper_read`, or for a deck in memory `stepper_read_text` (one text is the passage
+!>    `[passage_t()]`), then `stepper_build`. After a failure
+!>    `stepper%diagnostic` holds all that is wrong with the deck. What a deck cannot say is given
+!>    between reading and building: by `stepper_give_law` and `stepper_give_potential` an energy at
+!>    points, a type that extends `point_function_t`; by `stepper_give_force` and
+!>    `stepper_give_mass` the solid of a host code, a type that extends `given_force_t`.
+!> 2. `stepper_advance` until `stepper_is_done`: the grid of the deck. Or `stepper_step` with sizes
+!>    of the program's own, and `stepper_next_step` for the next step of the deck.
+!> 3. Between steps read `stepper%march%state` (`state_t`) and `stepper%march%ledger` (`ledger_t`),
+!>    `node_quantity`, `element_quantity`, `contact_quantity`, `pair_quantity`; put a state in by
+!>    `stepper_set_state`; go back by `stepper_snapshot` and `stepper_restore`; change loads by
+!>    `stepper_find_load`, `stepper_set_load`, and boundary values by `stepper_set_prescribed`,
+!>    `stepper_add_prescribed`, `stepper_remove_prescribed`.
+!> 4. To a file: `stepper_save`, `conditions_save`, `restart_write`; back into a new stepper:
+!>    `restart_read`, `stepper_load`, `conditions_load`.
+!> 5. `stepper_close`, also after an error, before the stepper goes.
+!>
+!> **What the engine computes for a step.** A `query_t` beside the stepper; asking changes nothing.
+!> `query_guess` for displacements u1, `query_evaluate`, then of that evaluation `query_residual`,
+!> `query_tangent`, `query_null_space`, `query_multipliers`. At any time `query_mass`,
+!> `query_momenta`, `query_unknowns`, `query_links`, and `query_constraints` with
+!> `query_curvature_times`. After a change of conditions `query_follow`; last `query_free`.
+!>
+!> **Contact and ties for a program that has its own solids.** `interface_init`,
+!> `interface_add_surface`, `interface_add_pair` (options: `contact_options_t`),
+!> `interface_add_tie`, `interface_set`, `interface_prepare`. In each step `interface_begin_step`;
+!> then, until `interface_update_active` is done, `interface_select` or `interface_choose`, and
+!> Newton's method on `interface_evaluate`, `interface_curvature`, with the multipliers or with
+!> `interface_null_space`, `interface_particular`, `interface_multipliers`. Pressures are
+!> multipliers over `interface_areas`.
+module emcon_api
+   use emcon_contact, only : gap_state_t
+   use emcon_csr, only : csr_from_elements, csr_from_entries, csr_multiply, &
+      csr_multiply_transposed, csr_t, csr_transpose
+   use emcon_csr_product, only : csr_product
+   use emcon_deck_source, only : passage_t
+   use emcon_errors, only : err_analysis, err_file, err_input, err_internal, err_interrupt, &
+      err_none, error_t
+   use emcon_given_force, only : given_failed, given_force_t, given_ok, given_outside
+   use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
+      formulation_segment, integration_elements, integration_segments, multiplier_dual, &
+      multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
+   use emcon_interface, only : interface_add_pair, interface_add_surface, interface_add_tie, &
+      interface_follow, interface_gather, interface_init, interface_links, interface_prepare, &
+      interface_t, interface_tie_matrices
+   use emcon_interface_areas, only : interface_areas
+   use emcon_interface_null_space, only : interface_multipliers, interface_null_space, &
+      interface_particular
+   use emcon_interface_settings, only : interface_set
+   use emcon_interface_step, only : constraint_values_t, interface_begin_step, interface_choose, &
+      interface_curvature, interface_drop, interface_evaluate, interface_gaps, &
+      interface_second_times, interface_select, interface_slave_nodes, interface_update_active, &
+      step_cycling, step_done, step_stands_off, step_too_far
+   use emcon_kinds, only : dp, wp
+   use emcon_ledger, only : ledger_t
+   use emcon_march, only : increment_t
+   use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
+   use emcon_quantities, only : contact_field, contact_quantity, element_quantity, &
+      node_quantity, pair_components, pair_quantity, quantity_components
+   use emcon_restart, only : restart_read, restart_t, restart_write
+   use emcon_state, only : state_t
+   use emcon_stepper, only : contact_gaps, stepper_advance, stepper_build, stepper_close, &
+      stepper_contact_seconds, stepper_fraction, stepper_is_done, stepper_load, stepper_open, &
+      stepper_read, stepper_read_text, stepper_save, stepper_t
+   use emcon_stepper_conditions, only : conditions_load, conditions_save, stepper_add_prescribed, &
+      stepper_find_load, stepper_remove_prescribed, stepper_set_load, stepper_set_prescribed
+   use emcon_stepper_constraints, only : contact_report_t, query_constraints, &
+      query_curvature_times, query_links, query_multipliers, query_null_space
+   use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
+      stepper_set_state, stepper_snapshot, stepper_step
+   use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_mass, &
+      stepper_give_potential
+   use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
+      query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
+   use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &
+      load_pressure
+   use emcon_text, only : string_t
+   use emcon_version, only : version
+   implicit none
+   public
+end module emcon_api

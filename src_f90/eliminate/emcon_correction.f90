@@ -1,0 +1,257 @@
+!> Newton corrections of the constrained system, by null space or saddle point.
+!>
+!> Patterns and orderings are kept as long as the active constraints stand on the same unknowns.
+module emcon_correction
+   use emcon_cholmod, only : cholmod_t
+   use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
+      constraints_merge_pattern
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : error_t
+   use emcon_independent_rows, only : independent_rows_find
+   use emcon_kinds, only : dp, wp
+   use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
+      null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
+      obstacle_pivot
+   use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
+      saddle_point_t
+   use emcon_steps, only : method_null_space
+   use emcon_system, only : system_t
+   use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
+   use emcon_umfpack, only : ordering_amd, ordering_less_fill, umfpack_t
+   implicit none
+   private
+   public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
+      correction_multipliers, correction_reset, correction_free, correction_reason, &
+      correction_seconds
+
+   type :: correction_t
+      integer :: method = method_null_space      !! as the deck asks
+      integer :: n_redundant = 0                 !! constraints that depend on earlier ones
+      integer, allocatable :: redundant(:)       !! (n_redundant) their places in the set
+      logical, allocatable :: is_near(:)         !! (n_redundant) they depend on others nearly only
+      logical :: uses_null_space = .false.       !! for the last constraints
+      logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
+      integer :: obstacle = obstacle_none        !! and why
+      integer :: n_factorisation = 0             !! made so far
+      type(umfpack_t) :: solver                  !! no active constraint
+      type(cholmod_t) :: definite_solver         !! the same, symmetric and positive definite
+      logical, private :: is_definite = .false.  !! last factorisation: by that one
+      type(csr_t) :: merged                      !! N with constraints
+      integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
+      integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
+      type(null_space_t) :: null_space
+      type(saddle_point_t) :: saddle_point
+      type(stopwatch_t), private :: clock        !! layouts and curvature of the constraints
+      logical, private :: has_saddle_point = .false.    !! it is laid out for these rows
+      logical, private :: is_reduced = .false.   !! last factorisation: by null space
+   end type correction_t
+
+contains
+
+   !> Forget all layouts: the numbering has changed.
+   subroutine correction_reset(self, method)
+      type(correction_t), intent(inout) :: self
+      integer, intent(in) :: method
+
+      self%method = method
+      if (allocated(self%row_start)) deallocate(self%row_start, self%column)
+   end subroutine correction_reset
+
+   !> Free what the solvers hold.
+   subroutine correction_free(self)
+      type(correction_t), intent(inout) :: self
+
+      call self%solver%free()
+      call self%definite_solver%free()
+      call self%null_space%solver%free()
+      call self%saddle_point%solver%free()
+   end subroutine correction_free
+
+   !> Prepare for the active constraints at their present gradients; `n_redundant` > 0: some of
+   !> them depend on others, and have to be dropped. Patterns are made anew where they have changed.
+   subroutine correction_lay_out(self, system, set, error)
+      type(correction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(error_t), allocatable, intent(out) :: error
+
+      self%n_redundant = 0
+      if (set%n == 0) then
+         self%fell_back = .false.
+         return
+      end if
+      call stopwatch_start(self%clock)
+      associate (null_space => self%null_space)
+         if (.not. has_pattern(self, set)) then
+            call take_pattern(self, system, set)
+            if (self%method == method_null_space) call null_space_init(null_space, set, &
+               self%merged, system%numbering, error)
+            if (allocated(error)) return
+         else if (self%method == method_null_space) then
+            call null_space_update(null_space, set, system%numbering)
+         end if
+         self%uses_null_space = self%method == method_null_space
+         if (self%uses_null_space) then
+            self%uses_null_space = null_space%obstacle == obstacle_none
+         else
+            call independent_rows_find(null_space%rows, set, system%numbering)
+         end if
+         self%n_redundant = null_space%rows%n_redundant
+         if (self%n_redundant > 0) then
+            self%redundant = null_space%rows%redundant(:self%n_redundant)
+            self%is_near = null_space%rows%is_near(:self%n_redundant)
+         end if
+      end associate
+      call stopwatch_stop(self%clock)
+   end subroutine correction_lay_out
+
+   !> The constraints stand on the unknowns that the layout was made for.
+   pure logical function has_pattern(self, set)
+      type(correction_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer :: n
+
+      n = set%force_rows%row_start(set%n + 1)
+      has_pattern = allocated(self%row_start)
+      if (has_pattern) has_pattern = size(self%row_start) == set%n + 1 .and. size(self%column) == n
+      if (has_pattern) has_pattern = all(self%row_start == set%force_rows%row_start)
+      if (has_pattern) has_pattern = all(self%column == set%force_rows%column(:n))
+   end function has_pattern
+
+   subroutine take_pattern(self, system, set)
+      type(correction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+
+      self%row_start = set%force_rows%row_start
+      self%column = set%force_rows%column(:set%force_rows%row_start(set%n + 1))
+      call constraints_merge_pattern(set, system%matrix, self%merged, self%slot)
+      self%has_saddle_point = .false.
+   end subroutine take_pattern
+
+   !> Factorise for the present tangent, gradients and multipliers. Where the null space turns out
+   !> as poor it is the saddle point that is factorised.
+   subroutine correction_factorise(self, system, set, is_singular, error)
+      type(correction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(out) :: is_singular
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      self%n_factorisation = self%n_factorisation + 1
+      if (set%n == 0) then
+         call factorise_free(self, system, is_singular, error)
+         return
+      end if
+      is_singular = .true.
+      if (self%n_redundant > 0) return
+      call stopwatch_start(self%clock)
+      self%merged%value = 0.0_dp
+      do k = 1, size(self%slot)
+         self%merged%value(self%slot(k)) = system%matrix%value(k)
+      end do
+      call constraints_add_curvature(set, system%numbering, self%merged)
+      call stopwatch_stop(self%clock)
+      self%is_reduced = self%method == method_null_space
+      self%obstacle = obstacle_none
+      if (self%is_reduced) then
+         call null_space_factorise(self%null_space, set, self%merged, is_singular, error)
+         if (allocated(error)) return
+         self%obstacle = self%null_space%obstacle
+         self%is_reduced = self%obstacle == obstacle_none
+      end if
+      self%fell_back = self%obstacle /= obstacle_none
+      if (self%is_reduced) return
+      if (.not. self%has_saddle_point) then
+         call saddle_point_init(self%saddle_point, set, self%merged, error)
+         if (allocated(error)) return
+         self%has_saddle_point = .true.
+      end if
+      call saddle_point_factorise(self%saddle_point, set, self%merged, is_singular, error)
+   end subroutine correction_factorise
+
+   !> Factorise the matrix as it is; a symmetric one that is not definite like any other.
+   subroutine factorise_free(self, system, is_singular, error)
+      type(correction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      logical, intent(out) :: is_singular
+      type(error_t), allocatable, intent(out) :: error
+
+      is_singular = .true.
+      self%is_definite = .false.
+      if (system%is_symmetric) then
+         call self%definite_solver%analyse(system%matrix, error)
+         if (.not. allocated(error)) call self%definite_solver%factorise(system%matrix%value, error)
+         if (allocated(error)) return
+         self%is_definite = .not. self%definite_solver%is_singular
+      end if
+      is_singular = .not. self%is_definite
+      if (self%is_definite) return
+      ! Minimum degree fills matrices of tied pieces by a quarter more than the pieces need.
+      self%solver%ordering = merge(ordering_less_fill, ordering_amd, &
+         system%numbering%n_dependent > 0)
+      call self%solver%analyse(system%matrix, error)
+      if (.not. allocated(error)) call self%solver%factorise(system%matrix%value, error)
+      is_singular = self%solver%is_singular
+   end subroutine factorise_free
+
+   !> The multipliers that belong to `residual` (without contact forces), by null space only: the
+   !> saddle point has them as unknowns.
+   subroutine correction_multipliers(self, system, set, residual)
+      type(correction_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(inout) :: set
+      real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
+
+      if (set%n == 0 .or. .not. self%uses_null_space) return
+      call null_space_multipliers(self%null_space, set, system%numbering, residual, set%lam)
+   end subroutine correction_multipliers
+
+   !> CPU time spent on constraints so far, over what the system without them would take [s].
+   pure real(dp) function correction_seconds(self)
+      type(correction_t), intent(in) :: self
+
+      correction_seconds = self%clock%seconds + self%null_space%clock%seconds
+   end function correction_seconds
+
+   !> Why the last factorisation is of the saddle point although the null space was asked for.
+   pure function correction_reason(self) result(text)
+      type(correction_t), intent(in) :: self
+      character(len=80) :: text
+
+      select case (self%obstacle)
+      case (obstacle_pivot)
+         text = "an active constraint has no unknown that is fit to be eliminated"
+      case (obstacle_fill)
+         text = "so many active constraints are coupled that eliminating them costs more"
+      case default
+         text = ""
+      end select
+   end function correction_reason
+
+   !> Correction `dq` of the unknowns, and for the saddle point that of the multipliers.
+   subroutine correction_solve(self, set, residual, dq, dlam, error)
+      type(correction_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown) with contact forces
+      real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
+      real(wp), intent(out), contiguous :: dlam(:)         !! (n)
+      type(error_t), allocatable, intent(out) :: error
+
+      dlam = 0.0_wp
+      if (set%n == 0) then
+         if (self%is_definite) then
+            call self%definite_solver%solve(residual, dq, error)
+         else
+            call self%solver%solve(residual, dq, error)
+         end if
+         dq = -dq
+      else if (self%is_reduced) then
+         call null_space_solve(self%null_space, set, self%merged, residual, dq, error)
+      else
+         call saddle_point_solve(self%saddle_point, set, residual, dq, dlam, error)
+      end if
+   end subroutine correction_solve
+
+end module emcon_correction

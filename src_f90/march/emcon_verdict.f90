@@ -1,0 +1,324 @@
+!> The verdict on a run: what was found wrong, in figures that run along with it.
+!>
+!> A run is good if its energy balance closes, nothing is behind a surface and every residual is
+!> within the tolerance. Warnings stand beside that: they do not make a run bad.
+module emcon_verdict
+   use emcon_interactions, only : contact_pair_t, formulation_nts
+   use emcon_judge, only : overlap_t
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_t
+   use emcon_march, only : increment_t, march_t
+   use emcon_scene, only : scene_t
+   use emcon_stand_off, only : stand_off_mean, stand_off_t
+   use emcon_text, only : note_add, notes_t, to_text
+   implicit none
+   private
+   public :: verdict_t, verdict_start, verdict_update, verdict_move, verdict_end, &
+      verdict_is_good, verdict_is_failure, verdict_balance_lines, verdict_line, guard_advice
+
+   !> Error of the energy balance, relative to the largest energy, that is accepted.
+   real(wp), parameter :: ten_digits = 1.0e-10_wp
+   !> Largest relative residual that is accepted where rounding ends Newton's method early: half of
+   !> the digits are left.
+   real(wp), parameter :: half_digits = sqrt(epsilon(1.0_wp))
+   !> So far, per edge, bodies may be in each other: corners of master surfaces are rounded over a
+   !> tenth of that, coordinates of decks by less. And so far that the run has failed.
+   real(wp), parameter :: touching = 1.0e-3_wp, far_behind = 0.1_wp
+   !> Different warnings that are kept; others are counted only.
+   integer, parameter :: most_warnings = 20
+
+   !> Running figures, and how the run ended.
+   type :: verdict_t
+      real(wp) :: total0 = 0.0_wp                !! total energy at the start
+      real(wp) :: largest_energy = 0.0_wp
+      real(wp) :: largest_drift = 0.0_wp         !! of total - contact work from `total0`
+      real(wp) :: reference = 0.0_wp             !! total - contact work after the last static step
+      real(wp) :: dynamic_drift = 0.0_wp         !! from `reference`, in steps that keep energy
+      real(wp) :: deepest = 0.0_wp               !! penetration per edge
+      real(wp) :: deepest_time = 0.0_wp          !! [T]
+      character(len=:), allocatable :: place     !! of the deepest one: bodies and nodes
+      real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
+      real(wp) :: unconverged_time = 0.0_wp      !! [T]
+      type(stand_off_t) :: stand_off
+      real(wp) :: stabilization = 0.0_wp         !! work of what STABILIZE bears
+      integer :: n_newton = 0
+      integer :: n_cut = 0
+      integer :: n_guarded = 0                   !! increments in which guards act
+      integer :: n_held = 0                      !! increments in which contacts that come and go
+      integer :: most_held = 0                   !! are held closed, and the most of these in one
+      real(wp), allocatable :: largest_force(:)  !! (n_pair) on the slave side
+      logical :: has_dynamics = .false.          !! a step keeps energy
+      integer :: n_warning = 0
+      type(notes_t) :: warnings                  !! the first different ones
+      type(notes_t) :: reasons                   !! why the run is bad
+      logical :: is_complete = .false.           !! the run has come to its end
+      character(len=:), allocatable :: message   !! of the error that ended it
+   end type verdict_t
+
+contains
+
+   !> Begin with the first state of `march`.
+   pure subroutine verdict_start(self, march)
+      type(verdict_t), intent(out) :: self
+      type(march_t), intent(in) :: march
+
+      self%total0 = march%ledger%total
+      self%reference = self%total0
+      self%largest_energy = abs(self%total0)
+      self%place = ""
+      self%message = ""
+      allocate(self%largest_force(size(march%state%pairs%total)), source=0.0_wp)
+   end subroutine verdict_start
+
+   !> The state was set from outside, which turned `before` into `after`: what came in or went out
+   !> by that is no error of the balance.
+   pure subroutine verdict_move(self, before, after)
+      type(verdict_t), intent(inout) :: self
+      type(ledger_t), intent(in) :: before, after
+
+      associate (change => after%total - after%contact_work - before%total + before%contact_work)
+         self%total0 = self%total0 + change
+         self%reference = self%reference + change
+      end associate
+   end subroutine verdict_move
+
+   !> Take over what `increment` has found, which has led to the state of `march`.
+   subroutine verdict_update(self, scene, march, increment)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(increment_t), intent(in) :: increment
+      integer :: i
+
+      self%n_newton = self%n_newton + increment%n_newton
+      self%n_cut = self%n_cut + increment%n_cut
+      if (increment%is_guarded) self%n_guarded = self%n_guarded + 1
+      if (increment%n_held > 0) self%n_held = self%n_held + 1
+      self%most_held = max(self%most_held, increment%n_held)
+      associate (state => march%state)
+         if (increment%overlap%depth > self%deepest) then
+            self%deepest = increment%overlap%depth
+            self%deepest_time = state%time
+            call place_text(scene, march, increment%overlap, self%place)
+         end if
+         self%stabilization = march%ledger%stabilization
+         if (increment%unconverged > self%unconverged) then
+            self%unconverged = increment%unconverged
+            self%unconverged_time = state%time
+         end if
+         do i = 1, size(state%pairs%total)
+            self%largest_force(i) = max(self%largest_force(i), &
+               norm2(state%pairs%total(i)%slave(:2)))
+         end do
+      end associate
+      self%stand_off%largest = max(self%stand_off%largest, increment%stand_off%largest)
+      self%stand_off%impulse = self%stand_off%impulse + increment%stand_off%impulse
+      self%stand_off%impulse_gap = self%stand_off%impulse_gap + increment%stand_off%impulse_gap
+      do i = 1, increment%warnings%n
+         call add_warning(self, increment%warnings%item(i)%text)
+      end do
+      call follow_energy(self, march)
+   end subroutine verdict_update
+
+   !> The bodies and nodes of an overlap. Bodies count as in the history.
+   subroutine place_text(scene, march, overlap, text)
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(overlap_t), intent(in) :: overlap
+      character(len=:), allocatable, intent(out) :: text
+
+      associate (label => scene%node_label, body => march%system%body, &
+            edge => overlap%edge)
+         text = "node " // to_text(label(overlap%node)) // " of body " // &
+            to_text(body(overlap%node)) // " behind the edge from node " // &
+            to_text(label(edge(1))) // " to " // to_text(label(edge(2))) // " of body " // &
+            to_text(body(edge(1)))
+      end associate
+   end subroutine place_text
+
+   !> The energy balance. In statics the works are sums over increments, exact only in the limit of
+   !> small ones: what they are off by is shown, not judged.
+   pure subroutine follow_energy(self, march)
+      type(verdict_t), intent(inout) :: self
+      type(march_t), intent(in) :: march
+      real(wp) :: kept
+
+      associate (ledger => march%ledger)
+         kept = ledger%total - ledger%contact_work
+         self%largest_energy = max(self%largest_energy, ledger%kinetic + ledger%strain)
+         self%largest_drift = max(self%largest_drift, abs(kept - self%total0))
+      end associate
+      if (march%scheme%has_inertia) then
+         self%has_dynamics = .true.
+         self%dynamic_drift = max(self%dynamic_drift, abs(kept - self%reference))
+      else
+         self%reference = kept
+      end if
+   end subroutine follow_energy
+
+   !> Count a warning, and keep it if it is another one than those before.
+   pure subroutine add_warning(self, text)
+      type(verdict_t), intent(inout) :: self
+      character(len=*), intent(in) :: text
+      integer :: i
+
+      self%n_warning = self%n_warning + 1
+      if (self%warnings%n == most_warnings) return
+      do i = 1, self%warnings%n
+         if (self%warnings%item(i)%text == text) return
+      end do
+      call note_add(self%warnings, text)
+   end subroutine add_warning
+
+   !> Judge the run: it has come to its end, or was ended by the error of text `message`.
+   subroutine verdict_end(self, message)
+      type(verdict_t), intent(inout) :: self
+      character(len=*), intent(in), optional :: message
+
+      self%is_complete = .not. present(message)
+      self%message = ""
+      if (present(message)) self%message = message
+      self%reasons = notes_t()
+      if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
+         "loads do work on motions that nothing holds: stabilization bears " // &
+         to_text(self%stabilization, 3))
+      if (self%dynamic_drift > ten_digits*self%largest_energy) call note_add(self%reasons, &
+         "the energy balance does NOT close to ten digits (" // &
+         to_text(self%dynamic_drift/self%largest_energy, 3) // " of the largest energy)")
+      if (self%deepest > touching) call note_add(self%reasons, "bodies overlap by " // &
+         to_text(self%deepest, 3) // " of an edge at time " // to_text(self%deepest_time, 9) // &
+         ", " // self%place)
+      if (self%unconverged > half_digits) call note_add(self%reasons, "a residual of " // &
+         to_text(self%unconverged, 3) // " was accepted at time " // &
+         to_text(self%unconverged_time, 9))
+   end subroutine verdict_end
+
+   !> Has the run come to its end with nothing found wrong?
+   pure logical function verdict_is_good(self)
+      type(verdict_t), intent(in) :: self
+
+      verdict_is_good = self%is_complete .and. self%reasons%n == 0
+   end function verdict_is_good
+
+   !> Is what was found wrong a failure of the analysis, asked for or not?
+   pure logical function verdict_is_failure(self, is_strict)
+      type(verdict_t), intent(in) :: self
+      logical, intent(in) :: is_strict           !! whatever is bad is a failure
+
+      verdict_is_failure = self%deepest > far_behind .or. (is_strict .and. self%reasons%n > 0)
+   end function verdict_is_failure
+
+   !> The verdict in a line.
+   subroutine verdict_line(self, line)
+      type(verdict_t), intent(in) :: self
+      character(len=:), allocatable, intent(out) :: line
+      integer :: i
+
+      if (.not. self%is_complete) then
+         line = "verdict: NOT COMPLETED"
+      else if (self%reasons%n > 0) then
+         line = "verdict: BAD"
+      else
+         line = "verdict: good: "
+         if (self%has_dynamics) line = line // &
+            "the energy balance closes to ten digits or better, "
+         if (allocated(self%largest_force)) then
+            if (size(self%largest_force) > 0) line = line // "nothing penetrates, "
+         end if
+         line = line // "all residuals are within the tolerance"
+      end if
+      do i = 1, self%reasons%n
+         line = line // merge(": ", "; ", i == 1) // self%reasons%item(i)%text
+      end do
+      if (self%n_warning > 0) line = line // "; warnings: " // to_text(self%n_warning)
+   end subroutine verdict_line
+
+   !> The closing balance, the warnings and the verdict.
+   subroutine verdict_balance_lines(self, scene, march, lines)
+      type(verdict_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(notes_t), intent(out) :: lines
+      character(len=:), allocatable :: text
+      real(wp) :: scale
+      integer :: k
+
+      associate (state => march%state, ledger => march%ledger)
+         if (state%increment > 0) then
+            scale = max(self%largest_energy, tiny(scale))
+            call note_add(lines, "increments " // to_text(state%increment) // ", time " // &
+               to_text(state%time, 9) // ", Newton iterations " // to_text(self%n_newton) // &
+               ", cuts " // to_text(self%n_cut))
+            call note_add(lines, "energy: kinetic " // to_text(ledger%kinetic, 9) // &
+               ", strain " // to_text(ledger%strain, 9) // ", external work " // &
+               to_text(ledger%external_work, 9) // ", contact work " // &
+               to_text(ledger%contact_work, 9))
+            call note_add(lines, "total at start " // to_text(self%total0, 12) // ", at end " // &
+               to_text(ledger%total, 12))
+            call note_add(lines, "largest error of the energy balance " // &
+               to_text(self%largest_drift/scale, 3) // &
+               " of the largest energy, deepest penetration " // to_text(self%deepest, 3) // &
+               " of an element")
+            call add_checked(march, lines)
+            if (abs(self%stabilization) > 0.0_wp) call note_add(lines, &
+               "work of what stabilization bears " // to_text(self%stabilization/scale, 3) // &
+               " of the largest energy")
+            if (self%n_guarded > 0) then
+               call guard_advice(scene%pair, text)
+               call note_add(lines, "guards hold nodes in " // to_text(self%n_guarded) // &
+                  " increments: " // text // " would make them needless")
+            end if
+            if (self%n_held > 0) call note_add(lines, "contacts that open and close in turn " // &
+               "are held closed in " // to_text(self%n_held) // " increments, " // &
+               to_text(self%most_held) // " at most in one")
+            if (self%stand_off%impulse > 0.0_wp) call note_add(lines, &
+               "largest stand-off of contact " // to_text(self%stand_off%largest, 3) // &
+               " of an element, mean over the impulse " // &
+               to_text(stand_off_mean(self%stand_off), 3))
+            do k = 1, size(self%largest_force)
+               call note_add(lines, "contact " // &
+                  scene%surface(scene%pair(k)%slave)%name // " on " // &
+                  scene%surface(scene%pair(k)%master)%name // ": " // &
+                  to_text(state%pairs%total(k)%n_active) // " active at end, largest force " // &
+                  to_text(self%largest_force(k), 9))
+            end do
+         end if
+      end associate
+      call verdict_line(self, text)
+      call note_add(lines, text)
+   end subroutine verdict_balance_lines
+
+   !> What these pairs can do to need no guards.
+   pure subroutine guard_advice(pair, advice)
+      type(contact_pair_t), intent(in) :: pair(:)
+      character(len=:), allocatable, intent(out) :: advice
+      logical :: is_nodes(size(pair)), is_one_sided, is_integrated
+
+      is_nodes = pair%formulation == formulation_nts
+      is_one_sided = any(pair%is_guarded .and. is_nodes .and. .not. pair%both_sides)
+      is_integrated = any(pair%is_guarded .and. .not. is_nodes)
+      advice = "a finer mesh there"
+      if (is_one_sided .or. is_integrated) advice = "the other surface as slave or " // advice
+      if (is_integrated .and. is_one_sided) then
+         advice = "TYPE=NODE TO SURFACE with SIDES=BOTH, " // advice
+      else if (is_integrated) then
+         advice = "TYPE=NODE TO SURFACE, " // advice
+      else if (is_one_sided) then
+         advice = "SIDES=BOTH, " // advice
+      end if
+   end subroutine guard_advice
+
+   !> What the judge looks at.
+   subroutine add_checked(march, lines)
+      type(march_t), intent(in) :: march
+      type(notes_t), intent(inout) :: lines
+
+      associate (outline => march%judge%outline)
+         if (outline%n_piece == 0) return
+         call note_add(lines, "penetration was looked for after every step, both ways, nodes and " &
+            // "edges: " // to_text(outline%n_piece) // " bodies with " // &
+            to_text(size(outline%edge, 2)) // " edges")
+      end associate
+   end subroutine add_checked
+
+end module emcon_verdict

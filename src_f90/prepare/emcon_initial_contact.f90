@@ -1,0 +1,376 @@
+!> Contact before the first step: adjustment, orientation, crossing, penetration.
+!>
+!> All formulations are judged by the gaps of nodes over edges.
+module emcon_initial_contact
+   use emcon_chain, only : chain_corners, chain_crossing, chain_t
+   use emcon_contact, only : constraint_t, gap_state_t
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_guards, only : guard_slack
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_nts
+   use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
+   use emcon_nts, only : nts_init, nts_nearest, nts_t
+   use emcon_scene, only : scene_t, where_text
+   use emcon_self_contact, only : chain_faces
+   use emcon_sort, only : find_sorted
+   use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   implicit none
+   private
+   public :: initial_contact_prepare
+
+   !> Nodes looked at to see on which side of the other surface they are.
+   integer, parameter :: most_samples = 64
+   !> Iterations that put a node onto the surface.
+   integer, parameter :: most_moves = 10
+   !> Nodes named in a message.
+   integer, parameter :: most_named = 10
+   !> Coordinates in a deck are rounded: so many epsilons of them are no penetration.
+   real(wp), parameter :: rounding = 8.0_wp*epsilon(1.0_wp)
+   !> So far behind an edge, per its length, a surface that faces it overlaps it; farther behind it
+   !> is on the wrong side.
+   real(wp), parameter :: deepest_overlap = 0.5_wp
+   !> Where a connected surface goes so far behind itself, per edge, it crosses itself.
+   real(wp), parameter :: crossing_depth = 1.0e-2_wp
+   !> Two polygons of one curve dip into each other by less than this, per edge, at blunt corners.
+   real(wp), parameter :: deepest_dip = 0.2_wp
+
+contains
+
+   !> Move the nodes that ADJUST= names onto their surface and check every pair; the notes tell
+   !> what was done.
+   subroutine initial_contact_prepare(scene, notes, error)
+      type(scene_t), intent(inout) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_options_t) :: options
+      type(nts_t) :: contact
+      logical :: is_checked(size(scene%surface))
+      logical :: is_meant                        !! overclosure is
+      integer :: i
+
+      is_meant = .false.
+      if (size(scene%step) > 0) then
+         options = scene%step(1)%contact
+         is_meant = scene%step(1)%resolves_overclosure
+      end if
+      is_checked = .false.
+      do i = 1, size(scene%pair)
+         associate (pair => scene%pair(i))
+            call init_check(contact, scene, pair, error)
+            if (allocated(error)) return
+            call contact%configure(scene%x, options)
+            if (.not. contact%is_self) then
+               call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
+               if (.not. allocated(error)) call check_crossing(scene, pair%master, &
+                  contact%master, is_checked, error)
+               if (.not. allocated(error)) call check_sides(scene, pair, contact, "master", error)
+               if (.not. allocated(error)) call check_slave_sides(scene, pair, error)
+               if (allocated(error)) return
+            end if
+            call adjust_pair(scene, pair, contact, notes)
+            ! Bodies of one surface may cross each other where their overlap is to be resolved.
+            if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) &
+               call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
+            if (is_meant .and. .not. allocated(error)) cycle
+            if (allocated(error)) return
+            call check_penetration(scene, pair, contact, error)
+            if (allocated(error) .and. pair%is_reverse .and. pair%may_choose) then
+               deallocate(error)                     ! `check_corners` has let the nodes pass
+               call become_guard(scene, pair, notes)
+               cycle
+            end if
+            if (.not. allocated(error)) call check_corners(scene, pair, options, error)
+            if (allocated(error)) return
+         end associate
+      end do
+   end subroutine initial_contact_prepare
+
+   !> Nodes that begin behind an edge of the slave, as polygons of one curve dip into each other,
+   !> cannot be held at it: they are kept from going in farther than guards allow.
+   subroutine become_guard(scene, pair, notes)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair
+      type(notes_t), intent(inout) :: notes
+
+      pair%slack = guard_slack
+      call note_add(notes, where_text(scene, pair%origin) // ": surface " // &
+         scene%surface(pair%slave)%name // " dips into edges of " // &
+         scene%surface(pair%master)%name // " at the start: its nodes are guarded, not held")
+   end subroutine become_guard
+
+   !> A surface that crosses itself has no outside. Each surface is looked at once.
+   subroutine check_crossing(scene, number, chain, is_checked, error)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: number              !! of the surface
+      type(chain_t), intent(in) :: chain
+      logical, intent(inout) :: is_checked(:)    !! (n_surface)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: one, other
+      integer :: first, second
+
+      if (is_checked(number) .or. chain%n_edge == 0) return
+      is_checked(number) = .true.
+      call chain_crossing(chain, scene%x, scene%u0, first, second)
+      if (first == 0) return
+      associate (surface => scene%surface(number))
+         call face_text(scene, surface, chain, first, one)
+         call face_text(scene, surface, chain, second, other)
+         call raise(error, err_input, where_text(scene, surface%origin) // ": error: contact " // &
+            "surface " // surface%name // " crosses itself: " // one // " and " // other)
+      end associate
+   end subroutine check_crossing
+
+   !> "face S1 of element 7 (nodes 1, 2)" for edge `e` of the chain of `surface`, or of a surface of
+   !> edges "the edge (nodes 1, 2)".
+   subroutine face_text(scene, surface, chain, e, text)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: e
+      character(len=:), allocatable, intent(out) :: text
+
+      text = "the edge"
+      if (.not. allocated(surface%edge)) text = "face S" // to_text(surface%face(e)) // &
+         " of element " // to_text(scene%element_label(surface%element(e)))
+      text = text // " (nodes " // to_text(scene%node_label(chain%edge(1, e))) // ", " // &
+         to_text(scene%node_label(chain%edge(2, e))) // ")"
+   end subroutine face_text
+
+   !> Contact of a pair in which every face counts: what is behind at first has no way in.
+   subroutine init_check(contact, scene, pair, error)
+      type(nts_t), intent(out) :: contact
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+
+      call nts_init(contact, scene, pair, error)
+      contact%every_face = .true.
+   end subroutine init_check
+
+   !> The same pair with slave and master exchanged.
+   pure function reversed(pair) result(other)
+      type(contact_pair_t), intent(in) :: pair
+      type(contact_pair_t) :: other
+
+      other = pair
+      other%slave = pair%master
+      other%master = pair%slave
+   end function reversed
+
+   !> Master nodes are all behind the slave surface.
+   subroutine check_slave_sides(scene, pair, error)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+      type(nts_t) :: contact
+
+      if (scene%surface(pair%slave)%is_nodal) return
+      call init_check(contact, scene, reversed(pair), error)
+      if (allocated(error)) return
+      call check_sides(scene, reversed(pair), contact, "slave", error)
+   end subroutine check_slave_sides
+
+   !> Slave nodes are all behind the master surface: its normals point away from them.
+   subroutine check_sides(scene, pair, contact, title, error)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(nts_t), intent(inout) :: contact
+      character(len=*), intent(in) :: title      !! what the deck calls the master of `pair`
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, stride, n_over, n_behind
+      real(wp) :: gap
+      logical :: is_over
+
+      stride = max(1, contact%n_constraint/most_samples)
+      n_over = 0
+      n_behind = 0
+      do i = 1, contact%n_constraint, stride
+         call nts_nearest(contact, i, scene%x, scene%u0, gap, is_over)
+         if (.not. is_over) cycle
+         n_over = n_over + 1
+         if (is_behind(scene, contact, i, gap)) n_behind = n_behind + 1
+      end do
+      if (n_over > 0 .and. n_behind == n_over) then
+         call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
+            // title // " surface " // scene%surface(pair%master)%name // " point away from " // &
+            "surface " // scene%surface(pair%slave)%name // "; check the face labels")
+      end if
+   end subroutine check_sides
+
+   !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
+   pure logical function is_behind(scene, contact, i, gap)
+      type(scene_t), intent(in) :: scene
+      type(nts_t), intent(in) :: contact
+      integer, intent(in) :: i
+      real(wp), intent(in) :: gap                !! over contact%edge(i) [L]
+
+      associate (master => contact%master, e => contact%edge(i))
+         is_behind = gap < -deepest_overlap*master%length(e)
+         if (is_behind .or. gap >= -noise(scene) .or. contact%slave%n_edge == 0) return
+         is_behind = .not. chain_faces(contact%slave, i, master%edge(:, e), scene%x, scene%u0)
+      end associate
+   end function is_behind
+
+   !> What the coordinates are uncertain by.
+   pure real(wp) function noise(scene)
+      type(scene_t), intent(in) :: scene
+
+      noise = rounding*maxval(abs(scene%x))
+   end function noise
+
+   !> Put the slave nodes within ADJUST= of the surface, and those behind it, onto it, free of
+   !> stress: along the normal, in the reference configuration. Of two nodes at one place of a
+   !> surface of tied pieces the other one goes along.
+   subroutine adjust_pair(scene, pair, contact, notes)
+      type(scene_t), intent(inout) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(nts_t), intent(inout) :: contact
+      type(notes_t), intent(inout) :: notes
+      type(gap_state_t) :: state
+      type(constraint_t) :: constraint(1)
+      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2)), way(2), largest
+      logical :: is_meant
+      integer :: i, k, n_moved
+
+      if (pair%adjust_distance < 0.0_wp .and. pair%adjust_set == 0) return
+      zero = 0.0_wp
+      call measure_start(scene, contact)
+      largest = 0.0_wp
+      n_moved = 0
+      do i = 1, contact%n_constraint
+         if (contact%edge(i) == 0) cycle
+         state = contact%state(i)
+         is_meant = state%gap0 <= pair%adjust_distance
+         if (pair%adjust_set > 0) is_meant = &
+            find_sorted(scene%node_set(pair%adjust_set)%item, contact%node(i)) > 0
+         if (.not. (state%is_over .and. is_meant)) cycle
+         largest = max(largest, abs(state%gap0))
+         n_moved = n_moved + 1
+         do k = 1, most_moves
+            call contact%evaluate([i], scene%x, scene%u0, zero, [0.0_wp], constraint)
+            associate (normal => constraint(1)%c(:, 1), node => contact%node(i), &
+                  twin => contact%twin(i))
+               way = constraint(1)%gap1*normal/dot_product(normal, normal)
+               scene%x(:, node) = scene%x(:, node) - way
+               if (twin > 0) scene%x(:, twin) = scene%x(:, twin) - way
+            end associate
+            if (abs(constraint(1)%gap1) <= epsilon(1.0_wp)*constraint(1)%size) exit
+         end do
+      end do
+      call note_add(notes, where_text(scene, pair%origin) // ": ADJUST moves " // &
+         to_text(n_moved) // " slave nodes, by " // to_text(largest) // " at most")
+   end subroutine adjust_pair
+
+   !> Slave nodes behind the master surface.
+   subroutine check_penetration(scene, pair, contact, error)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(nts_t), intent(inout) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: limit(contact%n_constraint)
+      integer :: i, n, own
+      character(len=:), allocatable :: found
+
+      call measure_start(scene, contact)
+      limit = noise(scene)
+      if (contact%is_self) then
+         associate (chain => contact%slave, state => contact%state)
+            do i = 1, contact%n_constraint
+               own = maxval(chain%node_edge(:, contact%chain_node(i)))
+               if (contact%edge(i) == 0) cycle
+               if (chain%part(own) /= chain%part(contact%edge(i))) cycle
+               ! Without a crossing this is the other side of a thin strip.
+               if (state(i)%gap0 < -crossing_depth*state(i)%size) limit(i) = huge(limit)
+            end do
+         end associate
+      end if
+      call find_behind(scene, contact, limit, n, found)
+      if (n == 0) return
+      call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // to_text(n) // &
+         " slave nodes of surface " // scene%surface(pair%slave)%name // " penetrate surface " // &
+         scene%surface(pair%master)%name // found // &
+         "; move them, or let *CONTACT PAIR, ADJUST= do it")
+   end subroutine check_penetration
+
+   !> Master nodes behind the slave surface, as a corner between two slave nodes: an integrated gap
+   !> sees it, but ADJUST= cannot mend it.
+   subroutine check_corners(scene, pair, options, error)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(contact_options_t), intent(in) :: options
+      type(error_t), allocatable, intent(out) :: error
+      type(nts_t) :: contact
+      logical, allocatable :: is_corner(:)
+      real(wp), allocatable :: limit(:)
+      character(len=:), allocatable :: found
+      integer :: k, n
+
+      if (pair%slave == pair%master .or. pair%is_reverse) return
+      if (pair%formulation == formulation_nts) then
+         if (.not. (pair%both_sides .and. pair%may_choose)) return
+      end if
+      call init_check(contact, scene, reversed(pair), error)
+      if (allocated(error)) return
+      call measure_start(scene, contact)
+      allocate(is_corner(contact%slave%n_edge))
+      allocate(limit(contact%n_constraint), source=noise(scene))
+      call chain_corners(contact%slave, scene%x, options%smoothing_angle, is_corner)
+      do k = 1, contact%n_constraint
+         if (contact%edge(k) == 0) cycle
+         associate (here => contact%slave%node_edge(2, k))
+            if (here > 0) then
+               if (.not. is_corner(here)) limit(k) = limit(k) + deepest_dip*contact%state(k)%size
+            end if
+            if (.not. chain_faces(contact%slave, k, contact%master%edge(:, contact%edge(k)), &
+               scene%x, scene%u0)) limit(k) = huge(limit)
+         end associate
+      end do
+      call find_behind(scene, contact, limit, n, found)
+      if (n == 0) return
+      call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // to_text(n) // &
+         " master nodes of surface " // scene%surface(pair%master)%name // " penetrate surface " &
+         // scene%surface(pair%slave)%name // ", between its nodes" // found // &
+         "; move them, or refine the slave surface and let *CONTACT PAIR, ADJUST= move its nodes")
+   end subroutine check_corners
+
+   !> Gaps at the start, of nodes that are near.
+   pure subroutine measure_start(scene, contact)
+      type(scene_t), intent(in) :: scene
+      type(nts_t), intent(inout) :: contact
+      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2))
+
+      zero = 0.0_wp
+      contact%reach = 0.0_wp
+      call contact%begin_step(scene%x, scene%u0, zero)
+      call contact%measure(scene%x, scene%u0, zero)
+   end subroutine measure_start
+
+   !> How many of the nodes measured are behind the surface by more than `limit`, and a text with
+   !> their labels and depths.
+   subroutine find_behind(scene, contact, limit, n, text)
+      type(scene_t), intent(in) :: scene
+      type(nts_t), intent(in) :: contact
+      real(wp), intent(in) :: limit(:)           !! (n_constraint) [L]
+      integer, intent(out) :: n
+      character(len=:), allocatable, intent(out) :: text
+      type(string_t) :: found(contact%n_constraint)
+      type(gap_state_t) :: state
+      real(wp) :: deepest
+      integer :: i
+
+      n = 0
+      deepest = 0.0_wp
+      do i = 1, contact%n_constraint
+         if (contact%edge(i) == 0) cycle
+         state = contact%state(i)
+         if (.not. state%is_over .or. state%gap0 >= -limit(i)) cycle
+         n = n + 1
+         deepest = max(deepest, -state%gap0)
+         found(n)%text = to_text(scene%node_label(contact%node(i))) // " (" // &
+            to_text(-state%gap0) // ")"
+      end do
+      text = ", by " // to_text(deepest) // " at most; node (depth): " // &
+         joined(found(:n), ", ", most_named)
+   end subroutine find_behind
+
+end module emcon_initial_contact

@@ -1,0 +1,275 @@
+!> The outlines of the pieces of a mesh that meet in contact, whatever surfaces the deck names.
+!>
+!> A piece is what hangs together by elements; its outline are the faces that one element alone has,
+!> the body to the left. What a tie covers is no outline; where it ends, two pieces meet in one
+!> place, as neighbours do. Surfaces of edges without elements stand for themselves.
+module emcon_outline
+   use emcon_bodies, only : bodies_find
+   use emcon_chain, only : chain_init, chain_t
+   use emcon_element_kinds, only : element_kinds
+   use emcon_errors, only : error_t
+   use emcon_joints, only : chain_join
+   use emcon_kinds, only : dp, wp
+   use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_t
+   use emcon_sort, only : find_sorted, sort_order, unique_sorted
+   use emcon_surface_edges, only : surface_edges
+   use emcon_tied_edges, only : tied_edges_find, tied_ends_find
+   implicit none
+   private
+   public :: outline_t, outline_init, outline_meets
+
+   type :: pieces_t
+      integer, allocatable :: piece(:)           !! ascending
+   end type pieces_t
+
+   type :: outline_t
+      integer :: n_piece = 0                     !! pieces that meet others or themselves
+      integer, allocatable :: start(:)           !! (n_piece + 1) first edge of each piece
+      integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node, piece by piece
+      !> (2, n_edge) the ends by their places: nodes, but one number for both nodes of a joint
+      integer, allocatable :: place(:, :)
+      !> (2, n_edge) the edges before and after; 0: the outline ends there, or branches
+      integer, allocatable :: link(:, :)
+      integer, allocatable :: host(:)            !! (n_node) edge that a tied end stands on; 0: none
+      logical, allocatable :: is_buried(:)       !! (n_node) under a tied piece
+      !> (n_edge) shortest side of the element behind it, of an edge without one its length [L]
+      real(wp), allocatable :: thickness(:)
+      type(pieces_t), allocatable :: on(:)       !! (n_surface) pieces that it is on
+      integer, allocatable :: pair(:, :)         !! (2, n_pair) surfaces that meet
+   end type outline_t
+
+contains
+
+   subroutine outline_init(self, scene)
+      type(outline_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: connected(:, :), piece(:), number(:), edge(:, :), order(:)
+      real(wp), allocatable :: thickness(:)
+      logical, allocatable :: is_tied(:), is_meant(:)
+      integer :: n_body, p
+
+      call connect(scene, connected)
+      call bodies_find(connected, size(scene%x, 2), piece, n_body)
+      call find_meetings(self, scene, piece, number)
+      allocate(self%start(self%n_piece + 1), source=1)
+      if (self%n_piece > 0) then
+         call find_edges(scene, edge, thickness)
+      else
+         allocate(edge(2, 0), thickness(0))
+      end if
+      ! From here on the piece of a node is its place among those that meet; 0: none of them.
+      piece = [(find_sorted(number, piece(p)), p = 1, size(piece))]
+      call tied_edges_find(scene, edge, is_tied)
+      is_meant = .not. is_tied .and. piece(edge(1, :)) > 0
+      edge = edge(:, pack([(p, p = 1, size(edge, 2))], is_meant))
+      thickness = pack(thickness, is_meant)
+      order = sort_order(piece(edge(1, :)))
+      self%edge = edge(:, order)
+      self%thickness = thickness(order)
+      do p = 1, self%n_piece
+         self%start(p + 1) = self%start(p) + count(piece(edge(1, :)) == p)
+      end do
+      call link_edges(self, size(scene%x, 2))
+      call find_places(self, scene)
+      call tied_ends_find(scene, self%edge, self%host, self%is_buried)
+   end subroutine outline_init
+
+   !> Elements, and after them surfaces of edges, by their nodes.
+   pure subroutine connect(scene, connected)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: connected(:, :)   !! (n, n_element + n_edge), 0: no node
+      integer, allocatable :: edge(:, :), spread(:, :)
+      integer :: s
+
+      connected = scene%element_node
+      do s = 1, size(scene%surface)
+         if (.not. allocated(scene%surface(s)%edge)) cycle
+         edge = scene%surface(s)%edge
+         allocate(spread(size(connected, 1), size(edge, 2)), source=0)
+         spread(:2, :) = edge
+         connected = reshape([connected, spread], &
+            [size(connected, 1), size(connected, 2) + size(edge, 2)])
+         deallocate(spread)
+      end do
+   end subroutine connect
+
+   !> Which pieces have a part in contact pairs, and which surfaces meet there.
+   subroutine find_meetings(self, scene, piece, number)
+      type(outline_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: piece(:)            !! (n_node)
+      integer, allocatable, intent(out) :: number(:)   !! (n_piece) as in `piece`, ascending
+      integer :: s, i
+
+      self%pair = reshape([scene%pair%slave, scene%pair%master], [2, size(scene%pair)], order=[2, 1])
+      allocate(self%on(size(scene%surface)), number(0))
+      do s = 1, size(scene%surface)
+         allocate(self%on(s)%piece(0))
+         if (.not. any(self%pair == s)) cycle
+         call pieces_of(scene, scene%surface(s), piece, self%on(s)%piece)
+         number = unique_sorted([number, self%on(s)%piece])
+      end do
+      self%n_piece = size(number)
+      do s = 1, size(scene%surface)
+         associate (on => self%on(s)%piece)
+            on = [(find_sorted(number, on(i)), i = 1, size(on))]
+         end associate
+      end do
+   end subroutine find_meetings
+
+   !> Does a contact pair bring pieces `p` and `q` together?
+   pure logical function outline_meets(self, p, q) result(meets)
+      type(outline_t), intent(in) :: self
+      integer, intent(in) :: p, q
+      integer :: k
+
+      meets = .true.
+      do k = 1, size(self%pair, 2)
+         associate (slave => self%on(self%pair(1, k))%piece, &
+               master => self%on(self%pair(2, k))%piece)
+            if (find_sorted(slave, p) > 0 .and. find_sorted(master, q) > 0) return
+            if (find_sorted(slave, q) > 0 .and. find_sorted(master, p) > 0) return
+         end associate
+      end do
+      meets = .false.
+   end function outline_meets
+
+   !> The pieces that `surface` is on.
+   pure subroutine pieces_of(scene, surface, piece, found)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: piece(:)
+      integer, allocatable, intent(out) :: found(:)    !! ascending
+      integer, allocatable :: edge(:, :)
+
+      if (surface%is_nodal) then
+         found = unique_sorted(piece(surface%node))
+      else
+         call surface_edges(scene, surface, edge)
+         found = unique_sorted(piece(edge(1, :)))
+      end if
+   end subroutine pieces_of
+
+   !> Faces that one element alone has, and edges of surfaces that no element has.
+   subroutine find_edges(scene, edge, thickness)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: edge(:, :)  !! (2, n)
+      real(wp), allocatable, intent(out) :: thickness(:)   !! (n) [L]
+      integer, allocatable :: order(:)
+      real(dp), allocatable :: key(:)
+      logical, allocatable :: is_free(:)
+      integer :: e, f, n
+
+      n = 0
+      allocate(edge(2, sum(element_kinds(scene%element_kind)%n_face)))
+      allocate(thickness(size(edge, 2)))
+      do e = 1, size(scene%element_kind)
+         associate (kind => element_kinds(scene%element_kind(e)))
+            do f = 1, kind%n_face
+               edge(:, n + f) = scene%element_node(kind%face_node(:, f), e)
+            end do
+            thickness(n + 1:n + kind%n_face) = minval(lengths(scene, edge(:, n + 1:n + kind%n_face)))
+            n = n + kind%n_face
+         end associate
+      end do
+      key = real(minval(edge, 1), dp)*real(size(scene%x, 2) + 1, dp) + real(maxval(edge, 1), dp)
+      order = sort_order(key)
+      allocate(is_free(n), source=.true.)
+      do e = 2, n
+         if (key(order(e)) > key(order(e - 1))) cycle
+         is_free(order(e - 1:e)) = .false.
+      end do
+      edge = edge(:, pack([(e, e = 1, n)], is_free))
+      thickness = pack(thickness, is_free)
+      call add_lone_edges(scene, edge, thickness)
+   end subroutine find_edges
+
+   !> Append the edges of surfaces of edges that are no faces of elements.
+   pure subroutine add_lone_edges(scene, edge, thickness)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(inout) :: edge(:, :)      !! (2, n)
+      real(wp), allocatable, intent(inout) :: thickness(:)   !! (n) [L]
+      integer, allocatable :: lone(:, :)
+      integer :: follower(size(scene%x, 2)), s, i
+
+      follower = 0
+      follower(edge(1, :)) = edge(2, :)
+      do s = 1, size(scene%surface)
+         if (.not. allocated(scene%surface(s)%edge)) cycle
+         associate (all => scene%surface(s)%edge)
+            lone = all(:, pack([(i, i = 1, size(all, 2))], follower(all(1, :)) /= all(2, :)))
+         end associate
+         follower(lone(1, :)) = lone(2, :)
+         thickness = [thickness, lengths(scene, lone)]
+         edge = reshape([edge, lone], [2, size(edge, 2) + size(lone, 2)])
+      end do
+   end subroutine add_lone_edges
+
+   pure function lengths(scene, edge) result(length)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: edge(:, :)          !! (2, n)
+      real(wp) :: length(size(edge, 2))
+
+      length = sqrt(sum((scene%x(:, edge(2, :)) - scene%x(:, edge(1, :)))**2, dim=1))
+   end function lengths
+
+   !> Find the neighbours of each edge. Where two outlines meet in a node, neither goes on.
+   pure subroutine link_edges(self, n_node)
+      type(outline_t), intent(inout) :: self
+      integer, intent(in) :: n_node
+      integer :: ends(n_node), begins(n_node), i
+
+      ends = 0
+      begins = 0
+      do i = 1, size(self%edge, 2)
+         associate (a => self%edge(1, i), b => self%edge(2, i))
+            begins(a) = merge(i, -1, begins(a) == 0)
+            ends(b) = merge(i, -1, ends(b) == 0)
+         end associate
+      end do
+      allocate(self%link(2, size(self%edge, 2)))
+      do i = 1, size(self%edge, 2)
+         associate (a => self%edge(1, i), b => self%edge(2, i))
+            self%link(1, i) = merge(max(0, ends(a)), 0, begins(a) > 0)
+            self%link(2, i) = merge(max(0, begins(b)), 0, ends(b) > 0)
+         end associate
+      end do
+   end subroutine link_edges
+
+   !> The places of the ends: pieces tied to each other have joints where their outlines go on.
+   subroutine find_places(self, scene)
+      type(outline_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(surface_t) :: surface
+      type(chain_t) :: chain
+      type(error_t), allocatable :: error
+      integer :: place(size(scene%x, 2)), begins(size(scene%x, 2)), ends(size(scene%x, 2)), i, k
+
+      self%place = self%edge
+      if (size(scene%tie) == 0) return
+      if (any(scene%tie%slave == 0)) return            ! known by its rows alone
+      begins = 0
+      ends = 0
+      do i = 1, size(self%edge, 2)
+         begins(self%edge(1, i)) = begins(self%edge(1, i)) + 1
+         ends(self%edge(2, i)) = ends(self%edge(2, i)) + 1
+      end do
+      associate (edge => self%edge, most => max(begins, ends))
+         surface%name = ""
+         surface%edge = edge(:, pack([(i, i = 1, size(edge, 2))], &
+            most(edge(1, :)) == 1 .and. most(edge(2, :)) == 1))
+      end associate
+      call chain_init(chain, scene, surface, error)
+      if (allocated(error)) return
+      call chain_join(chain, scene)
+      place = [(i, i = 1, size(place))]
+      do k = 1, size(chain%node)
+         if (chain%twin(k) > 0) place(chain%twin(k)) = chain%node(k)
+      end do
+      do i = 1, size(self%edge, 2)
+         self%place(:, i) = place(self%edge(:, i))
+      end do
+   end subroutine find_places
+
+end module emcon_outline

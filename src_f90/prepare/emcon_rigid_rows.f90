@@ -1,0 +1,87 @@
+!> Conditions on the motions of rigid bodies, as rows over the degrees of freedom of nodes:
+!> prescribed freedoms, linear constraints and the gaps of contact.
+module emcon_rigid_rows
+   use emcon_contact, only : constraint_t
+   use emcon_kinds, only : dp, wp
+   use emcon_steps, only : prescribed_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: rigid_rows_t, rigid_rows_find, rigid_rows_append
+
+   !> Sum of weight times displacement over some degrees of freedom = 0; the weights' sizes sum
+   !> up to 1.
+   type :: rigid_rows_t
+      integer :: n = 0
+      integer, allocatable :: start(:)               !! (n + 1) entries before each row, from 0
+      integer, allocatable :: dof(:)                 !! places in an (n_dim, n_node) array
+      real(wp), allocatable :: weight(:)
+      integer, allocatable :: low(:), high(:)        !! (n) first and last body; 0: none is free
+      real(dp) :: noise = 0.0_dp                     !! what prevents less prevents nothing
+   end type rigid_rows_t
+
+   !> A normal that prevents less of a motion than this, per unit of it, does not hold it: normals
+   !> are as exact as displacements that Newton's method has converged to.
+   real(dp), parameter :: contact_noise = sqrt(epsilon(1.0_dp))
+
+contains
+
+   !> Prescribed freedoms, then linear constraints.
+   subroutine rigid_rows_find(system, prescribed, rows)
+      type(system_t), intent(in) :: system
+      type(prescribed_t), intent(in) :: prescribed(:)
+      type(rigid_rows_t), intent(out) :: rows
+      real(wp) :: total
+      integer :: k, m, n, n_linear
+
+      m = size(prescribed)
+      n_linear = 0
+      if (allocated(system%linear%start)) n_linear = system%linear%n
+      n = m
+      if (n_linear > 0) n = m + system%linear%start(n_linear + 1)
+      rows%n = m + n_linear
+      allocate(rows%start(rows%n + 1), rows%dof(n), rows%weight(n))
+      rows%start(:m + 1) = [(k, k = 0, m)]
+      do k = 1, m
+         rows%dof(k) = 2*(prescribed(k)%node - 1) + prescribed(k)%dof
+         rows%weight(k) = 1.0_wp
+      end do
+      do k = 1, n_linear
+         associate (from => system%linear%start(k) + 1, to => system%linear%start(k + 1))
+            total = sum(abs(system%linear%weight(from:to)))
+            if (.not. total > 0.0_wp) total = 1.0_wp
+            rows%start(m + k + 1) = m + to
+            rows%dof(m + from:m + to) = system%linear%dof(from:to)
+            rows%weight(m + from:m + to) = system%linear%weight(from:to)/total
+         end associate
+      end do
+   end subroutine rigid_rows_find
+
+   !> Append the rows of contact: the gradients of gaps at the end.
+   subroutine rigid_rows_append(rows, item)
+      type(rigid_rows_t), intent(inout) :: rows
+      type(constraint_t), intent(in) :: item(:)
+      integer :: k, i, a, n
+      real(wp) :: total
+
+      if (size(item) == 0) return
+      rows%noise = contact_noise
+      n = rows%start(rows%n + 1)
+      rows%start = [rows%start, (n + 2*sum(item(:k)%n_node), k = 1, size(item))]
+      rows%dof = [rows%dof, spread(0, 1, 2*sum(item%n_node))]
+      rows%weight = [rows%weight, spread(0.0_wp, 1, 2*sum(item%n_node))]
+      rows%n = rows%n + size(item)
+      do k = 1, size(item)
+         total = sum(abs(item(k)%c(:, :item(k)%n_node)))
+         if (.not. total > 0.0_wp) total = 1.0_wp
+         do i = 1, item(k)%n_node
+            do a = 1, 2
+               n = n + 1
+               rows%dof(n) = 2*(item(k)%node(i) - 1) + a
+               rows%weight(n) = item(k)%c(a, i)/total
+            end do
+         end do
+      end do
+   end subroutine rigid_rows_append
+
+end module emcon_rigid_rows

@@ -1,0 +1,272 @@
+!> Ties before the first step: frozen integrals, multipliers at crosspoints, slave nodes moved onto
+!> the master surface.
+!>
+!> Source: docs/theory.md, section 11.
+module emcon_ties
+   use emcon_chain, only : chain_init, chain_t, surface_edges
+   use emcon_couplings, only : tie_rows_t, tie_t
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t, where_text
+   use emcon_sort, only : find_sorted
+   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_tie, only : tie_measure
+   use emcon_tie_balance, only : tie_balance, tie_balance_report_t, tie_is_balanced
+   use emcon_tie_ends, only : tie_ends_merge, tie_ends_take
+   use emcon_tie_moves, only : ties_move_nodes
+   use emcon_tied_edges, only : tied_edges_find
+   implicit none
+   private
+   public :: ties_prepare, find_crosspoints
+
+   integer, parameter :: most_sweeps = 4
+
+contains
+
+   !> Find the constraint rows of all ties and move their slave nodes so that D x_s = M x_m; the
+   !> notes tell how far. What they cover is no exterior any more.
+   subroutine ties_prepare(scene, notes, error)
+      type(scene_t), intent(inout) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: n_tie(:)
+      logical, allocatable :: is_held(:, :)
+      type(tie_rows_t) :: rows
+      integer :: t
+
+      if (size(scene%tie) == 0) return
+      do t = 1, size(scene%tie)
+         call tie_measure(scene, scene%tie(t), rows, error)
+         if (allocated(error)) return
+         scene%tie(t)%rows = rows
+      end do
+      call check_repeated(scene, error)
+      if (allocated(error)) return
+      call uncover_exterior(scene)
+      call count_ties(scene, n_tie)
+      call find_held(scene, is_held)
+      do t = 1, size(scene%tie)
+         call tie_ends_merge(scene%tie(t)%rows, n_tie, is_held)
+      end do
+      call balance(scene, error)
+      if (.not. allocated(error)) call ties_move_nodes(scene, notes, error)
+      if (.not. allocated(error)) call note_unbalanced(scene, notes, error)
+   end subroutine ties_prepare
+
+   !> Take the faces that ties cover out of all exterior.
+   pure subroutine uncover_exterior(scene)
+      type(scene_t), intent(inout) :: scene
+      logical, allocatable :: is_tied(:)
+      integer, allocatable :: edge(:, :)
+      integer :: s
+
+      do s = 1, size(scene%surface)
+         if (.not. scene%surface(s)%is_exterior) cycle
+         call surface_edges(scene, scene%surface(s), edge)
+         call tied_edges_find(scene, edge, is_tied)
+         associate (surface => scene%surface(s))
+            surface%element = pack(surface%element, .not. is_tied)
+            surface%face = pack(surface%face, .not. is_tied)
+         end associate
+      end do
+   end subroutine uncover_exterior
+
+   !> A slave node in the middle of one tie cannot be a slave node of another.
+   subroutine check_repeated(scene, error)
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: owner(:)
+      logical, allocatable :: is_inner(:)
+      integer :: t, k
+
+      allocate(owner(size(scene%x, 2)), source=0)
+      allocate(is_inner(size(scene%x, 2)), source=.false.)
+      do t = 1, size(scene%tie)
+         associate (rows => scene%tie(t)%rows)
+            do k = 1, size(rows%slave)
+               associate (node => rows%slave(k), is_inner_here => all(rows%neighbour(:, k) > 0))
+                  if (owner(node) > 0 .and. (is_inner(node) .or. is_inner_here)) then
+                     call raise(error, err_input, where_text(scene, scene%tie(t)%origin) // &
+                        ": *TIE " // scene%tie(t)%name // " over-constrains the model: slave " // &
+                        "node " // to_text(scene%node_label(node)) // " is a slave node of *TIE " &
+                        // scene%tie(owner(node))%name // " already; let the surface be the " // &
+                        "master of one of them")
+                     return
+                  end if
+                  owner(node) = t
+                  is_inner(node) = is_inner(node) .or. is_inner_here
+               end associate
+            end do
+         end associate
+      end do
+   end subroutine check_repeated
+
+   !> Number of ties that each node takes part in.
+   pure subroutine count_ties(scene, n_tie)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: n_tie(:)      !! (n_node)
+      integer, allocatable :: seen(:), edge(:, :)
+      integer :: t, i, k, side
+
+      allocate(n_tie(size(scene%x, 2)), seen(size(scene%x, 2)), source=0)
+      do t = 1, size(scene%tie)
+         do side = 1, 2
+            call surface_edges(scene, &
+               scene%surface(merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)), edge)
+            do i = 1, size(edge, 2)
+               do k = 1, 2
+                  associate (node => edge(k, i))
+                     if (seen(node) == t) cycle
+                     seen(node) = t
+                     n_tie(node) = n_tie(node) + 1
+                  end associate
+               end do
+            end do
+         end do
+      end do
+   end subroutine count_ties
+
+   !> Nodes at places where ends of several ties meet, and which of these places each is at.
+   subroutine find_crosspoints(scene, node, place, n_place)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: node(:)
+      integer, allocatable, intent(out) :: place(:)      !! (size of `node`) 1..n_place
+      integer, intent(out) :: n_place
+      type(chain_t) :: chain
+      type(error_t), allocatable :: error
+      integer, allocatable :: n_tie(:)
+      real(wp) :: reach(size(scene%x, 2))        !! half of the shortest edge at a chain end; else 0
+      integer :: t, side, k, i, j, surface
+
+      call count_ties(scene, n_tie)
+      reach = 0.0_wp
+      do t = 1, size(scene%tie)
+         do side = 1, 2
+            surface = merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)
+            call chain_init(chain, scene, scene%surface(surface), error)
+            if (allocated(error)) cycle
+            do k = 1, size(chain%node)
+               if (all(chain%node_edge(:, k) > 0) .or. n_tie(chain%node(k)) == 1) cycle
+               reach(chain%node(k)) = 0.5_wp*minval(chain%length(pack(chain%node_edge(:, k), &
+                  chain%node_edge(:, k) > 0)))
+            end do
+         end do
+      end do
+      node = pack([(i, i = 1, size(reach))], reach > 0.0_wp)
+      allocate(place(size(node)), source=0)
+      n_place = 0
+      do i = 1, size(node)
+         do j = 1, i - 1
+            if (norm2(scene%x(:, node(i)) - scene%x(:, node(j))) &
+               < min(reach(node(i)), reach(node(j)))) place(i) = place(j)
+         end do
+         if (place(i) > 0) cycle
+         n_place = n_place + 1
+         place(i) = n_place
+      end do
+   end subroutine find_crosspoints
+
+   !> Freedoms that are prescribed in some step.
+   pure subroutine find_held(scene, is_held)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: is_held(:, :)     !! (2, n_node)
+      integer :: i, k
+
+      allocate(is_held(2, size(scene%x, 2)), source=.false.)
+      do i = 1, size(scene%step)
+         associate (prescribed => scene%step(i)%prescribed)
+            do k = 1, size(prescribed)
+               is_held(prescribed(k)%dof, prescribed(k)%node) = .true.
+            end do
+         end associate
+      end do
+   end subroutine find_held
+
+   !> Let curved ties keep the equilibrium of a constant stress. A tie may be master of another one
+   !> whose slave nodes it moves: a few sweeps settle that.
+   subroutine balance(scene, error)
+      type(scene_t), intent(inout) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: moved
+      type(notes_t) :: unused
+      logical :: is_balanced, has_changed
+      integer :: t, sweep
+
+      moved = scene
+      do sweep = 1, most_sweeps
+         has_changed = .false.
+         do t = 1, size(scene%tie)
+            call balance_tie(moved, moved%tie(t), is_balanced, error)
+            if (allocated(error)) return
+            has_changed = has_changed .or. .not. is_balanced
+         end do
+         if (.not. has_changed) exit
+         call ties_move_nodes(moved, unused, error)
+         if (allocated(error)) return
+      end do
+      do t = 1, size(scene%tie)
+         scene%tie(t)%rows = moved%tie(t)%rows
+      end do
+   end subroutine balance
+
+   !> Balance one tie. On a curved interface the ends of the slave chain need no multiplier and may
+   !> have none; a chain that would keep less than two stays as it is.
+   subroutine balance_tie(scene, tie, was_balanced, error)
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(inout) :: tie
+      logical, intent(out) :: was_balanced
+      type(error_t), allocatable, intent(out) :: error
+      type(chain_t) :: slave, master
+      type(tie_balance_report_t) :: report
+      type(tie_rows_t) :: rows
+      logical :: is_end(size(tie%rows%slave))
+
+      call chain_init(slave, scene, scene%surface(tie%slave), error)
+      if (.not. allocated(error)) call chain_init(master, scene, scene%surface(tie%master), error)
+      if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%edge, master%edge, &
+         was_balanced, error)
+      if (allocated(error) .or. was_balanced) return
+      rows = tie%rows
+      is_end = any(rows%neighbour == 0, dim=1) .and. is_chain_end(slave, rows%slave)
+      if (count(.not. is_end) < 2) return
+      if (any(is_end)) call tie_ends_take(rows, is_end)
+      call tie_balance(rows, scene%x, slave%edge, master%edge, report, error)
+      if (.not. allocated(error) .and. report%is_balanced) tie%rows = rows
+   end subroutine balance_tie
+
+   !> Is a node an end of the chain?
+   pure function is_chain_end(chain, node) result(is_end)
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: node(:)
+      logical :: is_end(size(node))
+      integer :: i
+
+      do i = 1, size(node)
+         is_end(i) = any(chain%node_edge(:, find_sorted(chain%node, node(i))) == 0)
+      end do
+   end function is_chain_end
+
+   !> Tell which ties do not keep the equilibrium of a constant stress.
+   subroutine note_unbalanced(scene, notes, error)
+      type(scene_t), intent(in) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      type(chain_t) :: slave, master
+      logical :: is_balanced
+      integer :: t
+
+      do t = 1, size(scene%tie)
+         associate (tie => scene%tie(t))
+            call chain_init(slave, scene, scene%surface(tie%slave), error)
+            if (.not. allocated(error)) call chain_init(master, scene, &
+               scene%surface(tie%master), error)
+            if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%edge, &
+               master%edge, is_balanced, error)
+            if (allocated(error)) return
+            if (.not. is_balanced) call note_add(notes, "*TIE " // tie%name // ": its meshes " // &
+               "do not fit so well that a constant stress passes exactly")
+         end associate
+      end do
+   end subroutine note_unbalanced
+
+end module emcon_ties

@@ -1,0 +1,119 @@
+!> What the log and `emcon check` tell of ties and equations: subdomains, interfaces, crosspoints,
+!> and what elimination leaves.
+module emcon_link_lines
+   use emcon_couplings, only : tie_t
+   use emcon_interactions, only : multiplier_dual
+   use emcon_scene, only : scene_t
+   use emcon_surface_edges, only : surface_edges
+   use emcon_system, only : system_t
+   use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   use emcon_ties, only : find_crosspoints
+   implicit none
+   private
+   public :: add_link_lines
+
+   !> Subdomains, and nodes of a crosspoint, that are named.
+   integer, parameter :: most_subdomains = 100, most_nodes = 10
+
+contains
+
+   !> Add the lines to `notes`; none if the scene has neither ties nor equations.
+   subroutine add_link_lines(scene, system, notes)
+      type(scene_t), intent(in) :: scene
+      type(system_t), intent(in) :: system
+      type(notes_t), intent(inout) :: notes
+      integer, allocatable :: node(:), place(:)
+      character(len=:), allocatable :: text
+      integer :: k, n_place
+
+      if (system%linear%n == 0) return
+      call find_crosspoints(scene, node, place, n_place)
+      call elimination_text(system, text)
+      call note_add(notes, to_text(system%n_body) // " subdomains, " // &
+         to_text(size(scene%tie)) // " ties, " // to_text(n_place) // " crosspoints, " // &
+         to_text(size(scene%equation)) // " equations; " // text)
+      if (size(scene%tie) > 0) call add_subdomains(scene, system, notes)
+      do k = 1, size(scene%tie)
+         call tie_text(scene, scene%tie(k), text)
+         call note_add(notes, "tie " // text)
+      end do
+      do k = 1, n_place
+         call labels_text(scene, pack(node, place == k), text)
+         call note_add(notes, "crosspoint " // to_text(k) // ": nodes " // text)
+      end do
+   end subroutine add_link_lines
+
+   !> Unknowns without linear constraints, and with them.
+   subroutine elimination_text(system, text)
+      type(system_t), intent(in) :: system
+      character(len=:), allocatable, intent(out) :: text
+
+      associate (numbering => system%numbering)
+         if (system%is_reduced) then
+            text = to_text(numbering%n_unknown + numbering%n_dependent) // &
+               " unknowns before, " // to_text(numbering%n_unknown) // " after elimination"
+         else
+            text = to_text(numbering%n_unknown) // " unknowns and " // &
+               to_text(count(system%linear%is_used)) // " multipliers"
+         end if
+      end associate
+   end subroutine elimination_text
+
+   !> One line for each connected mesh.
+   subroutine add_subdomains(scene, system, notes)
+      type(scene_t), intent(in) :: scene
+      type(system_t), intent(in) :: system
+      type(notes_t), intent(inout) :: notes
+      integer :: n_node(system%n_body), n_element(system%n_body), first(system%n_body)
+      character(len=:), allocatable :: text
+      integer :: i, b
+
+      n_node = 0
+      n_element = 0
+      do i = 1, size(system%body)
+         if (system%body(i) > 0) n_node(system%body(i)) = n_node(system%body(i)) + 1
+      end do
+      do i = size(scene%element_kind), 1, -1
+         b = system%body(scene%element_node(1, i))
+         n_element(b) = n_element(b) + 1
+         first(b) = scene%element_label(i)
+      end do
+      do b = 1, min(system%n_body, most_subdomains)
+         text = "subdomain " // to_text(b) // ": "
+         if (n_element(b) > 0) text = text // to_text(n_element(b)) // " elements from " // &
+            to_text(first(b)) // " on, "
+         call note_add(notes, text // to_text(n_node(b)) // " nodes")
+      end do
+   end subroutine add_subdomains
+
+   !> Name, surfaces and multipliers of a tie.
+   subroutine tie_text(scene, tie, text)
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: tie
+      character(len=:), allocatable, intent(out) :: text
+      integer, allocatable :: slave(:, :), master(:, :)
+
+      call surface_edges(scene, scene%surface(tie%slave), slave)
+      call surface_edges(scene, scene%surface(tie%master), master)
+      text = tie%name // ": " // scene%surface(tie%slave)%name // " (slave, " // &
+         to_text(size(slave, 2)) // " edges) to " // &
+         scene%surface(tie%master)%name // " (" // &
+         to_text(size(master, 2)) // " edges), " // &
+         to_text(size(tie%rows%slave)) // " " // &
+         trim(merge("dual    ", "standard", tie%multiplier == multiplier_dual)) // " multipliers"
+   end subroutine tie_text
+
+   subroutine labels_text(scene, node, text)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: node(:)
+      character(len=:), allocatable, intent(out) :: text
+      type(string_t) :: label(size(node))
+      integer :: i
+
+      do i = 1, size(node)
+         label(i)%text = to_text(scene%node_label(node(i)))
+      end do
+      text = joined(label, ", ", most_nodes)
+   end subroutine labels_text
+
+end module emcon_link_lines

@@ -1,0 +1,349 @@
+!> What of a run goes into its files: fields, history and requested sets, at which increments.
+!>
+!> Turns states of the stepper into the plain arrays that results/ writes.
+module emcon_recorder
+   use emcon_errors, only : error_t
+   use emcon_history, only : column_t, history_append, history_close, history_create, &
+      history_publish, history_put_run, history_resume, history_set_append, history_set_define, &
+      history_t
+   use emcon_kinds, only : dp, wp
+   use emcon_ledger, only : body_momenta
+   use emcon_march, only : increment_t
+   use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
+   use emcon_quantities, only : contact_field, element_quantity, field_names, node_quantity
+   use emcon_requests, only : output_contact_file
+   use emcon_run_mark, only : run_mark
+   use emcon_scene, only : scene_t
+   use emcon_stepper, only : stepper_t
+   use emcon_text, only : string_t
+   use emcon_version, only : version
+   use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
+      vtkhdf_end_frame, vtkhdf_publish, vtkhdf_put_run, vtkhdf_resume, vtkhdf_t, vtkhdf_write
+   implicit none
+   private
+   public :: recorder_t, recorder_open, recorder_resume, recorder_write, recorder_publish, &
+      recorder_close, recorder_finish
+
+   !> Frames of a deck that asks for no field output.
+   integer, parameter :: default_frames = 100
+
+   character(len=13), parameter :: column_names(18) = [character(len=13) :: "increment", "time", &
+      "h", "kinetic", "strain", "external_work", "contact_work", "stabilization", "total", "px", &
+      "py", "lz", "active", "newton", "cuts", "penetration", "stand_off", "cpu"]
+
+   character(len=*), parameter :: counts(4) = [character(len=9) :: "increment", "active", &
+      "newton", "cuts"]
+
+   type :: recorder_t
+      type(vtkhdf_t) :: fields
+      type(history_t) :: history
+      logical :: has_fields = .false.
+      type(string_t), allocatable :: variable(:) !! fields that are written
+      type(series_t), allocatable :: series(:)   !! of PRINT requests
+      integer :: momentum_set = 0
+      integer :: n_row = 0
+      real(wp) :: last_time = -huge(1.0_wp)      !! of the last record
+   end type recorder_t
+
+contains
+
+   !> Begin the files `base`.vtkhdf, .h5 and .csv.
+   subroutine recorder_open(self, stepper, base, error)
+      type(recorder_t), intent(out) :: self
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: base
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: run
+
+      call run_mark(stepper, run)
+      call choose_fields(self, stepper%scene)
+      if (self%has_fields) then
+         call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), &
+            stepper%scene%element_node, stepper%scene%element_kind, fields_of(self), error)
+         if (allocated(error)) return
+         call vtkhdf_put_run(self%fields, run)
+      end if
+      call history_create(self%history, base, columns(), error)
+      if (allocated(error)) return
+      call history_put_run(self%history, run, stepper%source%line, version, error)
+      if (allocated(error)) return
+      call define_sets(self, stepper, error)
+      if (allocated(error)) return
+      call write_masses(self, stepper, error)
+   end subroutine recorder_open
+
+   !> Go on with the files of `base` after `n_row` rows and `n_frame` frames.
+   subroutine recorder_resume(self, stepper, base, n_row, n_frame, error)
+      type(recorder_t), intent(out) :: self
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: base
+      integer, intent(in) :: n_row, n_frame
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: run
+
+      call run_mark(stepper, run)
+      call choose_fields(self, stepper%scene)
+      if (self%has_fields) then
+         call vtkhdf_resume(self%fields, base // ".vtkhdf", run, fields_of(self), n_frame, error)
+         if (allocated(error)) return
+      end if
+      call history_resume(self%history, base, run, columns(), n_row, error)
+      if (allocated(error)) return
+      self%n_row = n_row
+      self%last_time = stepper%march%state%time
+      call define_sets(self, stepper, error)
+   end subroutine recorder_resume
+
+   pure function columns() result(list)
+      type(column_t) :: list(size(column_names))
+      integer :: i
+
+      list%name = column_names
+      do i = 1, size(list)
+         list(i)%is_integer = any(list(i)%name == counts)
+      end do
+   end function columns
+
+   !> The fields that some step asks for; all of them if none asks for any.
+   subroutine choose_fields(self, scene)
+      type(recorder_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer :: i, j, k
+
+      allocate(self%variable(0))
+      do i = 1, size(scene%step)
+         do j = 1, size(scene%step(i)%output)
+            associate (output => scene%step(i)%output(j))
+               if (output%kind > output_contact_file) cycle
+               do k = 1, size(output%variable)
+                  call add(output%variable(k)%text)
+               end do
+            end associate
+         end do
+      end do
+      if (size(self%variable) == 0) then
+         call add("U")
+         call add("V")
+         call add("RF")
+         call add("S")
+         call add("ENER")
+         if (size(scene%pair) > 0) then
+            call add("CDIS")
+            call add("CSTR")
+            call add("CF")
+         end if
+      end if
+      self%has_fields = .true.
+
+   contains
+
+      subroutine add(name)
+         character(len=*), intent(in) :: name
+         type(string_t) :: new(1)
+         integer :: l
+
+         new(1)%text = name
+         if (name == "ELSE") new(1)%text = "ENER"    ! the same, element by element
+         do l = 1, size(self%variable)
+            if (self%variable(l)%text == new(1)%text) return
+         end do
+         self%variable = [self%variable, new]
+      end subroutine add
+
+   end subroutine choose_fields
+
+   !> The fields of all variables, as the field file declares them.
+   function fields_of(self) result(fields)
+      type(recorder_t), intent(in) :: self
+      type(field_t), allocatable :: fields(:)
+      integer :: i
+
+      allocate(fields(0))
+      do i = 1, size(self%variable)
+         fields = [fields, field_names(self%variable(i)%text)]
+      end do
+   end function fields_of
+
+   !> Declare what PRINT requests name, and the bodies.
+   subroutine define_sets(self, stepper, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      call print_series_define(self%series, self%history, stepper, error)
+      if (allocated(error)) return
+      call history_set_define(self%history, "BODIES", "MOMENTUM", &
+         [(k, k = 1, stepper%march%system%n_body)], 3, self%momentum_set, error)
+   end subroutine define_sets
+
+   !> The masses of the bodies, once.
+   subroutine write_masses(self, stepper, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: mass(1, stepper%march%system%n_body)
+      integer :: i, k, i_set
+
+      mass = 0.0_dp
+      associate (system => stepper%march%system)
+         do i = 1, system%mass%n_row
+            do k = system%mass%row_start(i) + 1, system%mass%row_start(i + 1)
+               mass(1, system%body(i)) = mass(1, system%body(i)) + system%mass%value(k)
+            end do
+         end do
+         call history_set_define(self%history, "BODIES", "MASS", [(k, k = 1, system%n_body)], 1, &
+            i_set, error)
+      end associate
+      if (allocated(error)) return
+      call history_set_append(self%history, i_set, 0.0_dp, mass, error)
+   end subroutine write_masses
+
+   !> Record the present state after `increment`.
+   subroutine recorder_write(self, stepper, increment, cpu, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(inout) :: stepper
+      type(increment_t), intent(in) :: increment
+      real(dp), intent(in) :: cpu                !! seconds of CPU time so far
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: momenta(3, stepper%march%system%n_body)
+
+      associate (state => stepper%march%state, ledger => stepper%march%ledger)
+         call history_append(self%history, [real(dp) :: real(state%increment, dp), &
+            real(state%time, dp), real(increment%h, dp), real(ledger%kinetic, dp), &
+            real(ledger%strain, dp), real(ledger%external_work, dp), &
+            real(ledger%contact_work, dp), real(ledger%stabilization, dp), &
+            real(ledger%total, dp), real(ledger%momentum, dp), real(ledger%angular, dp), &
+            real(increment%n_active, dp), real(increment%n_newton, dp), &
+            real(increment%n_cut, dp), real(increment%overlap%depth, dp), &
+            real(increment%stand_off%largest, dp), cpu], error)
+         if (allocated(error)) return
+         self%n_row = self%n_row + 1
+         call body_momenta(stepper%march%system, stepper%scene%x, state, momenta)
+         call history_set_append(self%history, self%momentum_set, real(state%time, dp), &
+            real(momenta, dp), error)
+      end associate
+      if (allocated(error)) return
+      call print_series_write(self%series, self%history, stepper, self%last_time, error)
+      if (allocated(error)) return
+      call write_fields(self, stepper, error)
+      self%last_time = stepper%march%state%time
+   end subroutine recorder_write
+
+   !> Append a frame if a FILE request is due.
+   subroutine write_fields(self, stepper, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(inout) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      logical :: due, has_request
+      integer :: i
+
+      due = self%fields%n_frame == 0
+      has_request = .false.
+      associate (step => stepper%scene%step(stepper%march%state%i_step))
+         do i = 1, size(step%output)
+            if (step%output(i)%kind > output_contact_file) cycle
+            has_request = .true.
+            due = due .or. is_due(stepper, step%output(i), self%last_time)
+         end do
+      end associate
+      if (.not. has_request) then
+         due = due .or. default_frame(stepper, stepper%march%state%time) &
+            > default_frame(stepper, self%last_time)
+      end if
+      if (.not. due) return
+      call vtkhdf_begin_frame(self%fields, real(stepper%march%state%time, dp))
+      do i = 1, size(self%variable)
+         call write_variable(self, stepper, self%variable(i)%text, error)
+         if (allocated(error)) return
+      end do
+      call vtkhdf_end_frame(self%fields, error)
+   end subroutine write_fields
+
+   !> Number of the frame that `time` falls into, of those that every step gets by default.
+   pure integer function default_frame(stepper, time)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: time
+      real(wp) :: part
+
+      associate (state => stepper%march%state)
+         default_frame = 0
+         if (time <= state%start_time) return
+         part = (time - state%start_time)/stepper%scene%step(state%i_step)%duration
+         default_frame = floor(real(default_frames, wp)*part + sqrt(epsilon(1.0_wp)))
+      end associate
+   end function default_frame
+
+   !> The fields that belong to one variable, e.g. stress and von Mises stress to S.
+   subroutine write_variable(self, stepper, variable, error)
+      type(recorder_t), intent(inout) :: self
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: variable
+      type(error_t), allocatable, intent(out) :: error
+      type(field_t), allocatable :: fields(:)
+      real(dp), allocatable :: values(:, :), spread(:, :)
+      integer :: i, first
+
+      allocate(fields, source=field_names(variable))
+      if (fields(1)%is_cell) then
+         values = element_quantity(stepper, variable)
+      else if (any(variable == ["CDIS", "CSTR", "CF  "])) then
+         values = contact_field(stepper, variable)
+      else
+         values = node_quantity(stepper, variable)
+      end if
+      first = 1
+      do i = 1, size(fields)
+         spread = values(first:first + fields(i)%n_component - 1, :)
+         call vtkhdf_write(self%fields, trim(fields(i)%name), spread, error)
+         if (allocated(error)) return
+         first = first + fields(i)%n_component
+      end do
+   end subroutine write_variable
+
+   !> Make visible what is written, if it is time or forced.
+   subroutine recorder_publish(self, is_forced, error)
+      type(recorder_t), intent(inout) :: self
+      logical, intent(in) :: is_forced
+      type(error_t), allocatable, intent(out) :: error
+
+      call vtkhdf_publish(self%fields, is_forced, error)
+      if (.not. allocated(error)) call history_publish(self%history, is_forced, error)
+   end subroutine recorder_publish
+
+   !> Note the wall time of the run, and the CPU times that contact and the judge took.
+   subroutine recorder_finish(self, wall, contact, judge, error)
+      type(recorder_t), intent(inout) :: self
+      real(dp), intent(in) :: wall, contact, judge   !! [s]
+      type(error_t), allocatable, intent(out) :: error
+
+      call put("WALL_SECONDS", wall)
+      if (.not. allocated(error)) call put("CONTACT_CPU_SECONDS", contact)
+      if (.not. allocated(error)) call put("JUDGE_CPU_SECONDS", judge)
+
+   contains
+
+      subroutine put(name, seconds)
+         character(len=*), intent(in) :: name
+         real(dp), intent(in) :: seconds
+         integer :: i_set
+
+         call history_set_define(self%history, "RUN", name, [0], 1, i_set, error)
+         if (.not. allocated(error)) call history_set_append(self%history, i_set, 0.0_dp, &
+            reshape([seconds], [1, 1]), error)
+      end subroutine put
+
+   end subroutine recorder_finish
+
+   !> Complete and close all files; the first failure is told.
+   subroutine recorder_close(self, error)
+      type(recorder_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: second
+
+      call vtkhdf_close(self%fields, error)
+      call history_close(self%history, second)
+      if (.not. allocated(error)) call move_alloc(second, error)
+   end subroutine recorder_close
+
+end module emcon_recorder

@@ -1,0 +1,48 @@
+!> Contact: which surfaces meet, and how that is computed.
+module emcon_interactions
+   use emcon_kinds, only : wp
+   use emcon_origin, only : origin_t
+   implicit none
+   private
+   public :: contact_pair_t, contact_options_t
+   public :: formulation_nts, formulation_segment, formulation_mortar
+   public :: integration_segments, integration_elements
+   public :: multiplier_standard, multiplier_dual
+   public :: normal_edge, normal_nodal, smoothing_none, smoothing_hermite
+
+   integer, parameter :: formulation_nts = 1, formulation_segment = 2, formulation_mortar = 3
+   integer, parameter :: integration_segments = 1, integration_elements = 2
+   integer, parameter :: multiplier_standard = 1, multiplier_dual = 2
+   integer, parameter :: normal_edge = 1, normal_nodal = 2
+   integer, parameter :: smoothing_none = 1, smoothing_hermite = 2
+
+   type :: contact_pair_t
+      type(origin_t) :: origin
+      integer :: slave = 0                           !! index into `scene_t%surface`
+      integer :: master = 0
+      integer :: formulation = formulation_nts
+      logical :: both_sides = .false.                !! nodes of both surfaces are held
+      logical :: is_reverse = .false.                !! the second half of a pair with both sides
+      logical :: may_choose = .false.                !! both sides or one, and which one
+      logical :: is_asked = .false.                  !! the deck says so, or which
+      logical :: is_exchanged = .false.              !! the deck names what is the master first
+      logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
+      real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
+      integer :: of_pair = 0                         !! of a guard: the pair that it watches
+      real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
+      integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
+   end type contact_pair_t
+
+   !> How the contact of a step is computed: *MORTAR and *SURFACE SMOOTHING.
+   type :: contact_options_t
+      integer :: integration = integration_segments
+      integer :: n_point = 0                         !! POINTS=; 0: not given
+      integer :: multiplier = multiplier_dual
+      integer :: normal = normal_nodal
+      integer :: smoothing = smoothing_none
+      !> Turns sharper than this are corners: normals are not averaged, surfaces not smoothed there
+      real(wp) :: normal_angle = 60.0_wp             !! [degrees]
+      real(wp) :: smoothing_angle = 60.0_wp          !! [degrees]
+   end type contact_options_t
+
+end module emcon_interactions

@@ -1,0 +1,28 @@
+!> Sets of nodes and elements, and surfaces.
+module emcon_mesh
+   use emcon_origin, only : origin_t
+   implicit none
+   private
+   public :: named_set_t, surface_t
+
+   !> A node set or an element set.
+   type :: named_set_t
+      character(len=:), allocatable :: name          !! upper case
+      type(origin_t) :: origin
+      integer, allocatable :: item(:)                !! ascending, distinct indices
+   end type named_set_t
+
+   !> A surface: element faces in the order of the deck, or nodes, or edges between nodes.
+   type :: surface_t
+      character(len=:), allocatable :: name
+      type(origin_t) :: origin
+      logical :: is_nodal = .false.
+      logical :: is_exterior = .false.               !! every free face that no tie covers
+      integer, allocatable :: element(:)             !! (n_face)
+      integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind
+      integer, allocatable :: node(:)                !! (n_node), only if `is_nodal`
+      !> (2, n_edge) first and last nodes, the body to the left; only of a surface of edges
+      integer, allocatable :: edge(:, :)
+   end type surface_t
+
+end module emcon_mesh

@@ -1,0 +1,71 @@
+!> The steps of a deck: procedure, conditions, and how they are solved.
+module emcon_steps
+   use emcon_interactions, only : contact_options_t
+   use emcon_kinds, only : wp
+   use emcon_origin, only : origin_t
+   use emcon_requests, only : output_t
+   implicit none
+   private
+   public :: prescribed_t, load_t, step_t
+   public :: load_point, load_pressure, load_gravity
+   public :: procedure_static, procedure_dynamic
+   public :: initiation_persistent, initiation_admissible, initiation_velocity_update
+   public :: method_null_space, method_saddle_point
+
+   integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3
+   integer, parameter :: procedure_static = 1, procedure_dynamic = 2
+   integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
+      initiation_velocity_update = 3
+   integer, parameter :: method_null_space = 1, method_saddle_point = 2
+
+   !> One prescribed degree of freedom: u = `value` times the amplitude.
+   !>
+   !> Without amplitude: in a static step u runs linearly from what it is at the start of the step
+   !> to `value` at its end; in a dynamic step it is `value` from the first increment on.
+   type :: prescribed_t
+      type(origin_t) :: origin
+      integer :: node = 0
+      integer :: dof = 0                             !! 1..n_dim
+      real(wp) :: value = 0.0_wp                     !! [L]
+      integer :: amplitude = 0                       !! index, 0: none
+      logical :: is_frozen = .false.                 !! FIXED: stays where the step found it
+   end type prescribed_t
+
+   !> One load. Without amplitude: `value`; in a static step a linear run from `value_start`.
+   type :: load_t
+      type(origin_t) :: origin
+      integer :: kind = 0                            !! one of `load_`
+      integer :: target = 0                          !! node (point) or element (pressure, gravity)
+      integer :: place = 0                           !! dof (point) or face (pressure)
+      real(wp) :: value = 0.0_wp                     !! force | pressure, > 0 inwards | acceleration
+      real(wp) :: value_start = 0.0_wp               !! its value at the end of the step before
+      real(wp) :: direction(3) = 0.0_wp              !! gravity: unit vector
+      integer :: amplitude = 0
+   end type load_t
+
+   type :: step_t
+      type(origin_t) :: origin
+      integer :: procedure = 0                       !! one of `procedure_`
+      logical :: nlgeom = .false.
+      integer :: max_increments = 0                  !! INC; 0: not limited
+      logical :: is_direct = .false.                 !! increments as given
+      real(wp) :: h = 1.0_wp                         !! first, or fixed, increment [T]
+      real(wp) :: duration = 1.0_wp                  !! [T]
+      real(wp) :: h_min = 0.0_wp                     !! 0: not given
+      real(wp) :: h_max = 0.0_wp                     !! 0: not given
+      integer :: constraint_method = method_null_space
+      integer :: initiation = initiation_persistent
+      real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
+      type(contact_options_t) :: contact
+      logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
+      integer :: overclosure_amplitude = 0           !! part that is left over time; 0: linear to 0
+      logical :: stabilizes = .false.                !! statics: what no load works on may be free
+      real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
+      integer :: newton_maximum = 20
+      integer :: restart_frequency = 0               !! 0: no restart file
+      type(prescribed_t), allocatable :: prescribed(:)   !! all that hold in this step
+      type(load_t), allocatable :: load(:)               !! all that act in this step
+      type(output_t), allocatable :: output(:)           !! all that hold in this step
+   end type step_t
+
+end module emcon_steps

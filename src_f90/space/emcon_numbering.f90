@@ -1,0 +1,334 @@
+!> Which degrees of freedom are unknowns, which are prescribed, and which follow from others.
+!>
+!> Every displacement is a sum over unknown and prescribed ones, u = T w with T constant: one term
+!> of weight 1, itself, or for a dependent freedom the terms that linear constraints give it.
+!> Source: docs/theory.md, section 11.
+module emcon_numbering
+   use emcon_csr, only : csr_t
+   use emcon_kinds, only : dp, hp, wp
+   use emcon_linear_rows, only : linear_rows_t
+   use emcon_row_elimination, only : elimination_add, elimination_begin, elimination_left, &
+      elimination_resolve, row_elimination_t, row_redundant
+   use emcon_sort, only : unique_sorted
+   use emcon_steps, only : prescribed_t
+   implicit none
+   private
+   public :: numbering_t, numbering_init, pick_unknowns, pick_magnitudes, add_to_dofs
+   public :: spread_dependent, gather_dependent, numbering_matrix, unresolved_t
+
+   type :: numbering_t
+      integer :: n_unknown = 0
+      integer, allocatable :: unknown(:, :)      !! (n_dim, n_node) 1..n_unknown; 0: another kind
+      integer, allocatable :: dof(:)             !! (n_unknown) place in an (n_dim, n_node) array
+      integer :: n_dependent = 0
+      integer, allocatable :: dependent(:)       !! (n_dependent) their places, ascending
+      ! The terms of each freedom, those of freedom d from start(d) + 1 to start(d + 1):
+      integer, allocatable :: start(:)           !! (degrees of freedom + 1)
+      integer, allocatable :: term(:)            !! place of an unknown or prescribed freedom
+      integer, allocatable :: column(:)          !! its unknown; 0: prescribed
+      real(wp), allocatable :: weight(:)
+   end type numbering_t
+
+   !> A constraint that could not be used: it follows from others. Where it leaves prescribed
+   !> freedoms with weights, these have to fulfil it.
+   type :: unresolved_t
+      integer :: row = 0                         !! of the linear rows
+      integer, allocatable :: dof(:)
+      real(wp), allocatable :: weight(:)
+   end type unresolved_t
+
+contains
+
+   !> Number all degrees of freedom that are alive and that `prescribed` does not name: what has
+   !> neither an element nor an equation stays where it is. With `linear`, one freedom for each of
+   !> its used rows becomes dependent; rows that follow from earlier ones go to `unresolved`.
+   subroutine numbering_init(self, is_alive, prescribed, linear, unresolved)
+      type(numbering_t), intent(out) :: self
+      logical, intent(in) :: is_alive(:, :)      !! (n_dim, n_node)
+      type(prescribed_t), intent(in) :: prescribed(:)
+      type(linear_rows_t), intent(in), optional :: linear
+      type(unresolved_t), allocatable, intent(out), optional :: unresolved(:)
+      integer, allocatable :: start(:), term(:)
+      real(hp), allocatable :: weight(:)
+      type(unresolved_t), allocatable :: rest(:)
+      integer :: k
+
+      allocate(self%unknown, source=merge(1, 0, is_alive))
+      do k = 1, size(prescribed)
+         self%unknown(prescribed(k)%dof, prescribed(k)%node) = 0
+      end do
+      allocate(self%dependent(0))
+      if (present(linear)) then
+         call eliminate(self, linear, start, term, weight, rest)
+         if (present(unresolved)) call move_alloc(rest, unresolved)
+      else
+         allocate(start(1), term(0), source=0)
+         allocate(weight(0))
+      end if
+      call number_unknowns(self)
+      call collect_terms(self, start, term, weight)
+   end subroutine numbering_init
+
+   !> Find the dependent freedoms and their terms. Unknowns so far are those marked 1.
+   subroutine eliminate(self, linear, start, term, weight, unresolved)
+      type(numbering_t), intent(inout) :: self
+      type(linear_rows_t), intent(in) :: linear
+      integer, allocatable, intent(out) :: start(:), term(:)    !! by dependent freedom
+      real(hp), allocatable, intent(out) :: weight(:)
+      type(unresolved_t), allocatable, intent(out) :: unresolved(:)
+      type(row_elimination_t) :: elimination
+      integer, allocatable :: present_dof(:), place(:), row(:), pivot(:)
+      integer :: k, n, n_free, fate, n_dim
+
+      n_dim = size(self%unknown, 1)
+      allocate(place(size(self%unknown)), source=0)
+      present_dof = unique_sorted(linear%dof(:linear%start(linear%n + 1)))
+      present_dof = [pack(present_dof, is_free(present_dof)), &
+         pack(present_dof, .not. is_free(present_dof))]
+      place(present_dof) = [(k, k = 1, size(present_dof))]
+      n_free = count(is_free(present_dof))
+      row = pack([(k, k = 1, linear%n)], linear%is_used)
+      call elimination_begin(elimination, size(row), size(present_dof), n_free)
+      allocate(unresolved(size(row)))
+      n = 0
+      do k = 1, size(row)
+         associate (from => linear%start(row(k)) + 1, to => linear%start(row(k) + 1))
+            call elimination_add(elimination, place(linear%dof(from:to)), &
+               real(linear%weight(from:to), hp), real(linear%weight(from:to), hp), &
+               place([linear%own(row(k))]), fate)
+         end associate
+         if (fate /= row_redundant) cycle
+         n = n + 1
+         unresolved(n)%row = row(k)
+         call note_left(unresolved(n))
+      end do
+      unresolved = unresolved(:n)
+      call elimination_resolve(elimination, start, term, weight)
+      term = present_dof(term)
+      pivot = elimination%pivot
+      call sort_rows
+
+   contains
+
+      elemental logical function is_free(dof)
+         integer, intent(in) :: dof
+
+         is_free = self%unknown(1 + mod(dof - 1, n_dim), 1 + (dof - 1)/n_dim) > 0
+      end function is_free
+
+      !> The prescribed freedoms that a redundant row is left with.
+      subroutine note_left(item)
+         type(unresolved_t), intent(inout) :: item
+         integer, allocatable :: column(:)
+         real(hp), allocatable :: value(:)
+
+         call elimination_left(elimination, column, value)
+         item%dof = present_dof(column)
+         item%weight = real(value, wp)
+      end subroutine note_left
+
+      !> Rows in the order of the dependent freedoms, which become known as such.
+      subroutine sort_rows
+         integer, allocatable :: owner(:), first(:), from(:)
+         integer :: d, i, j
+
+         allocate(owner(size(place)), source=0)
+         do i = 1, size(pivot)
+            if (pivot(i) > 0) owner(present_dof(pivot(i))) = i
+         end do
+         deallocate(self%dependent)
+         self%dependent = pack([(d, d = 1, size(owner))], owner > 0)
+         first = start
+         allocate(from(size(term)))
+         deallocate(start)
+         allocate(start(size(self%dependent) + 1), source=0)
+         do d = 1, size(self%dependent)
+            i = owner(self%dependent(d))
+            start(d + 1) = start(d) + first(i + 1) - first(i)
+            from(start(d) + 1:start(d + 1)) = [(j, j = first(i) + 1, first(i + 1))]
+            self%unknown(1 + mod(self%dependent(d) - 1, n_dim), &
+               1 + (self%dependent(d) - 1)/n_dim) = 0
+         end do
+         term = term(from)
+         weight = weight(from)
+      end subroutine sort_rows
+
+   end subroutine eliminate
+
+   !> Numbers for the freedoms marked as unknown, node by node.
+   pure subroutine number_unknowns(self)
+      type(numbering_t), intent(inout) :: self
+      integer :: i, a, k, n_dim
+
+      n_dim = size(self%unknown, 1)
+      self%n_unknown = sum(self%unknown)
+      allocate(self%dof(self%n_unknown))
+      k = 0
+      do i = 1, size(self%unknown, 2)
+         do a = 1, n_dim
+            if (self%unknown(a, i) == 0) cycle
+            k = k + 1
+            self%unknown(a, i) = k
+            self%dof(k) = a + n_dim*(i - 1)
+         end do
+      end do
+   end subroutine number_unknowns
+
+   !> The terms of all freedoms from those of the dependent ones.
+   pure subroutine collect_terms(self, start, term, weight)
+      type(numbering_t), intent(inout) :: self
+      integer, intent(in) :: start(:), term(:)       !! by dependent freedom
+      real(hp), intent(in) :: weight(:)
+      integer :: d, k, n, t, n_dim
+
+      n_dim = size(self%unknown, 1)
+      self%n_dependent = size(self%dependent)
+      n = size(self%unknown) - self%n_dependent + size(term)
+      allocate(self%start(size(self%unknown) + 1), self%term(n), self%column(n), source=0)
+      allocate(self%weight(n), source=1.0_wp)
+      k = 1
+      n = 0
+      do d = 1, size(self%unknown)
+         if (is_dependent(d, k)) then
+            do t = start(k) + 1, start(k + 1)
+               n = n + 1
+               self%term(n) = term(t)
+               self%weight(n) = real(weight(t), wp)
+            end do
+            k = k + 1
+         else
+            n = n + 1
+            self%term(n) = d
+         end if
+         self%start(d + 1) = n
+      end do
+      do t = 1, n
+         self%column(t) = self%unknown(1 + mod(self%term(t) - 1, n_dim), &
+            1 + (self%term(t) - 1)/n_dim)
+      end do
+
+   contains
+
+      pure logical function is_dependent(d, k)
+         integer, intent(in) :: d, k
+
+         is_dependent = k <= self%n_dependent
+         if (is_dependent) is_dependent = self%dependent(k) == d
+      end function is_dependent
+
+   end subroutine collect_terms
+
+   !> T^T field: the forces on the unknowns that the forces `field` on all freedoms amount to.
+   pure subroutine pick_unknowns(self, field, vector)
+      type(numbering_t), intent(in) :: self
+      real(wp), intent(in) :: field(size(self%start) - 1)    !! (n_dim, n_node)
+      real(wp), intent(out) :: vector(:)                     !! (n_unknown)
+
+      call pick(self, self%weight, field, vector)
+   end subroutine pick_unknowns
+
+   !> |T|^T field: the same for magnitudes, which do not cancel.
+   pure subroutine pick_magnitudes(self, field, vector)
+      type(numbering_t), intent(in) :: self
+      real(wp), intent(in) :: field(size(self%start) - 1)    !! (n_dim, n_node)
+      real(wp), intent(out) :: vector(:)                     !! (n_unknown)
+
+      call pick(self, abs(self%weight), field, vector)
+   end subroutine pick_magnitudes
+
+   pure subroutine pick(self, weight, field, vector)
+      type(numbering_t), intent(in) :: self
+      real(wp), intent(in) :: weight(:)                      !! (terms)
+      real(wp), intent(in) :: field(:)
+      real(wp), intent(out) :: vector(:)
+      integer :: k, t
+
+      do k = 1, self%n_unknown
+         vector(k) = field(self%dof(k))
+      end do
+      do k = 1, self%n_dependent
+         associate (d => self%dependent(k))
+            do t = self%start(d) + 1, self%start(d + 1)
+               if (self%column(t) == 0) cycle
+               vector(self%column(t)) = vector(self%column(t)) + weight(t)*field(d)
+            end do
+         end associate
+      end do
+   end subroutine pick
+
+   !> Add `factor` times T `vector` to `field`, whose dependent entries follow from the others
+   !> before and after.
+   pure subroutine add_to_dofs(self, vector, factor, field)
+      type(numbering_t), intent(in) :: self
+      real(wp), intent(in) :: vector(:)                      !! (n_unknown)
+      real(wp), intent(in) :: factor
+      real(wp), intent(inout) :: field(size(self%start) - 1) !! (n_dim, n_node)
+      integer :: k
+
+      do k = 1, self%n_unknown
+         field(self%dof(k)) = field(self%dof(k)) + factor*vector(k)
+      end do
+      call spread_dependent(self, field)
+   end subroutine add_to_dofs
+
+   !> T as a matrix: a row for each of the degrees of freedom `dof`, a column for each unknown.
+   pure subroutine numbering_matrix(self, dof, matrix)
+      type(numbering_t), intent(in) :: self
+      integer, intent(in) :: dof(:)                          !! places in an (n_dim, n_node) array
+      type(csr_t), intent(out) :: matrix                     !! (size of dof x n_unknown)
+      integer :: i, t, n
+
+      matrix%n_row = size(dof)
+      matrix%n_col = self%n_unknown
+      allocate(matrix%row_start(size(dof) + 1), source=0)
+      n = sum(self%start(dof + 1) - self%start(dof))
+      allocate(matrix%column(n), matrix%value(n))
+      n = 0
+      do i = 1, size(dof)
+         do t = self%start(dof(i)) + 1, self%start(dof(i) + 1)
+            if (self%column(t) == 0) cycle
+            n = n + 1
+            matrix%column(n) = self%column(t) - 1
+            matrix%value(n) = real(self%weight(t), dp)
+         end do
+         matrix%row_start(i + 1) = n
+      end do
+      matrix%column = matrix%column(:n)
+      matrix%value = matrix%value(:n)
+   end subroutine numbering_matrix
+
+   !> Dependent entries of a displacement or velocity from those that they follow.
+   pure subroutine spread_dependent(self, field)
+      type(numbering_t), intent(in) :: self
+      real(wp), intent(inout) :: field(size(self%start) - 1) !! (n_dim, n_node)
+      real(wp) :: total
+      integer :: k, t
+
+      do k = 1, self%n_dependent
+         associate (d => self%dependent(k))
+            total = 0.0_wp
+            do t = self%start(d) + 1, self%start(d + 1)
+               total = total + self%weight(t)*field(self%term(t))
+            end do
+            field(d) = total
+         end associate
+      end do
+   end subroutine spread_dependent
+
+   !> Dependent entries of a force go to the freedoms that they follow.
+   pure subroutine gather_dependent(self, field)
+      type(numbering_t), intent(in) :: self
+      real(wp), intent(inout) :: field(size(self%start) - 1) !! (n_dim, n_node)
+      integer :: k, t
+
+      do k = 1, self%n_dependent
+         associate (d => self%dependent(k))
+            do t = self%start(d) + 1, self%start(d + 1)
+               field(self%term(t)) = field(self%term(t)) + self%weight(t)*field(d)
+            end do
+            field(d) = 0.0_wp
+         end associate
+      end do
+   end subroutine gather_dependent
+
+end module emcon_numbering

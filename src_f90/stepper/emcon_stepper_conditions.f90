@@ -1,0 +1,317 @@
+!> Loads and boundary conditions changed between steps.
+!>
+!> Changes hold for the present step of the deck. With an amplitude a value is what the amplitude is
+!> multiplied by. Without one, the linear runs of a static step go on from where they are to the new
+!> value at the end of the step; in a dynamic step it holds from the next step on.
+module emcon_stepper_conditions
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_loads, only : instant_t, prescribed_motion
+   use emcon_march, only : march_renumber
+   use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
+   use emcon_scene, only : scene_t
+   use emcon_state, only : state_t
+   use emcon_stepper, only : stepper_t
+   use emcon_stepper_free, only : stepper_check_open
+   use emcon_steps, only : load_gravity, load_point, prescribed_t, procedure_static, step_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: stepper_find_load, stepper_set_load
+   public :: stepper_set_prescribed, stepper_add_prescribed, stepper_remove_prescribed
+   public :: conditions_save, conditions_load
+
+contains
+
+   !> Number of the load of this kind in the present step: on degree of freedom `place` of node
+   !> `label` (`load_point`), on face `place` of element `label` (`load_pressure`), or on element
+   !> `label` (`load_gravity`). Of several the first.
+   subroutine stepper_find_load(self, kind, label, place, i, error)
+      type(stepper_t), intent(in) :: self
+      integer, intent(in) :: kind                    !! one of `load_`
+      integer, intent(in) :: label                   !! as in the deck
+      integer, intent(in) :: place                   !! not looked at for gravity
+      integer, intent(out) :: i
+      type(error_t), allocatable, intent(out) :: error
+      integer :: target
+
+      i = 0
+      call stepper_check_open(self, error)
+      if (allocated(error)) return
+      if (kind == load_point) then
+         target = findloc(self%scene%node_label, label, 1)
+      else
+         target = findloc(self%scene%element_label, label, 1)
+      end if
+      associate (load => self%scene%step(self%march%state%i_step)%load)
+         if (target > 0) i = findloc(load%kind == kind .and. load%target == target &
+            .and. (load%place == place .or. kind == load_gravity), .true., 1)
+      end associate
+      if (i > 0) return
+      call raise(error, err_input, "there is no load of this kind on " // &
+         trim(merge("node   ", "element", kind == load_point)) // " " // to_text(label) // &
+         " in step " // to_text(self%march%state%i_step) // " of the deck; what is to be " // &
+         "changed has to stand there, if only with the value 0")
+   end subroutine stepper_find_load
+
+   !> Give load `i` of the present step the value `value`.
+   subroutine stepper_set_load(self, i, value, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: i                       !! 1..number of loads of the step
+      real(wp), intent(in) :: value                  !! force | pressure | acceleration
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: part, present_value
+
+      call stepper_check_open(self, error)
+      if (.not. allocated(error)) call check_value(value, error)
+      if (allocated(error)) return
+      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+         if (i < 1 .or. i > size(step%load)) then
+            call raise(error, err_input, "there is no load " // to_text(i) // ": step " // &
+               to_text(state%i_step) // " of the deck has " // to_text(size(step%load)))
+            return
+         end if
+         associate (load => step%load(i))
+            part = part_passed(step, state)
+            if (step%procedure == procedure_static .and. part < 1.0_wp) then
+               present_value = load%value_start + (load%value - load%value_start)*part
+               load%value_start = run_start(present_value, value, part)
+            end if
+            load%value = value
+            self%march%system%loads%load(i) = load
+         end associate
+      end associate
+   end subroutine stepper_set_load
+
+   !> Give the boundary condition on degree of freedom `dof` of node `label` the value `value`.
+   !> One that is FIXED runs to it from where it is.
+   subroutine stepper_set_prescribed(self, label, dof, value, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: label                   !! of the node, as in the deck
+      integer, intent(in) :: dof                     !! 1, 2
+      real(wp), intent(in) :: value                  !! [L]
+      type(error_t), allocatable, intent(out) :: error
+      type(instant_t) :: now
+      real(wp) :: u, v
+      integer :: node, k
+
+      call find_prescribed(self, label, dof, node, k, error)
+      if (.not. allocated(error)) call check_value(value, error)
+      if (allocated(error)) return
+      if (k == 0) then
+         call refuse_freedom(error, label, dof, "is not prescribed")
+         return
+      end if
+      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+         now = instant_t(state%step_time, state%time)
+         call prescribed_motion(self%scene, step, step%prescribed(k), now, &
+            state%u_start(dof, node), u, v)
+         call start_run(step, state, step%prescribed(k), value, u)
+         step%prescribed(k)%value = value
+         step%prescribed(k)%is_frozen = .false.
+      end associate
+   end subroutine stepper_set_prescribed
+
+   !> Prescribe the displacement of a degree of freedom that was free. The unknowns are numbered
+   !> anew, the state stays.
+   subroutine stepper_add_prescribed(self, label, dof, value, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: label                   !! of the node, as in the deck
+      integer, intent(in) :: dof                     !! 1, 2
+      real(wp), intent(in) :: value                  !! [L]
+      type(error_t), allocatable, intent(out) :: error
+      type(prescribed_t) :: added
+      type(prescribed_t), allocatable :: list(:)
+      real(wp) :: u_start
+      integer :: node, k
+
+      call find_prescribed(self, label, dof, node, k, error)
+      if (.not. allocated(error)) call check_value(value, error)
+      if (allocated(error)) return
+      if (k > 0) then
+         call refuse_freedom(error, label, dof, "is prescribed already")
+         return
+      end if
+      added%node = node
+      added%dof = dof
+      added%value = value
+      u_start = self%march%state%u_start(dof, node)
+      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+         call start_run(step, state, added, value, state%u(dof, node))
+         allocate(list(size(step%prescribed) + 1))
+         list(:size(step%prescribed)) = step%prescribed
+         list(size(list)) = added
+      end associate
+      call renumber(self, list, error)
+      if (allocated(error)) self%march%state%u_start(dof, node) = u_start
+   end subroutine stepper_add_prescribed
+
+   !> Set a prescribed degree of freedom free. The unknowns are numbered anew, the state stays.
+   subroutine stepper_remove_prescribed(self, label, dof, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: label                   !! of the node, as in the deck
+      integer, intent(in) :: dof                     !! 1, 2
+      type(error_t), allocatable, intent(out) :: error
+      type(prescribed_t), allocatable :: list(:)
+      integer :: node, k, i
+
+      call find_prescribed(self, label, dof, node, k, error)
+      if (allocated(error)) return
+      if (k == 0) then
+         call refuse_freedom(error, label, dof, "is not prescribed")
+         return
+      end if
+      associate (all_of => self%scene%step(self%march%state%i_step)%prescribed)
+         list = pack(all_of, [(i /= k, i = 1, size(all_of))])
+      end associate
+      call renumber(self, list, error)
+      if (.not. allocated(error)) self%march%state%reaction(dof, node) = 0.0_wp
+   end subroutine stepper_remove_prescribed
+
+   !> Let `list` be the boundary conditions of the present step; on an error nothing changes.
+   subroutine renumber(self, list, error)
+      type(stepper_t), intent(inout) :: self
+      type(prescribed_t), allocatable, intent(inout) :: list(:)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: ignored
+      type(prescribed_t), allocatable :: before(:)
+
+      associate (step => self%scene%step(self%march%state%i_step))
+         call move_alloc(step%prescribed, before)
+         call move_alloc(list, step%prescribed)
+         call march_renumber(self%march, self%scene, error)
+         if (.not. allocated(error)) return
+         deallocate(step%prescribed)
+         call move_alloc(before, step%prescribed)
+      end associate
+      call march_renumber(self%march, self%scene, ignored)
+   end subroutine renumber
+
+   !> Put the conditions of the present step, and where in it the state is, into `restart`: what
+   !> `stepper_save` takes from the deck and its grid.
+   subroutine conditions_save(self, restart)
+      type(stepper_t), intent(in) :: self
+      type(restart_t), intent(inout) :: restart
+
+      if (.not. allocated(self%march%scheme)) return
+      associate (state => self%march%state, list => self%scene%step(self%march%state%i_step) &
+            %prescribed, load => self%scene%step(self%march%state%i_step)%load)
+         call restart_put(restart, "step_time", [state%step_time])
+         call restart_put(restart, "is_off_grid", [merge(1, 0, state%is_off_grid)])
+         call restart_put(restart, "prescribed_place", [list%node, list%dof, list%amplitude, &
+            merge(1, 0, list%is_frozen)])
+         call restart_put(restart, "prescribed_value", list%value)
+         call restart_put(restart, "load_value", [load%value, load%value_start])
+      end associate
+   end subroutine conditions_save
+
+   !> Take over what `conditions_save` has put into `restart`, after `stepper_load`. Nothing is done
+   !> for a restart file of the program, which changes no conditions.
+   subroutine conditions_load(self, restart, error)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(in) :: restart
+      type(error_t), allocatable, intent(out) :: error
+      type(prescribed_t), allocatable :: list(:)
+      real(wp), allocatable :: value(:)
+      real(wp) :: step_time(1)
+      integer, allocatable :: place(:, :), flat(:)
+      integer :: off(1), n
+
+      if (restart_size(restart, "step_time") < 0) return
+      call stepper_check_open(self, error)
+      if (allocated(error)) return
+      n = max(0, restart_size(restart, "prescribed_value"))
+      associate (step => self%scene%step(self%march%state%i_step), state => self%march%state)
+         allocate(list(n), flat(4*n), value(2*size(step%load)))
+         call restart_get(restart, "step_time", step_time, error)
+         if (.not. allocated(error)) call restart_get(restart, "is_off_grid", off, error)
+         if (.not. allocated(error)) call restart_get(restart, "load_value", value, error)
+         if (.not. allocated(error)) call restart_get(restart, "prescribed_place", flat, error)
+         if (.not. allocated(error)) call restart_get(restart, "prescribed_value", list%value, &
+            error)
+         if (allocated(error)) return
+         state%step_time = step_time(1)
+         state%is_off_grid = off(1) == 1
+         step%load%value = value(:size(step%load))
+         step%load%value_start = value(size(step%load) + 1:)
+         allocate(place, source=reshape(flat, [n, 4]))
+         list%node = place(:, 1)
+         list%dof = place(:, 2)
+         list%amplitude = place(:, 3)
+         list%is_frozen = place(:, 4) == 1
+      end associate
+      call renumber(self, list, error)
+   end subroutine conditions_load
+
+   !> The node of label `label`, and the condition on its degree of freedom `dof`; 0: it is free.
+   subroutine find_prescribed(self, label, dof, node, k, error)
+      type(stepper_t), intent(in) :: self
+      integer, intent(in) :: label, dof
+      integer, intent(out) :: node, k
+      type(error_t), allocatable, intent(out) :: error
+
+      k = 0
+      node = 0
+      call stepper_check_open(self, error)
+      if (allocated(error)) return
+      node = findloc(self%scene%node_label, label, 1)
+      if (node == 0) then
+         call raise(error, err_input, "there is no node " // to_text(label))
+      else if (dof < 1 .or. dof > self%scene%n_dim) then
+         call raise(error, err_input, "a node has the degrees of freedom 1 to " // &
+            to_text(self%scene%n_dim) // ", not " // to_text(dof))
+      else
+         associate (list => self%scene%step(self%march%state%i_step)%prescribed)
+            k = findloc(list%node == node .and. list%dof == dof, .true., 1)
+         end associate
+      end if
+   end subroutine find_prescribed
+
+   !> Let the linear run of a condition in a static step go from `u`, where it is now, to `value`.
+   pure subroutine start_run(step, state, prescribed, value, u)
+      type(step_t), intent(in) :: step
+      type(state_t), intent(inout) :: state
+      type(prescribed_t), intent(in) :: prescribed
+      real(wp), intent(in) :: value, u
+      real(wp) :: part
+
+      part = part_passed(step, state)
+      if (step%procedure /= procedure_static .or. prescribed%amplitude > 0) return
+      if (part < 1.0_wp) state%u_start(prescribed%dof, prescribed%node) = run_start(u, value, part)
+   end subroutine start_run
+
+   !> Where a run to `value` begins that has come to `now` after `part` < 1 of the step.
+   pure real(wp) function run_start(now, value, part)
+      real(wp), intent(in) :: now, value, part
+
+      run_start = now
+      if (part > 0.0_wp) run_start = (now - value*part)/(1.0_wp - part)
+   end function run_start
+
+   !> Part of the step of the deck that has passed: 0..1.
+   pure real(wp) function part_passed(step, state)
+      type(step_t), intent(in) :: step
+      type(state_t), intent(in) :: state
+
+      part_passed = min(1.0_wp, state%step_time/step%duration)
+   end function part_passed
+
+   subroutine check_value(value, error)
+      real(wp), intent(in) :: value
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. ieee_is_finite(value)) call raise(error, err_input, "the value is not finite")
+   end subroutine check_value
+
+   !> An input error: "degree of freedom 1 of node 7 is not prescribed", or what else it is.
+   pure subroutine refuse_freedom(error, label, dof, what)
+      type(error_t), allocatable, intent(out) :: error
+      integer, intent(in) :: label, dof
+      character(len=*), intent(in) :: what
+
+      call raise(error, err_input, "degree of freedom " // to_text(dof) // " of node " &
+         // to_text(label) // " " // what)
+   end subroutine refuse_freedom
+
+end module emcon_stepper_conditions

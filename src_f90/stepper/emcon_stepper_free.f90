@@ -1,0 +1,305 @@
+!> Steps of any size, and the state in and out: what scripts need beyond the grid of the deck.
+!>
+!> The state is read from `stepper%march%state`, energies and momenta from `stepper%march%ledger`.
+module emcon_stepper_free
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_measure, ledger_t
+   use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
+      march_set_time
+   use emcon_march_step, only : follow_links
+   use emcon_pair_record, only : pair_record_init
+   use emcon_state, only : state_t
+   use emcon_stepper, only : stepper_t
+   use emcon_steps, only : procedure_static
+   use emcon_system, only : pose_t, system_check_response, system_respond
+   use emcon_text, only : to_text
+   use emcon_verdict, only : verdict_move, verdict_t, verdict_update
+   implicit none
+   private
+   public :: stepper_step, stepper_next_step, stepper_set_state
+   public :: snapshot_t, stepper_snapshot, stepper_restore, stepper_check_open
+
+   !> Smaller than this part of the time that has passed in the step of the deck, no step is made:
+   !> time would not tell it from its start.
+   real(wp), parameter :: least_step = 1.0e4_wp*epsilon(1.0_wp)
+
+   !> A state to come back to: all that the next step depends on but the conditions of the step.
+   type :: snapshot_t
+      logical :: is_taken = .false.
+      type(state_t) :: state
+      type(ledger_t) :: ledger
+      type(verdict_t) :: verdict
+   end type snapshot_t
+
+contains
+
+   !> One step of the size `h` under the conditions of the present step of the deck, cut into parts
+   !> where it fails. It may end anywhere, also after the end of the deck's step: amplitudes and
+   !> linear runs keep their last value there. `stepper_advance` goes on from points of the deck's
+   !> grid only; a step that ends at one to within the rounding of time ends at it exactly. On an
+   !> error the state is that before the call.
+   subroutine stepper_step(self, h, increment, error)
+      type(stepper_t), intent(inout) :: self
+      real(wp), intent(in) :: h                      !! > 0 [T]
+      type(increment_t), intent(out) :: increment
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_check_open(self, error)
+      if (allocated(error)) return
+      if (.not. ieee_is_finite(h)) then
+         call raise(error, err_input, "a step needs a size h > 0 that is finite")
+      else if (.not. h > least_step*self%march%state%step_time) then
+         call raise(error, err_input, "a step needs a size h > 0 that time " // &
+            to_text(self%march%state%time) // " can tell, not " // to_text(h))
+      end if
+      if (allocated(error)) return
+      call march_free_increment(self%march, self%scene, h, increment, error)
+      if (.not. allocated(error)) call verdict_update(self%verdict, self%scene, self%march, &
+         increment)
+   end subroutine stepper_step
+
+   !> Begin the next step of the deck at the present time, wherever that is.
+   subroutine stepper_next_step(self, error)
+      type(stepper_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error   !! the present step goes on
+      type(error_t), allocatable :: ignored
+      type(snapshot_t) :: before
+
+      call stepper_check_open(self, error)
+      if (allocated(error)) return
+      if (self%march%state%i_step >= size(self%scene%step)) then
+         call raise(error, err_input, "step " // to_text(self%march%state%i_step) // &
+            " is the last one of the deck")
+         return
+      end if
+      call stepper_snapshot(self, before)
+      call march_begin_step(self%march, self%scene, self%march%state%i_step + 1, error)
+      if (.not. allocated(error)) return
+      self%march%state = before%state
+      call march_resume(self%march, self%scene, ignored)
+      self%march%state = before%state
+      self%march%ledger = before%ledger
+   end subroutine stepper_next_step
+
+   !> There is a model to work with.
+   subroutine stepper_check_open(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. allocated(self%march%scheme)) call raise(error, err_input, &
+         "there is no model: no deck was opened, or opening it failed")
+   end subroutine stepper_check_open
+
+   !> Put the given parts of the state in place of the present ones; on an error nothing changes.
+   !> Dependent nodes of ties and equations follow the others. Energies and momenta are measured
+   !> anew, the works stand. With `u` the forces of the last step are forgotten: contact forces,
+   !> reactions and what the pairs transmit are zero until the next step.
+   subroutine stepper_set_state(self, error, u, v, lam, is_active, time)
+      type(stepper_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: u(:, :)      !! (2, n_node) [L]
+      real(wp), intent(in), optional :: v(:, :)      !! (2, n_node) [L/T]; 0 in statics
+      !> (n_constraint) contact forces, 0 where a constraint does not act [M L/T^2]
+      real(wp), intent(in), optional :: lam(:)
+      logical, intent(in), optional :: is_active(:)  !! (n_constraint) what acted in the last step
+      real(wp), intent(in), optional :: time         !! total, not before the step's start [T]
+      type(state_t) :: next
+      type(ledger_t) :: before
+
+      call stepper_check_open(self, error)
+      if (allocated(error)) return
+      next = self%march%state
+      before = self%march%ledger
+      if (present(u)) call take_field(self, u, "u", next%u, error)
+      if (allocated(error)) return
+      if (present(v)) call take_field(self, v, "v", next%v, error)
+      if (allocated(error)) return
+      call take_contact(next, lam, is_active, error)
+      if (allocated(error)) return
+      call check_motion(self, next%v, error, time)
+      if (allocated(error)) return
+      if (present(u)) call measure_rest(self, next, error)
+      if (allocated(error)) return
+      self%march%state = next
+      call forget_searches(self)
+      if (present(time)) call march_set_time(self%march, self%scene, &
+         time - self%march%state%start_time)
+      call ledger_measure(self%march%ledger, self%march%system, self%scene%x, self%march%state)
+      call verdict_move(self%verdict, before, self%march%ledger)
+   end subroutine stepper_set_state
+
+   !> Take over a nodal field called `name`.
+   subroutine take_field(self, given, name, field, error)
+      type(stepper_t), intent(in) :: self
+      real(wp), intent(in) :: given(:, :)
+      character(len=*), intent(in) :: name
+      real(wp), intent(inout), contiguous :: field(:, :)     !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      if (any(shape(given) /= shape(field))) then
+         call raise(error, err_input, name // " is to have 2 components at each of " // &
+            to_text(size(field, 2)) // " nodes, not " // to_text(size(given, 1)) // " at " // &
+            to_text(size(given, 2)))
+         return
+      end if
+      do i = 1, size(given, 2)
+         if (all(ieee_is_finite(given(:, i)))) cycle
+         call raise(error, err_input, name // " is not finite at node " // &
+            to_text(self%scene%node_label(i)))
+         return
+      end do
+      field = given
+      call follow_links(self%march%system, field)
+   end subroutine take_field
+
+   !> Take over which constraints act, and their multipliers.
+   subroutine take_contact(next, lam, is_active, error)
+      type(state_t), intent(inout) :: next
+      real(wp), intent(in), optional :: lam(:)
+      logical, intent(in), optional :: is_active(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      if (present(is_active)) then
+         call check_size("the active set", size(is_active), size(next%lam), error)
+         if (allocated(error)) return
+         next%is_active = is_active
+         where (.not. is_active) next%lam = 0.0_wp
+      end if
+      if (.not. present(lam)) return
+      call check_size("lam", size(lam), size(next%lam), error)
+      if (allocated(error)) return
+      if (.not. all(ieee_is_finite(lam))) then
+         call raise(error, err_input, "lam is not finite")
+      else if (any(abs(lam) > 0.0_wp .and. .not. next%is_active)) then
+         call raise(error, err_input, "lam is not 0 at constraint " // &
+            to_text(findloc(abs(lam) > 0.0_wp .and. .not. next%is_active, .true., 1)) // &
+            ", which does not act")
+      else
+         next%lam = lam
+      end if
+   end subroutine take_contact
+
+   subroutine check_size(name, n, expected, error)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: n, expected
+      type(error_t), allocatable, intent(out) :: error
+
+      if (n /= expected) call raise(error, err_input, name // " is to have " // &
+         to_text(expected) // " entries, one for each possible constraint, not " // to_text(n))
+   end subroutine check_size
+
+   !> Velocities and time have to fit the present step of the deck.
+   subroutine check_motion(self, v, error, time)
+      type(stepper_t), intent(in) :: self
+      real(wp), intent(in) :: v(:, :)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: time
+
+      associate (state => self%march%state)
+         if (self%scene%step(state%i_step)%procedure == procedure_static &
+            .and. any(abs(v) > 0.0_wp)) then
+            call raise(error, err_input, "step " // to_text(state%i_step) // &
+               " of the deck is static: there are no velocities")
+            return
+         end if
+         if (.not. present(time)) return
+         if (.not. ieee_is_finite(time)) then
+            call raise(error, err_input, "the time is not finite")
+         else if (time < state%start_time) then
+            call raise(error, err_input, "time " // to_text(time) // " is before the start of " // &
+               "step " // to_text(state%i_step) // " of the deck, " // to_text(state%start_time))
+         end if
+      end associate
+   end subroutine check_motion
+
+   !> Internal forces and strain energy at the displacement of `next`, which no step has led to.
+   subroutine measure_rest(self, next, error)
+      type(stepper_t), intent(inout) :: self
+      type(state_t), intent(inout) :: next
+      type(error_t), allocatable, intent(out) :: error
+      type(pose_t) :: rest
+
+      rest%is_end = .true.
+      associate (system => self%march%system)
+         call system_respond(system, self%scene, rest, next%u, next%v, system%zero, system%zero, &
+            .false.)
+         call system_check_response(system, "u", error)
+         if (allocated(error)) return
+         next%internal = system%response%force
+         next%energy = system%response%energy
+         next%potential = system%potential
+         next%contact = 0.0_wp
+         next%reaction = 0.0_wp
+         call pair_record_init(next%pairs, system)
+      end associate
+   end subroutine measure_rest
+
+   !> The next step searches for contact anew.
+   subroutine forget_searches(self)
+      type(stepper_t), intent(inout) :: self
+      integer :: pair
+
+      do pair = 1, size(self%march%system%contact)
+         self%march%system%contact(pair)%contact%reach = 0.0_wp
+      end do
+   end subroutine forget_searches
+
+   !> Keep the present state in `snapshot`.
+   subroutine stepper_snapshot(self, snapshot)
+      type(stepper_t), intent(in) :: self
+      type(snapshot_t), intent(out) :: snapshot
+
+      snapshot%is_taken = allocated(self%march%scheme)
+      snapshot%state = self%march%state
+      snapshot%ledger = self%march%ledger
+      snapshot%verdict = self%verdict
+   end subroutine stepper_snapshot
+
+   !> Go back, or forward, to the state in `snapshot`: what follows has the same bits. The step of
+   !> the deck is the one of the snapshot, with the loads and boundary values that it has now.
+   subroutine stepper_restore(self, snapshot, error)
+      type(stepper_t), intent(inout) :: self
+      type(snapshot_t), intent(in) :: snapshot
+      type(error_t), allocatable, intent(out) :: error   !! the present state stays
+      type(error_t), allocatable :: ignored
+      type(snapshot_t) :: before
+
+      call stepper_check_open(self, error)
+      if (allocated(error)) return
+      if (.not. fits(self%march%state, snapshot)) then
+         call raise(error, err_input, "this state was not taken from this model")
+         return
+      end if
+      call stepper_snapshot(self, before)
+      self%march%state = snapshot%state
+      if (snapshot%state%i_step /= before%state%i_step) then
+         call march_resume(self%march, self%scene, error)
+         if (allocated(error)) then
+            self%march%state = before%state
+            call march_resume(self%march, self%scene, ignored)
+            self%march%state = before%state
+            self%march%ledger = before%ledger
+            return
+         end if
+         self%march%state = snapshot%state
+      end if
+      self%march%ledger = snapshot%ledger
+      self%verdict = snapshot%verdict
+      call forget_searches(self)
+   end subroutine stepper_restore
+
+   !> Is the snapshot of a model of the same size as that of `state`?
+   pure logical function fits(state, snapshot)
+      type(state_t), intent(in) :: state
+      type(snapshot_t), intent(in) :: snapshot
+
+      fits = snapshot%is_taken
+      if (fits) fits = size(snapshot%state%u) == size(state%u) &
+         .and. size(snapshot%state%lam) == size(state%lam) &
+         .and. size(snapshot%state%energy) == size(state%energy)
+   end function fits
+
+end module emcon_stepper_free

@@ -1,0 +1,118 @@
+!> What a program gives to a model between reading its deck and building it: laws, forces, mass.
+!>
+!> Copies are kept, also for a restart file that is loaded afterwards. Nodes that stand in no
+!> element are part of the model where they are given something. Gravity acts on the mass of
+!> elements only: the weight of given mass is for the giver to add.
+module emcon_stepper_given
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_given, only : given_add_force, given_add_law
+   use emcon_given_check, only : given_check_force, given_check_mass
+   use emcon_given_force, only : given_force_t
+   use emcon_materials, only : law_given
+   use emcon_node_potential, only : node_potential_init, node_potential_t
+   use emcon_point_function, only : point_function_t
+   use emcon_scene, only : where_text
+   use emcon_stepper, only : stepper_t
+   use emcon_text, only : to_upper
+   implicit none
+   private
+   public :: stepper_give_law, stepper_give_potential, stepper_give_force, stepper_give_mass
+
+contains
+
+   !> Give the strain energy of the *USER MATERIAL called `name`: W(E11, E22, 2 E12) per reference
+   !> volume [M/(L T^2)].
+   subroutine stepper_give_law(self, name, energy, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name           !! small or capital letters
+      class(point_function_t), intent(in) :: energy
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+      character(len=:), allocatable :: material
+
+      material = to_upper(trim(adjustl(name)))
+      call check_stage(self, error)
+      if (.not. allocated(error)) call check_material(self, material, error)
+      if (.not. allocated(error)) call given_add_law(self%given, material, energy)
+   end subroutine stepper_give_law
+
+   !> Can a law be given for the material `name`?
+   subroutine check_material(self, name, error)
+      type(stepper_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, k
+
+      k = 0
+      do i = 1, size(self%scene%material)
+         if (self%scene%material(i)%name == name) k = i
+      end do
+      if (k == 0) then
+         call raise(error, err_input, "there is no material " // name // " in the deck")
+      else if (self%scene%material(k)%law /= law_given) then
+         call raise(error, err_input, "material " // name // " (" // where_text(self%scene, &
+            self%scene%material(k)%origin) // ") has a law of its own: to give one, it has to be " &
+            // "a *USER MATERIAL")
+      else if (allocated(self%given%law)) then
+         do i = 1, size(self%given%law)
+            if (self%given%law(i)%material == name) call raise(error, err_input, &
+               "the law of material " // name // " is given already")
+         end do
+      end if
+   end subroutine check_material
+
+   !> Give a potential V(x, y) [M L^2/T^2] of the present position of each of some nodes.
+   subroutine stepper_give_potential(self, name, node, potential, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name           !! for messages
+      integer, intent(in) :: node(:)                 !! 1..n_node, each once
+      class(point_function_t), intent(in) :: potential
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+      type(node_potential_t) :: force
+
+      call check_stage(self, error)
+      if (.not. allocated(error)) call node_potential_init(force, name, node, &
+         size(self%scene%x, 2), potential, error)
+      if (.not. allocated(error)) call given_add_force(self%given, force)
+   end subroutine stepper_give_potential
+
+   !> Give forces between nodes. Those of several calls add up.
+   subroutine stepper_give_force(self, force, error)
+      type(stepper_t), intent(inout) :: self
+      class(given_force_t), intent(in) :: force
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+
+      call check_stage(self, error)
+      if (.not. allocated(error)) call given_check_force(force, size(self%scene%x, 2), error)
+      if (.not. allocated(error)) call given_add_force(self%given, force)
+   end subroutine stepper_give_force
+
+   !> Give a mass beside that of the elements, the same in both directions: symmetric, and no mass
+   !> negative.
+   subroutine stepper_give_mass(self, mass, error)
+      type(stepper_t), intent(inout) :: self
+      type(csr_t), intent(in) :: mass                    !! (n_node x n_node) [M]
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+
+      call check_stage(self, error)
+      if (allocated(error)) return
+      if (self%given%mass%n_row > 0) call raise(error, err_input, &
+         "a mass was given already; give one matrix with all of it")
+      if (.not. allocated(error)) call given_check_mass(mass, self%scene, error)
+      if (.not. allocated(error)) self%given%mass = mass
+   end subroutine stepper_give_mass
+
+   !> The deck is read, the model is not built.
+   subroutine check_stage(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (allocated(self%march%scheme)) then
+         call raise(error, err_input, "laws, forces and mass are given before the model is built")
+      else if (.not. self%is_read) then
+         call raise(error, err_input, "there is no scene to give anything to: no deck was read, " &
+            // "or reading it failed")
+      end if
+   end subroutine check_stage
+
+end module emcon_stepper_given

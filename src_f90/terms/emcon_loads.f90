@@ -1,0 +1,206 @@
+!> Loads and prescribed motion of one step, as functions of time and configuration.
+module emcon_loads
+   use emcon_amplitudes, only : find_amplitude_value
+   use emcon_csr, only : csr_t
+   use emcon_element_kinds, only : element_kinds
+   use emcon_kinds, only : dp, wp
+   use emcon_numbering, only : numbering_t
+   use emcon_reduction, only : freedom_numbers, reduction_slot, reduction_t
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
+   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t, &
+      procedure_static, step_t
+   implicit none
+   private
+   public :: instant_t, loads_t, loads_init, loads_add, prescribed_motion
+
+   !> A moment of a step, as amplitudes see it.
+   type :: instant_t
+      real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
+      real(wp) :: total_time = 0.0_wp            !! since the start of the analysis [T]
+   end type instant_t
+
+   type :: loads_t
+      integer :: n = 0
+      type(load_t), allocatable :: load(:)
+      integer, allocatable :: edge(:, :)         !! (2, n) nodes of a loaded edge, else 0
+      integer, allocatable :: slot(:, :)         !! (16, n) entries of the pressure stiffness
+      logical :: has_pressure = .false.
+      logical :: is_ramped = .false.             !! static: without amplitude, linear over the step
+      logical :: nlgeom = .false.
+      real(wp) :: duration = 1.0_wp
+   end type loads_t
+
+contains
+
+   !> The loads of `step`; `matrix` is the pattern that pressure stiffness goes into.
+   subroutine loads_init(self, scene, step, numbering, matrix, reduction)
+      type(loads_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(numbering_t), intent(in) :: numbering
+      type(csr_t), intent(in) :: matrix
+      type(reduction_t), intent(in) :: reduction
+      integer, allocatable :: number(:)
+      integer :: i, e, dofs(4), j, k
+
+      self%load = step%load
+      self%n = size(step%load)
+      self%has_pressure = any(step%load%kind == load_pressure)
+      self%is_ramped = step%procedure == procedure_static
+      self%nlgeom = step%nlgeom
+      self%duration = step%duration
+      allocate(self%edge(2, self%n), source=0)
+      allocate(self%slot(16, self%n), source=0)
+      allocate(number, source=freedom_numbers(numbering))
+      do i = 1, self%n
+         if (self%load(i)%kind /= load_pressure) cycle
+         e = self%load(i)%target
+         self%edge(:, i) = scene%element_node( &
+            element_kinds(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
+         dofs = number([2*self%edge(1, i) - 1, 2*self%edge(1, i), 2*self%edge(2, i) - 1, &
+            2*self%edge(2, i)])
+         do k = 1, 4
+            do j = 1, 4
+               self%slot(j + 4*(k - 1), i) = reduction_slot(reduction, matrix, dofs(j), dofs(k))
+            end do
+         end do
+      end do
+   end subroutine loads_init
+
+   !> Present size of load `i`.
+   pure real(wp) function load_value(self, scene, i, instant)
+      type(loads_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i
+      type(instant_t), intent(in) :: instant
+      real(wp) :: factor, rate
+
+      associate (load => self%load(i))
+         if (load%amplitude > 0) then
+            call amplitude_at(scene, load%amplitude, instant, factor, rate)
+            load_value = load%value*factor
+         else if (self%is_ramped) then
+            load_value = load%value_start &
+               + (load%value - load%value_start)*min(1.0_wp, instant%step_time/self%duration)
+         else
+            load_value = load%value
+         end if
+      end associate
+   end function load_value
+
+   pure subroutine amplitude_at(scene, i, instant, value, rate)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(out) :: value, rate
+      real(wp) :: time
+
+      time = instant%step_time
+      if (scene%amplitude(i)%is_total_time) time = instant%total_time
+      call find_amplitude_value(scene%amplitude(i), time, value, rate)
+   end subroutine amplitude_at
+
+   !> Add the loads at `instant`, acting on the positions x + u, to `force`; with `value` and
+   !> `side`, also subtract `factor` times their derivative by u from the matrix.
+   pure subroutine loads_add(self, scene, solid, instant, u, force, factor, value, side)
+      type(loads_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(solid_t), intent(in) :: solid
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(in), contiguous :: u(:, :)          !! (2, n_node)
+      real(wp), intent(inout), contiguous :: force(:, :)   !! (2, n_node)
+      real(wp), intent(in), optional :: factor
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
+      real(wp) :: p
+      integer :: i, j, node
+
+      do i = 1, self%n
+         associate (load => self%load(i))
+            p = load_value(self, scene, i, instant)
+            select case (load%kind)
+            case (load_point)
+               force(load%place, load%target) = force(load%place, load%target) + p
+            case (load_gravity)
+               do j = 1, element_kinds(solid%kind(load%target))%n_node
+                  node = solid%node(j, load%target)
+                  force(:, node) = force(:, node) &
+                     + p*solid%volume_mass(j, load%target)*load%direction(:2)
+               end do
+            case (load_pressure)
+               p = p*solid%thickness(load%target)
+               call add_pressure(self%edge(:, i), p, scene%x, u, self%nlgeom, force)
+               if (present(value) .and. self%nlgeom) then
+                  call add_pressure_stiffness(p*factor, self%slot(:, i), value, side)
+               end if
+            end select
+         end associate
+      end do
+   end subroutine loads_add
+
+   !> Pressure on the edge a-b: half of -p n |b - a| on either node, n outwards.
+   pure subroutine add_pressure(edge, p, x, u, nlgeom, force)
+      integer, intent(in) :: edge(2)
+      real(wp), intent(in) :: p                            !! [M/T^2]: pressure times thickness
+      real(wp), intent(in) :: x(:, :), u(:, :)
+      logical, intent(in) :: nlgeom
+      real(wp), intent(inout) :: force(:, :)
+      real(wp) :: a(2), half(2)
+
+      a = x(:, edge(2)) - x(:, edge(1))
+      if (nlgeom) a = a + (u(:, edge(2)) - u(:, edge(1)))
+      half = 0.5_wp*p*[-a(2), a(1)]
+      force(:, edge(1)) = force(:, edge(1)) + half
+      force(:, edge(2)) = force(:, edge(2)) + half
+   end subroutine add_pressure
+
+   !> The force is linear in the edge: f1 = p (a2 - b2)/2, f2 = p (b1 - a1)/2 on both nodes.
+   pure subroutine add_pressure_stiffness(p, slot, value, side)
+      real(wp), intent(in) :: p
+      integer, intent(in) :: slot(16)
+      real(dp), intent(inout) :: value(:), side(:)
+      real(wp), parameter :: turn(2, 2) = reshape([0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp], [2, 2])
+      integer :: i, j, a, b, k
+      real(wp) :: df
+
+      do j = 1, 2
+         do b = 1, 2
+            do i = 1, 2
+               do a = 1, 2
+                  k = slot(a + 2*(i - 1) + 4*(b - 1 + 2*(j - 1)))
+                  df = 0.5_wp*p*turn(a, b)*merge(1.0_wp, -1.0_wp, j == 2)
+                  if (k > 0) value(k) = value(k) - real(df, dp)
+                  if (k < 0) side(-k) = side(-k) - real(df, dp)
+               end do
+            end do
+         end do
+      end do
+   end subroutine add_pressure_stiffness
+
+   !> Displacement and velocity of a prescribed degree of freedom at `instant`; `u_start` is its
+   !> displacement at the start of the step. The velocity is the slope to the left.
+   pure subroutine prescribed_motion(scene, step, prescribed, instant, u_start, u, v)
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(prescribed_t), intent(in) :: prescribed
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(in) :: u_start
+      real(wp), intent(out) :: u, v
+      real(wp) :: factor, rate
+
+      v = 0.0_wp
+      if (prescribed%is_frozen) then
+         u = u_start
+      else if (prescribed%amplitude > 0) then
+         call amplitude_at(scene, prescribed%amplitude, instant, factor, rate)
+         u = prescribed%value*factor
+         v = prescribed%value*rate
+      else if (step%procedure == procedure_static) then
+         u = u_start + (prescribed%value - u_start) &
+            *min(1.0_wp, instant%step_time/step%duration)
+      else
+         u = prescribed%value
+      end if
+   end subroutine prescribed_motion
+
+end module emcon_loads
