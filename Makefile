@@ -1,19 +1,24 @@
 # EMCON. `make help` lists what can be made.
 #
-# MODE=release|debug|sanitize, WP=real64|real128|real32 (kind of the state; a folder for each),
+# MODE=release|debug|sanitize, WP=real64|real128|real32 (kind of the state), LICENSE=permissive
+# (without SuiteSparse, whose solvers are under the GPL): a folder for each.
 # V=1 shows commands, FFLAGS=... and CFLAGS=... are added to the flags below.
 # Compiler and libraries are looked up once, by .ci/setup, into build/config.mk.
 
 MODE ?= release
 WP ?= real64
+LICENSE ?= gpl
 PREFIX ?= /usr/local
-BUILD := build/$(MODE)$(if $(filter-out real64,$(WP)),-$(WP))
+BUILD := build/$(MODE)$(if $(filter-out real64,$(WP)),-$(WP))$(if $(filter-out gpl,$(LICENSE)),-$(LICENSE))
 O := $(BUILD)/obj
 ifeq ($(filter $(MODE),release debug sanitize),)
 $(error MODE is release, debug or sanitize, not '$(MODE)')
 endif
 ifeq ($(filter $(WP),real32 real64 real128),)
 $(error WP is real32, real64 or real128, not '$(WP)')
+endif
+ifeq ($(filter gpl permissive,$(LICENSE)),)
+$(error LICENSE is gpl or permissive, not '$(LICENSE)')
 endif
 
 # make has values of its own for these (f77, cc): `?=` would leave them.
@@ -35,7 +40,7 @@ Q := $(if $(V),,@)
 # Before anything else, unless build/config.mk was written on this machine: help and clean do
 # without. What the caller sets in place of a search is handed on.
 SETUP = FC='$(FC)' CC='$(CC)' $(foreach v,PYTHON HDF5_CFLAGS HDF5_LIBS UMFPACK_CFLAGS UMFPACK_LIBS \
-	LAPACK_LIBS,$(if $(findstring command,$(origin $v)),$v='$($v)')) .ci/setup
+	MUMPS_CFLAGS MUMPS_LIBS LAPACK_LIBS,$(if $(findstring command,$(origin $v)),$v='$($v)')) .ci/setup
 ifneq ($(filter-out help clean,$(MAKECMDGOALS)),)
 $(shell $(SETUP) system >&2)
 ifneq ($(.SHELLSTATUS),0)
@@ -63,11 +68,19 @@ LIB_SRC := $(wildcard $(addsuffix *.f90,$(filter-out %/app/,$(ROOMS))) \
 	$(addsuffix *.F90,$(filter-out %/app/,$(ROOMS))))
 LIB_C := $(wildcard $(addsuffix *.c,$(ROOMS)))
 APP_SRC := $(wildcard src_f90/app/*.f90)
-KERNEL_SRC := $(wildcard tests/kernels/*.f90)
+KERNEL_SRC := $(wildcard tests/kernels/*.f90 tests/kernels/*.F90)
+ifeq ($(LICENSE),permissive)
+UMFPACK_CFLAGS :=
+UMFPACK_LIBS :=
+GPL := %emcon_umfpack.f90 %emcon_cholmod.f90 %emcon_cholmod_shim.c %test_umfpack.f90 %test_cholmod.f90
+LIB_SRC := $(filter-out $(GPL),$(LIB_SRC))
+LIB_C := $(filter-out $(GPL),$(LIB_C))
+KERNEL_SRC := $(filter-out $(GPL),$(KERNEL_SRC))
+endif
 SRC := $(LIB_SRC) $(APP_SRC) $(KERNEL_SRC)
 INC := $(wildcard $(addsuffix *.inc,$(ROOMS)))
 vpath %.f90 $(ROOMS) tests/kernels
-vpath %.F90 $(ROOMS)
+vpath %.F90 $(ROOMS) tests/kernels
 vpath %.c $(ROOMS)
 objects = $(addprefix $(O)/,$(addsuffix .o,$(basename $(notdir $(1)))))
 LIB_OBJ := $(call objects,$(LIB_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(LIB_C)))
@@ -98,9 +111,10 @@ FFLAGS_sanitize := -O0 -g1 $(SANITIZE) -fcheck=bounds,do,mem,pointer,recursion
 CFLAGS_sanitize := -O0 -g1 $(SANITIZE)
 # A libubsan that is shared writes to no file but standard error.
 LDFLAGS_sanitize := $(SANITIZE) -static-libubsan
-FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(FFLAGS)
-CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(CFLAGS)
-LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(LAPACK_LIBS)
+FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(if $(GPL),-DEMCON_PERMISSIVE) \
+	$(FFLAGS)
+CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(MUMPS_CFLAGS) $(CFLAGS)
+LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS)
 
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
 # Read by cat: $(file <...) of GNU make 4.3 loses text when its buffer has to grow.

@@ -7,7 +7,7 @@ import subprocess
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-SUITES = re.findall(r'^ *call run\("(\w+)"', (ROOT / "tests/kernels/main.f90").read_text(), re.M)
+SUITES = re.findall(r'^ *call run\("(\w+)"', (ROOT / "tests/kernels/main.F90").read_text(), re.M)
 
 
 @pytest.mark.parametrize("mode", ["release", "debug"])
@@ -21,6 +21,6 @@ def test_suite(suite, mode):
 
 
 def test_every_suite_is_run():
-    """A file test_<suite>.f90 that main.f90 forgets would pass unseen."""
+    """A file test_<suite>.f90 that main.F90 forgets would pass unseen."""
     files = {p.stem.removeprefix("test_") for p in (ROOT / "tests/kernels").glob("test_*.f90")}
     assert files == set(SUITES)

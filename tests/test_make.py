@@ -60,7 +60,7 @@ class Tree:
         ):  # fmt: skip
             self.write(f"base/emcon_{name}.f90", user(name, used, call))
             self.write(f"base/{name}.inc", "      integer, parameter :: one = 1\n")
-        main = folder / "tests/kernels/main.f90"
+        main = folder / "tests/kernels/main.F90"
         main.parent.mkdir(parents=True)
         main.write_text("program main\n   use emcon_top, only : top\n   implicit none\n\n"
                         "   if (top(1) /= 4) error stop\nend program main\n")
@@ -135,7 +135,7 @@ def test_the_kernel_tests_are_compiled_once(tree):
     assert set(tree.make("MODE=debug", "kernels")) == {
         "emcon_beside", "emcon_low", "emcon_middle", "emcon_top",
     }  # fmt: skip
-    (tree.folder / "tests/kernels/main.f90").touch()
+    (tree.folder / "tests/kernels/main.F90").touch()
     assert " -fcheck=all," in tree.make("MODE=debug", "kernels")["main"]
     assert not tree.make("kernels")
 

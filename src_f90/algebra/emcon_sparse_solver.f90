@@ -12,13 +12,21 @@ module emcon_sparse_solver
    use emcon_text, only : to_text
    implicit none
    private
-   public :: sparse_solver_t, solver_check_square, solver_check_values, solver_raise
+   public :: sparse_solver_t, solver_box_t, solver_check_square, solver_check_values, solver_raise
+   public :: matrix_general, matrix_definite, matrix_symmetric
+
+   !> What a solver may rely on. Matrices are given in full, whatever they are.
+   integer, parameter :: matrix_general = 0, matrix_definite = 1, matrix_symmetric = 2
 
    type, abstract :: sparse_solver_t
+      integer :: symmetry = matrix_general    !! one of `matrix_`, set before `analyse`
+      !> Set before `analyse`: it is factorised often enough to pay for two analyses
+      logical :: seeks_less_fill = .false.
       !> The last `factorise` met a zero pivot, or one that is not positive where it must be, or
       !> values that are not finite: `solve` is then refused.
       logical :: is_singular = .false.
-      real(dp) :: rcond = 0.0_dp              !! smallest over largest pivot: an indicator only
+      real(dp) :: rcond = 0.0_dp              !! smallest over largest pivot, or 0: an indicator
+      integer :: n_negative = -1              !! pivots < 0 of a symmetric matrix; < 0: not counted
       integer(int64) :: n_factor = 0_int64    !! nonzeros of the factors
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
    contains
@@ -27,6 +35,11 @@ module emcon_sparse_solver
       procedure(solve_system), deferred :: solve
       procedure(free_memory), deferred :: free
    end type sparse_solver_t
+
+   !> For arrays of solvers.
+   type :: solver_box_t
+      class(sparse_solver_t), allocatable :: solver
+   end type solver_box_t
 
    abstract interface
       !> Order the pattern of a square matrix; returns at once if it is the one already analysed.

@@ -15,11 +15,10 @@ module emcon_umfpack
       sparse_solver_t
    implicit none
    private
-   public :: umfpack_t, ordering_amd, ordering_metis, ordering_less_fill
+   public :: umfpack_t, ordering_amd, ordering_metis
 
-   !> Values of `umfpack_t%ordering`, those of UMFPACK; and the one of the two that fills less, for
-   !> matrices that are factorised often enough to pay for two analyses.
-   integer, parameter :: ordering_amd = 1, ordering_metis = 3, ordering_less_fill = -1
+   !> Values of `umfpack_t%ordering`, those of UMFPACK.
+   integer, parameter :: ordering_amd = 1, ordering_metis = 3
 
    integer(c_int), parameter :: umfpack_ok = 0, umfpack_singular = 1, umfpack_out_of_memory = -1
    integer(c_int), parameter :: umfpack_aat = 2
@@ -128,7 +127,7 @@ contains
       ! Ones, not a null pointer: without values UMFPACK counts no diagonal entry and takes the
       ! strategy for unsymmetric patterns, which here costs twice the time and many digits.
       self%scaled%value = 1.0_dp
-      if (self%ordering == ordering_less_fill) then
+      if (self%seeks_less_fill) then
          call order(self, ordering_amd, status)
          fill = self%info(info_symmetric_fill)
          if (status == umfpack_ok) call order(self, ordering_metis, status)

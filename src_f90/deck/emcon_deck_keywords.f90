@@ -80,8 +80,8 @@ module emcon_deck_keywords
          // "!USER,!SUBMODEL"), &
       keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,~UNSYMM:NO," &
          // "~EXTRAPOLATION,~CONVERTSDI,!PERTURBATION"), &
-      keyword_t("STATIC", in_step, "DIRECT,~SOLVER,!STABILIZE:0,!RIKS,!EXPLICIT"), &
-      keyword_t("DYNAMIC", in_step, "DIRECT,~SOLVER,!ALPHA:0,!EXPLICIT:0,!APPLICATION,!INITIAL," &
+      keyword_t("STATIC", in_step, "DIRECT,SOLVER=,!STABILIZE:0,!RIKS,!EXPLICIT"), &
+      keyword_t("DYNAMIC", in_step, "DIRECT,SOLVER=,!ALPHA:0,!EXPLICIT:0,!APPLICATION,!INITIAL," &
          // "~NOHAF,~HAFTOL,~HALFINCSCALEFACTOR"), &
       keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER,!FOLLOWER," &
          // "!SECTOR"), &

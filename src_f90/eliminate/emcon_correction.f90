@@ -2,7 +2,6 @@
 !>
 !> Patterns and orderings are kept as long as the active constraints stand on the same unknowns.
 module emcon_correction
-   use emcon_cholmod, only : cholmod_t
    use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
       constraints_merge_pattern
    use emcon_csr, only : csr_t
@@ -14,10 +13,11 @@ module emcon_correction
       obstacle_pivot
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
       saddle_point_t
+   use emcon_solver_registry, only : solver_create, solver_default
+   use emcon_sparse_solver, only : matrix_definite, matrix_general, sparse_solver_t
    use emcon_steps, only : method_null_space
    use emcon_system, only : system_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
-   use emcon_umfpack, only : ordering_amd, ordering_less_fill, umfpack_t
    implicit none
    private
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
@@ -33,8 +33,9 @@ module emcon_correction
       logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
-      type(umfpack_t) :: solver                  !! no active constraint
-      type(cholmod_t) :: definite_solver         !! the same, symmetric and positive definite
+      integer :: choice = solver_default         !! of the direct solver, as the deck asks
+      class(sparse_solver_t), allocatable :: solver            !! no active constraint
+      class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
       logical, private :: is_definite = .false.  !! last factorisation: by that one
       type(csr_t) :: merged                      !! N with constraints
       integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
@@ -49,18 +50,31 @@ module emcon_correction
 contains
 
    !> Forget all layouts: the numbering has changed.
-   subroutine correction_reset(self, method)
+   subroutine correction_reset(self, method, choice)
       type(correction_t), intent(inout) :: self
-      integer, intent(in) :: method
+      integer, intent(in) :: method              !! one of `method_`
+      integer, intent(in) :: choice              !! one of `solver_`
 
       self%method = method
+      self%choice = choice
+      call make_solvers(self)
       if (allocated(self%row_start)) deallocate(self%row_start, self%column)
    end subroutine correction_reset
+
+   subroutine make_solvers(self)
+      type(correction_t), intent(inout) :: self
+
+      call solver_create(self%choice, matrix_general, self%solver)
+      call solver_create(self%choice, matrix_definite, self%definite_solver)
+      call solver_create(self%choice, matrix_general, self%null_space%solver)
+      call solver_create(self%choice, matrix_general, self%saddle_point%solver)
+   end subroutine make_solvers
 
    !> Free what the solvers hold.
    subroutine correction_free(self)
       type(correction_t), intent(inout) :: self
 
+      if (.not. allocated(self%solver)) return
       call self%solver%free()
       call self%definite_solver%free()
       call self%null_space%solver%free()
@@ -140,6 +154,7 @@ contains
       integer :: k
 
       self%n_factorisation = self%n_factorisation + 1
+      if (.not. allocated(self%solver)) call make_solvers(self)
       if (set%n == 0) then
          call factorise_free(self, system, is_singular, error)
          return
@@ -189,8 +204,7 @@ contains
       is_singular = .not. self%is_definite
       if (self%is_definite) return
       ! Minimum degree fills matrices of tied pieces by a quarter more than the pieces need.
-      self%solver%ordering = merge(ordering_less_fill, ordering_amd, &
-         system%numbering%n_dependent > 0)
+      self%solver%seeks_less_fill = system%numbering%n_dependent > 0
       call self%solver%analyse(system%matrix, error)
       if (.not. allocated(error)) call self%solver%factorise(system%matrix%value, error)
       is_singular = self%solver%is_singular

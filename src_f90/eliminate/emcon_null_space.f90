@@ -17,13 +17,15 @@ module emcon_null_space
    use emcon_independent_rows, only : independent_rows_find, independent_rows_t
    use emcon_kinds, only : dp, int64, wp
    use emcon_numbering, only : numbering_t
+   use emcon_solver_registry, only : solver_create, solver_default
+   use emcon_sparse_solver, only : matrix_general, sparse_solver_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
-   use emcon_umfpack, only : umfpack_t
    implicit none
    private
    public :: null_space_t, null_space_init, null_space_update, null_space_factorise, &
-      null_space_solve, null_space_multipliers, null_space_matrices, null_space_particular
+      null_space_solve, null_space_multipliers, null_space_matrices, null_space_particular, &
+      null_space_free
    public :: obstacle_none, obstacle_redundant, obstacle_pivot, obstacle_fill
 
    !> Why the constraints cannot be eliminated.
@@ -58,7 +60,7 @@ module emcon_null_space
       type(csr_t) :: d                           !! (n_unknown x n_free) DF
       type(csr_t) :: reduced                     !! P^T N DF
       type(triple_product_t) :: product
-      type(umfpack_t) :: solver
+      class(sparse_solver_t), allocatable :: solver
       type(stopwatch_t) :: clock                 !! P, DF and P^T N DF
       integer, allocatable :: owner(:)           !! (n_unknown) constraint of a dependent one, or 0
       real(wp), allocatable :: rhs(:), x(:)      !! (n_free)
@@ -95,6 +97,13 @@ contains
       call lay_out_matrices(self, set%force_rows)
       call fill_matrices(self, set)
    end subroutine null_space_matrices
+
+   !> Free what the solver holds.
+   subroutine null_space_free(self)
+      type(null_space_t), intent(inout) :: self
+
+      if (allocated(self%solver)) call self%solver%free()
+   end subroutine null_space_free
 
    !> Make room for another pattern.
    pure subroutine begin(self, n_unknown, n)
@@ -174,6 +183,8 @@ contains
       call lay_out_matrices(self, rows)
       call triple_product_init(self%product, self%p, matrix, self%d, self%reduced, error)
       if (allocated(error)) return
+      if (.not. allocated(self%solver)) call solver_create(solver_default, matrix_general, &
+         self%solver)
       call self%solver%analyse(self%reduced, error)
    end subroutine lay_out
 

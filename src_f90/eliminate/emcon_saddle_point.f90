@@ -7,7 +7,8 @@ module emcon_saddle_point
    use emcon_csr, only : csr_find, csr_from_entries, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_umfpack, only : umfpack_t
+   use emcon_solver_registry, only : solver_create, solver_default
+   use emcon_sparse_solver, only : matrix_general, sparse_solver_t
    implicit none
    private
    public :: saddle_point_t, saddle_point_init, saddle_point_factorise, saddle_point_solve
@@ -17,7 +18,7 @@ module emcon_saddle_point
       integer, allocatable :: slot(:)            !! N, then Gb^T, then G1
       integer, allocatable :: diagonal(:)        !! (n_unknown) entries of N
       real(dp) :: scale = 1.0_dp
-      type(umfpack_t) :: solver
+      class(sparse_solver_t), allocatable :: solver
       real(wp), allocatable :: rhs(:), x(:)
    end type saddle_point_t
 
@@ -50,6 +51,8 @@ contains
       row(n_matrix + 1:n_matrix + n_rows) = set%force_rows%column(:n_rows) + 1
       column(n_matrix + n_rows + 1:) = set%force_rows%column(:n_rows) + 1
       call csr_from_entries(self%full, n + set%n, n + set%n, row, column, self%slot)
+      if (.not. allocated(self%solver)) call solver_create(solver_default, matrix_general, &
+         self%solver)
       call self%solver%analyse(self%full, error)
       if (allocated(error)) return
       if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%diagonal)

@@ -209,8 +209,8 @@ contains
             self%system%solid%n_node, step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call correction_reset(self%correction, merge(step%constraint_method, &
-            method_saddle_point, self%system%is_reduced))
-         call velocity_update_reset(self%velocity_update)
+            method_saddle_point, self%system%is_reduced), step%solver)
+         call velocity_update_reset(self%velocity_update, step%solver)
          self%active%puts_off = .true.
          self%active%holds_gap = step%initiation == initiation_persistent &
             .and. self%scheme%has_inertia

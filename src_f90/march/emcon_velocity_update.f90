@@ -4,12 +4,13 @@
 !> s b + s^2 a/2; the positive root of s b + s^2 a/2 = lost energy is taken. The jump pushes the
 !> bodies apart and keeps the momenta. Source: Laursen & Love (2002); docs/theory.md, section 6.
 module emcon_velocity_update
-   use emcon_cholmod, only : cholmod_t
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : add_to_dofs, numbering_matrix, pick_unknowns
+   use emcon_solver_registry, only : solver_create
+   use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    use emcon_system, only : mass_times, system_t
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    implicit none
@@ -22,23 +23,25 @@ module emcon_velocity_update
 
    type :: velocity_update_t
       logical :: is_ready = .false.              !! mass factorised for the present numbering
-      type(cholmod_t) :: mass
+      class(sparse_solver_t), allocatable :: mass
       real(wp), allocatable :: push(:), jump(:)  !! (n_unknown)
    end type velocity_update_t
 
 contains
 
    !> The numbering has changed.
-   subroutine velocity_update_reset(self)
+   subroutine velocity_update_reset(self, choice)
       type(velocity_update_t), intent(inout) :: self
+      integer, intent(in) :: choice              !! one of `solver_`
 
+      call solver_create(choice, matrix_definite, self%mass)
       self%is_ready = .false.
    end subroutine velocity_update_reset
 
    subroutine velocity_update_free(self)
       type(velocity_update_t), intent(inout) :: self
 
-      call self%mass%free()
+      if (allocated(self%mass)) call self%mass%free()
       self%is_ready = .false.
    end subroutine velocity_update_free
 

@@ -12,8 +12,9 @@ module emcon_tie_balance_data
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : err_internal, error_t, raise
    use emcon_kinds, only : dp, wp
+   use emcon_solver_registry, only : solver_create, solver_default
    use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_umfpack, only : umfpack_t
+   use emcon_sparse_solver, only : matrix_general, solver_box_t
    implicit none
    private
    public :: tie_balance_t, tie_balance_init, tie_balance_free, tie_balance_residual
@@ -36,7 +37,7 @@ module emcon_tie_balance_data
       real(wp), allocatable :: multiplier(:, :)  !! (2, n_row)
       real(wp), allocatable :: residual(:, :)    !! (2, n_other) M^T L - s_g [L]
       real(wp) :: force = 0.0_wp                 !! largest |s_g| [L]
-      type(umfpack_t), private :: solver(2)      !! D and its transpose
+      type(solver_box_t), private :: side(2)     !! D and its transpose
    end type tie_balance_t
 
 contains
@@ -173,11 +174,12 @@ contains
          do i = 1, size(slot)
             d%value(slot(i)) = d%value(slot(i)) + real(self%d_value(i), dp)
          end do
-         call self%solver(side)%analyse(d, error)
+         call solver_create(solver_default, matrix_general, self%side(side)%solver)
+         call self%side(side)%solver%analyse(d, error)
          if (allocated(error)) return
-         call self%solver(side)%factorise(d%value, error)
+         call self%side(side)%solver%factorise(d%value, error)
          if (allocated(error)) return
-         if (self%solver(side)%is_singular) then
+         if (self%side(side)%solver%is_singular) then
             call raise(error, err_internal, "tie_balance_init: the slave matrix is singular")
             return
          end if
@@ -186,9 +188,11 @@ contains
 
    subroutine tie_balance_free(self)
       type(tie_balance_t), intent(inout) :: self
+      integer :: side
 
-      call self%solver(1)%free()
-      call self%solver(2)%free()
+      do side = 1, 2
+         if (allocated(self%side(side)%solver)) call self%side(side)%solver%free()
+      end do
    end subroutine tie_balance_free
 
    !> Positions, multipliers and the residual M^T L - s_g for the present M; its largest entry per
@@ -269,7 +273,7 @@ contains
                   r(self%d_column(i)) = r(self%d_column(i)) - self%d_value(i)*y(d, self%d_row(i))
                end if
             end do
-            call self%solver(side)%solve(r, dy, error)
+            call self%side(side)%solver%solve(r, dy, error)
             if (allocated(error)) return
             y(d, :) = y(d, :) + dy
          end do

@@ -4,6 +4,7 @@ module emcon_steps
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_requests, only : output_t
+   use emcon_solver_registry, only : solver_default
    implicit none
    private
    public :: prescribed_t, load_t, step_t
@@ -54,6 +55,7 @@ module emcon_steps
       real(wp) :: h_min = 0.0_wp                     !! 0: not given
       real(wp) :: h_max = 0.0_wp                     !! 0: not given
       integer :: constraint_method = method_null_space
+      integer :: solver = solver_default             !! one of `solver_`
       integer :: initiation = initiation_persistent
       real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
       type(contact_options_t) :: contact

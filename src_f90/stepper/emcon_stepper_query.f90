@@ -15,7 +15,7 @@ module emcon_stepper_query
    use emcon_loads, only : instant_t
    use emcon_march, only : march_free, march_init, march_resume, march_t
    use emcon_march_step, only : follow_links, march_guess
-   use emcon_null_space, only : null_space_t
+   use emcon_null_space, only : null_space_free, null_space_t
    use emcon_numbering, only : pick_unknowns
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
@@ -45,7 +45,7 @@ contains
       type(query_t), intent(inout) :: self
 
       call march_free(self%march)
-      call self%null_space%solver%free()
+      call null_space_free(self%null_space)
       call clear(self)
    end subroutine query_free
 

@@ -7,6 +7,7 @@ module test_correction
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
+   use emcon_solver_registry, only : solver_default
    use emcon_steps, only : method_null_space, method_saddle_point
    use emcon_system, only : system_t
    use linear_scenes, only : make_random_rows
@@ -71,7 +72,7 @@ contains
       call check_true(error, correction%fell_back .eqv. falls_back, "solved as a saddle point")
       call check_true(error, (correction_reason(correction) /= "") .eqv. falls_back, "a reason")
       if (allocated(error)) return
-      call correction_reset(saddle, method_saddle_point)
+      call correction_reset(saddle, method_saddle_point, solver_default)
       call correct(saddle, problem, expected, is_singular, error)
       if (allocated(error)) return
       call check_true(error, .not. saddle%fell_back, "the saddle point was asked for")
@@ -87,7 +88,7 @@ contains
       integer :: k
 
       call make_problem(problem)
-      call correction_reset(correction, method_null_space)
+      call correction_reset(correction, method_null_space, solver_default)
       problem%set%item(1)%g = 0.0_wp
       problem%set%item(1)%g(1, 1) = 1.0_wp
       do k = 1, 3
@@ -109,7 +110,7 @@ contains
       integer :: k
 
       call make_chain([(k, k = 1, 30)], [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp, 30, 4, problem)
-      call correction_reset(correction, method_null_space)
+      call correction_reset(correction, method_null_space, solver_default)
       call compare(correction, problem, .true., error)
       call correction_free(correction)
    end subroutine test_fill
@@ -130,7 +131,7 @@ contains
       call make_problem(problem, linear)
       call check_equal(error, problem%numbering%n_dependent, 4, "dependent freedoms")
       if (allocated(error)) return
-      call correction_reset(correction, method_null_space)
+      call correction_reset(correction, method_null_space, solver_default)
       call compare(correction, problem, .false., error)
       if (allocated(error)) return
       call check_true(error, correction%uses_null_space, "by null space")
@@ -202,7 +203,8 @@ contains
       problem%set%item(4) = problem%set%item(2)
       problem%set%item(5) = problem%set%item(2)
       do m = 1, 2
-         call correction_reset(correction, merge(method_null_space, method_saddle_point, m == 1))
+         call correction_reset(correction, merge(method_null_space, method_saddle_point, &
+            m == 1), solver_default)
          call correct(correction, problem, dq, is_singular, error)
          if (allocated(error)) return
          call check_true(error, is_singular, "singular")

@@ -10,6 +10,7 @@ module test_newton
       newton_singular, newton_solve, newton_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_solver_registry, only : solver_default
    use emcon_steps, only : load_point, load_t, method_null_space, method_saddle_point
    use emcon_system, only : pose_t, system_begin_step, system_init, system_t
    use emcon_text, only : to_text
@@ -62,7 +63,7 @@ contains
       if (allocated(error)) return
       call newton_init(trial%newton, trial%system%numbering%n_unknown, size(scene%x, 2), &
          1.0e3_wp*epsilon(1.0_wp), maximum)
-      call correction_reset(trial%correction, method)
+      call correction_reset(trial%correction, method, solver_default)
       call constraints_select(trial%set, none)
       trial%pose%is_end = .not. h > 0.0_wp
       if (h > 0.0_wp) trial%pose = scheme%pose(instant_t(), h)

@@ -4,7 +4,7 @@ module test_null_space
    use emcon_csr, only : csr_multiply, csr_multiply_transposed
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
+   use emcon_null_space, only : null_space_factorise, null_space_free, null_space_init, &
       null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
       obstacle_pivot, obstacle_redundant
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
@@ -102,7 +102,7 @@ contains
          call check_near(error, product, 0.0_wp*product, tol_dp, 1.0_wp, "G1 DF")
          if (allocated(error)) return
       end do
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_orthogonal
 
    subroutine test_reduced(error)
@@ -120,7 +120,7 @@ contains
          call check_near(error, real(dense_of(null_space%reduced), wp), expected, tol_dp, &
             maxval(abs(expected)), "P^T N DF")
       end do
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_reduced
 
    !> Correction and multipliers of the linear problem.
@@ -164,7 +164,7 @@ contains
          deallocate(rest, force, gap)
          if (allocated(error)) return
       end do
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_solution
 
    subroutine test_saddle_point(error)
@@ -196,7 +196,7 @@ contains
          if (allocated(error)) return
       end do
       call saddle%solver%free()
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_saddle_point
 
    !> Forces of given multipliers, in the kind of the state. The blocks have conditions of some 10.
@@ -222,7 +222,7 @@ contains
          deallocate(lam, g, c, force)
          if (allocated(error)) return
       end do
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_multipliers
 
    !> However a chain is numbered, its band has one diagonal on each side.
@@ -239,7 +239,7 @@ contains
       call expect(sample_dual, [0, n_chain])
       call expect(sample_parts, [0, n_chain/4, n_chain])
       call expect(sample_shuffled, [0, n_chain])
-      call null_space%solver%free()
+      call null_space_free(null_space)
 
    contains
 
@@ -281,7 +281,7 @@ contains
          "dependent unknown of the first constraint")
       call check_equal(error, null_space%present%dependent(3), problem%numbering%unknown(2, 7), &
          "dependent unknown of the third constraint")
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_pivot
 
    !> A normal that turns while the pattern stands: what comes out is what a new null space gives,
@@ -331,8 +331,8 @@ contains
          lam(:, 2))
       call check_near(error, dq(:, 2), dq(:, 3), 0.0_wp, 1.0_wp, "dq, to the last bit")
       call check_near(error, lam(:, 1), lam(:, 2), 0.0_wp, 1.0_wp, "lam, to the last bit")
-      call null_space%solver%free()
-      call new%solver%free()
+      call null_space_free(null_space)
+      call null_space_free(new)
    end subroutine test_choice
 
    !> Two nodes that face each other, each slave of the other.
@@ -376,7 +376,7 @@ contains
       call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
       if (allocated(error)) return
       call check_true(error, is_singular, "nothing is factorised")
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine expect_obstacle
 
    !> x_k + 9 x_(k+1), the last one on a master: each pivot alone passes, but x_1 = 9^4 x_5.
@@ -405,7 +405,7 @@ contains
       call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle_pivot, "obstacle")
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_growth
 
    subroutine test_fill(error)

@@ -4,7 +4,7 @@ module test_saddle_point
    use emcon_csr, only : csr_multiply_transposed
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
+   use emcon_null_space, only : null_space_factorise, null_space_free, null_space_init, &
       null_space_solve, null_space_t
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
       saddle_point_t
@@ -94,7 +94,7 @@ contains
          if (allocated(error)) return
       end do
       call saddle%solver%free()
-      call null_space%solver%free()
+      call null_space_free(null_space)
    end subroutine test_null_space
 
    subroutine test_singular(error)

@@ -73,7 +73,7 @@ def program(tmp_path_factory):
     tree = Tree(tmp_path_factory.mktemp("tree"))
     tree.write("base/emcon_plants.f90", PLANTS)
     tree.write("base/emcon_plant.c", PLANT_IN_C)
-    (tree.folder / "tests/kernels/main.f90").write_text(MAIN)
+    (tree.folder / "tests/kernels/main.F90").write_text(MAIN)
     tree.make("kernels", "MODE=sanitize")
     return tree.folder / "build/sanitize/kernels"
 

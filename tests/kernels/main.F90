@@ -12,7 +12,9 @@ program main
    use test_bodies, only : collect_bodies
    use test_chain, only : collect_chain
    use test_check, only : collect_check
+#ifndef EMCON_PERMISSIVE
    use test_cholmod, only : collect_cholmod
+#endif
    use test_constraints, only : collect_constraints
    use test_correction, only : collect_correction
    use test_csr, only : collect_csr
@@ -60,6 +62,7 @@ program main
    use test_search, only : collect_search
    use test_shape, only : collect_shape
    use test_solid, only : collect_solid
+   use test_solvers, only : collect_solvers
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
@@ -69,7 +72,9 @@ program main
    use test_tie_balance, only : collect_tie_balance
    use test_ties, only : collect_ties
    use test_triple_product, only : collect_triple_product
+#ifndef EMCON_PERMISSIVE
    use test_umfpack, only : collect_umfpack
+#endif
    use test_verdict, only : collect_verdict
    use test_velocity_update, only : collect_velocity_update
    implicit none
@@ -95,8 +100,13 @@ program main
    call run("csr", collect_csr)
    call run("triple_product", collect_triple_product)
    call run("row_elimination", collect_row_elimination)
+#ifndef EMCON_PERMISSIVE
    call run("umfpack", collect_umfpack)
+#endif
+   call run("solvers", collect_solvers)
+#ifndef EMCON_PERMISSIVE
    call run("cholmod", collect_cholmod)
+#endif
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("gauss", collect_gauss)
