@@ -97,3 +97,26 @@ def test_static_contact(tmp_path):
     deck = DECKS / "two_blocks_static.inp"
     first, second = (run_deck(deck, tmp_path / m, method=m) for m in METHODS)
     assert_same_fields(first.fields(), second.fields(), 1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_solvers(pressed, tmp_path, method):
+    """MUMPS solves the same step, but for round-off; a program may have been built without others."""
+    runs = {}
+    for solver in ("DEFAULT", "MUMPS"):
+        deck = Deck(pressed.text(), "pressed")
+        deck.replace("*DYNAMIC, DIRECT", f"*DYNAMIC, DIRECT, SOLVER={solver}")
+        runs[solver] = run_deck(deck, tmp_path / solver, h=0.005, t_end=0.05, method=method)
+    assert runs["MUMPS"].history["active"].max() >= 2
+    assert runs["MUMPS"].verdict["largest_energy_error"] < 1e-12
+    assert_same_fields(runs["DEFAULT"].fields(), runs["MUMPS"].fields(), 1e-9)
+
+
+def test_static_solvers(tmp_path):
+    """Without contact the matrix of statics is definite, with it that of a saddle point is not."""
+    fields = []
+    for solver in ("DEFAULT", "MUMPS"):
+        deck = Deck.read(DECKS / "two_blocks_static.inp")
+        deck.replace("*STATIC", f"*STATIC, SOLVER={solver}")
+        fields.append(run_deck(deck, tmp_path / solver, method="SADDLE POINT").fields())
+    assert_same_fields(*fields, 1e-9)
