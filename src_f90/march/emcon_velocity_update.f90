@@ -9,7 +9,7 @@ module emcon_velocity_update
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : add_to_dofs, numbering_matrix, pick_unknowns
-   use emcon_solver_registry, only : solver_create
+   use emcon_solver_registry, only : solver_create, solver_default
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    use emcon_system, only : mass_times, system_t
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
@@ -23,6 +23,7 @@ module emcon_velocity_update
 
    type :: velocity_update_t
       logical :: is_ready = .false.              !! mass factorised for the present numbering
+      integer :: choice = solver_default         !! of the direct solver, as the deck asks
       class(sparse_solver_t), allocatable :: mass
       real(wp), allocatable :: push(:), jump(:)  !! (n_unknown)
    end type velocity_update_t
@@ -34,7 +35,7 @@ contains
       type(velocity_update_t), intent(inout) :: self
       integer, intent(in) :: choice              !! one of `solver_`
 
-      call solver_create(choice, matrix_definite, self%mass)
+      self%choice = choice
       self%is_ready = .false.
    end subroutine velocity_update_reset
 
@@ -142,6 +143,7 @@ contains
       type(csr_t) :: mass, links, reduced
       integer :: n
 
+      call solver_create(self%choice, matrix_definite, self%mass)
       n = system%numbering%n_unknown
       if (keeps_links(system)) then
          n = system%linked%n_unknown

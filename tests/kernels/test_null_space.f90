@@ -5,8 +5,8 @@ module test_null_space
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_null_space, only : null_space_factorise, null_space_free, null_space_init, &
-      null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
-      obstacle_pivot, obstacle_redundant
+      null_space_multipliers, null_space_solve, null_space_t, null_space_update, &
+      obstacle_fill, obstacle_none, obstacle_pivot, obstacle_redundant
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
       saddle_point_t
    use random_constraints, only : full_gradient, make_chain, make_problem, make_rows, problem_t, &

@@ -5,7 +5,7 @@ module test_saddle_point
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_null_space, only : null_space_factorise, null_space_free, null_space_init, &
-      null_space_solve, null_space_t
+      null_space_multipliers, null_space_solve, null_space_t
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
       saddle_point_t
    use random_constraints, only : make_problem, problem_t, tol_dp

@@ -6,7 +6,7 @@ module test_velocity_update
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t
    use emcon_system, only : mass_times, pose_t, system_begin_step, system_init, system_t
-   use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
+   use emcon_velocity_update, only : velocity_update_apply, velocity_update_free, velocity_update_t
    use small_scenes, only : add_step, block_t, make_two_blocks, shake
    implicit none
    private
@@ -68,7 +68,7 @@ contains
       x1 = scene%x + du
       change = [sum(p1 - p0, dim=2), sum(x1(1, :)*(p1(2, :) - p0(2, :)) &
          - x1(2, :)*(p1(1, :) - p0(1, :)))]
-      call update%mass%free()
+      call velocity_update_free(update)
       call check_near(error, gain, restored, tol, 10.0_wp, "gain and what is said of it")
    end subroutine jump
 
