@@ -8,10 +8,12 @@ import ast
 import collections
 import graphlib
 import importlib.util
+import json
 import pathlib
 import re
 import subprocess
 
+import house_counts
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -28,6 +30,8 @@ COMMENT = re.compile(r"!.*")
 # At the start of a statement or behind a one-line `if (...)`.
 STOP = re.compile(r"(?:^|[;)])\s*(?:(?:error\s+)?stop\b(?!\s*[=(%])|call\s+(?:exit|abort)\b)", re.I)
 PRINT = re.compile(r"(?:^|[;)])\s*(?:print\s*[*\"'(]|write\s*\(\s*\*)", re.I)
+
+CITED = re.compile(r"(\S+\s)?\beqs?\. ((?:\(\w+\)(?:, | and | to )?)+)")
 
 _spec = importlib.util.spec_from_file_location("module_order", ROOT / "src_f90/module_order.py")
 module_order = importlib.util.module_from_spec(_spec)
@@ -132,7 +136,19 @@ def hidden(root):
                     yield f"{path.relative_to(root)}: defines {name} {times} times"
 
 
+def theory_numbers(root):
+    """Equations that sources cite and docs/theory.md does not have; the paper has its own."""
+    numbers = set(re.findall(r"\\tag\{(\w+)\}", (root / "docs/theory.md").read_text()))
+    for path in sources(root):
+        comments = " ".join(re.findall(r"!+[<>]?\s?(.*)", path.read_text()))
+        for kind, cited in re.findall(CITED, comments):
+            for number in re.findall(r"\w+", re.sub(r"and|to", "", cited)):
+                if not kind.startswith("paper") and number not in numbers:
+                    yield f"{path.relative_to(root)}: eq. ({number}) is not in docs/theory.md"
+
+
 CHECKS = {
+    "theory": theory_numbers,
     "names": names,
     "arrows up": arrows_up,
     "cycles": cycles,
@@ -148,6 +164,12 @@ def test_house(check):
     assert list(CHECKS[check](ROOT)) == []
 
 
+def test_counts_only_fall():
+    """Dummy arguments that say nothing, literals of the plane: `house_counts.py --list`."""
+    record = json.loads(house_counts.RECORD.read_text())
+    assert list(house_counts.risen(house_counts.counts(ROOT), record)) == []
+
+
 def test_one_version():
     """The library and the Python package bear the same version."""
     library = (ROOT / "src_f90/base/emcon_version.f90").read_text()
@@ -161,7 +183,8 @@ def test_one_version():
 
 GOOD = {
     "base/emcon_kinds.F90": "module emcon_kinds ! the kinds\nend module emcon_kinds\n",
-    "base/emcon_text.f90": "module emcon_text\n   use emcon_kinds, only : wp\n"
+    "base/emcon_text.f90": "!> Source: docs/theory.md, eqs. (1) and (2b); paper eq. (9).\n"
+    "module emcon_text\n   use emcon_kinds, only : wp\n"
     "   ! stop\n   text = 'stop'; stop_at = 1\nend module emcon_text\n",
     "stepper/emcon_stepper.f90": "module emcon_stepper\n   use :: emcon_text\n"
     "   use, intrinsic :: iso_c_binding\nend module emcon_stepper\n",
@@ -169,6 +192,10 @@ GOOD = {
     "order.py": "def f():\n    pass\n\n\nclass A:\n    def f(self):\n        pass\n",
 }
 BAD = {
+    "theory": {"base/emcon_a.f90": "module emcon_a ! eqs. (1) and (3a)\nend module emcon_a\n"},
+    "theory, two lines": {
+        "base/emcon_a.f90": "!> Source: docs/theory.md,\n!> eq. (4).\nmodule emcon_a\nend module\n"
+    },
     "names": {"base/emcon_sort.f90": "module emcon_order\nend module emcon_order\n"},
     "names, two": {
         "base/emcon_a.f90": "module emcon_a\nend module\nmodule emcon_b\nend module\n"
@@ -202,6 +229,8 @@ def build(root, files):
         path = root / "src_f90" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
+    (root / "docs").mkdir(exist_ok=True)
+    (root / "docs/theory.md").write_text("$$x = 1 \\tag{1}$$\n$$y = 2, \\tag{2b}$$\n")
     return root
 
 
@@ -213,6 +242,52 @@ def test_good_tree_passes(check, tmp_path):
 @pytest.mark.parametrize("fault", BAD)
 def test_bad_tree_fails(fault, tmp_path):
     assert list(CHECKS[fault.split(",")[0]](build(tmp_path, BAD[fault])))
+
+
+COUNTED = """module emcon_a
+   private
+   public :: f, a_t
+   type :: a_t
+   contains
+      procedure :: g
+      procedure, private :: k => k_of
+   end type a_t
+contains
+   subroutine f(x, y, z, n, &
+         error)
+      real(wp), intent(in) :: x(2, n), y(:)
+      real(wp), intent(out) :: z    !! 2*n_node of them
+      integer, intent(in) :: &
+         n                          !! > 0
+      type(error_t), intent(out) :: error
+      real(wp) :: work(3)
+      work(1) = y(2*(n - 1) + 1)**2 + sum(x, 2)
+   end subroutine f
+   pure integer function g(self, i)
+      class(a_t), intent(in) :: self
+      integer, intent(in) :: i
+   end function g
+   subroutine hidden(i)
+      integer, intent(in) :: i
+   end subroutine hidden
+end module emcon_a
+"""
+
+
+def test_what_is_counted(tmp_path):
+    build(tmp_path, {"solid/emcon_a.f90": COUNTED, "contact/emcon_a_plane.f90": COUNTED})
+
+    def found(kind, room):
+        return [f[2] for f in house_counts.places(tmp_path, kind) if f[0] == room]
+
+    silent = [(12, "f", "x"), (12, "f", "y"), (22, "g", "i")]
+    assert found("silent arguments", "solid") == silent
+    assert [number for number, _ in found("planar literals", "solid")] == [12, 18]
+    assert found("planar literals", "contact") == []
+    counts = house_counts.counts(tmp_path)
+    assert list(house_counts.risen(counts, counts)) == []
+    counts["planar literals"]["solid"] -= 1
+    assert len(list(house_counts.risen(house_counts.counts(tmp_path), counts))) == 1
 
 
 @pytest.mark.parametrize("in_git", [False, True])
