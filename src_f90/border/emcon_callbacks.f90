@@ -155,13 +155,12 @@ contains
       if (wants_hessian) hessian(:, :, :n) = real(ddw, wp)
    end subroutine point_callback_evaluate
 
-   !> The function knows steps only: the gradient at the end is that of a step without motion, whose
-   !> tangent is half of that at the end.
-   subroutine force_callback_respond(self, u0, du, is_end, wants_tangent, force, magnitude, &
-      energy, tangent, status)
+   !> As `given_force_t` has it.
+   subroutine force_callback_respond(self, u0, du, wants_tangent, force, magnitude, energy, &
+      tangent, status)
       class(force_callback_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: is_end, wants_tangent
+      logical, intent(in) :: wants_tangent
       real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
       real(wp), intent(out) :: energy
       real(dp), intent(inout), contiguous :: tangent(:)
@@ -173,10 +172,6 @@ contains
 
       allocate(start, source=real(u0, c_double))
       allocate(motion, source=real(du, c_double))
-      if (is_end) then
-         start = real(u0 + du, c_double)
-         motion = 0.0_c_double
-      end if
       allocate(f, size_of, mold=start)
       f = 0.0_c_double
       size_of = 0.0_c_double
@@ -191,7 +186,7 @@ contains
       force = real(f, wp)
       magnitude = real(size_of, wp)
       energy = real(last, wp)
-      if (wants_tangent) tangent = real(merge(2.0_c_double, 1.0_c_double, is_end)*k, dp)
+      if (wants_tangent) tangent = real(k, dp)
    end subroutine force_callback_respond
 
    pure integer function status_of(code)

@@ -14,10 +14,11 @@ module emcon_active_set
    use emcon_errors, only : error_t
    use emcon_holding, only : holding_complete, holding_find_free, holding_forget, holding_t
    use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, newton_t
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
-   use emcon_system, only : pose_t, system_t
+   use emcon_system, only : system_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
@@ -90,12 +91,11 @@ contains
       call constraints_select(self%set, [integer ::])
    end subroutine active_set_init
 
-   !> With `is_meant` the gaps at `u` that are closed are what the step resolves, else nothing.
-   subroutine active_set_overclosure(self, system, scene, u, is_meant)
+   !> With `is_meant` the gaps at x + u that are closed are what the step resolves, else nothing.
+   subroutine active_set_overclosure(self, system, x, u, is_meant)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: u(:, :)        !! (2, n_node)
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)       !! (2, n_node) [L]
       logical, intent(in) :: is_meant
       integer :: pair
 
@@ -106,8 +106,8 @@ contains
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
             contact%reach = 0.0_wp
-            call contact%begin_step(scene%x, u, system%zero)
-            call contact%measure(scene%x, u, system%zero)
+            call contact%begin_step(x, u, system%zero)
+            call contact%measure(x, u, system%zero)
             where (contact%state%is_near .and. contact%state%is_over)
                self%overclosure(first:last) = min(0.0_wp, contact%state%gap0)
             end where
@@ -115,38 +115,33 @@ contains
       end do
    end subroutine active_set_overclosure
 
-   !> Solve the step from `state`; `du` is the first guess and the result.
-   subroutine active_set_solve(self, system, scene, newton, correction, pose, state, offset, du, &
-      status, error)
+   !> Solve the step from `state`; `motion%du` is the first guess and the result.
+   subroutine active_set_solve(self, system, scene, newton, correction, motion, state, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
       type(correction_t), intent(inout) :: correction
-      type(pose_t), intent(in) :: pose
+      type(motion_t), intent(inout) :: motion    !! from `state`
       type(state_t), intent(in) :: state
-      real(wp), intent(in), contiguous :: offset(:, :)   !! (2, n_node) to `du`, for inertia
-      real(wp), intent(inout), contiguous :: du(:, :)    !! (2, n_node)
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: is_done, is_held
 
-      self%first = du
+      self%first = motion%du
       self%driven = newton%driven
       call stopwatch_start(system%contact_clock)
-      call active_set_begin(self, system, scene, state, du)
+      call active_set_begin(self, system, motion, state)
       call stopwatch_stop(system%contact_clock)
       do
          call stopwatch_start(system%contact_clock)
-         if (self%holding%is_needed) call hold(self, system, scene, pose, state%u, &
-            newton%driven, du)
-         call active_set_select(self, system, scene, state%u, du)
+         if (self%holding%is_needed) call hold(self, system, scene, newton%driven, motion)
+         call active_set_select(self, system, motion)
          call stopwatch_stop(system%contact_clock)
          status = step_not_held
          if (allocated(self%holding%text)) return
-         self%before = du
-         call newton_solve(newton, system, scene, correction, self%set, pose, state%u, state%v, &
-            offset, du, status, error)
+         self%before = motion%du
+         call newton_solve(newton, system, correction, self%set, motion, status, error)
          if (allocated(error)) return
          self%lam(self%set%id) = self%set%lam
          self%n_newton = self%n_newton + newton%n_iteration
@@ -156,36 +151,33 @@ contains
             cycle
          end if
          if (status == newton_diverged) then
-            call let_go_pulling(self, state%lam, du, is_done)
-            if (is_done) call begin_sharp(self, system, scene, newton, state, du, is_done)
+            call let_go_pulling(self, state%lam, motion%du, is_done)
+            if (is_done) call begin_sharp(self, system, newton, motion, state, is_done)
             if (is_done) return
             cycle
          end if
-         newton%driven = 0.0_wp                         ! the prescribed motion is in `du` now
+         newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
          if (status /= newton_converged .or. size(system%contact) == 0) return
          call stopwatch_start(system%contact_clock)
-         call active_set_advance(self, system, scene, state, du, is_done, status)
+         call active_set_advance(self, system, motion, state, is_done, status)
          if (is_done .and. status == step_done .and. self%holding%is_needed) then
-            call holding_find_free(self%holding, system, scene, pose, state%u, du, &
-               self%is_active, is_held)
+            call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
             if (.not. is_held) status = step_not_held
          end if
          call stopwatch_stop(system%contact_clock)
-         if (status == step_cycling) call begin_sharp(self, system, scene, newton, state, du, &
-            is_done)
+         if (status == step_cycling) call begin_sharp(self, system, newton, motion, state, is_done)
          if (is_done) return
       end do
    end subroutine active_set_solve
 
    !> Begin the step again with convex corners that are not rounded: in statics, where a node that is
    !> pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.
-   subroutine begin_sharp(self, system, scene, newton, state, du, is_done)
+   subroutine begin_sharp(self, system, newton, motion, state, is_done)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
       type(state_t), intent(in) :: state
-      real(wp), intent(inout), contiguous :: du(:, :)    !! (2, n_node)
       logical, intent(out) :: is_done
       integer :: pair, n_newton
 
@@ -199,58 +191,55 @@ contains
       end do
       if (is_done) return
       n_newton = self%n_newton
-      du = self%first
+      motion%du = self%first
       newton%driven = self%driven
       do pair = 1, size(system%contact)
          system%contact(pair)%contact%is_sharp = system%contact(pair)%contact%may_sharpen
       end do
-      call begin_sets(self, system, scene, state, du)
+      call begin_sets(self, system, motion, state)
       self%n_newton = n_newton
    end subroutine begin_sharp
 
    !> Take in what holds the bodies that would be free with the present set. The prescribed motion
-   !> `driven` in `du`, which the first correction of Newton's method meets, is left out on the way.
-   subroutine hold(self, system, scene, pose, u0, driven, du)
+   !> `driven`, which the first correction of Newton's method meets, is left out on the way.
+   subroutine hold(self, system, scene, driven, motion)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), driven(:, :)     !! (2, n_node)
-      real(wp), intent(inout), contiguous :: du(:, :)                !! (2, n_node)
+      real(wp), intent(in), contiguous :: driven(:, :)               !! (2, n_node)
+      type(motion_t), intent(inout) :: motion
       integer :: pair
 
-      du = du - driven
-      call holding_complete(self%holding, system, scene, pose, u0, du, self%is_active)
-      du = du + driven
+      motion%du = motion%du - driven
+      call holding_complete(self%holding, system, scene, motion, self%is_active)
+      motion%du = motion%du + driven
       do pair = 1, size(system%contact)
-         call system%contact(pair)%contact%begin_step(scene%x, u0, du)
+         call system%contact(pair)%contact%begin_step(motion%x, motion%u0, motion%du)
       end do
    end subroutine hold
 
-   !> Begin a step from `state` with the expected motion `du`: stencils, and the first set.
-   subroutine active_set_begin(self, system, scene, state, du)
+   !> Begin a step from `state` with the motion that is expected: stencils, and the first set.
+   subroutine active_set_begin(self, system, motion, state)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
-      real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
       integer :: pair
 
       do pair = 1, size(system%contact)
          system%contact(pair)%contact%is_sharp = .false.
       end do
-      call begin_sets(self, system, scene, state, du)
+      call begin_sets(self, system, motion, state)
    end subroutine active_set_begin
 
    !> Stencils and the first set, as the step began.
-   subroutine begin_sets(self, system, scene, state, du)
+   subroutine begin_sets(self, system, motion, state)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
-      real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
 
-      call begin_contact(self, system, scene, state, du)
+      call begin_contact(self, system, motion, state)
       call holding_forget(self%holding)
       self%lam = state%lam
       self%n_newton = 0
@@ -263,19 +252,18 @@ contains
       self%is_let_go = .false.
    end subroutine begin_sets
 
-   !> The next set from the motion `du` and the multipliers that solve the step with the present
-   !> one; `is_done` if that one stands, or if `status` tells of a failure.
-   subroutine active_set_advance(self, system, scene, state, du, is_done, status)
+   !> The next set from the motion and the multipliers that solve the step with the present one;
+   !> `is_done` if that one stands, or if `status` tells of a failure.
+   subroutine active_set_advance(self, system, motion, state, is_done, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
-      real(wp), intent(in), contiguous :: du(:, :)       !! (2, n_node)
       logical, intent(out) :: is_done
       integer, intent(out) :: status                     !! one of the `step_` codes
       logical :: has_changed
 
-      call update(self, system, scene, state, du, has_changed, status)
+      call update(self, system, motion, state, has_changed, status)
       if (self%is_stale .and. self%n_stale < most_stale) then
          self%n_stale = self%n_stale + 1
          self%n_tried = 0
@@ -292,12 +280,11 @@ contains
 
    !> Choose stencils; start from the constraints that acted before and still can, also where the
    !> step is expected to end.
-   subroutine begin_contact(self, system, scene, state, du)
+   subroutine begin_contact(self, system, motion, state)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
-      real(wp), intent(in), contiguous :: du(:, :)
       integer :: pair
 
       self%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%is_reduced
@@ -305,12 +292,12 @@ contains
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            call contact%begin_step(scene%x, state%u, du)
-            call contact%measure(scene%x, state%u, system%zero)
+            call contact%begin_step(motion%x, motion%u0, motion%du)
+            call contact%measure(motion%x, motion%u0, system%zero)
             self%is_active(first:last) = state%is_active(first:last) .and. contact%state%is_near &
                .and. contact%state%is_over
             if (.not. any(self%is_active(first:last))) cycle
-            call contact%measure(scene%x, state%u, du)
+            call contact%measure(motion%x, motion%u0, motion%du)
             self%is_active(first:last) = self%is_active(first:last) &
                .and. .not. contact%state%is_leaving
          end associate
@@ -318,18 +305,17 @@ contains
    end subroutine begin_contact
 
    !> Hand the present set to the constraints, with the gaps to hold; multipliers carry over.
-   subroutine active_set_select(self, system, scene, u0, du)
+   subroutine active_set_select(self, system, motion)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      type(motion_t), intent(in) :: motion
       integer :: k, pair, i
 
       call remember(self)
       if (self%set%n == 0 .and. .not. any(self%is_active)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
       do pair = 1, size(system%contact)
-         call system%contact(pair)%contact%measure(scene%x, u0, du)
+         call system%contact(pair)%contact%measure(motion%x, motion%u0, motion%du)
       end do
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
@@ -349,12 +335,11 @@ contains
    end subroutine active_set_select
 
    !> The next set, from the gaps and multipliers of the converged one.
-   subroutine update(self, system, scene, state, du, has_changed, status)
+   subroutine update(self, system, motion, state, has_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
-      real(wp), intent(in), contiguous :: du(:, :)
       logical, intent(out) :: has_changed
       integer, intent(out) :: status
       type(gap_state_t) :: gap
@@ -368,8 +353,8 @@ contains
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             ! The motion may be more than was expected.
-            call contact%begin_step(scene%x, state%u, du)
-            call contact%measure(scene%x, state%u, du)
+            call contact%begin_step(motion%x, motion%u0, motion%du)
+            call contact%measure(motion%x, motion%u0, motion%du)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                gap = contact%state(i)

@@ -13,12 +13,13 @@ module emcon_holding
       gaps_next_to_close, gaps_that_can_act, in_the_way
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : loads_add
+   use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs
    use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t, rigid_field, rigid_force
    use emcon_rigid_motion, only : describe_motion
    use emcon_rigid_rows, only : rigid_rows_append, rigid_rows_find, rigid_rows_t
    use emcon_scene, only : scene_t
-   use emcon_system, only : pose_t, system_stiffen, system_t
+   use emcon_system, only : system_stiffen, system_t
    implicit none
    private
    public :: holding_t, holding_begin, holding_forget, holding_complete, holding_find_free
@@ -93,15 +94,14 @@ contains
       self%brought = 0.0_wp
    end subroutine holding_forget
 
-   !> Take contacts into `is_active`, and move bodies in `du`, until contact holds all that it can.
+   !> Take contacts into `is_active`, and move bodies in `motion`, until contact holds all that it
+   !> can.
    !> `self%text` tells of a motion that a load works on with nothing in its way.
-   subroutine holding_complete(self, system, scene, pose, u0, du, is_active)
+   subroutine holding_complete(self, system, scene, motion, is_active)
       type(holding_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :)       !! (2, n_node)
-      real(wp), intent(inout), contiguous :: du(:, :)    !! (2, n_node)
+      type(motion_t), intent(inout) :: motion
       logical, intent(inout) :: is_active(:)             !! (n_constraint)
       type(look_t) :: look
       type(free_t), allocatable :: free(:)
@@ -111,23 +111,24 @@ contains
       self%is_loose = .false.
       if (allocated(self%text)) deallocate(self%text)
       do round = 1, 6*system%n_body + size(is_active)
-         call gaps_measure(system, scene, u0, du)
-         call look_at_contacts(self, system, scene, pose, u0, du, is_active, look)
+         call motion_place(motion)
+         call gaps_measure(system, motion)
+         call look_at_contacts(self, system, scene, motion, is_active, look)
          call find_free(look, free)
          if (size(free) == 0) exit
          has_changed = .false.
          do i = 1, size(free)
-            call find_load(self, system, scene, pose, look%bodies, u0 + du, free(i))
+            call find_load(self, system, motion, look%bodies, free(i))
             if (.not. norm2(free(i)%along) > 0.0_dp) cycle
-            call follow_load(self, system, scene, pose, look%bodies, free(i), u0, du, is_active)
+            call follow_load(self, system, scene, motion, look%bodies, free(i), is_active)
             if (self%is_pushed) call tell(look%bodies, system, scene, free(i), self%text)
             if (self%is_pushed) return
             has_changed = .true.
             exit
          end do
          do i = 1, size(free)
-            if (.not. has_changed) call take_nearest(self, system, scene, pose, look%bodies, &
-               free(i), u0, du, is_active, has_changed)
+            if (.not. has_changed) call take_nearest(self, system, scene, motion, &
+               look%bodies, free(i), is_active, has_changed)
          end do
          if (.not. has_changed) exit
       end do
@@ -139,12 +140,11 @@ contains
 
    !> Whether supports and the contacts `is_active` leave a motion at the end of the step; `is_held`
    !> unless it is one that must be.
-   subroutine holding_find_free(self, system, scene, pose, u0, du, is_active, is_held)
+   subroutine holding_find_free(self, system, scene, motion, is_active, is_held)
       type(holding_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      type(motion_t), intent(in) :: motion                       !! placed
       logical, intent(in) :: is_active(:)                        !! (n_constraint)
       logical, intent(out) :: is_held
       type(look_t) :: look
@@ -153,11 +153,11 @@ contains
 
       if (allocated(self%text)) deallocate(self%text)
       self%is_pushed = .false.
-      call look_at_contacts(self, system, scene, pose, u0, du, is_active, look)
+      call look_at_contacts(self, system, scene, motion, is_active, look)
       call find_free(look, free)
       k = min(1, size(free))
       do i = 1, size(free)
-         call find_load(self, system, scene, pose, look%bodies, u0 + du, free(i))
+         call find_load(self, system, motion, look%bodies, free(i))
          if (self%is_pushed .or. .not. norm2(free(i)%along) > 0.0_dp) cycle
          self%is_pushed = .true.
          k = i
@@ -196,18 +196,17 @@ contains
    end subroutine take_look
 
    !> The same with the contacts `is_active`; gaps have been measured.
-   subroutine look_at_contacts(self, system, scene, pose, u0, du, is_active, look)
+   subroutine look_at_contacts(self, system, scene, motion, is_active, look)
       type(holding_t), intent(in) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      type(motion_t), intent(in) :: motion
       logical, intent(in) :: is_active(:)
       type(look_t), intent(out) :: look
       type(constraint_set_t) :: set
 
-      call take_look(self, system, scene, u0 + du, look)
-      call gaps_evaluate(system, scene, pose, u0, du, is_active, set)
+      call take_look(self, system, scene, motion%u0 + motion%du, look)
+      call gaps_evaluate(system, motion, is_active, set)
       call rigid_rows_append(look%rows, set%item)
    end subroutine look_at_contacts
 
@@ -236,26 +235,24 @@ contains
 
    !> Let an assembly follow its load to the next contact and take that in. `self%is_pushed`: there
    !> is nothing in its way.
-   subroutine follow_load(self, system, scene, pose, bodies, free, u0, du, is_active)
+   subroutine follow_load(self, system, scene, motion, bodies, free, is_active)
       type(holding_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
+      type(motion_t), intent(inout) :: motion
       type(rigid_bodies_t), intent(in) :: bodies
       type(free_t), intent(in) :: free
-      real(wp), intent(in), contiguous :: u0(:, :)
-      real(wp), intent(inout), contiguous :: du(:, :)
       logical, intent(inout) :: is_active(:)
       type(constraint_set_t) :: set
-      real(wp) :: way(2, size(du, 2)), time, turn
-      real(dp) :: motion(3*size(free%member)), share(size(free%along))
+      real(wp) :: way(2, size(motion%du, 2)), time, turn
+      real(dp) :: rigid(3*size(free%member)), share(size(free%along))
       logical :: is_next(size(is_active))
       integer :: i
 
       share = free%along/norm2(free%along)
-      motion = matmul(free%z, share)
-      call rigid_field(bodies, free%member, motion, way)
-      call gaps_evaluate(system, scene, pose, u0, du, gaps_that_can_act(system) &
+      rigid = matmul(free%z, share)
+      call rigid_field(bodies, free%member, rigid, way)
+      call gaps_evaluate(system, motion, gaps_that_can_act(system) &
          .and. .not. is_active, set)
       call gaps_next_to_close(set, way, time, is_next)
       self%is_pushed = .not. any(is_next)
@@ -269,33 +266,32 @@ contains
       turn = 0.0_wp
       do i = 1, size(free%member)
          associate (size => bodies%size(free%member(i)))
-            if (size > 0.0_wp) turn = max(turn, real(abs(motion(3*i)), wp)/size)
+            if (size > 0.0_wp) turn = max(turn, real(abs(rigid(3*i)), wp)/size)
          end associate
       end do
       if (time*turn > largest_turn) then
          time = largest_turn/turn
          is_next = .false.
       end if
-      call move(system, way, time, du)
+      call move(system, way, time, motion%du)
       is_active = is_active .or. is_next
    end subroutine follow_load
 
    !> Along motions that no load works on take in the contacts that touch already; where no load
    !> acts on the bodies at all, those with the smallest gap. What has pulled is not asked again.
-   subroutine take_nearest(self, system, scene, pose, bodies, free, u0, du, is_active, has_changed)
+   subroutine take_nearest(self, system, scene, motion, bodies, free, is_active, has_changed)
       type(holding_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
+      type(motion_t), intent(in) :: motion
       type(rigid_bodies_t), intent(in) :: bodies
       type(free_t), intent(in) :: free
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       logical, intent(inout) :: is_active(:)
       logical, intent(inout) :: has_changed
       type(constraint_set_t) :: set
       logical :: is_next(size(is_active))
 
-      call gaps_evaluate(system, scene, pose, u0, du, gaps_that_can_act(system) &
+      call gaps_evaluate(system, motion, gaps_that_can_act(system) &
          .and. .not. (is_active .or. self%has_pulled), set)
       call gaps_nearest(set, bodies, free%member, free%z, is_next)
       if (free%is_loaded) call gaps_keep_closed(set, is_next)
@@ -325,18 +321,16 @@ contains
    end subroutine note_brought
 
    !> The load along each free motion; 0 if it is nothing against all loads on these bodies.
-   subroutine find_load(self, system, scene, pose, bodies, u, free)
+   subroutine find_load(self, system, motion, bodies, free)
       type(holding_t), intent(in) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
+      type(motion_t), intent(in) :: motion
       type(rigid_bodies_t), intent(in) :: bodies
-      real(wp), intent(in), contiguous :: u(:, :)        !! (2, n_node)
       type(free_t), intent(inout) :: free
       real(dp) :: total(3*size(free%member)), along(size(free%z, 2)), magnitude
 
       system%f_work = 0.0_wp
-      call loads_add(system%loads, scene, system%solid, pose%load_instant, u, system%f_work)
+      call loads_add(system%loads, system%solid, motion, system%f_work)
       call rigid_force(bodies, free%member, system%f_work, total, magnitude)
       along = matmul(total, free%z)
       free%is_loaded = magnitude > 0.0_dp

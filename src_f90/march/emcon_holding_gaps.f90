@@ -3,9 +3,9 @@ module emcon_holding_gaps
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
       constraints_select
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_t
    use emcon_rigid_bodies, only : rigid_bodies_t, rigid_field
-   use emcon_scene, only : scene_t
-   use emcon_system, only : pose_t, system_t
+   use emcon_system, only : system_t
    implicit none
    private
    public :: gaps_measure, gaps_evaluate, gaps_that_can_act, gaps_next_to_close, gaps_nearest, &
@@ -19,25 +19,22 @@ module emcon_holding_gaps
 
 contains
 
-   !> Gaps for the motion `du`, of the stencils that it calls for.
-   subroutine gaps_measure(system, scene, u0, du)
+   !> Gaps of a motion, of the stencils that it calls for.
+   subroutine gaps_measure(system, motion)
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      type(motion_t), intent(in) :: motion
       integer :: pair
 
       do pair = 1, size(system%contact)
-         call system%contact(pair)%contact%begin_step(scene%x, u0, du)
-         call system%contact(pair)%contact%measure(scene%x, u0, du)
+         call system%contact(pair)%contact%begin_step(motion%x, motion%u0, motion%du)
+         call system%contact(pair)%contact%measure(motion%x, motion%u0, motion%du)
       end do
    end subroutine gaps_measure
 
-   !> The contacts that `is_meant` marks, as they are at u0 + du.
-   subroutine gaps_evaluate(system, scene, pose, u0, du, is_meant, set)
+   !> The contacts that `is_meant` marks, over a motion that is placed.
+   subroutine gaps_evaluate(system, motion, is_meant, set)
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      type(motion_t), intent(in) :: motion
       logical, intent(in) :: is_meant(:)         !! (n_constraint)
       type(constraint_set_t), intent(out) :: set
       integer :: k, pair, i, id
@@ -49,7 +46,7 @@ contains
          call constraint_place(system, id, pair, i)
          set%target(k) = system%contact(pair)%contact%state(i)%gap1
       end do
-      call constraints_evaluate(set, system, scene, pose, u0, du)
+      call constraints_evaluate(set, system, motion)
    end subroutine gaps_evaluate
 
    !> Contacts that can act at the end of the motion that was measured.

@@ -12,6 +12,7 @@ module emcon_march
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_parts, only : march_in_parts
    use emcon_march_step, only : increment_t, march_t
+   use emcon_motion, only : motion_init, motion_of, pose_t
    use emcon_newton, only : interrupt_interface, newton_init
    use emcon_numbering, only : spread_dependent
    use emcon_overclosure, only : overclosure_check
@@ -23,7 +24,7 @@ module emcon_march
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_persistent, method_saddle_point, procedure_dynamic, &
       procedure_static, step_t
-   use emcon_system, only : pose_t, system_begin_step, system_check_response, system_init, &
+   use emcon_system, only : system_begin_step, system_check_response, system_init, &
       system_respond
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
@@ -55,7 +56,8 @@ contains
       call system_init(self%system, scene, error, given)
       if (allocated(error)) return
       n = size(scene%x, 2)
-      allocate(self%du(2, n), self%v1(2, n), self%offset(2, n), source=0.0_wp)
+      call motion_init(self%motion, scene%x)
+      allocate(self%v1(2, n), source=0.0_wp)
       associate (state => self%state)
          allocate(state%u(2, n), source=scene%u0)
          allocate(state%v(2, n), source=scene%v0)
@@ -146,9 +148,9 @@ contains
          integer :: i
 
          largest = maxval(abs(field))
-         self%du = field
+         self%motion%du = field
          call spread_dependent(self%system%linked, field)
-         change = maxval(abs(field - self%du), 1)
+         change = maxval(abs(field - self%motion%du), 1)
          i = maxloc(change, 1)
          if (change(i) > deck_rounding*largest) call note_add(self%system%notes, "the " // name // &
             " at the start does not fit the ties and equations: dependent nodes follow the " // &
@@ -193,7 +195,6 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(pose_t) :: rest
       type(overlap_t) :: overlap
       integer :: i
 
@@ -225,7 +226,7 @@ contains
                call contact%configure(scene%x, step%contact)
             end associate
          end do
-         call active_set_overclosure(self%active, self%system, scene, state%u_start, &
+         call active_set_overclosure(self%active, self%system, scene%x, state%u_start, &
             step%resolves_overclosure)
          self%meant_overlap = 0.0_wp
          if (step%resolves_overclosure) then
@@ -235,9 +236,8 @@ contains
          end if
          call count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = grid_time(self, step, state%n_grid)
-         self%du = 0.0_wp
-         rest%is_end = .true.
-         call system_respond(self%system, scene, rest, state%u, state%v, self%du, self%du, .false.)
+         call system_respond(self%system, motion_of(pose_t(is_end=.true.), scene%x, state%u, &
+            self%system%zero), .false.)
          call system_check_response(self%system, "at the start of the step", error)
          if (allocated(error)) return
          state%internal = self%system%response%force

@@ -13,7 +13,8 @@ module emcon_march_step
    use emcon_judge, only : judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
-   use emcon_loads, only : instant_t, prescribed_motion
+   use emcon_loads, only : prescribed_motion
+   use emcon_motion, only : instant_t, motion_t
    use emcon_newton, only : interrupt_interface, newton_t
    use emcon_numbering, only : gather_dependent, spread_dependent
    use emcon_pair_record, only : pair_record_measure
@@ -72,7 +73,8 @@ module emcon_march_step
       integer :: most_stride = 1                 !! largest increment, in grid increments
       integer :: n_level = 0                     !! halvings allowed
       integer :: revision = 0                    !! changes with the numbering of the unknowns
-      real(wp), allocatable :: du(:, :), v1(:, :), offset(:, :)   !! (2, n_node)
+      type(motion_t) :: motion                   !! of the step
+      real(wp), allocatable :: v1(:, :)          !! (2, n_node) velocity at its end
       !> Asked before each iteration, if there is one.
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
    end type march_t
@@ -100,7 +102,7 @@ contains
       do attempt = 1, 2
          call march_guess(self, scene, start, h, is_at_rest=attempt == 2)
          call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
-            self%scheme%pose(start, h), self%state, self%offset, self%du, status, error)
+            self%motion, self%state, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
          if (status /= step_refused .or. self%active%n_newton > 0) exit
@@ -144,7 +146,7 @@ contains
       type(overlap_t) :: overlap
 
       call stopwatch_start(self%judge_clock)
-      call judge_step(self%judge, scene%x, self%state%u, self%du, overlap)
+      call judge_step(self%judge, scene%x, self%state%u, self%motion%du, overlap)
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
       if (may_cut .and. h > scale(increment%h, -judge_levels)) then
          if (goes_in(self, scene, overlap)) status = step_overlaps
@@ -239,28 +241,31 @@ contains
       integer :: k
 
       finish = instant_t(start%step_time + h, start%total_time + h)
-      self%offset = 0.0_wp
-      self%du = 0.0_wp
-      if (self%scheme%has_inertia .and. .not. is_at_rest) self%du = h*self%state%v
-      where (.not. self%system%is_alive) self%du = 0.0_wp
+      self%motion%pose = self%scheme%pose(start, h)
+      self%motion%u0 = self%state%u
+      self%motion%v0 = self%state%v
+      self%motion%offset = 0.0_wp
+      self%motion%du = 0.0_wp
+      if (self%scheme%has_inertia .and. .not. is_at_rest) self%motion%du = h*self%state%v
+      where (.not. self%system%is_alive) self%motion%du = 0.0_wp
       self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%i_step))
          do k = 1, size(step%prescribed)
             associate (a => step%prescribed(k)%dof, i => step%prescribed(k)%node)
                call prescribed_motion(scene, step, step%prescribed(k), finish, &
                   state%u_start(a, i), u, v)
-               self%du(a, i) = u - state%u(a, i)
+               self%motion%du(a, i) = u - state%u(a, i)
                self%v1(a, i) = v
                if (self%scheme%has_inertia) then
-                  self%offset(a, i) = 0.5_wp*h*(state%v(a, i) + v) - self%du(a, i)
+                  self%motion%offset(a, i) = 0.5_wp*h*(state%v(a, i) + v) - self%motion%du(a, i)
                else
-                  self%newton%driven(a, i) = self%du(a, i)
+                  self%newton%driven(a, i) = self%motion%du(a, i)
                end if
             end associate
          end do
       end associate
-      call follow_links(self%system, self%du)
-      call follow_links(self%system, self%offset)
+      call follow_links(self%system, self%motion%du)
+      call follow_links(self%system, self%motion%offset)
       call follow_links(self%system, self%newton%driven)
    end subroutine march_guess
 
@@ -292,7 +297,8 @@ contains
          do i = 1, size(state%v, 2)
             do a = 1, 2
                if (system%numbering%unknown(a, i) > 0) then
-                  self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), self%du(a, i))
+                  self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), &
+                     self%motion%du(a, i))
                   system%residual(a, i) = 0.0_wp
                end if
             end do
@@ -312,10 +318,10 @@ contains
             if (.not. has_root) call note_add(increment%notes, &
                "velocity update: no root, the energy lost in this step is not restored")
          end if
-         state%u = state%u + self%du
+         state%u = state%u + self%motion%du
          state%v = self%v1
          state%contact = self%newton%contact
-         call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%du, &
+         call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
             merge(0.5_wp, 0.0_wp, self%scheme%has_inertia))
          state%internal = system%response%force
          state%energy = system%response%energy
@@ -355,11 +361,11 @@ contains
             // " onto the surface nearest to it")
          if (.not. allocated(holding%text)) return
          call tell_stabilized(self%active%holding, increment)
-         do i = 1, size(self%du, 2)
+         do i = 1, size(self%motion%du, 2)
             do a = 1, 2
                if (system%numbering%unknown(a, i) == 0) cycle
                self%ledger%stabilization = self%ledger%stabilization &
-                  - system%residual(a, i)*self%du(a, i)
+                  - system%residual(a, i)*self%motion%du(a, i)
             end do
          end do
       end associate
@@ -387,18 +393,19 @@ contains
       real(wp) :: contact_work
       integer :: k
 
-      associate (state => self%state, system => self%system, set => self%active%set)
+      associate (state => self%state, system => self%system, set => self%active%set, &
+            motion => self%motion)
          contact_work = 0.0_wp
          if (self%scheme%has_inertia) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
             end do
-            self%ledger%external_work = self%ledger%external_work + sum(system%external*self%du) &
-               + sum(state%reaction*self%du) + sum(system%inertia*self%offset)
+            self%ledger%external_work = self%ledger%external_work + sum(system%external*motion%du) &
+               + sum(state%reaction*motion%du) + sum(system%inertia*motion%offset)
          else
-            contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*self%du)
+            contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*motion%du)
             self%ledger%external_work = self%ledger%external_work - contact_work &
-               + 0.5_wp*sum((state%internal + system%response%force)*self%du)
+               + 0.5_wp*sum((state%internal + system%response%force)*motion%du)
          end if
          self%ledger%contact_work = self%ledger%contact_work + contact_work
       end associate

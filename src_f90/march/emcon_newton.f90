@@ -11,9 +11,9 @@ module emcon_newton
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_kinds, only : wp
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
+   use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
-   use emcon_scene, only : scene_t
-   use emcon_system, only : pose_t, system_respond, system_tangent_times, system_t
+   use emcon_system, only : system_respond, system_tangent_times, system_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
@@ -100,18 +100,14 @@ contains
       allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
    end subroutine newton_init
 
-   !> Solve for `du`, whose prescribed entries stand; on entry a first guess. The multipliers of
-   !> `set` start from what they are.
-   subroutine newton_solve(self, system, scene, correction, set, pose, u0, v0, offset, du, status, &
-      error)
+   !> Solve for `motion%du`, whose prescribed entries stand; on entry a first guess. The multipliers
+   !> of `set` start from what they are.
+   subroutine newton_solve(self, system, correction, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
       type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(inout) :: set
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), offset(:, :)
-      real(wp), intent(inout), contiguous :: du(:, :)
+      type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: norm, defect
@@ -120,24 +116,25 @@ contains
 
       call begin(self, set%n)
       is_driven = any(abs(self%driven) > 0.0_wp) .and. size(self%residual) > 0
-      if (is_driven) du = du - self%driven
+      if (is_driven) motion%du = motion%du - self%driven
       do
          call check_interrupt(self, status, error)
          if (allocated(error)) return
-         call evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, du, &
-            norm, defect, is_rounding, status, error)
+         call evaluate_damped(self, system, correction, set, motion, status, error)
+         if (.not. allocated(error) .and. status == newton_converged) call measure(self, system, &
+            correction, set, norm, defect, is_rounding)
          if (correction%n_redundant > 0 .and. status == newton_converged) then
             status = newton_redundant
-            if (is_driven) du = du + self%driven
+            if (is_driven) motion%du = motion%du + self%driven
          end if
          if (allocated(error) .or. status /= newton_converged) return
          if (is_driven) then
-            call start_driven(self, system, correction, set, pose, u0, du, status, error)
+            call start_driven(self, system, correction, set, motion, status, error)
             if (allocated(error) .or. status /= newton_converged) return
             is_driven = .false.
             cycle
          end if
-         call search(self, system, set, pose, du, goes_on)
+         call search(self, system, set, motion, goes_on)
          if (goes_on) cycle
          call judge(self, max(norm, defect), is_rounding, next)
          select case (next)
@@ -150,9 +147,9 @@ contains
             call factorise(self, system, correction, set, status, error)
             if (allocated(error) .or. status /= newton_converged) return
          end select
-         call correct(self, system, correction, set, du, error)
+         call correct(self, system, correction, set, motion%du, error)
          if (allocated(error)) return
-         if (pose%is_end .and. is_too_far(self, scene%x)) then
+         if (motion%pose%is_end .and. is_too_far(self, motion%x)) then
             status = newton_singular
             return
          end if
@@ -160,16 +157,15 @@ contains
    end subroutine newton_solve
 
    !> In statics, go back on the last correction if contact forces turned on the way.
-   subroutine search(self, system, set, pose, du, goes_on)
+   subroutine search(self, system, set, motion, goes_on)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(inout), contiguous :: du(:, :)
+      type(motion_t), intent(inout) :: motion
       logical, intent(out) :: goes_on            !! there is another place to look at
 
       goes_on = .false.
-      if (.not. pose%is_end .or. set%n == set%n_linear) return
+      if (.not. motion%pose%is_end .or. set%n == set%n_linear) return
       if (self%line%is_on) then
          call line_search_take(self%line, dot_product(self%way, self%residual))
       else
@@ -181,7 +177,7 @@ contains
       goes_on = self%line%is_on
       if (.not. goes_on) return
       self%correction = self%line%step*self%way
-      call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
+      call add_to_dofs(system%numbering, self%correction, 1.0_wp, motion%du)
       set%lam = set%lam + self%line%step*self%dlam
    end subroutine search
 
@@ -314,19 +310,17 @@ contains
 
    !> First correction: what the prescribed motion does by the tangent at its start. Elements at
    !> driven nodes would be squeezed if these moved alone.
-   subroutine start_driven(self, system, correction, set, pose, u0, du, status, error)
+   subroutine start_driven(self, system, correction, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(inout) :: set
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :)
-      real(wp), intent(inout), contiguous :: du(:, :)
+      type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       integer :: k, i
 
-      call system_tangent_times(system, pose, u0, du, self%driven, self%contact)
+      call system_tangent_times(system, motion, self%driven, self%contact)
       call pick_unknowns(system%numbering, self%contact, self%scale)
       self%residual = self%residual + self%scale
       do k = 1, set%n
@@ -337,35 +331,26 @@ contains
       end do
       call factorise(self, system, correction, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return
-      call correct(self, system, correction, set, du, error)
+      call correct(self, system, correction, set, motion%du, error)
       self%work = 0.0_wp
-      du = du + self%driven
+      motion%du = motion%du + self%driven
    end subroutine start_driven
 
-   !> Residual at `du`; the last correction is halved as long as there is none.
-   subroutine evaluate_damped(self, system, scene, correction, set, pose, u0, v0, offset, du, &
-      norm, defect, is_rounding, status, error)
+   !> Forces and constraints; the last correction is halved as long as there are none.
+   subroutine evaluate_damped(self, system, correction, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
       type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(inout) :: set
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), offset(:, :)
-      real(wp), intent(inout), contiguous :: du(:, :)
-      real(wp), intent(out) :: norm, defect
-      logical, intent(out) :: is_rounding
+      type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
       status = newton_refused
-      is_rounding = .false.
-      norm = huge(norm)
-      defect = huge(defect)
       do i = 0, most_halvings
-         call system_respond(system, scene, pose, u0, v0, du, offset, &
-            with_tangent=.not. self%is_polish)
+         call motion_place(motion)
+         call system_respond(system, motion, with_tangent=.not. self%is_polish)
          if (allocated(system%failure)) allocate(error, source=system%failure)
          if (allocated(error)) return
          if (.not. allocated(system%refusal)) exit
@@ -373,18 +358,16 @@ contains
          self%correction = 0.5_wp*self%correction
          self%work = 0.5_wp*self%work
          self%line%is_on = .false.
-         call add_to_dofs(system%numbering, self%correction, -1.0_wp, du)
+         call add_to_dofs(system%numbering, self%correction, -1.0_wp, motion%du)
       end do
       status = newton_converged
       if (set%n > 0) then
          call stopwatch_start(system%contact_clock)
-         call constraints_evaluate(set, system, scene, pose, u0, du)
+         call constraints_evaluate(set, system, motion)
          call constraints_rows(set, system%numbering)
          call stopwatch_stop(system%contact_clock)
       end if
       call correction_lay_out(correction, system, set, error)
-      if (allocated(error)) return
-      call measure(self, system, correction, set, norm, defect, is_rounding)
    end subroutine evaluate_damped
 
    !> Residual with contact forces, its size relative to its contributions, and the largest gap

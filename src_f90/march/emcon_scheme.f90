@@ -2,8 +2,7 @@
 !> velocity follows. The residual frame, Newton's method and the step loop serve all schemes.
 module emcon_scheme
    use emcon_kinds, only : wp
-   use emcon_loads, only : instant_t
-   use emcon_system, only : pose_t
+   use emcon_motion, only : instant_t, pose_t
    implicit none
    private
    public :: scheme_t

@@ -1,9 +1,8 @@
 !> The energy-momentum scheme, paper eq. (4): discrete gradients, mid-point inertia.
 module emcon_scheme_energy_momentum
    use emcon_kinds, only : wp
-   use emcon_loads, only : instant_t
+   use emcon_motion, only : instant_t, pose_t
    use emcon_scheme, only : scheme_t
-   use emcon_system, only : pose_t
    implicit none
    private
    public :: scheme_energy_momentum_t

@@ -1,9 +1,8 @@
 !> Equilibrium without inertia: forces and loads at the end of the increment.
 module emcon_scheme_static
    use emcon_kinds, only : wp
-   use emcon_loads, only : instant_t
+   use emcon_motion, only : instant_t, pose_t
    use emcon_scheme, only : scheme_t
-   use emcon_system, only : pose_t
    implicit none
    private
    public :: scheme_static_t

@@ -10,18 +10,21 @@ module emcon_solid
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create
    use emcon_materials, only : law_given
+   use emcon_motion, only : motion_t
    use emcon_point_function, only : point_failed, point_gradient, point_ok
    use emcon_scene, only : scene_t
    use emcon_shape, only : shape_create, shape_t
-   use emcon_text, only : to_text
+   use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: solid_t, solid_init, solid_respond, solid_response_t, solid_round, solid_tangent_times
+   public :: solid_t, solid_init, solid_respond, solid_response_t, solid_tangent_times
    public :: solid_evaluate_given, obstacle_text
 
    type :: solid_t
       integer :: n_element = 0
       integer :: n_node = 0
+      integer, allocatable :: label(:)                   !! (n_element)
+      type(string_t), allocatable :: material(:)         !! names of the materials
       integer, allocatable :: kind(:)                    !! (n_element)
       integer, allocatable :: node(:, :)                 !! (max_element_nodes, n_element)
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
@@ -63,6 +66,12 @@ contains
       n = size(scene%element_kind)
       self%n_element = n
       self%n_node = size(scene%x, 2)
+      self%label = scene%element_label
+      allocate(self%material(size(scene%material)))
+      do k = 1, size(scene%material)
+         self%material(k)%text = ""
+         if (allocated(scene%material(k)%name)) self%material(k)%text = scene%material(k)%name
+      end do
       self%kind = scene%element_kind
       self%node = scene%element_node
       allocate(self%law_of(n), self%geometry(n), self%thickness(n))
@@ -208,15 +217,13 @@ contains
       end do
    end subroutine reference_gradient
 
-   !> Forces of a step from `u0` to `u0 + du`; with `slot`, also adds `factor` times the tangent
-   !> to the matrix entries `value` (slot > 0) and `side` (slot < 0). What a displacement is rounded
-   !> by, a force is too: `u0` is exact here, as what the step starts from; see `solid_round`.
-   subroutine solid_respond(self, u0, du, nlgeom, response, factor, slot, value, side)
+   !> Forces of a motion; with `slot`, also adds the tangent to the matrix entries `value` (slot > 0)
+   !> and `side` (slot < 0). What displacements are rounded by, forces are too.
+   subroutine solid_respond(self, motion, nlgeom, response, slot, value, side)
       type(solid_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      type(motion_t), intent(in) :: motion
       logical, intent(in) :: nlgeom
       type(solid_response_t), intent(inout) :: response
-      real(wp), intent(in), optional :: factor
       integer, intent(in), contiguous, optional :: slot(:)       !! element matrices by columns
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
       type(element_response_t) :: part
@@ -231,7 +238,7 @@ contains
       response%rounding = 0.0_wp
       response%inverted_element = 0
       if (self%has_given) then
-         call solid_evaluate_given(self, u0, du, nlgeom, with_tangent, response%given)
+         call solid_evaluate_given(self, motion%from, motion%by, nlgeom, with_tangent, response%given)
          response%inverted_element = response%given%inverted_element
          if (response%inverted_element > 0) return
       end if
@@ -239,13 +246,15 @@ contains
       dlocal = 0.0_wp
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
-         call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
+         call gather(self%node(:n, e), motion%from, motion%by, local0, dlocal)
          call respond_element(self, e, response%given, local0, dlocal, nlgeom, with_tangent, part)
          if (part%is_inverted) then
             response%inverted_element = e
             return
          end if
          response%energy(e) = part%energy
+         largest = max(maxval(abs(local0(:, :n) + dlocal(:, :n))), &
+            maxval(motion%computed(:, self%node(:n, e))))
          do i = 1, n
             node = self%node(i, e)
             response%force(:, node) = response%force(:, node) + part%force(:, i)
@@ -253,35 +262,11 @@ contains
             response%rounding(:, node) = response%rounding(:, node) + largest*self%stiffness(i, e)
          end do
          if (with_tangent) then
-            call scatter(2*n, part%tangent, factor, slot(first:), value, side)
+            call scatter(2*n, part%tangent, motion%weight, slot(first:), value, side)
             first = first + 4*n*n
          end if
       end do
    end subroutine solid_respond
-
-   !> What the forces of a step of no length from `u` are rounded by, where `u` was computed as a
-   !> change of `before`.
-   pure subroutine solid_round(self, u, before, rounding)
-      type(solid_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: u(:, :), before(:, :)          !! (2, n_node) [L]
-      real(wp), intent(inout), contiguous :: rounding(:, :)              !! (2, n_node) [M L/T^2]
-      real(wp) :: largest
-      integer :: e, i
-
-      rounding = 0.0_wp
-      do e = 1, self%n_element
-         associate (node => self%node(:self%geometry(e)%n_node, e))
-            largest = 0.0_wp
-            do i = 1, size(node)
-               largest = max(largest, maxval(abs(u(:, node(i)) - u(:, node(1)))), &
-                  maxval(abs(u(:, node(i)))), maxval(abs(before(:, node(i)))))
-            end do
-            do i = 1, size(node)
-               rounding(:, node(i)) = rounding(:, node(i)) + largest*self%stiffness(i, e)
-            end do
-         end associate
-      end do
-   end subroutine solid_round
 
    !> Response of element `e`, by its law or from what the given laws have answered.
    pure subroutine respond_element(self, e, given, local0, dlocal, nlgeom, with_tangent, part)
@@ -338,7 +323,7 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
       type(given_response_t), intent(inout) :: given
-      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
+      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
       logical :: is_inverted
       integer :: e, i, k
 
@@ -351,7 +336,7 @@ contains
       dlocal = 0.0_wp
       do e = 1, self%n_element
          if (self%first_point(e) == 0) cycle
-         call gather(self%node(:self%geometry(e)%n_node, e), u0, du, local0, dlocal, largest)
+         call gather(self%node(:self%geometry(e)%n_node, e), u0, du, local0, dlocal)
          do k = 1, self%geometry(e)%n_gp
             i = self%first_point(e) - 1 + k
             associate (points => given%points(self%law_of(e)))
@@ -367,18 +352,18 @@ contains
    end subroutine gather_strains
 
    !> Why `response` is none: an element is inverted, `by` what, or a given law does not answer.
-   subroutine obstacle_text(scene, response, by, text)
-      type(scene_t), intent(in) :: scene
+   subroutine obstacle_text(self, response, by, text)
+      type(solid_t), intent(in) :: self
       type(solid_response_t), intent(in) :: response
       character(len=*), intent(in) :: by
       character(len=:), allocatable, intent(out) :: text
 
       if (response%given%material == 0) then
-         text = "element " // to_text(scene%element_label(max(1, response%inverted_element))) // &
+         text = "element " // to_text(self%label(max(1, response%inverted_element))) // &
             " is inverted" // by
          return
       end if
-      text = "the law given for material " // scene%material(response%given%material)%name
+      text = "the law given for material " // self%material(response%given%material)%text
       if (response%given%status == point_failed) then
          text = text // " has failed"
       else
@@ -387,46 +372,42 @@ contains
    end subroutine obstacle_text
 
    !> Displacements of the nodes of an element relative to its first node, which does not round them
-   !> with the distance that a body has flown, and the largest of them and of the entries of `du`:
-   !> what the differences are rounded by.
-   pure subroutine gather(node, u0, du, local0, dlocal, largest)
+   !> with the distance that a body has flown.
+   pure subroutine gather(node, u0, du, local0, dlocal)
       integer, intent(in) :: node(:)
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       real(wp), intent(inout) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
-      real(wp), intent(out) :: largest
       integer :: i
 
-      largest = 0.0_wp
       do i = 1, size(node)
          local0(:, i) = u0(:, node(i)) - u0(:, node(1))
          dlocal(:, i) = du(:, node(i)) - du(:, node(1))
-         largest = max(largest, maxval(abs(local0(:, i) + dlocal(:, i))), &
-            maxval(abs(du(:, node(i)))))
       end do
    end subroutine gather
 
-   !> Add `factor` times the tangent of the step times `direction` to `product`. Elements that
-   !> `direction` does not touch are passed over.
-   subroutine solid_tangent_times(self, u0, du, nlgeom, factor, direction, product)
+   !> Add the tangent of a motion times `direction` to `product`. Elements that `direction` does not
+   !> touch are passed over.
+   subroutine solid_tangent_times(self, motion, nlgeom, direction, product)
       type(solid_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :), direction(:, :)   !! (2, n_node)
+      type(motion_t), intent(in) :: motion
       logical, intent(in) :: nlgeom
-      real(wp), intent(in) :: factor
+      real(wp), intent(in), contiguous :: direction(:, :)                       !! (2, n_node)
       real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
       type(element_response_t) :: part
-      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
+      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
       type(given_response_t) :: given
       real(wp) :: image(2*max_element_nodes)
       integer :: e, i, n, node
 
-      if (self%has_given) call solid_evaluate_given(self, u0, du, nlgeom, .true., given)
+      if (self%has_given) call solid_evaluate_given(self, motion%from, motion%by, nlgeom, &
+         .true., given)
       if (given%inverted_element > 0) return
       local0 = 0.0_wp
       dlocal = 0.0_wp
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          if (.not. any(abs(direction(:, self%node(:n, e))) > 0.0_wp)) cycle
-         call gather(self%node(:n, e), u0, du, local0, dlocal, largest)
+         call gather(self%node(:n, e), motion%from, motion%by, local0, dlocal)
          call respond_element(self, e, given, local0, dlocal, nlgeom, .true., part)
          if (part%is_inverted) return
          image = 0.0_wp
@@ -437,7 +418,7 @@ contains
          end do
          do i = 1, n
             node = self%node(i, e)
-            product(:, node) = product(:, node) + factor*image(2*i - 1:2*i)
+            product(:, node) = product(:, node) + motion%weight*image(2*i - 1:2*i)
          end do
       end do
    end subroutine solid_tangent_times

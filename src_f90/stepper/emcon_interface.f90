@@ -22,6 +22,7 @@ module emcon_interface
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_mesh, only : surface_t
+   use emcon_motion, only : motion_init, motion_t
    use emcon_null_space, only : null_space_t
    use emcon_numbering, only : gather_dependent, numbering_init, numbering_matrix, numbering_t, &
       spread_dependent, unresolved_t
@@ -65,6 +66,7 @@ module emcon_interface
       type(numbering_t) :: linked                !! unknowns, u = T w
       type(active_set_t) :: active
       type(state_t) :: state                     !! start of the step
+      type(motion_t) :: motion                   !! as last handed over
       type(null_space_t) :: space
    end type interface_t
 
@@ -279,8 +281,8 @@ contains
             end associate
             system%first_constraint(i + 1) = system%n_constraint
          end do
-         allocate(system%u_work(2, self%n_node), system%zero(2, self%n_node), &
-            system%magnitude(2, self%n_node), source=0.0_wp)
+         allocate(system%zero(2, self%n_node), system%magnitude(2, self%n_node), source=0.0_wp)
+         call motion_init(self%motion, scene%x)
          self%n_constraint = system%n_constraint
       end associate
       call active_set_init(self%active, self%system)

@@ -23,8 +23,8 @@ module emcon_interface_step
    use emcon_interface_stage, only : check_begun, check_mask, check_motion, &
       check_multipliers
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_place
    use emcon_steps, only : initiation_persistent
-   use emcon_system, only : pose_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -72,11 +72,12 @@ contains
       do i = 1, size(self%system%contact)
          self%system%contact(i)%contact%reach = 0.0_wp     ! nothing depends on the past
       end do
+      call take_motion(self, u0, du)
       self%state%u = u0
       self%state%is_active = was_active
       call take_options(self)
       call constraints_select(self%active%set, [integer ::])
-      call active_set_begin(self%active, self%system, self%scene, self%state, du)
+      call active_set_begin(self%active, self%system, self%motion, self%state)
       active = self%active%is_active
       self%has_stencils = .true.
    end subroutine interface_begin_step
@@ -102,6 +103,17 @@ contains
          end associate
       end do
    end subroutine interface_gaps
+
+   !> Take over a motion.
+   subroutine take_motion(self, u0, du)
+      type(interface_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+
+      self%motion%pose%is_end = self%is_end
+      self%motion%u0 = u0
+      self%motion%du = du
+      call motion_place(self%motion)
+   end subroutine take_motion
 
    !> Measure all gaps, which the contacts keep.
    subroutine measure(self, u0, du)
@@ -151,7 +163,8 @@ contains
       if (allocated(error)) return
       call take_options(self)
       self%active%is_active = active
-      call active_set_select(self%active, self%system, self%scene, u0, du)
+      call take_motion(self, u0, du)
+      call active_set_select(self%active, self%system, self%motion)
    end subroutine interface_select
 
    !> Select the constraints `id`, with gaps to hold of the host's own choice.
@@ -196,8 +209,9 @@ contains
       call check_begun(self, place, error)
       if (.not. allocated(error)) call check_near(self, place, self%active%set%id, error)
       if (allocated(error)) return
+      call take_motion(self, u0, du)
       associate (set => self%active%set)
-         call constraints_evaluate(set, self%system, self%scene, pose_t(is_end=self%is_end), u0, du)
+         call constraints_evaluate(set, self%system, self%motion)
          call constraints_rows(set, self%system%numbering)
          values%n = set%n
          values%id = set%id
@@ -296,6 +310,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: magnitude(:, :)   !! (2, n_node) sum of |contributions| to
                                                           !! the residual [M L/T^2]
+      real(wp) :: force(2, self%n_node)
       character(len=*), parameter :: place = "interface_update_active"
 
       is_done = .false.
@@ -312,14 +327,15 @@ contains
       end if
       self%active%set%lam = lam
       self%active%lam(self%active%set%id) = lam
+      call take_motion(self, u0, du)
       self%state%u = u0
       self%system%magnitude = 0.0_wp
       if (present(magnitude)) then
          self%system%magnitude = magnitude
       else
-         call constraints_force(self%active%set, 1, self%system%u_work, self%system%magnitude)
+         call constraints_force(self%active%set, 1, force, self%system%magnitude)
       end if
-      call active_set_advance(self%active, self%system, self%scene, self%state, du, is_done, status)
+      call active_set_advance(self%active, self%system, self%motion, self%state, is_done, status)
       active = self%active%is_active
    end subroutine interface_update_active
 

@@ -7,7 +7,8 @@ module emcon_stepper_conditions
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_loads, only : instant_t, prescribed_motion
+   use emcon_loads, only : prescribed_motion
+   use emcon_motion, only : instant_t
    use emcon_march, only : march_renumber
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
    use emcon_scene, only : scene_t

@@ -7,6 +7,7 @@ module emcon_stepper_constraints
    use emcon_csr_product, only : csr_product
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
+   use emcon_motion, only : motion_place, motion_t, pose_t
    use emcon_null_space, only : null_space_matrices, null_space_multipliers, obstacle_none, &
       obstacle_redundant
    use emcon_numbering, only : numbering_init, numbering_matrix, numbering_t, pick_unknowns
@@ -14,7 +15,7 @@ module emcon_stepper_constraints
    use emcon_stepper_free, only : stepper_check_open
    use emcon_stepper_query, only : query_check_field, query_sync, query_t
    use emcon_steps, only : prescribed_t
-   use emcon_system, only : pose_t, system_t
+   use emcon_system, only : system_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -49,7 +50,7 @@ contains
       type(contact_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
       type(numbering_t) :: freedoms
-      real(wp), allocatable :: du(:, :)
+      type(motion_t) :: motion
       logical, allocatable :: is_near(:)
 
       call query_sync(self, stepper, error)
@@ -57,13 +58,16 @@ contains
       if (.not. allocated(error)) call query_check_field(stepper, u1, "u1", error)
       if (allocated(error)) return
       self%is_evaluated = .false.                ! the stencils are others from here on
-      allocate(du, source=u1)
-      du = u1 - u0
+      motion = self%march%motion
+      motion%pose = pose_t()
+      motion%u0 = u0
+      motion%du = u1 - u0
+      call motion_place(motion)
       associate (system => self%march%system)
          allocate(is_near(system%n_constraint))
-         call find_near(system, stepper%scene%x, u0, du, is_near)
+         call find_near(system, motion, is_near)
          call select_near(self%near, system, is_near, keeps_gap)
-         call constraints_evaluate(self%near, system, stepper%scene, pose_t(), u0, du)
+         call constraints_evaluate(self%near, system, motion)
          call number_all(size(u0, 2), freedoms)
          call constraints_rows(self%near, freedoms)
          call fill_report(report, self%near, system)
@@ -71,20 +75,18 @@ contains
    end subroutine query_constraints
 
    !> The contact constraints with a surface near that they are over.
-   subroutine find_near(system, x, u0, du, is_near)
+   subroutine find_near(system, motion, is_near)
       type(system_t), intent(inout) :: system
-      real(wp), intent(in), contiguous :: x(:, :)
-      real(wp), intent(in) :: u0(:, :), du(:, :)
+      type(motion_t), intent(in) :: motion
       logical, intent(out) :: is_near(:)             !! (n_constraint)
       integer :: pair
 
       is_near = .false.
-      system%u_work = u0
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             contact%reach = 0.0_wp               ! not what was found for another motion
-            call contact%begin_step(x, system%u_work, du)
-            call contact%measure(x, system%u_work, du)
+            call contact%begin_step(motion%x, motion%u0, motion%du)
+            call contact%measure(motion%x, motion%u0, motion%du)
             is_near(system%first_constraint(pair) + 1:system%first_constraint(pair + 1)) = &
                contact%state%is_near .and. contact%state%is_over .and. &
                (pair <= system%n_pair .or. contact%state%gap1 < contact%state%closed)

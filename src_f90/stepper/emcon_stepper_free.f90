@@ -9,11 +9,12 @@ module emcon_stepper_free
    use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
       march_set_time
    use emcon_march_step, only : follow_links
+   use emcon_motion, only : motion_of, pose_t
    use emcon_pair_record, only : pair_record_init
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
    use emcon_steps, only : procedure_static
-   use emcon_system, only : pose_t, system_check_response, system_respond
+   use emcon_system, only : system_check_response, system_respond
    use emcon_text, only : to_text
    use emcon_verdict, only : verdict_move, verdict_t, verdict_update
    implicit none
@@ -220,12 +221,10 @@ contains
       type(stepper_t), intent(inout) :: self
       type(state_t), intent(inout) :: next
       type(error_t), allocatable, intent(out) :: error
-      type(pose_t) :: rest
 
-      rest%is_end = .true.
       associate (system => self%march%system)
-         call system_respond(system, self%scene, rest, next%u, next%v, system%zero, system%zero, &
-            .false.)
+         call system_respond(system, motion_of(pose_t(is_end=.true.), self%scene%x, next%u, &
+            system%zero), .false.)
          call system_check_response(system, "u", error)
          if (allocated(error)) return
          next%internal = system%response%force

@@ -12,7 +12,7 @@ module emcon_stepper_query
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_ledger, only : body_momenta
-   use emcon_loads, only : instant_t
+   use emcon_motion, only : instant_t, motion_place
    use emcon_march, only : march_free, march_init, march_resume, march_t
    use emcon_march_step, only : follow_links, march_guess
    use emcon_null_space, only : null_space_free, null_space_t
@@ -123,7 +123,7 @@ contains
       if (.not. allocated(error)) call check_size(h, error)
       if (allocated(error)) return
       call march_guess(self%march, stepper%scene, now(self), h, is_at_rest=.false.)
-      u1 = self%march%state%u + self%march%du
+      u1 = self%march%state%u + self%march%motion%du
    end subroutine query_guess
 
    subroutine check_size(h, error)
@@ -168,17 +168,13 @@ contains
       if (.not. allocated(error)) call take_contact(self, error, lam, is_active)
       if (allocated(error)) return
       call take_motion(self, stepper, h, u1)
-      associate (march => self%march, system => self%march%system, state => self%march%state)
-         associate (pose => march%scheme%pose(now(self), h))
-            call system_respond(system, stepper%scene, pose, state%u, state%v, march%du, &
-               march%offset, with_tangent)
-            call system_check_response(system, "u1", error)
-            if (allocated(error)) return
-            call begin_contact(self, stepper)
-            call active_set_select(march%active, system, stepper%scene, state%u, march%du)
-            call constraints_evaluate(march%active%set, system, stepper%scene, pose, state%u, &
-               march%du)
-         end associate
+      associate (march => self%march, system => self%march%system)
+         call system_respond(system, march%motion, with_tangent)
+         call system_check_response(system, "u1", error)
+         if (allocated(error)) return
+         call begin_contact(self)
+         call active_set_select(march%active, system, march%motion)
+         call constraints_evaluate(march%active%set, system, march%motion)
          call constraints_rows(march%active%set, system%numbering)
          call constraints_force(march%active%set, 1, self%contact)
          is_finite = all(ieee_is_finite(system%residual))
@@ -232,22 +228,22 @@ contains
             do k = 1, size(list)
                associate (a => list(k)%dof, i => list(k)%node)
                   du = u1(a, i) - march%state%u(a, i)
-                  if (march%scheme%has_inertia) march%offset(a, i) = march%offset(a, i) &
-                     + (march%du(a, i) - du)
+                  if (march%scheme%has_inertia) march%motion%offset(a, i) = &
+                     march%motion%offset(a, i) + (march%motion%du(a, i) - du)
                end associate
             end do
          end associate
-         march%du = u1 - march%state%u
-         call follow_links(march%system, march%du)
-         call follow_links(march%system, march%offset)
+         march%motion%du = u1 - march%state%u
+         call follow_links(march%system, march%motion%du)
+         call follow_links(march%system, march%motion%offset)
+         call motion_place(march%motion)
       end associate
    end subroutine take_motion
 
    !> Choose stencils for the motion, by a search that does not depend on earlier ones, and take the
    !> wanted constraints that have a surface near.
-   subroutine begin_contact(self, stepper)
+   subroutine begin_contact(self)
       type(query_t), intent(inout) :: self
-      type(stepper_t), intent(in) :: stepper
       integer :: pair
 
       associate (march => self%march, system => self%march%system, state => self%march%state, &
@@ -258,8 +254,8 @@ contains
                   first => system%first_constraint(pair) + 1, &
                   last => system%first_constraint(pair + 1))
                contact%reach = 0.0_wp
-               call contact%begin_step(stepper%scene%x, state%u, march%du)
-               call contact%measure(stepper%scene%x, state%u, march%du)
+               call contact%begin_step(march%motion%x, march%motion%u0, march%motion%du)
+               call contact%measure(march%motion%x, march%motion%u0, march%motion%du)
                active%is_active(first:last) = state%is_active(first:last) .and. &
                   contact%state%is_near
             end associate

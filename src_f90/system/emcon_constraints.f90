@@ -9,9 +9,9 @@ module emcon_constraints
    use emcon_csr, only : csr_find, csr_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
+   use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
-   use emcon_scene, only : scene_t
-   use emcon_system, only : pose_t, system_t
+   use emcon_system, only : system_t
    implicit none
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
@@ -63,17 +63,14 @@ contains
       if (pair > 0) i = id - system%first_constraint(pair)
    end subroutine constraint_place
 
-   !> Values and derivatives of all active constraints for the step `u0` to `u0 + du`.
-   subroutine constraints_evaluate(self, system, scene, pose, u0, du)
+   !> Values and derivatives of all active constraints over a motion.
+   subroutine constraints_evaluate(self, system, motion)
       type(constraint_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      type(motion_t), intent(in) :: motion
       integer :: k, pair, i, first, last, number(self%n)
 
       if (self%n == 0) return
-      if (pose%is_end) system%u_work = u0 + du
       do k = 1, self%n
          call constraint_place(system, self%id(k), pair, i)
          number(k) = i
@@ -81,7 +78,7 @@ contains
       self%n_linear = count(self%id <= system%linear%n)
       last = self%n_linear
       do k = 1, last
-         call evaluate_linear(system%linear, self%id(k), u0, du, self%item(k))
+         call evaluate_linear(system%linear, self%id(k), motion%u0, motion%du, self%item(k))
       end do
       do pair = 1, size(system%contact)
          first = last + 1
@@ -89,16 +86,12 @@ contains
          if (last < first) cycle
          associate (contact => system%contact(pair)%contact, wanted => number(first:last), &
                target => self%target(first:last))
-            if (pose%is_end) then
-               call contact%evaluate(wanted, scene%x, system%u_work, system%zero, target, &
-                  self%item(first:last))
-            else
-               call contact%evaluate(wanted, scene%x, u0, du, target, self%item(first:last))
-            end if
+            call contact%evaluate(wanted, motion%x, motion%from, motion%by, target, &
+               self%item(first:last))
          end associate
       end do
       do k = 1, self%n
-         if (pose%is_end) self%item(k)%h = 2.0_wp*self%item(k)%h
+         self%item(k)%h = motion%weight*self%item(k)%h
          self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
       end do
    end subroutine constraints_evaluate

@@ -14,37 +14,27 @@ module emcon_system
    use emcon_kinds, only : dp, wp
    use emcon_layout, only : layout_bodies, layout_pattern
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
-   use emcon_loads, only : instant_t, loads_add, loads_init, loads_t
+   use emcon_loads, only : loads_add, loads_init, loads_t
    use emcon_mass, only : mass_init, mass_place
    use emcon_materials, only : law_linear
+   use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_point_function, only : point_failed
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : obstacle_text, solid_init, solid_respond, solid_response_t, solid_round, &
-      solid_t, solid_tangent_times
+   use emcon_solid, only : obstacle_text, solid_init, solid_respond, solid_response_t, solid_t, &
+      solid_tangent_times
    use emcon_steps, only : method_null_space, procedure_dynamic
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_timer, only : stopwatch_t
    implicit none
    private
-   public :: system_t, pose_t, system_init, system_begin_step, system_respond, &
+   public :: system_t, system_init, system_begin_step, system_respond, &
       system_check_response, system_stiffen, system_tangent_times, mass_times
 
    !> What is added to the tangent of a body that nothing holds, per stiffness of its elements: far
    !> below what bends a body, far above the round-off of its rigid motions.
    real(wp), parameter :: least_stiffness = sqrt(epsilon(1.0_wp))
-
-   !> Where forces are evaluated and how inertia enters: all that a scheme decides.
-   type :: pose_t
-      !> Inertia s M (b du - w v0): b du - w v0 is the change of velocity, computed with the same b
-      !> as the velocity itself. Two factors for du and v0 would round apart, a bias in each step.
-      real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: no inertia
-      real(wp) :: rate = 0.0_wp                  !! b [1/T]
-      real(wp) :: v_weight = 0.0_wp              !! w
-      logical :: is_end = .false.                !! gradients at the end, not discrete gradients
-      type(instant_t) :: load_instant            !! when loads are taken
-   end type pose_t
 
    type :: system_t
       type(solid_t) :: solid
@@ -86,7 +76,7 @@ module emcon_system
       real(wp), allocatable :: external(:, :)    !! (2, n_node) loads
       real(wp), allocatable :: residual(:, :)    !! (2, n_node) without contact forces
       real(wp), allocatable :: magnitude(:, :)   !! (2, n_node) sum of |contributions| to it
-      real(wp), allocatable :: u_work(:, :), f_work(:, :), zero(:, :)
+      real(wp), allocatable :: f_work(:, :), zero(:, :)
       type(stopwatch_t) :: contact_clock         !! search, gaps, constraints
    end type system_t
 
@@ -122,7 +112,7 @@ contains
       allocate(self%response%energy(self%solid%n_element), source=0.0_wp)
       allocate(self%inertia(2, n), self%external(2, n), source=0.0_wp)
       allocate(self%residual(2, n), self%magnitude(2, n), source=0.0_wp)
-      allocate(self%u_work(2, n), self%f_work(2, n), self%zero(2, n), source=0.0_wp)
+      allocate(self%f_work(2, n), self%zero(2, n), source=0.0_wp)
    end subroutine system_init
 
    !> The contact of pairs and guards, and the numbers of their constraints, after the linear ones.
@@ -233,73 +223,58 @@ contains
          is_too_full)
    end subroutine number_and_lay_out
 
-   !> Residual of the step from `u0`, `v0` to `u0 + du` without contact forces, and with
-   !> `with_tangent` the tangent. `refusal` or `failure` is allocated where there is none.
-   subroutine system_respond(self, scene, pose, u0, v0, du, offset, with_tangent)
+   !> Residual of a motion without contact forces, and with `with_tangent` the tangent. `refusal` or
+   !> `failure` is allocated where there is none.
+   subroutine system_respond(self, motion, with_tangent)
       type(system_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), v0(:, :), du(:, :)   !! (2, n_node)
-      real(wp), intent(in), contiguous :: offset(:, :)       !! (2, n_node) to `du`, for inertia
+      type(motion_t), intent(in) :: motion
       logical, intent(in) :: with_tangent
 
       if (allocated(self%refusal)) deallocate(self%refusal)
       if (allocated(self%failure)) deallocate(self%failure)
       self%external = 0.0_wp
-      if (with_tangent) self%is_symmetric = has_symmetric_tangent(self, pose)
-      if (with_tangent) self%matrix%value = real(pose%mass_scale*pose%rate, dp)*self%mass_value
-      if (pose%is_end) then
-         self%u_work = u0 + du
-         call respond_at(self%u_work, self%zero, 2.0_wp, 1.0_wp)
+      if (with_tangent) then
+         self%is_symmetric = has_symmetric_tangent(self, motion)
+         self%matrix%value = real(motion%pose%mass_scale*motion%pose%rate, dp)*self%mass_value
+         call solid_respond(self%solid, motion, self%nlgeom, self%response, self%slot, &
+            self%matrix%value, self%reduction%side%value)
+         call loads_add(self%loads, self%solid, motion, self%external, self%matrix%value, &
+            self%reduction%side%value)
       else
-         self%u_work = u0 + 0.5_wp*du
-         call respond_at(u0, du, 1.0_wp, 0.5_wp)
+         call solid_respond(self%solid, motion, self%nlgeom, self%response)
+         call loads_add(self%loads, self%solid, motion, self%external)
       end if
+      if (self%given%is_any) call add_given(self, motion, with_tangent)
+      if (with_tangent) call reduction_add(self%reduction, self%matrix)
+      if (with_tangent .and. self%is_stiffened) call add_stiffening(self)
       if (self%response%inverted_element > 0) then
-         call obstacle_text(scene, self%response, "", self%refusal)
+         call obstacle_text(self%solid, self%response, "", self%refusal)
          if (self%response%given%status == point_failed) call raise(self%failure, err_analysis, &
             self%refusal)
       end if
       if (allocated(self%refusal) .or. allocated(self%failure)) return
-      if (pose%mass_scale > 0.0_wp) then
-         self%f_work = pose%rate*(du + offset) - pose%v_weight*v0
-         call mass_times(self, self%f_work, self%inertia)
-         self%inertia = pose%mass_scale*self%inertia
-         self%f_work = abs(pose%rate*(du + offset)) + abs(pose%v_weight*v0)
-         call mass_times(self, self%f_work, self%magnitude)
-         self%magnitude = pose%mass_scale*self%magnitude
-      else
-         self%inertia = 0.0_wp
-         self%magnitude = 0.0_wp
-      end if
+      call respond_inertia(self, motion)
       self%residual = self%inertia + (self%response%force - self%external)
       self%magnitude = self%magnitude + (self%response%magnitude + abs(self%external))
-
-   contains
-
-      !> Internal forces from `start` by `step`, loads at `u_work`.
-      subroutine respond_at(start, step, solid_factor, load_factor)
-         real(wp), intent(in), contiguous :: start(:, :), step(:, :)
-         real(wp), intent(in) :: solid_factor, load_factor
-
-         if (with_tangent) then
-            call solid_respond(self%solid, start, step, self%nlgeom, self%response, &
-               solid_factor, self%slot, self%matrix%value, self%reduction%side%value)
-            call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
-               self%external, load_factor, self%matrix%value, self%reduction%side%value)
-         else
-            call solid_respond(self%solid, start, step, self%nlgeom, self%response)
-            call loads_add(self%loads, scene, self%solid, pose%load_instant, self%u_work, &
-               self%external)
-         end if
-         if (pose%is_end) call solid_round(self%solid, start, u0, self%response%rounding)
-         if (self%given%is_any) call add_given(self, pose%is_end, u0, du, with_tangent)
-         if (.not. with_tangent) return
-         call reduction_add(self%reduction, self%matrix)
-         if (self%is_stiffened) call add_stiffening(self)
-      end subroutine respond_at
-
    end subroutine system_respond
+
+   !> s M (b du - w v0), and the sizes of what it consists of in `magnitude`.
+   subroutine respond_inertia(self, motion)
+      type(system_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion
+
+      self%inertia = 0.0_wp
+      self%magnitude = 0.0_wp
+      associate (pose => motion%pose)
+         if (.not. pose%mass_scale > 0.0_wp) return
+         self%f_work = pose%rate*(motion%du + motion%offset) - pose%v_weight*motion%v0
+         call mass_times(self, self%f_work, self%inertia)
+         self%inertia = pose%mass_scale*self%inertia
+         self%f_work = abs(pose%rate*(motion%du + motion%offset)) + abs(pose%v_weight*motion%v0)
+         call mass_times(self, self%f_work, self%magnitude)
+         self%magnitude = pose%mass_scale*self%magnitude
+      end associate
+   end subroutine respond_inertia
 
    !> Let Newton's method not move the bodies `is_loose` farther than the residual calls for: a
    !> small stiffness of their nodes in the tangent alone, which changes no solution.
@@ -357,14 +332,13 @@ contains
    end subroutine add_stiffening
 
    !> Add the given forces to what the elements respond.
-   subroutine add_given(self, is_end, u0, du, with_tangent)
+   subroutine add_given(self, motion, with_tangent)
       type(system_t), intent(inout) :: self
-      logical, intent(in) :: is_end, with_tangent
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      type(motion_t), intent(in) :: motion
+      logical, intent(in) :: with_tangent
 
       if (self%response%inverted_element > 0) return
-      call given_sum_respond(self%given, u0, du, is_end, with_tangent, self%refusal, &
-         self%failure)
+      call given_sum_respond(self%given, motion, with_tangent, self%refusal, self%failure)
       if (allocated(self%refusal) .or. allocated(self%failure)) return
       self%response%force = self%response%force + self%given%force
       self%response%magnitude = self%response%magnitude + self%given%magnitude
@@ -389,34 +363,27 @@ contains
 
    !> Second derivatives of a potential are symmetric: those of discrete gradients of quadratic
    !> energies and of gradients at the end, unless a pressure follows the surface.
-   pure logical function has_symmetric_tangent(self, pose)
+   pure logical function has_symmetric_tangent(self, motion)
       type(system_t), intent(in) :: self
-      type(pose_t), intent(in) :: pose
+      type(motion_t), intent(in) :: motion
 
-      has_symmetric_tangent = pose%is_end .or. (self%has_linear_laws .and. .not. self%nlgeom)
+      has_symmetric_tangent = motion%pose%is_end .or. (self%has_linear_laws .and. .not. self%nlgeom)
       if (self%nlgeom .and. self%loads%has_pressure) has_symmetric_tangent = .false.
-      if (.not. given_sum_is_symmetric(self%given, pose%is_end)) has_symmetric_tangent = .false.
+      if (.not. given_sum_is_symmetric(self%given, motion)) has_symmetric_tangent = .false.
    end function has_symmetric_tangent
 
-   !> The tangent of internal forces and inertia at u0 + du times `direction`, on all nodes: what
-   !> prescribed motion does to first order. In gradients at the end (`is_end`) as in steps.
-   subroutine system_tangent_times(self, pose, u0, du, direction, product)
+   !> The tangent of internal forces and inertia times `direction`, on all nodes: what prescribed
+   !> motion does to first order.
+   subroutine system_tangent_times(self, motion, direction, product)
       type(system_t), intent(inout) :: self
-      type(pose_t), intent(in) :: pose
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :), direction(:, :)   !! (2, n_node)
-      real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in), contiguous :: direction(:, :)            !! (2, n_node)
+      real(wp), intent(inout), contiguous :: product(:, :)           !! (2, n_node)
 
-      self%f_work = (pose%mass_scale*pose%rate)*direction
+      self%f_work = (motion%pose%mass_scale*motion%pose%rate)*direction
       call mass_times(self, self%f_work, product)
-      if (pose%is_end) then
-         self%u_work = u0 + du
-         call solid_tangent_times(self%solid, self%u_work, self%zero, self%nlgeom, 2.0_wp, &
-            direction, product)
-      else
-         call solid_tangent_times(self%solid, u0, du, self%nlgeom, 1.0_wp, direction, product)
-      end if
-      if (self%given%is_any) call given_sum_tangent_times(self%given, u0, du, pose%is_end, &
-         direction, product)
+      call solid_tangent_times(self%solid, motion, self%nlgeom, direction, product)
+      if (self%given%is_any) call given_sum_tangent_times(self%given, motion, direction, product)
    end subroutine system_tangent_times
 
    !> M field, in both directions.

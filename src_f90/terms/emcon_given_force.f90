@@ -31,20 +31,20 @@ module emcon_given_force
    end type given_force_t
 
    abstract interface
-      !> Forces of the step from `u0` to `u0 + du`: a discrete gradient of the energy E, with
-      !> force.du = E(u0 + du) - E(u0); or (`is_end`) the gradient of E at u0 + du.
-      subroutine respond_interface(self, u0, du, is_end, wants_tangent, force, magnitude, energy, &
+      !> Forces of a motion from `u0` to `u0 + du`: a discrete gradient of the energy E, with
+      !> force.du = E(u0 + du) - E(u0); where du = 0, the gradient of E.
+      subroutine respond_interface(self, u0, du, wants_tangent, force, magnitude, energy, &
          tangent, status)
          import :: given_force_t, dp, wp
          class(given_force_t), intent(inout) :: self
          real(wp), intent(in), contiguous :: u0(:, :), du(:, :)       !! (2, n_node) [L]
-         logical, intent(in) :: is_end
          logical, intent(in) :: wants_tangent                         !! else leave `tangent` alone
          real(wp), intent(inout), contiguous :: force(:, :)           !! (2, n_node) 0 on entry
          !> (2, n_node) sums of |contributions| to `force`; left at 0: not known
          real(wp), intent(inout), contiguous :: magnitude(:, :)
          real(wp), intent(out) :: energy                              !! E(u0 + du) [M L^2/T^2]
-         !> Derivative of `force` by u0 + du, in the slots of `pattern`; 0 on entry
+         !> Derivative of `force` by u0 + du, in the slots of `pattern`; 0 on entry. Where du = 0, half
+         !> of the second derivatives of E
          real(dp), intent(inout), contiguous :: tangent(:)
          integer, intent(out) :: status                               !! one of the `given_` codes
       end subroutine respond_interface

@@ -9,6 +9,7 @@ module emcon_given_sum
    use emcon_given_check, only : given_check_force, given_check_mass, given_name
    use emcon_given_force, only : given_failed, given_ok, given_outside
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_t
    use emcon_reduction, only : reduction_slot, reduction_t
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
@@ -31,7 +32,6 @@ module emcon_given_sum
       real(wp), allocatable :: magnitude(:, :)   !! (2, n_node) sum of |contributions|
       real(wp), allocatable :: rounding(:, :)    !! (2, n_node) times epsilon: round-off
       real(wp) :: energy = 0.0_wp                !! sum over all, at the end
-      real(wp), allocatable, private :: x(:, :)  !! (2, n_node) [L]
       integer, allocatable, private :: label(:)  !! (n_node)
       real(wp), allocatable, private :: part(:, :), part_magnitude(:, :), position(:, :)
    end type given_sum_t
@@ -63,7 +63,6 @@ contains
          allocate(self%slot(self%first(size(force) + 1)), source=0)
          allocate(self%tangent(self%first(size(force) + 1)), source=0.0_dp)
       end associate
-      self%x = scene%x
       self%label = scene%node_label
       allocate(self%has_force(n), source=.false.)
       allocate(self%force(2, n), self%magnitude(2, n), self%rounding(2, n), source=0.0_wp)
@@ -171,11 +170,11 @@ contains
       end do
    end subroutine given_sum_place
 
-   !> Forces of the step from `u0` by `du`. Without `refusal` and `error` there are some.
-   subroutine given_sum_respond(self, u0, du, is_end, wants_tangent, refusal, error)
+   !> Forces of a motion. Without `refusal` and `error` there are some.
+   subroutine given_sum_respond(self, motion, wants_tangent, refusal, error)
       type(given_sum_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      logical, intent(in) :: is_end, wants_tangent
+      type(motion_t), intent(in) :: motion
+      logical, intent(in) :: wants_tangent
       !> What the displacements have done to which force, for "... by the displacements"
       character(len=:), allocatable, intent(out) :: refusal
       type(error_t), allocatable, intent(out) :: error
@@ -187,14 +186,15 @@ contains
       self%rounding = 0.0_wp
       self%energy = 0.0_wp
       if (wants_tangent) self%tangent = 0.0_dp
-      self%position = abs(self%x) + max(abs(u0), abs(u0 + du))
+      self%position = abs(motion%x) + max(abs(motion%u0), abs(motion%u0 + motion%du))
       do i = 1, size(self%given%force)
          associate (force => self%given%force(i)%force, &
                tangent => self%tangent(self%first(i) + 1:self%first(i + 1)))
             self%part = 0.0_wp
             self%part_magnitude = 0.0_wp
-            call force%respond(u0, du, is_end, wants_tangent, self%part, self%part_magnitude, &
-               energy, tangent, status)
+            call force%respond(motion%from, motion%by, wants_tangent, self%part, &
+               self%part_magnitude, energy, tangent, status)
+            if (wants_tangent) tangent = real(motion%weight, dp)*tangent
             call judge(self, i, energy, tangent, status, refusal, error)
             if (allocated(refusal) .or. allocated(error)) return
             call complete_magnitude(force%pattern, self%part, self%part_magnitude)
@@ -305,17 +305,17 @@ contains
       end do
    end subroutine given_sum_add_tangent
 
-   !> Add the tangents at u0 + du times `direction` to `product`, where there are any.
-   subroutine given_sum_tangent_times(self, u0, du, is_end, direction, product)
+   !> Add the tangents of a motion times `direction` to `product`, where there are any.
+   subroutine given_sum_tangent_times(self, motion, direction, product)
       type(given_sum_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :), direction(:, :)   !! (2, n_node)
-      logical, intent(in) :: is_end
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in), contiguous :: direction(:, :)                       !! (2, n_node)
       real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
       character(len=:), allocatable :: refusal
       type(error_t), allocatable :: error
       integer :: i, j, k, l
 
-      call given_sum_respond(self, u0, du, is_end, .true., refusal, error)
+      call given_sum_respond(self, motion, .true., refusal, error)
       if (allocated(refusal) .or. allocated(error)) return
       do l = 1, size(self%given%force)
          associate (pattern => self%given%force(l)%force%pattern)
@@ -333,17 +333,20 @@ contains
    end subroutine given_sum_tangent_times
 
    !> Are all tangents symmetric?
-   pure logical function given_sum_is_symmetric(self, is_end) result(is_symmetric)
+   pure logical function given_sum_is_symmetric(self, motion) result(is_symmetric)
       type(given_sum_t), intent(in) :: self
-      logical, intent(in) :: is_end
+      type(motion_t), intent(in) :: motion
       integer :: i
 
       is_symmetric = .true.
       if (.not. self%is_any) return
       do i = 1, size(self%given%force)
          associate (force => self%given%force(i)%force)
-            if (is_end) is_symmetric = is_symmetric .and. force%is_symmetric_at_end
-            if (.not. is_end) is_symmetric = is_symmetric .and. force%is_symmetric_in_steps
+            if (motion%pose%is_end) then
+               is_symmetric = is_symmetric .and. force%is_symmetric_at_end
+            else
+               is_symmetric = is_symmetric .and. force%is_symmetric_in_steps
+            end if
          end associate
       end do
    end function given_sum_is_symmetric

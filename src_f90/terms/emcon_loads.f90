@@ -1,9 +1,10 @@
 !> Loads and prescribed motion of one step, as functions of time and configuration.
 module emcon_loads
-   use emcon_amplitudes, only : find_amplitude_value
+   use emcon_amplitudes, only : amplitude_t, find_amplitude_value
    use emcon_csr, only : csr_t
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : instant_t, motion_t
    use emcon_numbering, only : numbering_t
    use emcon_reduction, only : freedom_numbers, reduction_slot, reduction_t
    use emcon_scene, only : scene_t
@@ -12,17 +13,12 @@ module emcon_loads
       procedure_static, step_t
    implicit none
    private
-   public :: instant_t, loads_t, loads_init, loads_add, prescribed_motion
-
-   !> A moment of a step, as amplitudes see it.
-   type :: instant_t
-      real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
-      real(wp) :: total_time = 0.0_wp            !! since the start of the analysis [T]
-   end type instant_t
+   public :: loads_t, loads_init, loads_add, prescribed_motion
 
    type :: loads_t
       integer :: n = 0
       type(load_t), allocatable :: load(:)
+      type(amplitude_t), allocatable :: amplitude(:)     !! of the scene
       integer, allocatable :: edge(:, :)         !! (2, n) nodes of a loaded edge, else 0
       integer, allocatable :: slot(:, :)         !! (16, n) entries of the pressure stiffness
       logical :: has_pressure = .false.
@@ -45,6 +41,7 @@ contains
       integer :: i, e, dofs(4), j, k
 
       self%load = step%load
+      self%amplitude = scene%amplitude
       self%n = size(step%load)
       self%has_pressure = any(step%load%kind == load_pressure)
       self%is_ramped = step%procedure == procedure_static
@@ -69,16 +66,15 @@ contains
    end subroutine loads_init
 
    !> Present size of load `i`.
-   pure real(wp) function load_value(self, scene, i, instant)
+   pure real(wp) function load_value(self, i, instant)
       type(loads_t), intent(in) :: self
-      type(scene_t), intent(in) :: scene
       integer, intent(in) :: i
       type(instant_t), intent(in) :: instant
       real(wp) :: factor, rate
 
       associate (load => self%load(i))
          if (load%amplitude > 0) then
-            call amplitude_at(scene, load%amplitude, instant, factor, rate)
+            call amplitude_at(self%amplitude(load%amplitude), instant, factor, rate)
             load_value = load%value*factor
          else if (self%is_ramped) then
             load_value = load%value_start &
@@ -89,35 +85,31 @@ contains
       end associate
    end function load_value
 
-   pure subroutine amplitude_at(scene, i, instant, value, rate)
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: i
+   pure subroutine amplitude_at(amplitude, instant, value, rate)
+      type(amplitude_t), intent(in) :: amplitude
       type(instant_t), intent(in) :: instant
       real(wp), intent(out) :: value, rate
       real(wp) :: time
 
       time = instant%step_time
-      if (scene%amplitude(i)%is_total_time) time = instant%total_time
-      call find_amplitude_value(scene%amplitude(i), time, value, rate)
+      if (amplitude%is_total_time) time = instant%total_time
+      call find_amplitude_value(amplitude, time, value, rate)
    end subroutine amplitude_at
 
-   !> Add the loads at `instant`, acting on the positions x + u, to `force`; with `value` and
-   !> `side`, also subtract `factor` times their derivative by u from the matrix.
-   pure subroutine loads_add(self, scene, solid, instant, u, force, factor, value, side)
+   !> Add the loads of a motion, which act on it where it is placed, to `force`; with `value` and
+   !> `side`, also subtract their derivatives by the end of the step from the matrix.
+   pure subroutine loads_add(self, solid, motion, force, value, side)
       type(loads_t), intent(in) :: self
-      type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
-      type(instant_t), intent(in) :: instant
-      real(wp), intent(in), contiguous :: u(:, :)          !! (2, n_node)
-      real(wp), intent(inout), contiguous :: force(:, :)   !! (2, n_node)
-      real(wp), intent(in), optional :: factor
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(inout), contiguous :: force(:, :)   !! (2, n_node) [M L/T^2]
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
       real(wp) :: p
       integer :: i, j, node
 
       do i = 1, self%n
          associate (load => self%load(i))
-            p = load_value(self, scene, i, instant)
+            p = load_value(self, i, motion%pose%load_instant)
             select case (load%kind)
             case (load_point)
                force(load%place, load%target) = force(load%place, load%target) + p
@@ -129,9 +121,9 @@ contains
                end do
             case (load_pressure)
                p = p*solid%thickness(load%target)
-               call add_pressure(self%edge(:, i), p, scene%x, u, self%nlgeom, force)
+               call add_pressure(self%edge(:, i), p, motion%x, motion%at, self%nlgeom, force)
                if (present(value) .and. self%nlgeom) then
-                  call add_pressure_stiffness(p*factor, self%slot(:, i), value, side)
+                  call add_pressure_stiffness(p*motion%load_weight, self%slot(:, i), value, side)
                end if
             end select
          end associate
@@ -192,7 +184,7 @@ contains
       if (prescribed%is_frozen) then
          u = u_start
       else if (prescribed%amplitude > 0) then
-         call amplitude_at(scene, prescribed%amplitude, instant, factor, rate)
+         call amplitude_at(scene%amplitude(prescribed%amplitude), instant, factor, rate)
          u = prescribed%value*factor
          v = prescribed%value*rate
       else if (step%procedure == procedure_static) then

@@ -100,11 +100,10 @@ contains
    end subroutine place
 
    !> As `given_force_t` has it.
-   subroutine respond(self, u0, du, is_end, wants_tangent, force, magnitude, energy, tangent, &
-      status)
+   subroutine respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, status)
       class(node_potential_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: is_end, wants_tangent
+      logical, intent(in) :: wants_tangent
       real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
       real(wp), intent(out) :: energy
       real(dp), intent(inout), contiguous :: tangent(:)
@@ -116,10 +115,6 @@ contains
          self%z(:, i) = self%x(:, i) + u0(:, self%node(i))
          self%dz(:, i) = du(:, self%node(i))
       end do
-      if (is_end) then
-         self%z = self%z + self%dz
-         self%dz = 0.0_wp
-      end if
       energy = 0.0_wp
       call point_gradient(self%potential, self%z, self%dz, wants_tangent, self%response, status)
       if (status == given_failed) self%reason = "its function failed"
@@ -129,20 +124,19 @@ contains
          force(:, self%node(i)) = self%response%gradient(:, i)
          magnitude(:, self%node(i)) = abs(self%response%gradient(:, i))
       end do
-      if (wants_tangent) call put_tangent(self, merge(2.0_wp, 1.0_wp, is_end), tangent)
+      if (wants_tangent) call put_tangent(self, tangent)
    end subroutine respond
 
-   !> `factor` times the tangents into the rows of the nodes.
-   subroutine put_tangent(self, factor, tangent)
+   !> The tangents into the rows of the nodes.
+   subroutine put_tangent(self, tangent)
       class(node_potential_t), intent(in) :: self
-      real(wp), intent(in) :: factor
       real(dp), intent(inout) :: tangent(:)
       integer :: i, a, k
 
       do i = 1, size(self%node)
          do a = 1, 2
             k = self%pattern%row_start(2*(self%node(i) - 1) + a)
-            tangent(k + 1:k + 2) = real(factor*self%response%tangent(a, :, i), dp)
+            tangent(k + 1:k + 2) = real(self%response%tangent(a, :, i), dp)
          end do
       end do
    end subroutine put_tangent

@@ -114,12 +114,11 @@ contains
    end function strain_rows
 
    !> The stress of the mean of the strains, on the displacements in the middle: forces . du is the
-   !> change of the energy exactly. At the end (`is_end`) both are those of the end.
-   subroutine respond(self, u0, du, is_end, wants_tangent, force, magnitude, energy, tangent, &
-      status)
+   !> change of the energy exactly.
+   subroutine respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, status)
       class(triangles_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: is_end, wants_tangent
+      logical, intent(in) :: wants_tangent
       real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
       real(wp), intent(out) :: energy
       real(dp), intent(inout), contiguous :: tangent(:)
@@ -137,10 +136,6 @@ contains
             call strain_of(gradient, u0(:, node), f0, e0)
             call strain_of(gradient, u0(:, node) + du(:, node), f1, e1)
             if (.not. f1(1, 1)*f1(2, 2) - f1(1, 2)*f1(2, 1) > 0.0_wp) return
-            if (is_end) then
-               f0 = f1
-               e0 = e1
-            end if
             stress = matmul(law, 0.5_wp*(e0 + e1))
             rows = strain_rows(gradient, 0.5_wp*(f0 + f1))
             energy = energy + 0.5_wp*area*dot_product(e1, matmul(law, e1))
@@ -154,7 +149,7 @@ contains
 
    contains
 
-      !> At the end the derivative of the end's forces, twice what it is in a step.
+      !> The derivative of the forces by the end of the step.
       subroutine add_tangent()
          real(wp) :: k(6, 6), initial
          integer :: a, b
@@ -169,7 +164,7 @@ contains
                k(2*a, 2*b) = k(2*a, 2*b) + initial
             end do
          end do
-         k = merge(1.0_wp, 0.5_wp, is_end)*area*k
+         k = 0.5_wp*area*k
          associate (slot => reshape(self%slot(36*(t - 1) + 1:36*t), [6, 6]))
             do b = 1, 6
                do a = 1, 6

@@ -6,6 +6,7 @@ module given_hosts
    use emcon_errors, only : error_t
    use emcon_given_force, only : given_failed, given_force_t, given_ok, given_outside
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_of, motion_t, pose_t
    use emcon_point_function, only : point_function_t, point_ok
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t
@@ -65,43 +66,30 @@ contains
       allocate(self%response%energy(self%solid%n_element), source=0.0_wp)
    end subroutine solid_host_init
 
-   subroutine solid_host_respond(self, u0, du, is_end, wants_tangent, force, magnitude, energy, &
-      tangent, status)
+   subroutine solid_host_respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, &
+      status)
       class(solid_host_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: is_end, wants_tangent
+      logical, intent(in) :: wants_tangent
       real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
       real(wp), intent(out) :: energy
       real(dp), intent(inout), contiguous :: tangent(:)
       integer, intent(out) :: status
+      type(motion_t) :: motion
       real(dp) :: side(0)
 
       energy = 0.0_wp
-      if (is_end) then
-         call run(u0 + du, 0.0_wp*du, 2.0_wp)
+      motion = motion_of(pose_t(), 0.0_wp*u0, u0, du)
+      if (wants_tangent) then
+         call solid_respond(self%solid, motion, .true., self%response, self%slot, tangent, side)
       else
-         call run(u0, du, 1.0_wp)
+         call solid_respond(self%solid, motion, .true., self%response)
       end if
       status = merge(given_outside, given_ok, self%response%inverted_element > 0)
       if (status /= given_ok) return
       force = self%response%force
       if (self%tells_magnitude) magnitude = self%response%magnitude
       energy = sum(self%response%energy)
-
-   contains
-
-      subroutine run(start, step, factor)
-         real(wp), intent(in), contiguous :: start(:, :), step(:, :)
-         real(wp), intent(in) :: factor
-
-         if (wants_tangent) then
-            call solid_respond(self%solid, start, step, .true., self%response, factor, self%slot, &
-               tangent, side)
-         else
-            call solid_respond(self%solid, start, step, .true., self%response)
-         end if
-      end subroutine run
-
    end subroutine solid_host_respond
 
    !> Springs between the nodes `node` of `n_node` in turn.
@@ -119,11 +107,11 @@ contains
          [(2*node(i:i + 1) - 1, i = 1, n)], slot, error)
    end subroutine chain_host_init
 
-   subroutine chain_respond(self, u0, du, is_end, wants_tangent, force, magnitude, energy, &
-      tangent, status)
+   subroutine chain_respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, &
+      status)
       class(chain_host_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: is_end, wants_tangent
+      logical, intent(in) :: wants_tangent
       real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
       real(wp), intent(out) :: energy
       real(dp), intent(inout), contiguous :: tangent(:)
@@ -146,10 +134,8 @@ contains
          e0 = u0(1, b) - u0(1, a)
          e1 = e0 + (du(1, b) - du(1, a))
          if (abs(e1) > self%longest) status = given_outside
-         if (is_end) e0 = e1
          f = (0.5_wp*self%k + 0.25_wp*self%c*(e0**2 + e1**2))*(e0 + e1)
          slope = 0.5_wp*self%k + 0.25_wp*self%c*((e0**2 + e1**2) + (e0 + e1)*2.0_wp*e1)
-         if (is_end) slope = 2.0_wp*slope
          energy = energy + 0.5_wp*self%k*e1**2 + 0.25_wp*self%c*e1**4
          force(1, b) = force(1, b) + f
          force(1, a) = force(1, a) - f

@@ -9,6 +9,7 @@ module test_given_law
    use emcon_law_linear, only : lame_constants
    use emcon_march, only : increment_t
    use emcon_materials, only : law_coupled_neo_hooke, law_given, law_linear
+   use emcon_motion, only : motion_of, pose_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_restart, only : restart_t
    use emcon_scene, only : scene_t
@@ -182,15 +183,17 @@ contains
       call shake(du, 0.1_wp)
       call shake(way, 1.0_wp)
       if (law /= law_linear) du = 0.0_wp
-      call solid_respond(given%march%system%solid, u0, du, .true., one)
-      call solid_respond(own%march%system%solid, u0, du, .true., other)
+      call solid_respond(given%march%system%solid, motion_of(pose_t(), scene%x, u0, du), .true., one)
+      call solid_respond(own%march%system%solid, motion_of(pose_t(), scene%x, u0, du), .true., other)
       call check_near(error, one%force, other%force, 64.0_wp*eps, young, "force")
       call check_near(error, one%energy, other%energy, 64.0_wp*eps, young, "energy")
       call check_near(error, one%rounding, other%rounding, 16.0_wp*eps, young, "rounding")
       product = 0.0_wp
       expected = 0.0_wp
-      call solid_tangent_times(given%march%system%solid, u0, du, .true., 1.0_wp, way, product)
-      call solid_tangent_times(own%march%system%solid, u0, du, .true., 1.0_wp, way, expected)
+      call solid_tangent_times(given%march%system%solid, motion_of(pose_t(), scene%x, u0, du), &
+         .true., way, product)
+      call solid_tangent_times(own%march%system%solid, motion_of(pose_t(), scene%x, u0, du), &
+         .true., way, expected)
       call check_near(error, product, expected, 256.0_wp*eps, young, "tangent")
       call stepper_close(given)
       call stepper_close(own)
@@ -218,15 +221,15 @@ contains
       call shake(way, 1.0_wp)
       product = 0.0_wp
       associate (solid => given%march%system%solid)
-         call solid_tangent_times(solid, u0, du, .true., 1.0_wp, way, product)
-         call solid_respond(solid, u0, du + d*way, .true., up)
-         call solid_respond(solid, u0, du - d*way, .true., down)
+         call solid_tangent_times(solid, motion_of(pose_t(), scene%x, u0, du), .true., way, product)
+         call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du + d*way), .true., up)
+         call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du - d*way), .true., down)
          call check_equal(error, up%inverted_element, 0, "inverted")
          ! third derivatives of the law are a hundred times its modulus at such strains
          call check_near(error, product, (up%force - down%force)/(2.0_wp*d), 1.0e4_wp*d**2, &
             young, "tangent")
-         call solid_respond(solid, u0, du, .true., up)
-         call solid_respond(solid, u0, 0.0_wp*du, .true., down)
+         call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du), .true., up)
+         call solid_respond(solid, motion_of(pose_t(), scene%x, u0, 0.0_wp*du), .true., down)
          call check_near(error, sum(up%force*du), sum(up%energy) - sum(down%energy), 256.0_wp*eps, &
             sum(up%magnitude*abs(du)) + sum(up%energy), "work of the step")
       end associate
@@ -376,8 +379,8 @@ contains
       call shake(u1, 0.1_wp)
       call query_evaluate(query, given, 0.1_wp, u1, .true., error)
       if (allocated(error)) return
-      call solid_respond(given%march%system%solid, given%march%state%u, u1, .true., &
-         given%march%system%response)
+      call solid_respond(given%march%system%solid, motion_of(pose_t(), scene%x, &
+         given%march%state%u, u1), .true., given%march%system%response)
       call check_near(error, query%march%system%response%force, &
          given%march%system%response%force, 64.0_wp*eps, young, "force")
       call query_free(query)

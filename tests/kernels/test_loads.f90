@@ -5,7 +5,8 @@ module test_loads
    use emcon_csr, only : csr_find
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_loads, only : instant_t, loads_add, prescribed_motion
+   use emcon_loads, only : loads_add, prescribed_motion
+   use emcon_motion, only : instant_t, motion_of, pose_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
    use emcon_system, only : system_begin_step, system_init, system_t
@@ -73,7 +74,8 @@ contains
       real(wp), intent(out), contiguous :: force(:, :)
 
       force = 0.0_wp
-      call loads_add(system%loads, scene, system%solid, instant, u, force)
+      call loads_add(system%loads, system%solid, motion_of(pose_t(is_end=.true., &
+         load_instant=instant), scene%x, u, 0.0_wp*u), force)
    end subroutine forces
 
    !> -p n L t, half on either node, on the deformed edge.
@@ -167,7 +169,7 @@ contains
       system%matrix%value = 0.0_dp
       call shake(u, 0.2_wp)
       up = 0.0_wp
-      call loads_add(system%loads, scene, system%solid, instant_t(), u, up, 0.5_wp, &
+      call loads_add(system%loads, system%solid, motion_of(pose_t(), scene%x, u, 0.0_wp*u), up, &
          system%matrix%value, system%reduction%side%value)
       n = system%numbering%n_unknown
       do j = 1, n

@@ -5,14 +5,14 @@ module test_newton
    use emcon_correction, only : correction_free, correction_reset, correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_loads, only : instant_t
+   use emcon_motion, only : instant_t, motion_init, motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_refused, &
       newton_singular, newton_solve, newton_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_solver_registry, only : solver_default
    use emcon_steps, only : load_point, load_t, method_null_space, method_saddle_point
-   use emcon_system, only : pose_t, system_begin_step, system_init, system_t
+   use emcon_system, only : system_begin_step, system_init, system_t
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, &
       shake, young
@@ -26,8 +26,7 @@ module test_newton
       type(newton_t) :: newton
       type(correction_t) :: correction
       type(constraint_set_t) :: set
-      type(pose_t) :: pose
-      real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :)
+      type(motion_t) :: motion
       integer :: status = 0
    end type trial_t
 
@@ -65,20 +64,19 @@ contains
          1.0e3_wp*epsilon(1.0_wp), maximum)
       call correction_reset(trial%correction, method, solver_default)
       call constraints_select(trial%set, none)
-      trial%pose%is_end = .not. h > 0.0_wp
-      if (h > 0.0_wp) trial%pose = scheme%pose(instant_t(), h)
-      trial%u0 = scene%u0
-      trial%v0 = scene%v0
-      trial%du = 0.0_wp*scene%u0
+      call motion_init(trial%motion, scene%x)
+      trial%motion%pose%is_end = .not. h > 0.0_wp
+      if (h > 0.0_wp) trial%motion%pose = scheme%pose(instant_t(), h)
+      trial%motion%u0 = scene%u0
+      trial%motion%v0 = scene%v0
    end subroutine prepare
 
-   subroutine solve(trial, scene, error)
+   subroutine solve(trial, error)
       type(trial_t), intent(inout) :: trial
-      type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
 
-      call newton_solve(trial%newton, trial%system, scene, trial%correction, trial%set, &
-         trial%pose, trial%u0, trial%v0, trial%system%zero, trial%du, trial%status, error)
+      call newton_solve(trial%newton, trial%system, trial%correction, trial%set, trial%motion, &
+         trial%status, error)
    end subroutine solve
 
    !> The largest r(k+1)/r(k)^2 of the relative residuals above round-off, from 0.1 on: bounded, and
@@ -127,7 +125,7 @@ contains
       scene%v0(2, :) = 2.0_wp*scene%x(1, :)
       call prepare(trial, scene, 0.2_wp, 20, method_null_space, error)
       if (allocated(error)) return
-      call solve(trial, scene, error)
+      call solve(trial, error)
       if (allocated(error)) return
       call check_quadratic(error, trial, "large step")
       call check_true(error, trial%newton%n_iteration <= 8, &
@@ -152,8 +150,8 @@ contains
          call prepare(trial, scene, 0.1_wp, 20, method, error)
          if (allocated(error)) return
          call constraints_select(trial%set, [1, 2, 3])
-         call trial%system%contact(1)%contact%begin_step(scene%x, trial%u0, trial%du)
-         call solve(trial, scene, error)
+         call trial%system%contact(1)%contact%begin_step(scene%x, trial%motion%u0, trial%motion%du)
+         call solve(trial, error)
          if (allocated(error)) return
          call check_quadratic(error, trial, "method " // to_text(method))
          call check_near(error, trial%set%defect, [0.0_wp, 0.0_wp, 0.0_wp], &
@@ -174,8 +172,8 @@ contains
       call clamp(scene%step(1), [1, 2, 3, 4])
       call prepare(trial, scene, 0.0_wp, 20, method_null_space, error)
       if (allocated(error)) return
-      trial%du(1, 2) = 0.1_wp
-      call solve(trial, scene, error)
+      trial%motion%du(1, 2) = 0.1_wp
+      call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_converged, "status")
       call check_equal(error, trial%newton%n_solve, 0, "linear systems")
@@ -193,7 +191,7 @@ contains
       call add_step(scene, .false., 1.0_wp, 1)
       call prepare(trial, scene, 1.0_wp, 20, method_null_space, error)
       if (allocated(error)) return
-      call solve(trial, scene, error)
+      call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, [trial%status, trial%newton%n_solve], [newton_converged, 0], "solves")
       call correction_free(trial%correction)
@@ -211,7 +209,7 @@ contains
       scene%v0(2, :) = 2.0_wp*scene%x(1, :)
       call prepare(trial, scene, 0.2_wp, 2, method_null_space, error)
       if (allocated(error)) return
-      call solve(trial, scene, error)
+      call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_diverged, "status")
       call check_equal(error, trial%newton%n_iteration, 2, "iterations")
@@ -235,8 +233,8 @@ contains
       call add_load(scene%step(1), load)
       call prepare(trial, scene, 0.0_wp, 20, method_null_space, error)
       if (allocated(error)) return
-      trial%pose%load_instant%step_time = 1.0_wp
-      call solve(trial, scene, error)
+      trial%motion%pose%load_instant%step_time = 1.0_wp
+      call solve(trial, error)
       if (allocated(error)) return
       call check_true(error, trial%status /= newton_converged, "no solution is claimed")
       call check_true(error, any(trial%status == [newton_singular, newton_diverged, &
@@ -254,8 +252,8 @@ contains
       call add_step(scene, .false., 0.1_wp, 1)
       call prepare(trial, scene, 0.1_wp, 20, method_null_space, error)
       if (allocated(error)) return
-      trial%du(1, [3, 7]) = 1.5_wp
-      call solve(trial, scene, error)
+      trial%motion%du(1, [3, 7]) = 1.5_wp
+      call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_refused, "status")
       call check_equal(error, trial%system%response%inverted_element, 3, "element")
@@ -283,11 +281,11 @@ contains
       end do
       call prepare(trial, scene, 0.0_wp, 60, method_null_space, error)
       if (allocated(error)) return
-      trial%pose%load_instant%step_time = 1.0_wp
-      call solve(trial, scene, error)
+      trial%motion%pose%load_instant%step_time = 1.0_wp
+      call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_converged, "status")
-      call check_true(error, all(trial%du(2, 3:) < -0.5_wp .and. trial%du(2, 3:) > -1.0_wp), &
+      call check_true(error, all(trial%motion%du(2, 3:) < -0.5_wp .and. trial%motion%du(2, 3:) > -1.0_wp), &
          "pressed flat, not through")
       call check_near(error, trial%system%response%force(2, 3:), [load%value, load%value], &
          1.0e4_wp*epsilon(1.0_wp), young, "internal forces balance the loads")

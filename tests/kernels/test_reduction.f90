@@ -6,14 +6,14 @@ module test_reduction
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
-   use emcon_loads, only : instant_t
+   use emcon_motion, only : instant_t, motion_of, pose_t
    use emcon_numbering, only : numbering_init, numbering_t, pick_unknowns
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
    use emcon_steps, only : load_pressure, load_t, method_saddle_point, prescribed_t
-   use emcon_system, only : pose_t, system_begin_step, system_init, system_respond, system_t
+   use emcon_system, only : system_begin_step, system_init, system_respond, system_t
    use emcon_text, only : to_text
    use linear_scenes, only : add_equation, add_node, add_tie_by_hand, begin_rows, dense_terms, &
       put_row
@@ -133,8 +133,8 @@ contains
       call shake(u0, 0.05_wp)
       call shake(v0, 1.0_wp)
       call shake(du, 0.05_wp)
-      call system_respond(reduced, scene, pose, u0, v0, du, reduced%zero, .true.)
-      call system_respond(full, scene, pose, u0, v0, du, full%zero, .true.)
+      call system_respond(reduced, motion_of(pose, scene%x, u0, du, v0), .true.)
+      call system_respond(full, motion_of(pose, scene%x, u0, du, v0), .true.)
       call check_equal(error, reduced%response%inverted_element, 0, "inverted")
       allocate(t, source=dense_terms(reduced%numbering))
       t = t(full%numbering%dof, :)
@@ -196,8 +196,8 @@ contains
       if (allocated(error)) return
       allocate(u, source=scene%x)
       call shake(u, 0.05_wp)
-      call system_respond(reduced, scene, scheme%pose(instant_t(), 0.25_wp), 0.0_wp*u, 0.0_wp*u, &
-         u, reduced%zero, .true.)
+      call system_respond(reduced, motion_of(scheme%pose(instant_t(), 0.25_wp), scene%x, &
+         0.0_wp*u, u), .true.)
       call check_true(error, reduced%is_symmetric, "known as symmetric")
       a = real(dense_of(reduced%matrix), wp)
       call check_near(error, a, transpose(a), 128.0_wp*eps, maxval(abs(a)), "symmetry")
@@ -246,8 +246,8 @@ contains
       call shake(u, 0.05_wp)
       call shake(other, 0.05_wp)
       do k = 1, 3
-         call system_respond(reduced, scene, scheme%pose(instant_t(), 0.25_wp), u, 0.0_wp*u, &
-            merge(other, u, k == 2), reduced%zero, .true.)
+         call system_respond(reduced, motion_of(scheme%pose(instant_t(), 0.25_wp), scene%x, u, &
+            merge(other, u, k == 2)), .true.)
          if (k == 1) first = reduced%matrix%value
          call check_true(error, all(reduced%matrix%value == first) .eqv. k /= 2, &
             "bits of response " // to_text(k))

@@ -4,13 +4,12 @@ module test_scheme
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : body_momenta, ledger_t
-   use emcon_loads, only : instant_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
+   use emcon_motion, only : instant_t, pose_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
-   use emcon_system, only : pose_t
    use emcon_text, only : to_text
    use small_scenes, only : add_step, block_t, make_block
    implicit none

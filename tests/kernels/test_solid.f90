@@ -4,6 +4,7 @@ module test_solid
    use emcon_element, only : element_respond, element_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
+   use emcon_motion, only : motion_of, pose_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t
    use small_scenes, only : add_block, block_t, make_block, shake, young
@@ -105,7 +106,7 @@ contains
       call shake(u0, 0.1_wp)
       call shake(du, 0.1_wp)
       call make_response(solid, response)
-      call solid_respond(solid, u0, du, .true., response)
+      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du), .true., response)
       force = 0.0_wp
       do e = 1, solid%n_element
          n = solid%geometry(e)%n_node
@@ -157,7 +158,7 @@ contains
       u0 = 1.0e8_wp
       du = 0.0_wp
       du(1, :) = -3.0e7_wp
-      call solid_respond(solid, u0, du, .true., response)
+      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du), .true., response)
       call check_near(error, response%energy, 0.0_wp*response%energy, (4.0e8_wp*eps)**2, young, &
          "energy")
       call check_near(error, abs(response%force)/response%rounding, 0.0_wp*u0, 4.0_wp*eps, 1.0_wp, &
@@ -178,9 +179,9 @@ contains
       allocate(u0, du, source=0.0_wp*scene%x)
       call make_response(solid, response)
       du(1, [4, 8]) = -1.5_wp                    ! the right side of element 3
-      call solid_respond(solid, u0, du, .true., response)
+      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du), .true., response)
       call check_equal(error, response%inverted_element, 3, "inverted element")
-      call solid_respond(solid, u0, 0.5_wp*du, .true., response)
+      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, 0.5_wp*du), .true., response)
       call check_equal(error, response%inverted_element, 0, "inverted element at half of it")
    end subroutine test_inverted
 

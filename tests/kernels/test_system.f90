@@ -4,13 +4,13 @@ module test_system
    use emcon_csr, only : csr_multiply
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_loads, only : instant_t
+   use emcon_motion, only : instant_t, motion_of, motion_t, pose_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
    use emcon_steps, only : load_pressure, load_t
-   use emcon_system, only : mass_times, pose_t, system_begin_step, system_init, system_respond, &
+   use emcon_system, only : mass_times, system_begin_step, system_init, system_respond, &
       system_t, system_tangent_times
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, shake, young
@@ -99,16 +99,16 @@ contains
       call shake(v0, 1.0_wp)
       call shake(du, 0.1_wp)
       step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
-      call system_respond(system, scene, pose, u0, v0, du, system%zero, .true.)
+      call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .true.)
       matrix = real(dense_of(system%matrix), wp)
       do j = 1, size(way)
          way = 0.0_wp
          way(j) = step
          call add_to_dofs(system%numbering, way, 1.0_wp, du)
-         call system_respond(system, scene, pose, u0, v0, du, system%zero, .false.)
+         call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .false.)
          call pick_unknowns(system%numbering, system%residual, up)
          call add_to_dofs(system%numbering, way, -2.0_wp, du)
-         call system_respond(system, scene, pose, u0, v0, du, system%zero, .false.)
+         call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .false.)
          call pick_unknowns(system%numbering, system%residual, down)
          call add_to_dofs(system%numbering, way, 1.0_wp, du)
          call check_near(error, matrix(:, j), (up - down)/(2.0_wp*step), 300.0_wp*step**2, &
@@ -124,6 +124,7 @@ contains
       type(scene_t) :: scene
       type(system_t) :: system
       type(pose_t) :: pose(2)
+      type(motion_t) :: motion
       real(wp), allocatable :: u0(:, :), du(:, :), way(:, :), product(:, :), x(:), y(:), z(:)
       integer :: k
 
@@ -141,9 +142,10 @@ contains
          call random_number(x)
          way = 0.0_wp
          call add_to_dofs(system%numbering, x, 1.0_wp, way)
-         call system_respond(system, scene, pose(k), u0, 0.0_wp*u0, du, system%zero, .true.)
+         motion = motion_of(pose(k), scene%x, u0, du)
+         call system_respond(system, motion, .true.)
          call csr_multiply(system%matrix, x, y)
-         call system_tangent_times(system, pose(k), u0, du, way, product)
+         call system_tangent_times(system, motion, way, product)
          call pick_unknowns(system%numbering, product, z)
          call check_near(error, z, y, tol, 10.0_wp*young, "product by pose " // to_text(k))
       end do
@@ -157,6 +159,7 @@ contains
       type(system_t) :: system
       real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :), offset(:, :), change(:, :)
       real(wp), allocatable :: expected(:, :)
+      type(motion_t) :: motion
       real(wp), parameter :: h = 0.3_wp
 
       call make_system(scene, system, .false., error)
@@ -165,7 +168,9 @@ contains
       call shake(v0, 1.0_wp)
       call shake(du, 0.1_wp)
       call shake(offset, 0.1_wp)
-      call system_respond(system, scene, scheme%pose(instant_t(), h), u0, v0, du, offset, .false.)
+      motion = motion_of(scheme%pose(instant_t(), h), scene%x, u0, du, v0)
+      motion%offset = offset
+      call system_respond(system, motion, .false.)
       change = (scheme%velocity(h, v0, du + offset) - v0)/h
       call mass_times(system, change, expected)
       call check_near(error, system%inertia, expected, tol, 20.0_wp, "inertia")

@@ -4,8 +4,9 @@ module test_velocity_update
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_of, pose_t
    use emcon_scene, only : scene_t
-   use emcon_system, only : mass_times, pose_t, system_begin_step, system_init, system_t
+   use emcon_system, only : mass_times, system_begin_step, system_init, system_t
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_free, velocity_update_t
    use small_scenes, only : add_step, block_t, make_two_blocks, shake
    implicit none
@@ -39,7 +40,6 @@ contains
       type(system_t) :: system
       type(constraint_set_t) :: set
       type(velocity_update_t) :: update
-      type(pose_t) :: pose
       real(wp), allocatable :: u0(:, :), v0(:, :), v1(:, :), du(:, :), p0(:, :), p1(:, :), x1(:, :)
       real(wp) :: restored
       logical :: has_root
@@ -57,7 +57,7 @@ contains
       call system%contact(1)%contact%begin_step(scene%x, u0, du)
       call constraints_select(set, [1, 2, 3])
       set%lam = lam
-      call constraints_evaluate(set, system, scene, pose, u0, du)
+      call constraints_evaluate(set, system, motion_of(pose_t(), scene%x, u0, du))
       lost = -sum(set%lam*set%item%dgap)
       v1 = v0
       call velocity_update_apply(update, system, set, v1, restored, has_root, error)

@@ -1,0 +1,100 @@
+!> A motion over one step, and where in it forces are evaluated.
+!>
+!> A scheme decides where. Forces are discrete gradients over a span of the step, from `from` by
+!> `by`: over the whole of it, or over nothing at its end, where a discrete gradient is the gradient.
+!> Who takes a motion needs not know which: a derivative over the span times `weight` is that by the
+!> end of the step. Source: docs/theory.md, section 2.
+module emcon_motion
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: instant_t, pose_t, motion_t, motion_init, motion_place, motion_of
+
+   !> A moment of a step, as amplitudes see it.
+   type :: instant_t
+      real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
+      real(wp) :: total_time = 0.0_wp            !! since the start of the analysis [T]
+   end type instant_t
+
+   !> Where forces are evaluated and how inertia enters: all that a scheme decides.
+   type :: pose_t
+      !> Inertia s M (b du - w v0): b du - w v0 is the change of velocity, computed with the same b
+      !> as the velocity itself. Two factors for du and v0 would round apart, a bias in each step.
+      real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: no inertia
+      real(wp) :: rate = 0.0_wp                  !! b [1/T]
+      real(wp) :: v_weight = 0.0_wp              !! w
+      logical :: is_end = .false.                !! gradients at the end, not discrete gradients
+      type(instant_t) :: load_instant            !! when loads are taken
+   end type pose_t
+
+   type :: motion_t
+      type(pose_t) :: pose
+      real(wp), allocatable :: x(:, :)           !! (n_dim, n_node) reference positions [L]
+      real(wp), allocatable :: u0(:, :)          !! displacement at the start [L]
+      real(wp), allocatable :: v0(:, :)          !! velocity at the start [L/T]
+      real(wp), allocatable :: du(:, :)          !! displacement over the step [L]
+      real(wp), allocatable :: offset(:, :)      !! to `du`, for inertia [L]
+      ! of `motion_place`:
+      real(wp), allocatable :: from(:, :)        !! displacement where the span starts [L]
+      real(wp), allocatable :: by(:, :)          !! displacement over the span [L]
+      real(wp), allocatable :: at(:, :)          !! displacement on which loads act [L]
+      real(wp), allocatable :: computed(:, :)    !! >= 0, what was computed to find the span [L]
+      real(wp) :: weight = 1.0_wp
+      real(wp) :: load_weight = 0.5_wp           !! derivative of `at` by the end of the step
+   end type motion_t
+
+contains
+
+   !> A motion of rest of nodes at `x`.
+   pure subroutine motion_init(self, x)
+      type(motion_t), intent(out) :: self
+      real(wp), intent(in), contiguous :: x(:, :)        !! (n_dim, n_node) [L]
+
+      allocate(self%x, source=x)
+      allocate(self%u0, self%v0, self%du, self%offset, self%from, self%by, self%at, &
+         self%computed, mold=x)
+      self%u0 = 0.0_wp
+      self%v0 = 0.0_wp
+      self%du = 0.0_wp
+      self%offset = 0.0_wp
+      call motion_place(self)
+   end subroutine motion_init
+
+   !> Find the span and the place of the loads for the present `pose`, `u0` and `du`: whoever
+   !> changes these calls it before forces or constraints are evaluated.
+   pure subroutine motion_place(self)
+      type(motion_t), intent(inout) :: self
+
+      if (self%pose%is_end) then
+         self%from = self%u0 + self%du
+         self%by = 0.0_wp
+         self%at = self%from
+         self%computed = max(abs(self%from), abs(self%u0))
+         self%weight = 2.0_wp
+         self%load_weight = 1.0_wp
+      else
+         self%from = self%u0
+         self%by = self%du
+         self%at = self%u0 + 0.5_wp*self%du
+         self%computed = abs(self%du)
+         self%weight = 1.0_wp
+         self%load_weight = 0.5_wp
+      end if
+   end subroutine motion_place
+
+   !> The motion from `u0` by `du`, from rest unless `v0` is given, placed.
+   pure function motion_of(pose, x, u0, du, v0) result(motion)
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)    !! (n_dim, n_node) [L]
+      real(wp), intent(in), contiguous, optional :: v0(:, :)             !! (n_dim, n_node) [L/T]
+      type(motion_t) :: motion
+
+      call motion_init(motion, x)
+      motion%pose = pose
+      motion%u0 = u0
+      motion%du = du
+      if (present(v0)) motion%v0 = v0
+      call motion_place(motion)
+   end function motion_of
+
+end module emcon_motion
