@@ -31,8 +31,10 @@ contains
 
       call measure(partners, x, share, reach)
       associate (n => partners%master%n_edge)
-         is_covered = [(leaves_nothing(partners, m, share(m), reach(:, m)), m = 1, n)]
-         rows%covered = partners%master%edge(:, pack([(m, m = 1, n)], is_covered))
+         allocate(is_covered, source=[(leaves_nothing(partners, m, share(m), reach(:, m)), &
+            m = 1, n)])
+         if (allocated(rows%covered)) deallocate(rows%covered)
+         allocate(rows%covered, source=partners%master%edge(:, pack([(m, m = 1, n)], is_covered)))
       end associate
       call find_buried(partners, share, reach, rows%buried)
       call find_ends(partners, rows%ending)
