@@ -20,18 +20,17 @@ STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 
 
 def statements(path):
-    """(first line, statement without comments, its FORD comment), continued lines joined."""
+    """(first line, statement without comments, its FORD comments), continued lines joined."""
     code, told, start = "", "", 0
     for number, line in enumerate(path.read_text().splitlines(), 1):
         bare, _, comment = STRING.sub('""', line).partition("!")
         start = start if code else number
-        told += comment[1:] if comment.startswith("!") else ""
+        told += comment[1:] if comment[:1] in {"!", ">"} else ""
         code += bare.strip().removeprefix("&")
         if code.endswith("&"):
             code = code[:-1]
-        elif code or comment:
-            if code:
-                yield start, code, told.strip()
+        elif code:
+            yield start, code, told.strip()
             code, told = "", ""
 
 
@@ -72,8 +71,14 @@ def public_names(path):
     return names
 
 
+def without_brackets(text):
+    while "(" in text and (shorter := re.sub(r"\([^()]*\)", "", text)) != text:
+        text = shorter
+    return text
+
+
 def silent_arguments(path):
-    """(line, procedure, argument) of public procedures whose declaration has no `!!` comment.
+    """(line, procedure, argument) of public procedures whose declaration has no `!!` or `!>`.
 
     Objects of derived types say with their type what they are, and count as told.
     """
@@ -87,7 +92,7 @@ def silent_arguments(path):
         elif inside and inside[-1][0] in names and (match := DECLARED.match(low)):
             if told or match[1] in {"type", "class"}:
                 continue
-            for name in re.findall(r"(\w+)(?:\([^()]*\))?\s*(?:,|$)", match[2]):
+            for name in re.findall(r"\w+", without_brackets(match[2])):
                 if name in inside[-1][1]:
                     yield number, inside[-1][0], name
 

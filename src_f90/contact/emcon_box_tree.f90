@@ -136,7 +136,7 @@ contains
       real(wp), intent(in) :: low(2), high(2)    !! [L]
       real(wp), intent(in) :: reach              !! >= 0 [L]
       integer, allocatable, intent(inout) :: found(:)   !! made longer where needed
-      integer, intent(inout) :: n
+      integer, intent(inout) :: n                !! number in `found`, >= 0
       integer :: k, i, leaf, n_before
 
       if (self%n_leaf == 0) return

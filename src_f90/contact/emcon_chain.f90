@@ -159,7 +159,7 @@ contains
    !> huge(1) if they are in different parts.
    pure integer function chain_distance(self, a, b)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: a, b
+      integer, intent(in) :: a, b                !! edges, 1 to n_edge
 
       chain_distance = huge(1)
       associate (p => self%part(a))
@@ -175,7 +175,7 @@ contains
    !> Do edges `a` and `b` follow each other over a joint, whose nodes may be a little apart?
    pure logical function chain_is_joint(self, a, b) result(is_joint)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: a, b
+      integer, intent(in) :: a, b                !! edges, 1 to n_edge
 
       is_joint = .false.
       if (self%next(a) == b) is_joint = self%edge(2, a) /= self%edge(1, b)
@@ -185,7 +185,7 @@ contains
    !> Does edge `e` end or begin at `node`, or at a joint with it?
    pure logical function chain_touches(self, e, node) result(touches)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: e
+      integer, intent(in) :: e                   !! edge, 1 to n_edge
       integer, intent(in) :: node                !! of the scene
 
       touches = any(self%node(self%end_node(:, e)) == node) &
@@ -235,7 +235,7 @@ contains
    !> At either end of edge `e` the shorter one of the two edges there, in the reference.
    pure function chain_shorter(self, e) result(length)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: e
+      integer, intent(in) :: e                   !! edge, 1 to n_edge
       real(wp) :: length(2)
       integer :: side
 

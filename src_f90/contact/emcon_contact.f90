@@ -87,7 +87,7 @@ module emcon_contact
       pure subroutine configure_interface(self, x, options)
          import :: contact_t, contact_options_t, wp
          class(contact_t), intent(inout) :: self
-         real(wp), intent(in), contiguous :: x(:, :)
+         real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
          type(contact_options_t), intent(in) :: options
       end subroutine configure_interface
 
@@ -102,7 +102,7 @@ module emcon_contact
       pure subroutine measure_interface(self, x, u0, du)
          import :: contact_t, wp
          class(contact_t), intent(inout) :: self
-         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       end subroutine measure_interface
 
       !> The constraints `wanted` with all their derivatives; `target` are the mean gaps to hold.
@@ -110,7 +110,7 @@ module emcon_contact
          import :: constraint_t, contact_t, wp
          class(contact_t), intent(inout) :: self
          integer, intent(in) :: wanted(:)             !! (n) numbers of constraints, ascending
-         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
          real(wp), intent(in) :: target(:)            !! (n) [L]
          type(constraint_t), intent(inout) :: item(:) !! (n)
       end subroutine evaluate_interface
@@ -120,7 +120,7 @@ module emcon_contact
       pure subroutine area_interface(self, x, u, area, length)
          import :: contact_t, wp
          class(contact_t), intent(in) :: self
-         real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+         real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
          real(wp), intent(out) :: area(:)             !! (n_constraint) [L^2]
          real(wp), intent(out) :: length(:)           !! (n_constraint) [L]
       end subroutine area_interface
@@ -132,7 +132,7 @@ contains
    !> Set up for steps some of which are static, or none; before `configure`.
    pure subroutine suit_steps(self, meets_statics)
       class(contact_t), intent(inout) :: self
-      logical, intent(in) :: meets_statics
+      logical, intent(in) :: meets_statics       !! some step has no inertia
 
       self%meets_statics = meets_statics
       self%rounding = merge(static_rounding, dynamic_rounding, meets_statics)
@@ -141,7 +141,7 @@ contains
    !> Make room for `n` nodes and count them.
    pure subroutine constraint_resize(self, n)
       type(constraint_t), intent(inout) :: self
-      integer, intent(in) :: n
+      integer, intent(in) :: n                   !! > 0
 
       self%n_node = n
       if (allocated(self%node)) then

@@ -29,7 +29,8 @@ contains
    !> Begin to sum moments over the nodes `node`.
    pure subroutine form_begin(self, node, n_slave)
       type(edge_form_t), intent(inout) :: self
-      integer, intent(in) :: node(:), n_slave
+      integer, intent(in) :: node(:)             !! (n) distinct, slave nodes first
+      integer, intent(in) :: n_slave             !! number of these
       integer :: i
 
       if (allocated(self%node)) then
@@ -51,9 +52,10 @@ contains
    !> that the integral of a weight is never negative.
    pure subroutine form_share(self, side, is_dual, gap, area)
       type(edge_form_t), intent(in) :: self
-      integer, intent(in) :: side
-      logical, intent(in) :: is_dual
-      real(wp), intent(out) :: gap(0:1), area(0:1)
+      integer, intent(in) :: side                !! 1: first node of the edge, 2: last
+      logical, intent(in) :: is_dual             !! else the standard basis
+      real(wp), intent(out) :: gap(0:1)          !! at start and end [L^3]
+      real(wp), intent(out) :: area(0:1)         !! at start and end [L^2]
       real(wp) :: theta(0:1)
 
       theta = 0.0_wp
@@ -80,9 +82,11 @@ contains
    !> there, numbers `e` in `form`; one of them may be absent, 0.
    pure subroutine form_constraint(form, e, node, is_dual, target, scale, work, item)
       type(edge_form_t), intent(in) :: form(:)
-      integer, intent(in) :: e(2), node
-      logical, intent(in) :: is_dual
-      real(wp), intent(in) :: target, scale
+      integer, intent(in) :: e(2)                !! that ends at the node, that begins there
+      integer, intent(in) :: node                !! of the scene
+      logical, intent(in) :: is_dual             !! else the standard basis
+      real(wp), intent(in) :: target             !! mean gap to hold [L]
+      real(wp), intent(in) :: scale              !! > 0 [L^2]
       type(wide_t), intent(inout) :: work(3)
       type(constraint_t), intent(inout) :: item
       integer :: list(1 + sum(form(pack(e, e > 0))%n_node)), n, k, i

@@ -81,7 +81,7 @@ contains
    !> The curve over a part of the stencil: `joined_pieces`, `piece_before` or `piece_after`.
    pure function hermite_curve(stencil, part) result(curve)
       type(hermite_stencil_t), intent(in) :: stencil
-      integer, intent(in) :: part
+      integer, intent(in) :: part                !! of the chain, as above
       type(hermite_curve_t) :: curve
       integer :: k, other
       logical :: is_joined(6)
@@ -128,7 +128,7 @@ contains
    pure function hermite_point(curve, edge, s) result(p)
       type(hermite_curve_t), intent(in) :: curve
       real(wp), intent(in) :: edge(2, 5)         !! not read where the curve does not need them
-      real(wp), intent(in) :: s
+      real(wp), intent(in) :: s                  !! place on the curve
       type(hermite_point_t) :: p
       real(wp) :: start(2), finish(2), eta, z, chord(2)
       integer :: e
@@ -169,7 +169,7 @@ contains
    !> down with the distance. There is always one, as F falls along either straight end.
    pure subroutine hermite_closest(curve, edge, b, s, is_found)
       type(hermite_curve_t), intent(in) :: curve
-      real(wp), intent(in) :: edge(2, 5)
+      real(wp), intent(in) :: edge(2, 5)         !! as in `hermite_point` [L]
       real(wp), intent(in) :: b(2)               !! position relative to node 3
       real(wp), intent(inout) :: s               !! in: where to start; out: the root
       logical, intent(out) :: is_found           !! .false.: too near to the centre of curvature
@@ -247,7 +247,7 @@ contains
    !> rounding must not choose one of them.
    pure function hermite_weights(curve, s0, s1) result(w)
       type(hermite_curve_t), intent(in) :: curve
-      real(wp), intent(in) :: s0, s1
+      real(wp), intent(in) :: s0, s1             !! places on the curve at start and end
       type(hermite_weights_t) :: w
       type(dg_t) :: s
       integer :: e, i, e_last

@@ -96,8 +96,8 @@ contains
    pure subroutine hermite_gap_value(stencil, x, s, gap, is_found)
       type(hermite_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 7)
-      real(wp), intent(inout) :: s(3)
-      real(wp), intent(out) :: gap
+      real(wp), intent(inout) :: s(3)  !! on the joined pieces, the one before, the one after
+      real(wp), intent(out) :: gap               !! [L]
       logical, intent(out) :: is_found           !! .false.: no unique closest point; gap undefined
       real(wp) :: edge(2, 5), b(2), other
       integer :: side

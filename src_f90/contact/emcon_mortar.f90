@@ -72,7 +72,7 @@ contains
 
    pure subroutine mortar_configure(self, x, options)
       class(mortar_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
       integer :: n
 
@@ -96,7 +96,7 @@ contains
    !> Choose the pairs of edges for the step.
    pure subroutine mortar_begin_step(self, x, u0, du)
       class(mortar_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: e, n
 
       call near_list_update(self%near, x, u0, du, self%reach)
@@ -149,7 +149,7 @@ contains
 
    pure subroutine mortar_measure_edges(self, x, u0, du)
       class(mortar_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(frame_t) :: frame(0:1)
       real(wp) :: local(2, n_place), dlocal(2, n_place), part(n_moment, 0:1)
       integer :: e, k, i
@@ -217,8 +217,8 @@ contains
 
    pure subroutine mortar_form_edge(self, e, x, u0, du)
       class(mortar_t), intent(inout) :: self
-      integer, intent(in) :: e
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer, intent(in) :: e                   !! slave edge
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp) :: local(2, n_place), dlocal(2, n_place)
       integer :: k, i, variable(2*n_place)
 

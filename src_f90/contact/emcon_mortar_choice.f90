@@ -107,7 +107,7 @@ contains
 
    pure subroutine pair_append(list, n, stencil)
       type(pair_stencil_t), allocatable, intent(inout) :: list(:)
-      integer, intent(inout) :: n
+      integer, intent(inout) :: n                !! number in `list`, >= 0
       type(pair_stencil_t), intent(in) :: stencil
       type(pair_stencil_t), allocatable :: longer(:)
 
@@ -125,9 +125,9 @@ contains
    pure subroutine pairs_drop_far(list, master, first, n, x, u0)
       type(pair_stencil_t), intent(inout) :: list(:)
       type(chain_t), intent(in) :: master
-      integer, intent(in) :: first
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      integer, intent(inout) :: n
+      integer, intent(in) :: first               !! >= 1
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (2, n_node) [L]
+      integer, intent(inout) :: n                !! out: what is kept
       real(wp), dimension(n - first + 1) :: low, high, height
       integer :: order(n - first + 1), i, j
       logical :: is_kept(n - first + 1)
@@ -173,9 +173,9 @@ contains
    pure subroutine pairs_seen(list, master, first, last, point, x, u0, du, seen)
       type(pair_stencil_t), intent(in) :: list(:)
       type(chain_t), intent(in) :: master
-      integer, intent(in) :: first, last
+      integer, intent(in) :: first, last         !! indices into `list`; last < first: none
       real(wp), intent(in) :: point(:)           !! (n_point) on 0..1
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer, intent(out) :: seen(:, :)         !! (2, n_point) pair, and the one beside it or 0
       type(frame_t) :: frame
       real(wp) :: local(2, n_place), dlocal(2, n_place), beyond(2)

@@ -83,7 +83,7 @@ contains
    !> that of the end.
    pure real(wp) function frame_project(self, k)
       type(frame_t), intent(in) :: self
-      integer, intent(in) :: k
+      integer, intent(in) :: k                   !! 1 to n_master
       real(wp) :: a, b, c
 
       associate (p => self%along(:, k), q => self%edge_along)
@@ -104,7 +104,7 @@ contains
    !> `end_rounding` into that of the ends of the edge.
    pure real(wp) function frame_meet(self, k)
       type(frame_t), intent(in) :: self
-      integer, intent(in) :: k
+      integer, intent(in) :: k                   !! 1 to n_master
       real(wp) :: low, high, value, slope, last, z, dz
       integer :: i
 
@@ -148,8 +148,9 @@ contains
    pure subroutine frame_hit(self, stencil, xi, eta, gap)
       type(frame_t), intent(in) :: self
       type(pair_stencil_t), intent(in) :: stencil
-      real(wp), intent(in) :: xi
-      real(wp), intent(out) :: eta, gap
+      real(wp), intent(in) :: xi                 !! on the slave edge, 0 to 1
+      real(wp), intent(out) :: eta               !! 0 to 1 within the master edge
+      real(wp), intent(out) :: gap               !! [L]
       real(wp) :: along(4), above(4), norm
 
       call look(self, xi, along, above, norm)
@@ -167,8 +168,9 @@ contains
    pure subroutine frame_point(self, stencil, xi, eta, gap)
       type(frame_t), intent(in) :: self
       type(pair_stencil_t), intent(in) :: stencil
-      real(wp), intent(in) :: xi
-      real(wp), intent(out) :: eta, gap
+      real(wp), intent(in) :: xi                 !! on the slave edge, 0 to 1
+      real(wp), intent(out) :: eta               !! 0 to 1 within the master edge
+      real(wp), intent(out) :: gap               !! [L]
       real(wp) :: along(4), above(4), norm, slope
 
       call frame_hit(self, stencil, xi, eta, gap)

@@ -18,8 +18,8 @@ contains
    pure subroutine stencil_slave(self, chain, e, is_averaged, is_corner)
       type(pair_stencil_t), intent(inout) :: self
       type(chain_t), intent(in) :: chain
-      integer, intent(in) :: e
-      logical, intent(in) :: is_averaged
+      integer, intent(in) :: e                   !! edge of `chain`
+      logical, intent(in) :: is_averaged         !! averaged normals
       logical, intent(in) :: is_corner(:)        !! (n_edge) at the first node of each edge
 
       self%node(place_first) = chain%edge(1, e)
@@ -59,9 +59,10 @@ contains
    pure subroutine stencil_master(self, chain, m, is_smooth, is_wide, is_corner)
       type(pair_stencil_t), intent(inout) :: self
       type(chain_t), intent(in) :: chain
-      integer, intent(in) :: m
-      logical, intent(in) :: is_smooth, is_wide
-      logical, intent(in) :: is_corner(:)
+      integer, intent(in) :: m                   !! edge of `chain`
+      logical, intent(in) :: is_smooth           !! cubic master
+      logical, intent(in) :: is_wide             !! points look past the ends of the edge
+      logical, intent(in) :: is_corner(:)        !! (n_edge) at the first node of each edge
       real(wp) :: length(3)
 
       self%edge = m
@@ -126,7 +127,7 @@ contains
    !> Positions of the nodes at the start relative to the edge's first node, and their motion.
    pure subroutine stencil_gather(self, x, u0, du, local, dlocal)
       type(pair_stencil_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(out) :: local(:, :), dlocal(:, :)         !! (2, n_place)
       integer :: k, origin
 
@@ -145,7 +146,8 @@ contains
    !> Does the master edge from node `first` to node `last` of the frame run against the slave edge?
    pure logical function frame_faces(frame, first, last)
       type(frame_t), intent(in) :: frame
-      integer, intent(in) :: first, last
+      integer, intent(in) :: first               !! 1 to n_master
+      integer, intent(in) :: last                !! another one
       real(wp) :: along(2), above(2)
 
       along = frame%along(:, last) - frame%along(:, first)

@@ -27,7 +27,8 @@ contains
 
    pure subroutine near_list_init(self, item, edge, u0, depth)
       type(near_list_t), intent(out) :: self
-      integer, intent(in) :: item(:, :), edge(:, :)
+      integer, intent(in) :: item(:, :)          !! (1 or 2, n_item) nodes of each slave item
+      integer, intent(in) :: edge(:, :)          !! (2, n_edge) nodes of the master edges
       real(wp), intent(in) :: u0(:, :)           !! (2, n_node)
       real(wp), intent(in) :: depth              !! [L]
 
@@ -42,7 +43,7 @@ contains
    !> 0 to search in any case.
    pure subroutine near_list_update(self, x, u0, du, reach)
       type(near_list_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(inout) :: reach           !! [L]
       real(wp) :: step_motion, motion
 

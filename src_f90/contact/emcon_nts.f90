@@ -123,7 +123,7 @@ contains
 
    pure subroutine nts_configure(self, x, options)
       class(nts_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
 
       self%smoothing = options%smoothing
@@ -140,7 +140,7 @@ contains
    !> Choose for each slave node the nearest master edge at the start of the step.
    pure subroutine nts_begin_step(self, x, u0, du)
       class(nts_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: i, k
       real(wp) :: best
 
@@ -236,7 +236,7 @@ contains
 
    pure subroutine nts_measure(self, x, u0, du)
       class(nts_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: i
 
       do i = 1, self%n_constraint
@@ -416,9 +416,9 @@ contains
 
    pure subroutine nts_evaluate(self, wanted, x, u0, du, target, item)
       class(nts_t), intent(inout) :: self
-      integer, intent(in) :: wanted(:)
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: target(:)
+      integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in) :: target(:)          !! (n) [L]
       type(constraint_t), intent(inout) :: item(:)
       integer :: k
       logical :: is_found
@@ -438,8 +438,9 @@ contains
 
    pure subroutine nts_area(self, x, u, area, length)
       class(nts_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp), intent(out) :: area(:), length(:)
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
+      real(wp), intent(out) :: length(:)         !! (n_constraint) [L]
       real(wp) :: at_node(size(self%slave%node))
 
       at_node = 0.0_wp
@@ -452,9 +453,9 @@ contains
    !> For checks before the first step only. `is_over`: not past an end of the surface.
    pure subroutine nts_nearest(self, i, x, u, gap, is_over)
       type(nts_t), intent(inout) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp), intent(out) :: gap
+      integer, intent(in) :: i                   !! slave node, index into `node`
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(out) :: gap               !! [L]
       logical, intent(out) :: is_over            !! .false. also if there is no edge
       real(wp) :: best
       real(wp) :: zero(size(x, 1), size(x, 2))

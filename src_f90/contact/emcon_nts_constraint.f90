@@ -81,10 +81,10 @@ contains
    !> The gap over a smoothed surface; `is_found`: there is a unique closest point.
    pure subroutine smooth_constraint(smooth, x, u0, du, target, item, is_found)
       type(smooth_stencil_t), intent(in) :: smooth
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: target
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in) :: target             !! gap to hold [L]
       type(constraint_t), intent(inout) :: item
-      logical, intent(out) :: is_found
+      logical, intent(out) :: is_found           !! else `item` is left as it is
       real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
       type(dg15_t) :: gap
 

@@ -96,9 +96,10 @@ contains
    !> The same gap for one configuration, and the projection `xi` on the edge (0..1 inside).
    pure subroutine nts_gap_value(x, before, after, rounding, gap, xi)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
-      integer, intent(in) :: before, after
+      integer, intent(in) :: before, after       !! as in `nts_gap`
       real(wp), intent(in) :: rounding(2, 2)  !! as in `nts_gap`
-      real(wp), intent(out) :: gap, xi
+      real(wp), intent(out) :: gap               !! [L]
+      real(wp), intent(out) :: xi                !! on the line of the edge, 0 to 1 within it
       real(wp) :: a(2), b(2), edge(2), length, other, tau
 
       a = x(:, last) - x(:, first)

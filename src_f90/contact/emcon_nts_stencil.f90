@@ -45,9 +45,10 @@ contains
    pure subroutine polygon_stencil(self, master, slave, edge, rounding, x, u0)
       type(polygon_stencil_t), intent(out) :: self
       type(chain_t), intent(in) :: master
-      integer, intent(in) :: slave, edge
+      integer, intent(in) :: slave               !! node of the scene
+      integer, intent(in) :: edge                !! of `master`, the nearest
       real(wp), intent(in) :: rounding(2)        !! of concave and convex corners, per edge
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (2, n_node) [L]
       integer :: e
 
       self%node(1) = slave
@@ -76,10 +77,10 @@ contains
    !> bisector it stands, in place of `edge`; 0 or, if it stands on the bisector, the other one.
    pure subroutine edge_of_sector(master, slave, x, u, edge, other)
       type(chain_t), intent(in) :: master
-      integer, intent(in) :: slave
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer, intent(inout) :: edge
-      integer, intent(out) :: other
+      integer, intent(in) :: slave               !! node of the scene
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      integer, intent(inout) :: edge             !! in: the nearest
+      integer, intent(out) :: other              !! edge, or 0
       real(wp) :: own(2), arm(2), to_slave(2), length(2), past
       integer :: side, corner, beside(2)
 
@@ -132,9 +133,10 @@ contains
       type(smooth_stencil_t), intent(out) :: self
       type(chain_t), intent(in) :: master
       logical, intent(in) :: is_corner(:)        !! (n_edge) at the first node of each
-      integer, intent(in) :: slave, edge
+      integer, intent(in) :: slave               !! node of the scene
+      integer, intent(in) :: edge                !! of `master`, the nearest
       real(wp), intent(in) :: rounding           !! of corners, as a fraction of the edge
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (2, n_node) [L]
       real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
       integer :: near(5), k, number
 
@@ -188,9 +190,10 @@ contains
 
    !> Positions of the stencil's nodes at the start relative to its edge, and their motion.
    pure subroutine stencil_gather(x, u0, du, n, node, local, dlocal)
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      integer, intent(in) :: n, node(:)
-      real(wp), intent(out) :: local(:, :), dlocal(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      integer, intent(in) :: n                   !! number of nodes
+      integer, intent(in) :: node(:)             !! (>= n) of the scene: slave, edge, others
+      real(wp), intent(out) :: local(:, :), dlocal(:, :)   !! (2, >= n) [L]
       integer :: k
 
       do k = 1, n
@@ -201,8 +204,8 @@ contains
 
    !> Reference length of the stencil's edge: what gaps are measured against.
    pure real(wp) function stencil_length(x, node)
-      real(wp), intent(in) :: x(:, :)
-      integer, intent(in) :: node(:)
+      real(wp), intent(in) :: x(:, :)            !! (2, n_node) [L]
+      integer, intent(in) :: node(:)             !! slave, edge, others
       real(wp) :: a(2)
 
       a = x(:, node(3)) - x(:, node(2))
@@ -211,8 +214,9 @@ contains
 
    !> Distance of a node from an edge as a segment.
    pure real(wp) function edge_distance(x, u, node, edge)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: node, edge(2)
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene) [L]
+      integer, intent(in) :: node                !! of the scene
+      integer, intent(in) :: edge(2)             !! its nodes, of the scene
       real(wp) :: a(2), b(2), xi
 
       a = (x(:, edge(2)) - x(:, edge(1))) + (u(:, edge(2)) - u(:, edge(1)))
@@ -224,8 +228,9 @@ contains
 
    !> Is a node in front of the line of an edge, by more than round-off?
    pure logical function is_outside(x, u, node, edge)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: node, edge(2)
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene) [L]
+      integer, intent(in) :: node                !! of the scene
+      integer, intent(in) :: edge(2)             !! its nodes, of the scene
       real(wp) :: a(2), b(2)
 
       a = (x(:, edge(2)) - x(:, edge(1))) + (u(:, edge(2)) - u(:, edge(1)))

@@ -22,7 +22,7 @@ contains
    !> `to_point`, nearer than the nearest one so far?
    pure subroutine nearest_update(self, edge, to_point, along)
       type(nearest_t), intent(inout) :: self
-      integer, intent(in) :: edge
+      integer, intent(in) :: edge                !! its number
       real(wp), intent(in) :: to_point(2), along(2)      !! [L]
       real(wp) :: share, way(2), square
       integer :: side
@@ -65,9 +65,9 @@ contains
    !> node of `a`: to its last node, and to the first and the last node of `b`.
    pure subroutine crossing_find(a, to_b, crosses, share, enters)
       real(wp), intent(in) :: a(2), to_b(2, 2)   !! [L]
-      logical, intent(out) :: crosses
+      logical, intent(out) :: crosses            !! is there a common point inside both?
       real(wp), intent(out) :: share             !! of `a` before the crossing
-      logical, intent(out) :: enters
+      logical, intent(out) :: enters             !! `a` goes behind the line of `b`
       real(wp) :: b(2), side(4)
 
       b = to_b(:, 2) - to_b(:, 1)
@@ -88,7 +88,7 @@ contains
 
    !> Not norm2: its bits depend on the units.
    pure real(wp) function length_of(a)
-      real(wp), intent(in) :: a(2)
+      real(wp), intent(in) :: a(2)               !! any unit
 
       length_of = sqrt(dot_product(a, a))
    end function length_of

@@ -43,7 +43,7 @@ contains
 
    !> Distance of two boxes along the axis where it is largest; 0 if they overlap.
    pure real(wp) function box_distance(low_a, high_a, low_b, high_b)
-      real(wp), intent(in) :: low_a(2), high_a(2), low_b(2), high_b(2)
+      real(wp), intent(in) :: low_a(2), high_a(2), low_b(2), high_b(2)   !! [L]
 
       box_distance = max(0.0_wp, maxval(low_a - high_b), maxval(low_b - high_a))
    end function box_distance

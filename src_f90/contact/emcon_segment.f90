@@ -56,7 +56,7 @@ contains
 
    pure subroutine segment_configure(self, x, options)
       class(segment_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
 
       self%is_dual = options%multiplier == multiplier_dual
@@ -66,7 +66,7 @@ contains
 
    pure subroutine segment_begin_step(self, x, u0, du)
       class(segment_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
 
       ! Weights ask which nodes are near: a list from earlier steps would make them depend on these.
       self%nts%reach = 0.0_wp
@@ -105,7 +105,7 @@ contains
    !> The stencils of all nodal gaps that a constraint is made of must hold at the end.
    pure subroutine segment_measure(self, x, u0, du)
       class(segment_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: i, k
 
       call weighted_measure(self, x, u0, du)
@@ -122,7 +122,7 @@ contains
 
    pure subroutine segment_measure_edges(self, x, u0, du)
       class(segment_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp) :: w(n_moment, 2), a(2), b(2), length(0:1)
       integer :: e, k
 
@@ -151,8 +151,8 @@ contains
 
    pure subroutine segment_form_edge(self, e, x, u0, du)
       class(segment_t), intent(inout) :: self
-      integer, intent(in) :: e
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      integer, intent(in) :: e                   !! slave edge
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp) :: w(n_moment, 2)
       logical :: is_there(2)
       integer :: k

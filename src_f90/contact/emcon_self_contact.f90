@@ -24,8 +24,8 @@ contains
    pure logical function self_contact_may_touch(chain, k, e, both_sides, x, u) result(may_touch)
       type(chain_t), intent(in) :: chain
       integer, intent(in) :: k                   !! index into the nodes of `chain`
-      integer, intent(in) :: e
-      logical, intent(in) :: both_sides
+      integer, intent(in) :: e                   !! edge of `chain`
+      logical, intent(in) :: both_sides          !! each holds the other
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
       real(wp) :: a(2), b(2), mean(2), length, distance
       integer :: own, first, n, side
@@ -58,7 +58,8 @@ contains
    !> Are the edges at node `k` of the chain neither edge `e` nor neighbours of it?
    pure logical function self_contact_is_apart(chain, k, e) result(is_apart)
       type(chain_t), intent(in) :: chain
-      integer, intent(in) :: k, e
+      integer, intent(in) :: k                   !! index into the nodes of `chain`
+      integer, intent(in) :: e                   !! edge of `chain`
       integer :: side
 
       is_apart = .true.
@@ -72,9 +73,9 @@ contains
    !> Does the edge between the two of `edge`, of any surface, face the chain at its node `k`?
    pure logical function chain_faces(chain, k, edge, x, u)
       type(chain_t), intent(in) :: chain
-      integer, intent(in) :: k
+      integer, intent(in) :: k                   !! index into the nodes of `chain`
       integer, intent(in) :: edge(2)             !! nodes of the scene
-      real(wp), intent(in) :: x(:, :), u(:, :)
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene) [L]
       real(wp) :: a(2), mean(2)
 
       mean = mean_along(chain, k, x, u)

@@ -34,7 +34,7 @@ contains
       type(touch_rule_t), intent(out) :: self
       type(chain_t), intent(in) :: chain
       type(scene_t), intent(in) :: scene
-      logical, intent(in) :: both_sides
+      logical, intent(in) :: both_sides          !! each body holds the other
       integer, allocatable :: body(:), host(:)
       logical, allocatable :: is_buried(:)
       integer :: n_body
@@ -52,7 +52,8 @@ contains
    !> Does a constraint of class `class` look at edge `e`?
    pure logical function touch_rule_sees(self, class, e) result(sees)
       type(touch_rule_t), intent(in) :: self
-      integer, intent(in) :: class, e
+      integer, intent(in) :: class               !! 1 to n_class
+      integer, intent(in) :: e                   !! edge of the chain
 
       sees = .true.
       if (self%n_class > 1) sees = 1 + mod(self%body(e) - 1, self%n_class) == class
@@ -64,7 +65,8 @@ contains
    pure logical function touch_rule_allows(self, chain, k, e, x, u) result(allows)
       type(touch_rule_t), intent(in) :: self
       type(chain_t), intent(in) :: chain
-      integer, intent(in) :: k, e
+      integer, intent(in) :: k                   !! index into the nodes of `chain`
+      integer, intent(in) :: e                   !! edge of `chain`
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
       integer :: own
 

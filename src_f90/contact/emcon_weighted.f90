@@ -49,15 +49,15 @@ module emcon_weighted
       pure subroutine measure_interface(self, x, u0, du)
          import :: weighted_t, wp
          class(weighted_t), intent(inout) :: self
-         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       end subroutine measure_interface
 
       !> Fill `form(e)` with nodes and moments in the arithmetic.
       pure subroutine form_interface(self, e, x, u0, du)
          import :: weighted_t, wp
          class(weighted_t), intent(inout) :: self
-         integer, intent(in) :: e
-         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+         integer, intent(in) :: e                !! slave edge
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       end subroutine form_interface
 
    end interface
@@ -108,7 +108,7 @@ contains
    !> Mean gaps at both ends of the step; 0 where nothing is covered.
    pure subroutine weighted_measure(self, x, u0, du)
       class(weighted_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp) :: gap(0:1), area(0:1), part_gap(0:1), part_area(0:1), least
       integer :: i, k
 
@@ -158,9 +158,9 @@ contains
 
    pure subroutine weighted_evaluate(self, wanted, x, u0, du, target, item)
       class(weighted_t), intent(inout) :: self
-      integer, intent(in) :: wanted(:)
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: target(:)
+      integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in) :: target(:)          !! (n) [L]
       type(constraint_t), intent(inout) :: item(:)
       integer :: i, k, n
 
@@ -184,8 +184,9 @@ contains
    !> The multipliers are forces by the scale of their constraints.
    pure subroutine weighted_area(self, x, u, area, length)
       class(weighted_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp), intent(out) :: area(:), length(:)
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
+      real(wp), intent(out) :: length(:)         !! (n_constraint) [L]
 
       area = self%scale*self%thickness
       length = self%cover

@@ -149,7 +149,7 @@ contains
       type(correction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
-      logical, intent(out) :: is_singular
+      logical, intent(out) :: is_singular        !! there is no factor to solve with
       type(error_t), allocatable, intent(out) :: error
       integer :: k
 

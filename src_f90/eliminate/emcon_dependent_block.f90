@@ -204,7 +204,7 @@ contains
    !> x = G_d^-1 x or G_d^-T x in place; both sides are numbered by constraints.
    subroutine dependent_block_solve(self, is_transposed, x)
       type(dependent_block_t), intent(in) :: self
-      logical, intent(in) :: is_transposed
+      logical, intent(in) :: is_transposed       !! G_d^-T, else G_d^-1
       real(dp), intent(inout), contiguous :: x(:)    !! (n)
       real(dp) :: ordered(size(x))
       integer :: one(self%bands%n_block)

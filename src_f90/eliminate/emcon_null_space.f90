@@ -320,7 +320,7 @@ contains
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(csr_t), intent(in) :: matrix
-      logical, intent(out) :: is_singular
+      logical, intent(out) :: is_singular        !! there is no factor to solve with
       type(error_t), allocatable, intent(out) :: error
 
       is_singular = .true.

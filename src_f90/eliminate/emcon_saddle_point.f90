@@ -67,7 +67,7 @@ contains
       type(saddle_point_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(csr_t), intent(in) :: matrix
-      logical, intent(out) :: is_singular
+      logical, intent(out) :: is_singular        !! there is no factor to solve with
       type(error_t), allocatable, intent(out) :: error
       integer :: k, n_matrix, n_rows
 

@@ -37,8 +37,9 @@ contains
    pure subroutine element_respond(geometry, law, u0, du, nlgeom, with_tangent, response)
       type(element_geometry_t), intent(in) :: geometry
       class(law_t), intent(in) :: law
-      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)
-      logical, intent(in) :: nlgeom, with_tangent
+      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)   !! [L]
+      logical, intent(in) :: nlgeom              !! .false.: small strains
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(element_response_t), intent(inout) :: response
       type(law_response_t) :: state
       real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2), strain(3), dstrain(3)
@@ -59,9 +60,9 @@ contains
    !> Strain and its increment at point `k` of an element that moves from `u0` to `u0 + du`.
    pure subroutine element_point_strain(geometry, k, u0, du, nlgeom, strain, dstrain, is_inverted)
       type(element_geometry_t), intent(in) :: geometry
-      integer, intent(in) :: k
-      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)
-      logical, intent(in) :: nlgeom
+      integer, intent(in) :: k                   !! 1 to n_gp
+      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)   !! [L]
+      logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out) :: strain(3), dstrain(3)       !! E11, E22, 2 E12
       logical, intent(out) :: is_inverted                  !! at the end
       real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2)
@@ -76,8 +77,9 @@ contains
    pure subroutine element_respond_known(geometry, state, u0, du, nlgeom, with_tangent, response)
       type(element_geometry_t), intent(in) :: geometry
       type(law_response_t), intent(in) :: state(:)         !! (n_gp)
-      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)
-      logical, intent(in) :: nlgeom, with_tangent
+      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)   !! [L]
+      logical, intent(in) :: nlgeom              !! .false.: small strains
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(element_response_t), intent(inout) :: response
       type(law_response_t) :: weighted
       real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2), strain(3), dstrain(3)
@@ -168,9 +170,10 @@ contains
    !> Strain (E11, E22, 2 E12) at the start, its increment E1 - E0 to relative accuracy, and the
    !> deformation gradients of the mid and the end configuration (identity without `nlgeom`).
    pure subroutine element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
-      real(wp), intent(in) :: grad0(2, 2), dgrad(2, 2)
-      logical, intent(in) :: nlgeom
-      real(wp), intent(out) :: strain(3), dstrain(3), f_mid(2, 2), f_end(2, 2)
+      real(wp), intent(in) :: grad0(2, 2), dgrad(2, 2)   !! (component, by X)
+      logical, intent(in) :: nlgeom              !! .false.: small strains
+      real(wp), intent(out) :: strain(3), dstrain(3)   !! E11, E22, 2 E12
+      real(wp), intent(out) :: f_mid(2, 2), f_end(2, 2)   !! (component, by X)
 
       strain = [grad0(1, 1), grad0(2, 2), grad0(1, 2) + grad0(2, 1)]
       f_mid = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])

@@ -12,8 +12,9 @@ contains
    !> degree of freedom a of node i is `n_dim*(i - 1) + a`.
    pure subroutine element_lists(solid, n_dim, start, list)
       type(solid_t), intent(in) :: solid
-      integer, intent(in) :: n_dim
-      integer, allocatable, intent(out) :: start(:), list(:)
+      integer, intent(in) :: n_dim               !! freedoms per node
+      integer, allocatable, intent(out) :: start(:)   !! (n_element + 1) into `list`; last: size + 1
+      integer, allocatable, intent(out) :: list(:)   !! degrees of freedom, element by element
       integer :: e, i, a, k
 
       allocate(start(solid%n_element + 1), list(n_dim*max_element_nodes*solid%n_element))

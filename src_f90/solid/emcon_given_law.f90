@@ -69,7 +69,7 @@ contains
    !> Room for `n` points.
    pure subroutine given_points_make_room(self, n)
       type(given_points_t), intent(inout) :: self
-      integer, intent(in) :: n
+      integer, intent(in) :: n                   !! >= 0
 
       if (allocated(self%strain)) return
       allocate(self%strain(3, n), self%dstrain(3, n), source=0.0_wp)
@@ -78,7 +78,7 @@ contains
    !> The response at point `i`. The stress normal to the plane is not known, and given as 0.
    pure function given_state(self, i) result(state)
       type(given_points_t), intent(in) :: self
-      integer, intent(in) :: i
+      integer, intent(in) :: i                   !! 1 to the number of points
       type(law_response_t) :: state
 
       state%energy = self%response%energy(i)
@@ -89,7 +89,7 @@ contains
    !> Largest second derivative at rest, as half of it: what a step of no size has as its tangent.
    subroutine given_rest_stiffness(law, stiffness, error)
       type(given_law_t), intent(in) :: law
-      real(wp), intent(out) :: stiffness
+      real(wp), intent(out) :: stiffness         !! [M/(L T^2)]; 0 after an error
       type(error_t), allocatable, intent(out) :: error
       type(point_response_t) :: response
       real(wp), parameter :: rest(3, 1) = 0.0_wp

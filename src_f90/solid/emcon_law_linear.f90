@@ -19,7 +19,7 @@ contains
    !> Lame's constants from Young's modulus and Poisson's ratio.
    pure subroutine lame_constants(young, nu, lam, mu)
       real(wp), intent(in) :: young, nu          !! E > 0; nu in (-1, 0.5)
-      real(wp), intent(out) :: lam, mu
+      real(wp), intent(out) :: lam, mu           !! [M/(L T^2)]
 
       lam = young*nu/((1.0_wp + nu)*(1.0_wp - 2.0_wp*nu))
       mu = 0.5_wp*young/(1.0_wp + nu)

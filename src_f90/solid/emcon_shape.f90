@@ -60,10 +60,10 @@ contains
 
    !> Values and natural derivatives of the shape functions of `kind` at `point`.
    pure subroutine shape_values(kind, point, value, slope)
-      integer, intent(in) :: kind
-      real(wp), intent(in) :: point(2)
-      real(wp), intent(out) :: value(max_element_nodes)
-      real(wp), intent(out) :: slope(2, max_element_nodes)
+      integer, intent(in) :: kind                !! index into `element_kinds`
+      real(wp), intent(in) :: point(2)           !! natural coordinates
+      real(wp), intent(out) :: value(max_element_nodes)   !! 0 beyond the nodes of `kind`
+      real(wp), intent(out) :: slope(2, max_element_nodes)   !! by natural coordinates
       real(wp), parameter :: corner(2, 4) = reshape([-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, &
          1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], [2, 4])
       integer :: i

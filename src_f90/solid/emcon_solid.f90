@@ -222,10 +222,10 @@ contains
    subroutine solid_respond(self, motion, nlgeom, response, slot, value, side)
       type(solid_t), intent(in) :: self
       type(motion_t), intent(in) :: motion
-      logical, intent(in) :: nlgeom
+      logical, intent(in) :: nlgeom              !! .false.: small strains
       type(solid_response_t), intent(inout) :: response
       integer, intent(in), contiguous, optional :: slot(:)       !! element matrices by columns
-      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! both with `slot`
       type(element_response_t) :: part
       real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
       logical :: with_tangent
@@ -296,7 +296,8 @@ contains
    subroutine solid_evaluate_given(self, u0, du, nlgeom, with_tangent, given)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      logical, intent(in) :: nlgeom, with_tangent
+      logical, intent(in) :: nlgeom              !! .false.: small strains
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(given_response_t), intent(inout) :: given
       integer :: k
 
@@ -355,8 +356,8 @@ contains
    subroutine obstacle_text(self, response, by, text)
       type(solid_t), intent(in) :: self
       type(solid_response_t), intent(in) :: response
-      character(len=*), intent(in) :: by
-      character(len=:), allocatable, intent(out) :: text
+      character(len=*), intent(in) :: by         !! ends "... is inverted"
+      character(len=:), allocatable, intent(out) :: text   !! names the element
 
       if (response%given%material == 0) then
          text = "element " // to_text(self%label(max(1, response%inverted_element))) // &
@@ -390,7 +391,7 @@ contains
    subroutine solid_tangent_times(self, motion, nlgeom, direction, product)
       type(solid_t), intent(in) :: self
       type(motion_t), intent(in) :: motion
-      logical, intent(in) :: nlgeom
+      logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(in), contiguous :: direction(:, :)                       !! (2, n_node)
       real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
       type(element_response_t) :: part

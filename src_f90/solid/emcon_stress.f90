@@ -23,7 +23,7 @@ contains
    subroutine nodal_stress(solid, u, nlgeom, stress)
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)            !! (2, n_node)
-      logical, intent(in) :: nlgeom
+      logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
       type(given_response_t) :: given
       integer :: count_at(solid%n_node), e, i, k, node
@@ -115,8 +115,8 @@ contains
    !> Means over the reference volume of each element, and that volume.
    subroutine element_means(solid, u, nlgeom, stress, strain, volume)
       type(solid_t), intent(in) :: solid
-      real(wp), intent(in), contiguous :: u(:, :)
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in), contiguous :: u(:, :)   !! (2, n_node) [L]
+      logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out) :: stress(:, :)      !! (6, n_element)
       real(wp), intent(out) :: strain(:, :)      !! (3, n_element) E11, E22, 2 E12
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
@@ -140,7 +140,7 @@ contains
 
    !> Von Mises stress of (xx, yy, zz, xy, yz, xz).
    pure real(wp) function von_mises(s)
-      real(wp), intent(in) :: s(6)
+      real(wp), intent(in) :: s(6)               !! [M/(L T^2)]
 
       von_mises = sqrt(0.5_wp*((s(1) - s(2))**2 + (s(2) - s(3))**2 + (s(3) - s(1))**2) &
          + 3.0_wp*(s(4)**2 + s(5)**2 + s(6)**2))

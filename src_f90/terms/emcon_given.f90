@@ -46,7 +46,7 @@ contains
    !> Append a copy of the strain energy of the material `name`.
    subroutine given_add_law(self, name, energy)
       type(given_t), intent(inout) :: self
-      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: name       !! as in `material_t`
       class(point_function_t), intent(in) :: energy
       type(given_law_t), allocatable :: longer(:)
       integer :: i, n

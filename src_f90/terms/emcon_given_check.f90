@@ -36,7 +36,7 @@ contains
    !> The pattern of `force` is one over the freedoms of `n_node` nodes.
    subroutine given_check_force(force, n_node, error)
       class(given_force_t), intent(in) :: force
-      integer, intent(in) :: n_node
+      integer, intent(in) :: n_node              !! of the model
       type(error_t), allocatable, intent(out) :: error
 
       call check_pattern(force%pattern, 2*n_node, given_name(force) // ": its pattern", &

@@ -174,7 +174,7 @@ contains
    subroutine given_sum_respond(self, motion, wants_tangent, refusal, error)
       type(given_sum_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion
-      logical, intent(in) :: wants_tangent
+      logical, intent(in) :: wants_tangent       !! else no tangent is computed
       !> What the displacements have done to which force, for "... by the displacements"
       character(len=:), allocatable, intent(out) :: refusal
       type(error_t), allocatable, intent(out) :: error
@@ -294,7 +294,7 @@ contains
    !> Add the tangents of the last response to the matrix and to what stands on its side.
    pure subroutine given_sum_add_tangent(self, value, side)
       type(given_sum_t), intent(in) :: self
-      real(dp), intent(inout), contiguous :: value(:), side(:)
+      real(dp), intent(inout), contiguous :: value(:), side(:)   !! slots > 0, slots < 0
       integer :: k
 
       do k = 1, size(self%slot)

@@ -22,7 +22,7 @@ contains
       type(given_sum_t), intent(in) :: given
       type(equation_t), intent(in) :: equation(:)
       integer, allocatable, intent(out) :: body(:)           !! (n_node) connected part; 0: of none
-      integer, intent(out) :: n_body
+      integer, intent(out) :: n_body             !! largest number in `body`
       logical, allocatable, intent(out) :: is_alive(:, :)    !! (2, n_node)
       integer, allocatable :: node(:, :), link(:, :)
       integer :: i, k

@@ -103,7 +103,7 @@ contains
       type(solid_t), intent(in) :: solid
       type(motion_t), intent(in) :: motion
       real(wp), intent(inout), contiguous :: force(:, :)   !! (2, n_node) [M L/T^2]
-      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       real(wp) :: p
       integer :: i, j, node
 
@@ -176,8 +176,9 @@ contains
       type(step_t), intent(in) :: step
       type(prescribed_t), intent(in) :: prescribed
       type(instant_t), intent(in) :: instant
-      real(wp), intent(in) :: u_start
-      real(wp), intent(out) :: u, v
+      real(wp), intent(in) :: u_start            !! [L]
+      real(wp), intent(out) :: u                 !! [L]
+      real(wp), intent(out) :: v                 !! [L/T]
       real(wp) :: factor, rate
 
       v = 0.0_wp

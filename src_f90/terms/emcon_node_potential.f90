@@ -30,9 +30,9 @@ contains
    !> of `n_node` nodes.
    subroutine node_potential_init(self, name, node, n_node, potential, error)
       type(node_potential_t), intent(out) :: self
-      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: name       !! stands in messages
       integer, intent(in) :: node(:)                 !! 1..n_node, each once
-      integer, intent(in) :: n_node
+      integer, intent(in) :: n_node              !! of the model
       class(point_function_t), intent(in) :: potential
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: slot(:)
@@ -94,7 +94,7 @@ contains
    !> Take the reference positions of the nodes.
    subroutine place(self, x)
       class(node_potential_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
 
       self%x = x(:, self%node)
    end subroutine place
@@ -102,12 +102,12 @@ contains
    !> As `given_force_t` has it.
    subroutine respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, status)
       class(node_potential_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      logical, intent(in) :: wants_tangent
-      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
-      real(wp), intent(out) :: energy
-      real(dp), intent(inout), contiguous :: tangent(:)
-      integer, intent(out) :: status
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      logical, intent(in) :: wants_tangent       !! else no tangent is computed
+      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)  !! (2, n_node) 0 on entry
+      real(wp), intent(out) :: energy            !! at the end [M L^2/T^2]
+      real(dp), intent(inout), contiguous :: tangent(:)   !! slots of `pattern`
+      integer, intent(out) :: status             !! one of the `given_` codes
       integer :: i, n
 
       n = size(self%node)
