@@ -1,6 +1,6 @@
 !> What a slave edge gives to the constraints of its two nodes: integrals over its covered part.
 !>
-!> Source: docs/theory.md, section 4, weighted gaps.
+!> Source: docs/theory.md, eqs. (15) and (15b).
 module emcon_edge_form
    use emcon_contact, only : constraint_resize, constraint_t
    use emcon_dgrad_wide, only : wide_add, wide_add_product, wide_clear, wide_t
@@ -49,7 +49,7 @@ contains
    !>
    !> The weight is N_1 + theta (N_1 - N_2) or N_2 - theta (N_1 - N_2): theta = 1 is the dual basis,
    !> 0 the standard one. Where the edge is covered in part, theta is the square of the part, so
-   !> that the integral of a weight is never negative.
+   !> that the integral of a weight is never negative: docs/theory.md, eqs. (15b) to (15d).
    pure subroutine form_share(self, side, is_dual, gap, area)
       type(edge_form_t), intent(in) :: self
       integer, intent(in) :: side                !! 1: first node of the edge, 2: last
@@ -79,7 +79,7 @@ contains
    end subroutine form_share
 
    !> The constraint (Phi - target W)/scale of a slave node, from the edges that end there and begin
-   !> there, numbers `e` in `form`; one of them may be absent, 0.
+   !> there, numbers `e` in `form`; one of them may be absent, 0. Source: docs/theory.md, eq. (15).
    pure subroutine form_constraint(form, e, node, is_dual, target, scale, work, item)
       type(edge_form_t), intent(in) :: form(:)
       integer, intent(in) :: e(2)                !! that ends at the node, that begins there

@@ -13,7 +13,7 @@
 !> (l_{e-1} + l_e) has an error of the first. At a corner or an end, that with which the piece is
 !> itself a parabola, 2 E/l - tau of the other end: of the same order. The chord, or an end without
 !> curvature, errs by the first order there, and bends the surface at a plane of symmetry.
-!> Source: docs/theory.md, section 4.
+!> Source: docs/theory.md, eq. (14a) and section 4.3.
 module emcon_hermite
    use emcon_dgrad1, only : dg_constant, dg_negative_part, dg_t, dg_variable, operator(*), &
       operator(+), operator(-)
@@ -116,7 +116,8 @@ contains
       end do
    end function hermite_curve
 
-   !> Factors of two edges of lengths `l` in the slope of the parabola at their common node.
+   !> Factors of two edges of lengths `l` in the slope of the parabola at their common node:
+   !> docs/theory.md, eq. (14a).
    pure function parabola(l) result(factor)
       real(wp), intent(in) :: l(2)
       real(wp) :: factor(2)
@@ -166,7 +167,8 @@ contains
    end function tangent_at
 
    !> Place of the closest point: the root of F = (b - y).tau to which one comes from `s` by going
-   !> down with the distance. There is always one, as F falls along either straight end.
+   !> down with the distance, docs/theory.md, eq. (14b). There is always one, as F falls along
+   !> either straight end.
    pure subroutine hermite_closest(curve, edge, b, s, is_found)
       type(hermite_curve_t), intent(in) :: curve
       real(wp), intent(in) :: edge(2, 5)         !! as in `hermite_point` [L]

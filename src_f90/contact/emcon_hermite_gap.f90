@@ -8,7 +8,7 @@
 !> Across a corner of the surface there is a second curve, the edge behind it alone. Each curve
 !> goes on straight beyond its end; the gap is the larger one at a convex corner, the smaller one at
 !> a concave one. In statics that choice is rounded.
-!> Source: docs/theory.md, section 4. Sign: gap > 0 is open.
+!> Source: docs/theory.md, eq. (14b). Sign: gap > 0 is open.
 module emcon_hermite_gap
    use emcon_dgrad1, only : weight_t => dg_t, dg_constant, operator(*), operator(-)
    use emcon_dgrad15, only : dg_negative_part, dg_root, dg_sqrt, dg_t, difference, difference_t, &

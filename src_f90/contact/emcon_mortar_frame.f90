@@ -2,7 +2,7 @@
 !>
 !> The slave point x(xi) = x1 + xi a, a = x2 - x1, looks along n(xi), which is t(xi) turned by -90
 !> degrees, t(xi) = (1 - xi) t1 + xi t2. A node y stands at (y - x).t along the tangent and at the
-!> height (y - x) x t over the point. Source: docs/theory.md, section 4.
+!> height (y - x) x t over the point. Source: docs/theory.md, eqs. (15e) to (15h).
 module emcon_mortar_frame
    use emcon_kinds, only : wp
    use emcon_rounded, only : rounded_clip, rounded_clip_slope, rounded_negative
@@ -80,7 +80,7 @@ contains
    end subroutine frame_init
 
    !> Where master node `k` projects to: xi on the line of the edge; beyond its ends the field is
-   !> that of the end.
+   !> that of the end. The root of docs/theory.md, eq. (15f).
    pure real(wp) function frame_project(self, k)
       type(frame_t), intent(in) :: self
       integer, intent(in) :: k                   !! 1 to n_master
@@ -144,7 +144,8 @@ contains
          + xi**2*self%square(3))
    end subroutine look
 
-   !> Place eta on the master edge that the slave point `xi` looks at, and the gap there.
+   !> Place eta on the master edge that the slave point `xi` looks at, and the gap there:
+   !> docs/theory.md, eq. (15g).
    pure subroutine frame_hit(self, stencil, xi, eta, gap)
       type(frame_t), intent(in) :: self
       type(pair_stencil_t), intent(in) :: stencil
@@ -164,7 +165,7 @@ contains
    end subroutine frame_hit
 
    !> The gap at the slave point `xi` over the master edge and, on a polygon, over its neighbours
-   !> where the point looks past its ends.
+   !> where the point looks past its ends: docs/theory.md, eq. (15h).
    pure subroutine frame_point(self, stencil, xi, eta, gap)
       type(frame_t), intent(in) :: self
       type(pair_stencil_t), intent(in) :: stencil
@@ -231,7 +232,7 @@ contains
       smooth_slope = c(1) + x*(2.0_wp*c(2) + x*3.0_wp*c(3))
    end function smooth_slope
 
-   !> Moments over the segment that the master edge covers.
+   !> Moments over the segment that the master edge covers: docs/theory.md, eq. (15).
    pure function frame_moments(self, stencil, point, weight) result(moment)
       type(frame_t), intent(in) :: self
       type(pair_stencil_t), intent(in) :: stencil

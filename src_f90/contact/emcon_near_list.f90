@@ -1,6 +1,6 @@
 !> Which master edges each slave node or edge may touch: kept over steps as long as that is safe.
 !>
-!> Source: docs/theory.md, section 4, candidate search.
+!> Source: docs/theory.md, eq. (15j).
 module emcon_near_list
    use emcon_kinds, only : wp
    use emcon_search, only : box_distance, candidates_t, search_candidates

@@ -6,7 +6,7 @@
 !> over a master node, hence neither energy nor penetration is made there. In statics a node can
 !> come to rest in a dent, at a master node, where the gradient jumps: there corners are rounded,
 !> all to the outside, so that a closed gap is no penetration.
-!> Source: docs/theory.md, section 4. Sign: gap > 0 is open.
+!> Source: docs/theory.md, eqs. (12) to (14). Sign: gap > 0 is open.
 module emcon_nts_gap
    use emcon_dgrad10, only : dg_above_negative, dg_cross, dg_dot, dg_negative_part, dg_sqrt, &
       dg_t, difference, difference_t, operator(*), operator(+), operator(-), operator(/)
@@ -24,7 +24,7 @@ module emcon_nts_gap
 
 contains
 
-   !> The gap over a step, in discrete-gradient arithmetic.
+   !> The gap over a step, in discrete-gradient arithmetic: docs/theory.md, eq. (13).
    pure function nts_gap(x0, dx, before, after, rounding) result(gap)
       real(wp), intent(in) :: x0(:, :)           !! (2, 3 to 5) slave, edge, further nodes; local
       real(wp), intent(in) :: dx(:, :)           !! their motion
@@ -72,7 +72,7 @@ contains
 
    !> kappa min(tau, 0), 0 in front of the rounded corner. kappa = -tan(theta/2), theta the turn
    !> from edge `a` to edge `b` (> 0: convex corner). Rounded so that it is nowhere above the sharp
-   !> one, on either side of kappa = 0 with one tangent.
+   !> one, on either side of kappa = 0 with one tangent: docs/theory.md, eqs. (14) and (14c).
    pure function bent_part(tau, rounding, a, b, length_product) result(part)
       type(dg_t), intent(in) :: tau
       real(wp), intent(in) :: rounding(2)        !! half widths, concave and convex [L]

@@ -2,7 +2,7 @@
 !> multiplier basis.
 !>
 !> It stands between node to segment, whose gaps it takes, and mortar, whose constraints it makes.
-!> Source: docs/theory.md, section 4.7; paper, section 2 ("several extensions").
+!> Source: docs/theory.md, eq. (15i); paper, section 2 ("several extensions").
 module emcon_segment
    use emcon_contact, only : constraint_t
    use emcon_dgrad10, only : dg_dot, dg_sqrt, dg_t, difference
@@ -76,7 +76,8 @@ contains
       self%reach = self%nts%reach
    end subroutine segment_begin_step
 
-   !> The weights of an edge's nodal gaps in the moments, in units of its length.
+   !> The weights of an edge's nodal gaps in the moments, in units of its length: docs/theory.md,
+   !> eq. (15i).
    pure function weights(is_over) result(w)
       logical, intent(in) :: is_over(2)          !! is the node over the master surface?
       real(wp) :: w(n_moment, 2)

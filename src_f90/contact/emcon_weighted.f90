@@ -2,7 +2,7 @@
 !>
 !> One constraint per slave node A: the gap integrated over the slave edges with the multiplier
 !> basis of A, as a mean over the covered part. A formulation gives the integrals of each slave
-!> edge. Source: docs/theory.md, section 4, weighted gaps.
+!> edge. Source: docs/theory.md, eq. (15).
 module emcon_weighted
    use emcon_chain, only : chain_init, chain_t, chain_thickness
    use emcon_contact, only : constraint_t, contact_t, deepest_arrival
@@ -181,7 +181,7 @@ contains
       end do
    end subroutine weighted_evaluate
 
-   !> The multipliers are forces by the scale of their constraints.
+   !> The multipliers are forces by the scale of their constraints: docs/theory.md, eq. (15a).
    pure subroutine weighted_area(self, x, u, area, length)
       class(weighted_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]

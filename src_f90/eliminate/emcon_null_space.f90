@@ -3,7 +3,8 @@
 !> One unknown per active constraint becomes dependent. With the constraint rows split into
 !> [G_u G_d], P = [I; -Gb_d^-1 Gb_u] from the discrete gradients and DF = [I; -G1_d^-1 G1_u] from
 !> the gradients at the end; P^T N DF du = -P^T r is smaller than the saddle-point system, has no
-!> zero block and needs no scale. Source: docs/theory.md, section 5; paper eqs. (5) and (7).
+!> zero block and needs no scale. Source: docs/theory.md, eqs. (18) to (20);
+!> paper eqs. (5) and (7).
 !>
 !> Every decision here depends on the present gradients and the pattern only, so that a run does
 !> not remember how it came to where it is.
@@ -338,7 +339,7 @@ contains
       is_singular = self%solver%is_singular
    end subroutine null_space_factorise
 
-   !> dq = DF du - [0; G1_d^-1 defect] with P^T N dq = -P^T residual.
+   !> dq = DF du - [0; G1_d^-1 defect] with P^T N dq = -P^T residual: docs/theory.md, eq. (19).
    subroutine null_space_solve(self, set, matrix, residual, dq, error)
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
@@ -370,7 +371,8 @@ contains
       part(gap%dependent) = -real(x, wp)
    end subroutine null_space_particular
 
-   !> The multipliers from the dependent rows: Gb_d^T lam = r_d, r without contact forces.
+   !> The multipliers from the dependent rows: Gb_d^T lam = r_d, r without contact forces;
+   !> docs/theory.md, eq. (20).
    !>
    !> The factors are of kind `dp`; refinement with gradients of kind `wp` goes on as long as it
    !> gains and the equations are not yet met to the round-off of each of them.

@@ -1,7 +1,7 @@
 !> The saddle-point system of the paper's eq. (6), with the multipliers as unknowns.
 !>
 !> [N, -s Gb^T; s G1, 0] [dq; dlam/s] = -[residual; s defect]. The scale s, the largest diagonal
-!> entry of N, makes all blocks of one size and one unit.
+!> entry of N, makes all blocks of one size and one unit. Source: docs/theory.md, eq. (17).
 module emcon_saddle_point
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_find, csr_from_entries, csr_t

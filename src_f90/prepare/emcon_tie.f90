@@ -3,7 +3,7 @@
 !>
 !> D_AB = int psi_A N_B dA over slave nodes, M_AC = int psi_A N_C dA over master nodes, with the
 !> standard (psi = N) or the dual multiplier basis of each slave node. Source: docs/theory.md,
-!> eq. (15b) and section 4.5.
+!> eqs. (15b) and (27).
 module emcon_tie
    use emcon_chain, only : chain_init, chain_t
    use emcon_couplings, only : tie_rows_t, tie_t

@@ -2,8 +2,8 @@
 !>
 !> The strain is bilinear in the positions, so with the algorithmic stress of the law the force is
 !> a discrete gradient of the strain energy: f.du = W1 - W0, without net force and moment on the
-!> mid-configuration. Source: docs/theory.md, section 3. Strains come from grad u, never from
-!> positions: a rigid offset of the scene costs no digits.
+!> mid-configuration. Source: docs/theory.md, eqs. (6) and (11). Strains come from grad u, never
+!> from positions: a rigid offset of the scene costs no digits.
 module emcon_element
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
@@ -168,7 +168,8 @@ contains
    end subroutine displacement_gradient
 
    !> Strain (E11, E22, 2 E12) at the start, its increment E1 - E0 to relative accuracy, and the
-   !> deformation gradients of the mid and the end configuration (identity without `nlgeom`).
+   !> deformation gradients of the mid and the end configuration (identity without `nlgeom`):
+   !> docs/theory.md, eq. (6).
    pure subroutine element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
       real(wp), intent(in) :: grad0(2, 2), dgrad(2, 2)   !! (component, by X)
       logical, intent(in) :: nlgeom              !! .false.: small strains
@@ -188,7 +189,8 @@ contains
          dot_product(f_mid(:, 1), dgrad(:, 2)) + dot_product(f_mid(:, 2), dgrad(:, 1))]
    end subroutine element_strain
 
-   !> Add B(mid)^T D B(end) + factor (grad N_i . S grad N_j) I; stress and tangent are weighted.
+   !> Add B(mid)^T D B(end) + factor (grad N_i . S grad N_j) I; stress and tangent are weighted:
+   !> docs/theory.md, eq. (11).
    pure subroutine add_tangent(n, gradient, f_mid, f_end, state, factor, tangent)
       integer, intent(in) :: n
       real(wp), intent(in) :: gradient(2, max_node), f_mid(2, 2), f_end(2, 2)

@@ -3,7 +3,7 @@
 !> E is the Green-Lagrange strain (small strain without NLGEOM). A law gives W(e1, e2, e3) with
 !> e1 = tr E, e2 = (tr^2 E - tr E^2)/2, e3 = det E, in discrete-gradient arithmetic; stress and
 !> tangent follow here for all laws. In terms of E nothing cancels at small strains, as
-!> det C - 1 = 2 e1 + 4 e2 + 8 e3. Source: docs/theory.md, section 3.
+!> det C - 1 = 2 e1 + 4 e2 + 8 e3. Source: docs/theory.md, eq. (7).
 module emcon_law
    use emcon_dgrad3, only : dg_t, dg_variable, operator(+), operator(*)
    use emcon_kinds, only : wp
@@ -43,7 +43,8 @@ module emcon_law
 
 contains
 
-   !> Response to a strain that goes from `strain` to `strain + dstrain` in plane strain.
+   !> Response to a strain that goes from `strain` to `strain + dstrain` in plane strain:
+   !> docs/theory.md, eqs. (9) and (10).
    pure subroutine law_response_plane(law, strain, dstrain, response)
       class(law_t), intent(in) :: law
       real(wp), intent(in) :: strain(3), dstrain(3)   !! E11, E22, 2 E12
@@ -74,7 +75,7 @@ contains
       response%tangent(3, 3) = response%tangent(3, 3) - 0.25_wp*w%g(2)
    end subroutine law_response_plane
 
-   !> det C - 1 = 2 e1 + 4 e2 + 8 e3.
+   !> det C - 1 = 2 e1 + 4 e2 + 8 e3: docs/theory.md, eq. (7).
    pure function volume_excess(e1, e2, e3) result(y)
       type(dg_t), intent(in) :: e1, e2, e3
       type(dg_t) :: y

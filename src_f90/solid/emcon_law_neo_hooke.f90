@@ -19,7 +19,7 @@ contains
 
    !> J^(-2/3) I1 = 3 exp(z), z = ln(1 + a) - ln(1 + y)/3 with a = I1/3 - 1, y = J^2 - 1. At small
    !> strains only second-order terms may be left: z = phi(y)/3 - phi(a) - 4/3 e2 - 8/3 e3 with
-   !> phi(x) = x - ln(1 + x); at large ones it is these that would cancel.
+   !> phi(x) = x - ln(1 + x), docs/theory.md, eq. (8); at large ones it is these that would cancel.
    pure function neo_hooke_energy(self, e1, e2, e3) result(w)
       class(law_neo_hooke_t), intent(in) :: self
       type(dg_t), intent(in) :: e1, e2, e3

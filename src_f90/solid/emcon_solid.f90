@@ -175,7 +175,7 @@ contains
    end subroutine init_element
 
    !> A displacement u rounds the strain by epsilon |grad N| |u|, however small the strain is; what
-   !> force that makes follows from the law's stiffness at rest.
+   !> force that makes follows from the law's stiffness at rest: docs/theory.md, eq. (26).
    pure subroutine estimate_stiffness(self, at_rest, e)
       type(solid_t), intent(inout) :: self
       real(wp), intent(in) :: at_rest
