@@ -23,7 +23,8 @@ ROOMS = (
 )
 # The program knows runs and the stepper only; texts and errors of base are common to all.
 ONLY = {"app": {"app", "record", "stepper", "base"}}
-TOP = set("Makefile src_f90 pywrap input_decks tests docs README.md LICENSE".split())
+TOP = set("Makefile src_f90 pywrap input_decks tests docs".split())
+TOP |= set("README.md LICENSE CHANGELOG.md CITATION.cff".split())
 
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 COMMENT = re.compile(r"!.*")
@@ -171,11 +172,16 @@ def test_counts_only_fall():
 
 
 def test_one_version():
-    """The library and the Python package bear the same version."""
+    """The library, the package, the citation bear one version, the newest of CHANGELOG.md."""
     library = (ROOT / "src_f90/base/emcon_version.f90").read_text()
     package = (ROOT / "pywrap/pyproject.toml").read_text()
     (number,) = re.findall(r'version = "([\d.]+)"', library)
     assert number in re.findall(r'^version = "(.*)"', package, re.M)
+    changes = re.findall(r"^## \[(\d\S*)\] - (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)
+    citation = (ROOT / "CITATION.cff").read_text()
+    told = [re.search(rf"^{key}: \"?([^\"\n]*)", citation, re.M)[1]
+            for key in ("version", "date-released")]
+    assert (number, *told[1:]) == changes[0] and told[0] == number
 
 
 # ---- the checks themselves, on made-up trees ----------------------------------------------------
