@@ -3,11 +3,13 @@
 !> A formulation chooses, once per step, what each constraint is made of (its stencil), and gives
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
+   use emcon_constraint, only : condition_t, constraint_t
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
    implicit none
    private
-   public :: contact_t, contact_box_t, constraint_t, constraint_resize, gap_state_t
+   public :: contact_t, contact_box_t, condition_resize, gap_state_t
    public :: deepest_arrival
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
@@ -17,21 +19,6 @@ module emcon_contact
    !> So far, per edge, a contact may close in the step in which it slides onto its surface: corners
    !> dip into edges; beyond, a body flies through.
    real(wp), parameter :: deepest_arrival = 0.05_wp
-
-   !> One constraint over a step, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
-   type :: constraint_t
-      integer :: n_node = 0
-      integer :: n_slave = 0                          !! nodes 1..n_slave are on the slave side
-      integer, allocatable :: node(:)                 !! (>= n_node) the first is the slave node
-      real(wp) :: gap0 = 0.0_wp                       !! f at the start [L], > 0 open
-      real(wp) :: gap1 = 0.0_wp                       !! at the end
-      real(wp) :: dgap = 0.0_wp                       !! gap1 - gap0, to relative accuracy
-      real(wp) :: size = 0.0_wp                       !! length of an edge [L]
-      real(wp), allocatable :: g(:, :)                !! (2, >= n_node) discrete gradient
-      real(wp), allocatable :: c(:, :)                !! (2, >= n_node) gradient at the end
-      !> (i, j): derivative of g(i) by end coordinate j, coordinates node by node
-      real(wp), allocatable :: h(:, :)
-   end type constraint_t
 
    !> Where one possible constraint stands at both ends of a step.
    type :: gap_state_t
@@ -47,7 +34,7 @@ module emcon_contact
       real(wp) :: closed = 0.0_wp                     !! the gap at which it acts, < 0: a guard [L]
    end type gap_state_t
 
-   type, abstract :: contact_t
+   type, abstract, extends(constraint_t) :: contact_t
       integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       logical :: may_sharpen = .false.                !! of polygons: convex corners are rounded
@@ -69,6 +56,7 @@ module emcon_contact
       type(gap_state_t), allocatable :: state(:)      !! (n_constraint) as last measured
    contains
       procedure :: suit_steps
+      procedure :: linearise
       procedure(configure_interface), deferred :: configure
       procedure(begin_interface), deferred :: begin_step
       procedure(measure_interface), deferred :: measure
@@ -107,12 +95,12 @@ module emcon_contact
 
       !> The constraints `wanted` with all their derivatives; `target` are the mean gaps to hold.
       pure subroutine evaluate_interface(self, wanted, x, u0, du, target, item)
-         import :: constraint_t, contact_t, wp
+         import :: condition_t, contact_t, wp
          class(contact_t), intent(inout) :: self
          integer, intent(in) :: wanted(:)             !! (n) numbers of constraints, ascending
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
          real(wp), intent(in) :: target(:)            !! (n) [L]
-         type(constraint_t), intent(inout) :: item(:) !! (n)
+         type(condition_t), intent(inout) :: item(:) !! (n)
       end subroutine evaluate_interface
 
       !> Area over which each multiplier of the last step acts, which ended at x + u: pressure is
@@ -138,9 +126,24 @@ contains
       self%rounding = merge(static_rounding, dynamic_rounding, meets_statics)
    end subroutine suit_steps
 
+   !> As `constraint_t` has it: second derivatives are by the end of the step.
+   pure subroutine linearise(self, wanted, motion, target, item)
+      class(contact_t), intent(inout) :: self
+      integer, intent(in) :: wanted(:)                !! (n) numbers of constraints, ascending
+      type(motion_t), intent(in) :: motion            !! placed
+      real(wp), intent(in) :: target(:)               !! (n) mean gaps to hold [L]
+      type(condition_t), intent(inout) :: item(:)     !! (n)
+      integer :: k
+
+      call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
+      do k = 1, size(item)
+         item(k)%h = motion%weight*item(k)%h
+      end do
+   end subroutine linearise
+
    !> Make room for `n` nodes and count them.
-   pure subroutine constraint_resize(self, n)
-      type(constraint_t), intent(inout) :: self
+   pure subroutine condition_resize(self, n)
+      type(condition_t), intent(inout) :: self
       integer, intent(in) :: n                   !! > 0
 
       self%n_node = n
@@ -150,6 +153,6 @@ contains
       end if
       allocate(self%node(n), source=0)
       allocate(self%g(2, n), self%c(2, n), self%h(2*n, 2*n), source=0.0_wp)
-   end subroutine constraint_resize
+   end subroutine condition_resize
 
 end module emcon_contact

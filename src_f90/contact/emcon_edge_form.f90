@@ -2,7 +2,8 @@
 !>
 !> Source: docs/theory.md, eqs. (15) and (15b).
 module emcon_edge_form
-   use emcon_contact, only : constraint_resize, constraint_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : condition_resize
    use emcon_dgrad_wide, only : wide_add, wide_add_product, wide_clear, wide_t
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : moment_area, moment_area_xi, moment_cover, moment_gap, &
@@ -88,7 +89,7 @@ contains
       real(wp), intent(in) :: target             !! mean gap to hold [L]
       real(wp), intent(in) :: scale              !! > 0 [L^2]
       type(wide_t), intent(inout) :: work(3)
-      type(constraint_t), intent(inout) :: item
+      type(condition_t), intent(inout) :: item
       integer :: list(1 + sum(form(pack(e, e > 0))%n_node)), n, k, i
       integer :: place(size(list))
 
@@ -102,7 +103,7 @@ contains
          if (e(k) > 0) call append(form(e(k))%node(form(e(k))%n_slave + 1:form(e(k))%n_node), &
             list, n)
       end do
-      call constraint_resize(item, n)
+      call condition_resize(item, n)
       item%node(:n) = list(:n)
       item%gap0 = 0.0_wp
       item%gap1 = 0.0_wp
@@ -171,7 +172,7 @@ contains
       type(wide_t), intent(in) :: part
       integer, intent(in) :: place(:)
       real(wp), intent(in) :: factor
-      type(constraint_t), intent(inout) :: item
+      type(condition_t), intent(inout) :: item
       integer :: i, j, a, b, row, column
 
       item%gap0 = item%gap0 + factor*part%f0

@@ -5,7 +5,8 @@
 module emcon_nts
    use emcon_chain, only : chain_corners, chain_init, chain_shortest, chain_t, chain_thickness, &
       chain_tributary
-   use emcon_contact, only : constraint_t, contact_t, gap_state_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : contact_t, gap_state_t
    use emcon_errors, only : error_t
    use emcon_facing, only : facing_allows
    use emcon_hermite_gap, only : hermite_gap_value
@@ -419,7 +420,7 @@ contains
       integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
-      type(constraint_t), intent(inout) :: item(:)
+      type(condition_t), intent(inout) :: item(:)
       integer :: k
       logical :: is_found
 

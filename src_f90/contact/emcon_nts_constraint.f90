@@ -2,7 +2,8 @@
 !>
 !> Source: docs/theory.md, sections 4.2 and 4.3.
 module emcon_nts_constraint
-   use emcon_contact, only : constraint_resize, constraint_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : condition_resize
    use emcon_dgrad10, only : dg10_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
    use emcon_hermite_gap, only : hermite_gap
@@ -22,7 +23,7 @@ contains
       type(polygon_stencil_t), intent(in) :: stencil(:)
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node)
       real(wp), intent(in) :: target             !! gap to hold [L]
-      type(constraint_t), intent(inout) :: item
+      type(condition_t), intent(inout) :: item
       integer :: n, i, k, list(sum(stencil%n))
 
       n = 0
@@ -50,7 +51,7 @@ contains
       type(polygon_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: share
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      type(constraint_t), intent(inout) :: item
+      type(condition_t), intent(inout) :: item
       real(wp) :: local(2, 5), dlocal(2, 5)
       type(dg10_t) :: gap
       integer :: k, j, at(10)
@@ -83,7 +84,7 @@ contains
       type(smooth_stencil_t), intent(in) :: smooth
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(in) :: target             !! gap to hold [L]
-      type(constraint_t), intent(inout) :: item
+      type(condition_t), intent(inout) :: item
       logical, intent(out) :: is_found           !! else `item` is left as it is
       real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
       type(dg15_t) :: gap
@@ -104,11 +105,11 @@ contains
 
    !> Nodes and size of a constraint over `node`: slave node, edge, further ones.
    pure subroutine begin_constraint(item, x, node)
-      type(constraint_t), intent(inout) :: item
+      type(condition_t), intent(inout) :: item
       real(wp), intent(in) :: x(:, :)
       integer, intent(in) :: node(:)
 
-      call constraint_resize(item, size(node))
+      call condition_resize(item, size(node))
       item%n_slave = 1
       item%node(:size(node)) = node
       item%size = stencil_length(x, node)

@@ -4,7 +4,7 @@
 !> It stands between node to segment, whose gaps it takes, and mortar, whose constraints it makes.
 !> Source: docs/theory.md, eq. (15i); paper, section 2 ("several extensions").
 module emcon_segment
-   use emcon_contact, only : constraint_t
+   use emcon_constraint, only : condition_t
    use emcon_dgrad10, only : dg_dot, dg_sqrt, dg_t, difference
    use emcon_dgrad_wide, only : wide_add, wide_add_part, wide_add_product, wide_clear
    use emcon_edge_form, only : form_begin
@@ -23,7 +23,7 @@ module emcon_segment
    type, extends(weighted_t) :: segment_t
       type(nts_t) :: nts                              !! gaps of the nodes
       integer, allocatable :: end_node(:, :)          !! (2, n_edge) nodes as numbers in `nts`
-      type(constraint_t) :: nodal(2)                  !! of one edge
+      type(condition_t) :: nodal(2)                  !! of one edge
    contains
       procedure :: configure => segment_configure
       procedure :: begin_step => segment_begin_step

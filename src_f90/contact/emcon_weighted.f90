@@ -5,7 +5,8 @@
 !> edge. Source: docs/theory.md, eq. (15).
 module emcon_weighted
    use emcon_chain, only : chain_init, chain_t, chain_thickness
-   use emcon_contact, only : constraint_t, contact_t, deepest_arrival
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : contact_t, deepest_arrival
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_form, only : edge_form_t, form_constraint, form_share
    use emcon_errors, only : error_t
@@ -161,7 +162,7 @@ contains
       integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
-      type(constraint_t), intent(inout) :: item(:)
+      type(condition_t), intent(inout) :: item(:)
       integer :: i, k, n
 
       self%is_formed = .false.

@@ -1,5 +1,6 @@
 !> Gaps of contacts along motions of bodies: which close first, which are in the way.
 module emcon_holding_gaps
+   use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
       constraints_select
    use emcon_kinds, only : dp, wp
@@ -76,16 +77,13 @@ contains
       real(wp), intent(out) :: time
       logical, intent(out) :: is_next(:)         !! (n_constraint)
       real(wp) :: rate(set%n), gap(set%n)
-      integer :: k, i
+      integer :: k
 
       time = huge(time)
       is_next = .false.
       do k = 1, set%n
          associate (item => set%item(k))
-            rate(k) = 0.0_wp
-            do i = 1, item%n_node
-               rate(k) = rate(k) - dot_product(item%c(:, i), way(:, item%node(i)))
-            end do
+            rate(k) = -condition_rate(item, way)
             gap(k) = max(0.0_wp, set%target(k))
             if (rate(k) <= in_the_way*sum(abs(item%c(:, :item%n_node)))) rate(k) = 0.0_wp
             if (rate(k) > 0.0_wp) time = min(time, gap(k)/rate(k))
@@ -105,15 +103,15 @@ contains
       real(dp), intent(in) :: z(:, :)            !! (3*members, n) motions that are left of it
       logical, intent(out) :: is_next(:)         !! (n_constraint)
       real(wp) :: way(2, size(bodies%of_node)), rate(set%n), smallest
-      integer :: j, k, i
+      integer :: j, k
 
       rate = 0.0_wp
       do j = 1, size(z, 2)
          call rigid_field(bodies, member, z(:, j), way)
          do k = 1, set%n
             associate (item => set%item(k))
-               rate(k) = max(rate(k), abs(sum([(dot_product(item%c(:, i), &
-                  way(:, item%node(i))), i = 1, item%n_node)]))/sum(abs(item%c(:, :item%n_node))))
+               rate(k) = max(rate(k), abs(condition_rate(item, way)) &
+                  /sum(abs(item%c(:, :item%n_node))))
             end associate
          end do
       end do

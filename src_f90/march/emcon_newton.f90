@@ -4,6 +4,7 @@
 !> unit and no absolute size enters. After the tolerance is met, corrections with the last
 !> factorisation go on down to round-off: energy is lost to what the residual leaves.
 module emcon_newton
+   use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
       constraints_rows
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
@@ -318,16 +319,13 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
-      integer :: k, i
+      integer :: k
 
       call system_tangent_times(system, motion, self%driven, self%contact)
       call pick_unknowns(system%numbering, self%contact, self%scale)
       self%residual = self%residual + self%scale
       do k = 1, set%n
-         do i = 1, set%item(k)%n_node
-            set%defect(k) = set%defect(k) &
-               + dot_product(set%item(k)%c(:, i), self%driven(:, set%item(k)%node(i)))
-         end do
+         set%defect(k) = set%defect(k) + condition_rate(set%item(k), self%driven)
       end do
       call factorise(self, system, correction, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return

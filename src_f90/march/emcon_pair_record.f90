@@ -3,8 +3,8 @@
 !> Forces and moments belong to the configuration that the step's gradients are those of; areas and
 !> lengths to the multipliers of the step. Signs: docs/theory.md, eq. (1).
 module emcon_pair_record
+   use emcon_constraint, only : condition_force, condition_t
    use emcon_constraints, only : constraint_set_t
-   use emcon_contact, only : constraint_t
    use emcon_kinds, only : wp
    use emcon_system, only : system_t
    implicit none
@@ -75,7 +75,7 @@ contains
    !> Add forces and moments on both sides of a pair.
    pure subroutine add_up(total, item, lam, x, u, du, lag)
       type(pair_total_t), intent(inout) :: total
-      type(constraint_t), intent(in) :: item(:)
+      type(condition_t), intent(in) :: item(:)
       real(wp), intent(in) :: lam(:), lag
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)
       real(wp) :: place(2), force(3)
@@ -87,7 +87,7 @@ contains
             associate (node => item(k)%node(i))
                place = x(:, node) + (u(:, node) - lag*du(:, node))
             end associate
-            force(:2) = lam(k)*item(k)%g(:, i)
+            force(:2) = condition_force(item(k), lam(k), i)
             force(3) = place(1)*force(2) - place(2)*force(1)
             if (i <= item(k)%n_slave) then
                total%slave = total%slave + force
@@ -103,7 +103,7 @@ contains
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       integer, intent(in) :: k
-      type(constraint_t), intent(in) :: item(:)
+      type(condition_t), intent(in) :: item(:)
       real(wp), intent(in) :: lam(:)
       integer :: j, i, first
 
@@ -116,7 +116,8 @@ contains
          end do
          do j = 1, size(item)
             do i = 1, item(j)%n_slave
-               force(:, item(j)%node(i)) = force(:, item(j)%node(i)) + lam(j)*item(j)%g(:, i)
+               force(:, item(j)%node(i)) = force(:, item(j)%node(i)) &
+                  + condition_force(item(j), lam(j), i)
             end do
          end do
          do i = 1, size(node)

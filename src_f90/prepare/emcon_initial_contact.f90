@@ -3,7 +3,8 @@
 !> All formulations are judged by the gaps of nodes over edges.
 module emcon_initial_contact
    use emcon_chain, only : chain_corners, chain_crossing, chain_t
-   use emcon_contact, only : constraint_t, gap_state_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : gap_state_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_guards, only : guard_slack
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_nts
@@ -227,7 +228,7 @@ contains
       type(nts_t), intent(inout) :: contact
       type(notes_t), intent(inout) :: notes
       type(gap_state_t) :: state
-      type(constraint_t) :: constraint(1)
+      type(condition_t) :: constraint(1)
       real(wp) :: zero(size(scene%x, 1), size(scene%x, 2)), way(2), largest
       logical :: is_meant
       integer :: i, k, n_moved

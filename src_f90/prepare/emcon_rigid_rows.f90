@@ -1,7 +1,7 @@
 !> Conditions on the motions of rigid bodies, as rows over the degrees of freedom of nodes:
 !> prescribed freedoms, linear constraints and the gaps of contact.
 module emcon_rigid_rows
-   use emcon_contact, only : constraint_t
+   use emcon_constraint, only : condition_t
    use emcon_kinds, only : dp, wp
    use emcon_steps, only : prescribed_t
    use emcon_system, only : system_t
@@ -60,7 +60,7 @@ contains
    !> Append the rows of contact: the gradients of gaps at the end.
    subroutine rigid_rows_append(rows, item)
       type(rigid_rows_t), intent(inout) :: rows
-      type(constraint_t), intent(in) :: item(:)
+      type(condition_t), intent(in) :: item(:)
       integer :: k, i, a, n
       real(wp) :: total
 

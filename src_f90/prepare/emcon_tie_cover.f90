@@ -31,10 +31,13 @@ contains
 
       call measure(partners, x, share, reach)
       associate (n => partners%master%n_edge)
-         allocate(is_covered, source=[(leaves_nothing(partners, m, share(m), reach(:, m)), &
-            m = 1, n)])
+         allocate(is_covered(n))
+         do m = 1, n
+            is_covered(m) = leaves_nothing(partners, m, share(m), reach(:, m))
+         end do
          if (allocated(rows%covered)) deallocate(rows%covered)
-         allocate(rows%covered, source=partners%master%edge(:, pack([(m, m = 1, n)], is_covered)))
+         allocate(rows%covered(size(partners%master%edge, 1), count(is_covered)))
+         rows%covered = partners%master%edge(:, pack([(m, m = 1, n)], is_covered))
       end associate
       call find_buried(partners, share, reach, rows%buried)
       call find_ends(partners, rows%ending)

@@ -5,10 +5,9 @@
 !> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
 !> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_contact, only : constraint_resize, constraint_t
+   use emcon_constraint, only : condition_force, condition_t, constraint_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_kinds, only : dp, wp
-   use emcon_linear_rows, only : linear_rows_t
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
    use emcon_system, only : system_t
@@ -23,7 +22,7 @@ module emcon_constraints
       integer :: n = 0
       integer :: n_linear = 0                    !! the first ones: linear, without curvature
       integer, allocatable :: id(:)              !! (n) numbers over all pairs
-      type(constraint_t), allocatable :: item(:) !! (n) values and derivatives
+      type(condition_t), allocatable :: item(:) !! (n) values and derivatives
       real(wp), allocatable :: target(:)         !! (n) mean gap to hold [L]
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
       !> (n) it acts also where it says nearly what others say
@@ -68,69 +67,36 @@ contains
       type(constraint_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      integer :: k, pair, i, first, last, number(self%n)
+      integer :: k, pair, number(self%n), last
 
       if (self%n == 0) return
       do k = 1, self%n
-         call constraint_place(system, self%id(k), pair, i)
-         number(k) = i
+         call constraint_place(system, self%id(k), pair, number(k))
       end do
       self%n_linear = count(self%id <= system%linear%n)
-      last = self%n_linear
-      do k = 1, last
-         call evaluate_linear(system%linear, self%id(k), motion%u0, motion%du, self%item(k))
-      end do
+      last = 0
+      call linearise(system%linear, self%n_linear)
       do pair = 1, size(system%contact)
-         first = last + 1
-         last = count(self%id <= system%first_constraint(pair + 1))
-         if (last < first) cycle
-         associate (contact => system%contact(pair)%contact, wanted => number(first:last), &
-               target => self%target(first:last))
-            call contact%evaluate(wanted, motion%x, motion%from, motion%by, target, &
-               self%item(first:last))
-         end associate
+         call linearise(system%contact(pair)%contact, &
+            count(self%id <= system%first_constraint(pair + 1)))
       end do
       do k = 1, self%n
-         self%item(k)%h = motion%weight*self%item(k)%h
          self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
       end do
+
+   contains
+
+      !> The conditions of `constraint`, which are those up to number `to`.
+      subroutine linearise(constraint, to)
+         class(constraint_t), intent(inout) :: constraint
+         integer, intent(in) :: to
+
+         if (to > last) call constraint%linearise(number(last + 1:to), motion, &
+            self%target(last + 1:to), self%item(last + 1:to))
+         last = to
+      end subroutine linearise
+
    end subroutine constraints_evaluate
-
-   !> The linear constraint of row `id`.
-   pure subroutine evaluate_linear(linear, id, u0, du, item)
-      type(linear_rows_t), intent(in) :: linear
-      integer, intent(in) :: id
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      type(constraint_t), intent(inout) :: item
-      integer :: s, a, i, node
-
-      associate (from => linear%start(id) + 1, to => linear%start(id + 1))
-         if (.not. allocated(item%node)) allocate(item%node(1 + to - from), &
-            item%g(2, 1 + to - from), item%c(2, 1 + to - from), item%h(0, 0))
-         item%n_node = 1
-         item%n_slave = 1
-         item%node(1) = (linear%own(id) + 1)/2
-         item%g = 0.0_wp
-         item%gap0 = 0.0_wp
-         item%dgap = 0.0_wp
-         do s = from, to
-            node = (linear%dof(s) + 1)/2
-            a = 2 - mod(linear%dof(s), 2)
-            i = findloc(item%node(:item%n_node), node, 1)
-            if (i == 0) then
-               item%n_node = item%n_node + 1
-               i = item%n_node
-               item%node(i) = node
-            end if
-            item%g(a, i) = item%g(a, i) + linear%weight(s)
-            item%gap0 = item%gap0 + linear%weight(s)*u0(a, node)
-            item%dgap = item%dgap + linear%weight(s)*du(a, node)
-         end do
-      end associate
-      item%c = item%g
-      item%gap1 = item%gap0 + item%dgap
-      item%size = linear%size(id)
-   end subroutine evaluate_linear
 
    !> Gradients of the active constraints as rows over the unknowns: those by all freedoms, times T.
    subroutine constraints_rows(self, numbering)
@@ -337,15 +303,16 @@ contains
       integer, intent(in) :: first
       real(wp), intent(out), contiguous :: force(:, :)                   !! (2, n_node)
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (2, n_node), added to
+      real(wp) :: part(size(force, 1))
       integer :: k, i, node
 
       force = 0.0_wp
       do k = first, self%n
          do i = 1, self%item(k)%n_node
             node = self%item(k)%node(i)
-            force(:, node) = force(:, node) + self%lam(k)*self%item(k)%g(:, i)
-            if (.not. present(magnitude)) cycle
-            magnitude(:, node) = magnitude(:, node) + abs(self%lam(k)*self%item(k)%g(:, i))
+            part = condition_force(self%item(k), self%lam(k), i)
+            force(:, node) = force(:, node) + part
+            if (present(magnitude)) magnitude(:, node) = magnitude(:, node) + abs(part)
          end do
       end do
    end subroutine constraints_force
@@ -391,7 +358,7 @@ contains
 
    !> Degree of freedom of local coordinate `i` of a constraint.
    pure integer function dof_of(item, i)
-      type(constraint_t), intent(in) :: item
+      type(condition_t), intent(in) :: item
       integer, intent(in) :: i
 
       dof_of = 2*(item%node((i + 1)/2) - 1) + 2 - mod(i, 2)

@@ -2,7 +2,7 @@
 module random_constraints
    use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
       constraints_merge_pattern, constraints_rows, constraints_select
-   use emcon_contact, only : constraint_resize
+   use emcon_contact, only : condition_resize
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
@@ -46,7 +46,7 @@ contains
       call constraints_select(problem%set, [(k, k = 1, n_constraint)])
       do k = 1, n_constraint
          associate (item => problem%set%item(k))
-            call constraint_resize(item, 3 + mod(k, 3))
+            call condition_resize(item, 3 + mod(k, 3))
             call random_number(u)
             item%node(:item%n_node) = [k, 11 + int(5.0_wp*u(:item%n_node - 1)) &
                + [(5*(i - 1), i = 1, item%n_node - 1)]]
@@ -84,7 +84,7 @@ contains
          w(:first - 1) = 0.0_wp
          w(last + 1:) = 0.0_wp
          associate (item => problem%set%item(k))
-            call constraint_resize(item, last - first + 3)
+            call condition_resize(item, last - first + 3)
             item%node(:item%n_node) = [at(k), [(at(k) + i, i = first - 2, -1)], &
                [(at(k) + i, i = 1, last - 2)], n + at(k), n + at(k) + 1]
             angle = 4.0_wp*real(at(k), wp)/real(n, wp)

@@ -1,7 +1,7 @@
 !> Redundant constraints, and the choice of the unknowns to eliminate.
 module test_independent_rows
    use check, only : check_equal, check_true, test_case_t
-   use emcon_contact, only : constraint_resize
+   use emcon_contact, only : condition_resize
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find, independent_rows_t
    use emcon_kinds, only : dp, wp
@@ -148,7 +148,7 @@ contains
       do i = 1, size(problem%numbering%unknown, 2)
          if (count(problem%numbering%unknown(:, i) == 0) == 1) k = i
       end do
-      call constraint_resize(problem%set%item(3), 1)
+      call condition_resize(problem%set%item(3), 1)
       associate (item => problem%set%item(3))
          item%node(1) = k
          item%g(:, 1) = merge(1.0_wp, 0.0_wp, problem%numbering%unknown(:, k) == 0)
@@ -175,7 +175,7 @@ contains
       end do
       call make_problem(problem, linear)
       associate (item => problem%set%item(6))
-         call constraint_resize(item, 3)
+         call condition_resize(item, 3)
          item%node(:3) = [6, 19, 22]
          item%g(:, 2) = -less*item%g(:, 1)
          item%c(:, 2) = -less*item%c(:, 1)
@@ -272,7 +272,7 @@ contains
          end do
       end do
       associate (item => problem%set%item(k))
-         call constraint_resize(item, n)
+         call condition_resize(item, n)
          item%node(:n) = node(:n)
          item%g = 0.0_wp
          item%c = 0.0_wp

@@ -3,7 +3,8 @@ module test_interface
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_chain, only : surface_edges
-   use emcon_contact, only : constraint_t, gap_state_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
@@ -149,7 +150,7 @@ contains
       type(system_t) :: system
       type(interface_t) :: face
       type(constraint_values_t) :: values
-      type(constraint_t), allocatable :: item(:)
+      type(condition_t), allocatable :: item(:)
       type(gap_state_t), allocatable :: state(:)
       real(wp), allocatable :: u0(:, :), du(:, :)
       integer, allocatable :: node(:)

@@ -4,7 +4,8 @@ module test_joints
    use cut_scenes, only : add_tie, make_cut_blocks, make_cut_strip, merge_surfaces, same_node
    use emcon_chain, only : chain_corners, chain_crossing, chain_distance, chain_init, &
       chain_is_joint, chain_t, chain_touches, chain_tributary
-   use emcon_contact, only : constraint_t, contact_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : contact_t
    use emcon_contact_registry, only : new_contact
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
@@ -271,7 +272,7 @@ contains
       integer, intent(inout) :: n_near
       type(error_t), allocatable, intent(inout) :: error
       class(contact_t), allocatable :: contact, expected
-      type(constraint_t), allocatable :: item(:), expected_item(:)
+      type(condition_t), allocatable :: item(:), expected_item(:)
       real(wp), allocatable :: v(:, :), dv(:, :), target(:)
       integer, allocatable :: wanted(:)
       integer :: node(size(cut%x, 2)), j, k
@@ -310,7 +311,7 @@ contains
 
    !> `item` with its nodes replaced by `node` is `expected`.
    subroutine check_same(item, expected, node, n, scale, what, error)
-      type(constraint_t), intent(in) :: item, expected
+      type(condition_t), intent(in) :: item, expected
       integer, intent(in) :: node(:), n
       real(wp), intent(in) :: scale
       character(len=*), intent(in) :: what
@@ -332,7 +333,7 @@ contains
    end subroutine check_same
 
    pure subroutine spread_out(item, node, g, c, h)
-      type(constraint_t), intent(in) :: item
+      type(condition_t), intent(in) :: item
       integer, intent(in) :: node(:)
       real(wp), intent(out) :: g(:), c(:), h(:, :)
       integer :: i, j, a, b
@@ -490,7 +491,7 @@ contains
       type(scene_t) :: scene
       type(mortar_t) :: mortar
       type(contact_options_t) :: options
-      type(constraint_t) :: item(3)
+      type(condition_t) :: item(3)
       real(wp) :: u(2, 20), force(2, 20), expected(2, 20)
       integer :: i, k, j, formulation
 
@@ -549,7 +550,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       class(contact_t), allocatable :: contact
-      type(constraint_t) :: item(1)
+      type(condition_t) :: item(1)
       real(wp) :: u(2, 20), du(2, 20), size_g
       real(wp), allocatable :: mid(:, :)
       integer :: i, j, k, n_both
@@ -591,7 +592,7 @@ contains
          **(1.0_wp/3.0_wp), bound = 25.0_wp*(step/shortest)**2
       type(scene_t) :: scene
       class(contact_t), allocatable :: contact
-      type(constraint_t) :: item(3), up(3), down(3)
+      type(condition_t) :: item(3), up(3), down(3)
       real(wp) :: u(2, 20), du(2, 20), way(2, 20), size_h
       integer, allocatable :: wanted(:)
       integer :: i, j, k, a, column, n_checked, n_try
@@ -625,7 +626,7 @@ contains
    contains
 
       subroutine compare_column(item, up, down, a, k)
-         type(constraint_t), intent(in) :: item, up, down
+         type(condition_t), intent(in) :: item, up, down
          integer, intent(in) :: a, k
          integer :: at
 

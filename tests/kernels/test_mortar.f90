@@ -2,7 +2,7 @@
 !> pairs.
 module test_mortar
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_contact, only : constraint_t
+   use emcon_constraint, only : condition_t
    use emcon_edge_form, only : form_share
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
@@ -240,7 +240,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(mortar_t) :: mortar
-      type(constraint_t) :: item(3)
+      type(condition_t) :: item(3)
       real(wp) :: expected, matrix(3, 3), length(3)
       integer :: i, a, b, place
 
@@ -281,7 +281,7 @@ contains
       real(wp), parameter :: least = 0.02_wp*0.5_wp, nearly = 1.0e-6_wp
       type(scene_t) :: scene
       type(mortar_t) :: mortar
-      type(constraint_t) :: item(1)
+      type(condition_t) :: item(1)
       real(wp) :: c, low, high, u(2, 16), area(0:1)
       integer :: i, k, side
 
@@ -359,7 +359,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(mortar_t) :: mortar
-      type(constraint_t) :: item(3)
+      type(condition_t) :: item(3)
       real(wp), allocatable :: u(:, :), du(:, :)
       real(wp) :: target(3), area(0:1), moved, way
       integer :: i, j, k, n, n_checked
@@ -400,7 +400,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(mortar_t) :: mortar
-      type(constraint_t) :: item(3)
+      type(condition_t) :: item(3)
       real(wp), allocatable :: u(:, :), du(:, :), mid(:, :)
       integer :: i, j, k, n
 
@@ -455,7 +455,7 @@ contains
       character(len=*), intent(in) :: what
       integer, intent(inout) :: n_checked
       type(error_t), allocatable, intent(inout) :: error
-      type(constraint_t), allocatable :: item(:), up(:), down(:)
+      type(condition_t), allocatable :: item(:), up(:), down(:)
       real(wp), allocatable :: target(:)
       real(wp) :: way(size(u, 1), size(u, 2)), step, bound, size_h
       integer, allocatable :: wanted(:)
@@ -502,7 +502,7 @@ contains
       type(contact_pair_t) :: pair
       type(contact_options_t) :: options
       type(mortar_t) :: mortar
-      type(constraint_t), allocatable :: item(:)
+      type(condition_t), allocatable :: item(:)
       real(wp), allocatable :: u(:, :), du(:, :), target(:)
       integer, allocatable :: wanted(:)
       real(wp) :: moved

@@ -1,7 +1,8 @@
 !> Node-to-segment contact of a moving surface: nearest edges, gap states, evaluation, areas.
 module test_nts
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_contact, only : constraint_t, gap_state_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
@@ -116,7 +117,7 @@ contains
       type(block_t) :: lower, upper
       type(contact_pair_t) :: pair
       type(nts_t) :: nts
-      type(constraint_t) :: item(1)
+      type(condition_t) :: item(1)
       real(wp), allocatable :: zero(:, :), u(:, :)
       integer :: i, own
 
@@ -147,7 +148,7 @@ contains
       type(scene_t) :: scene
       type(block_t) :: lower, upper
       type(nts_t) :: nts
-      type(constraint_t) :: item(1)
+      type(condition_t) :: item(1)
       real(wp), allocatable :: u(:, :), zero(:, :)
       real(wp) :: gap(2)
       integer :: k
@@ -309,7 +310,7 @@ contains
       type(block_t) :: lower, upper
       type(nts_t) :: nts
       type(gap_state_t) :: state
-      type(constraint_t) :: item(1)
+      type(condition_t) :: item(1)
       real(wp), allocatable :: u(:, :), du(:, :)
       integer :: i, k, n
 
@@ -377,7 +378,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(nts_t) :: nts
-      type(constraint_t) :: item(1)
+      type(condition_t) :: item(1)
       real(wp), allocatable :: u(:, :), du(:, :)
       real(wp) :: middle(2), moment
       integer :: i, j, k, n, most
@@ -430,7 +431,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(nts_t) :: nts, polygon
-      type(constraint_t) :: item(1)
+      type(condition_t) :: item(1)
       real(wp), allocatable :: u(:, :), zero(:, :)
       real(wp), parameter :: radius = 5.0_wp
       real(wp) :: angle, middle(2), below(2)     ! the edge from 0 to 1 is below

@@ -1,0 +1,71 @@
+!> What a constraint is: a number of conditions, each with a value and derivatives over a motion.
+!>
+!> Who solves a step knows conditions only: its forces are the sum of lam_k times their directions.
+!> Source: docs/theory.md, eq. (1) and section 4.
+module emcon_constraint
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   implicit none
+   private
+   public :: condition_t, condition_force, condition_rate, constraint_t
+
+   !> One condition over a motion, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
+   type :: condition_t
+      integer :: n_node = 0
+      integer :: n_slave = 0                          !! nodes 1..n_slave are on the slave side
+      integer, allocatable :: node(:)                 !! (>= n_node) the first is the slave node
+      real(wp) :: gap0 = 0.0_wp                       !! f at the start [L], > 0 open
+      real(wp) :: gap1 = 0.0_wp                       !! at the end
+      real(wp) :: dgap = 0.0_wp                       !! gap1 - gap0, to relative accuracy
+      real(wp) :: size = 0.0_wp                       !! length of an edge [L]
+      real(wp), allocatable :: g(:, :)                !! (n_dim, >= n_node) discrete gradient
+      real(wp), allocatable :: c(:, :)                !! (n_dim, >= n_node) gradient at the end
+      !> (i, j): derivative of g(i) by end coordinate j, coordinates node by node
+      real(wp), allocatable :: h(:, :)
+   end type condition_t
+
+   type, abstract :: constraint_t
+   contains
+      procedure(linearise_interface), deferred :: linearise
+   end type constraint_t
+
+   abstract interface
+
+      !> The conditions `wanted` with all their derivatives over a motion that is placed.
+      pure subroutine linearise_interface(self, wanted, motion, target, item)
+         import :: condition_t, constraint_t, motion_t, wp
+         class(constraint_t), intent(inout) :: self
+         integer, intent(in) :: wanted(:)             !! (n) numbers of conditions, ascending
+         type(motion_t), intent(in) :: motion         !! placed
+         real(wp), intent(in) :: target(:)            !! (n) values to hold [L]
+         type(condition_t), intent(inout) :: item(:)  !! (n)
+      end subroutine linearise_interface
+
+   end interface
+
+contains
+
+   !> The force of the multiplier `lam` on node `i` of the condition: along the discrete gradient,
+   !> as there is no friction.
+   pure function condition_force(self, lam, i) result(force)
+      type(condition_t), intent(in) :: self
+      real(wp), intent(in) :: lam                     !! [M L/T^2]
+      integer, intent(in) :: i                        !! 1..n_node
+      real(wp) :: force(size(self%g, 1))              !! (n_dim) [M L/T^2]
+
+      force = lam*self%g(:, i)
+   end function condition_force
+
+   !> By how much the condition's value at the end changes with the field `way`, to first order.
+   pure real(wp) function condition_rate(self, way) result(rate)
+      type(condition_t), intent(in) :: self
+      real(wp), intent(in) :: way(:, :)               !! (n_dim, n_node of the scene)
+      integer :: i
+
+      rate = 0.0_wp
+      do i = 1, self%n_node
+         rate = rate + dot_product(self%c(:, i), way(:, self%node(i)))
+      end do
+   end function condition_rate
+
+end module emcon_constraint
