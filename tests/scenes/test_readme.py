@@ -221,6 +221,17 @@ def test_rooms():
     assert rooms in listed
 
 
+def test_modules():
+    """Modules that docs/develop.md names are there, and its table has the folders in their order."""
+    text = (ROOT / "docs/develop.md").read_text()
+    modules = {p.stem for p in (ROOT / "src_f90").rglob("emcon*") if p.suffix in {".f90", ".F90"}}
+    named = {span for span in code_spans(text) if re.fullmatch(r"emcon_\w+", span)}
+    assert named and named <= modules
+    table = text.split("## The house")[1].split("Beside it")[0]
+    rooms = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
+    assert rooms == next(s.split() for s in code_spans(README.read_text()) if s.endswith(" app"))
+
+
 def test_decks_are_complete():
     """Every deck opens with a heading that says what to expect, as the README promises."""
     for deck in DECKS.glob("*.inp"):
