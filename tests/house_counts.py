@@ -80,7 +80,7 @@ def without_brackets(text):
 def silent_arguments(path):
     """(line, procedure, argument) of public procedures whose declaration has no `!!` or `!>`.
 
-    Objects of derived types say with their type what they are, and count as told.
+    A single object of a derived type says with its type what it is, and counts as told.
     """
     names, inside = public_names(path), []
     for number, code, told in statements(path):
@@ -90,10 +90,12 @@ def silent_arguments(path):
         elif head := HEAD.match(low):
             inside.append((head[1], set(re.findall(r"\w+", head[2] or ""))))
         elif inside and inside[-1][0] in names and (match := DECLARED.match(low)):
-            if told or match[1] in {"type", "class"}:
+            if told:
                 continue
+            arrays = set(re.findall(r"(\w+)\(", match[2]))
             for name in re.findall(r"\w+", without_brackets(match[2])):
-                if name in inside[-1][1]:
+                is_single = match[1] in {"type", "class"} and name not in arrays
+                if name in inside[-1][1] and not is_single:
                     yield number, inside[-1][0], name
 
 

@@ -265,7 +265,7 @@ contains
       real(wp), intent(out) :: z    !! 2*n_node of them
       integer, intent(in) :: &
          n                          !! > 0
-      type(error_t), intent(out) :: error
+      type(error_t), intent(out) :: error(:)
       real(wp) :: work(3)
       work(1) = y(2*(n - 1) + 1)**2 + sum(x, 2)
    end subroutine f
@@ -286,7 +286,7 @@ def test_what_is_counted(tmp_path):
     def found(kind, room):
         return [f[2] for f in house_counts.places(tmp_path, kind) if f[0] == room]
 
-    silent = [(12, "f", "x"), (12, "f", "y"), (22, "g", "i")]
+    silent = [(12, "f", "x"), (12, "f", "y"), (16, "f", "error"), (22, "g", "i")]
     assert found("silent arguments", "solid") == silent
     assert [number for number, _ in found("planar literals", "solid")] == [12, 18]
     assert found("planar literals", "contact") == []

@@ -82,13 +82,13 @@ contains
    !> The constraint (Phi - target W)/scale of a slave node, from the edges that end there and begin
    !> there, numbers `e` in `form`; one of them may be absent, 0. Source: docs/theory.md, eq. (15).
    pure subroutine form_constraint(form, e, node, is_dual, target, scale, work, item)
-      type(edge_form_t), intent(in) :: form(:)
+      type(edge_form_t), intent(in) :: form(:)   !! (n_edge) of the slave side
       integer, intent(in) :: e(2)                !! that ends at the node, that begins there
       integer, intent(in) :: node                !! of the scene
       logical, intent(in) :: is_dual             !! else the standard basis
       real(wp), intent(in) :: target             !! mean gap to hold [L]
       real(wp), intent(in) :: scale              !! > 0 [L^2]
-      type(wide_t), intent(inout) :: work(3)
+      type(wide_t), intent(inout) :: work(3)     !! work space
       type(condition_t), intent(inout) :: item
       integer :: list(1 + sum(form(pack(e, e > 0))%n_node)), n, k, i
       integer :: place(size(list))

@@ -106,7 +106,7 @@ contains
    end subroutine pair_cut_corners
 
    pure subroutine pair_append(list, n, stencil)
-      type(pair_stencil_t), allocatable, intent(inout) :: list(:)
+      type(pair_stencil_t), allocatable, intent(inout) :: list(:)   !! (>= n) grows
       integer, intent(inout) :: n                !! number in `list`, >= 0
       type(pair_stencil_t), intent(in) :: stencil
       type(pair_stencil_t), allocatable :: longer(:)
@@ -123,7 +123,7 @@ contains
    !> Of the pairs of one slave edge, from number `first` to `n`, keep the nearer one of two that
    !> cover the same part of it; not of two that overlap a little at a joint of the master.
    pure subroutine pairs_drop_far(list, master, first, n, x, u0)
-      type(pair_stencil_t), intent(inout) :: list(:)
+      type(pair_stencil_t), intent(inout) :: list(:)   !! (>= n)
       type(chain_t), intent(in) :: master
       integer, intent(in) :: first               !! >= 1
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (2, n_node) [L]
@@ -171,7 +171,7 @@ contains
    !> of a joint of the master sees one of the edges there, one that looks at a master node the
    !> edges on both sides of it: which of them comes first must not matter.
    pure subroutine pairs_seen(list, master, first, last, point, x, u0, du, seen)
-      type(pair_stencil_t), intent(in) :: list(:)
+      type(pair_stencil_t), intent(in) :: list(:)   !! (>= last)
       type(chain_t), intent(in) :: master
       integer, intent(in) :: first, last         !! indices into `list`; last < first: none
       real(wp), intent(in) :: point(:)           !! (n_point) on 0..1

@@ -420,7 +420,7 @@ contains
       integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
-      type(condition_t), intent(inout) :: item(:)
+      type(condition_t), intent(inout) :: item(:)   !! (n)
       integer :: k
       logical :: is_found
 

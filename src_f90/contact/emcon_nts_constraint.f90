@@ -20,7 +20,7 @@ contains
    !> The mean of the gaps over polygons, one, or two that give the same gap: from both edges at a
    !> corner. The discrete gradient then does not depend on which of them comes first.
    pure subroutine polygon_constraint(stencil, x, u0, du, target, item)
-      type(polygon_stencil_t), intent(in) :: stencil(:)
+      type(polygon_stencil_t), intent(in) :: stencil(:)   !! (1 or 2)
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node)
       real(wp), intent(in) :: target             !! gap to hold [L]
       type(condition_t), intent(inout) :: item

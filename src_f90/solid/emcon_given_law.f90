@@ -44,7 +44,7 @@ contains
       type(material_t), intent(in) :: material
       type(given_law_t), intent(inout) :: law
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given(:)
+      type(given_law_t), intent(in), optional :: given(:)   !! one for each such material
       integer :: i
 
       if (present(given)) then

@@ -58,7 +58,7 @@ contains
       type(solid_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given(:)
+      type(given_law_t), intent(in), optional :: given(:)   !! one for each such material
       type(shape_t) :: stiffness(size(element_kinds)), mass(size(element_kinds))
       real(wp) :: at_rest(size(scene%material))
       integer :: e, k, n

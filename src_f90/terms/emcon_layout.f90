@@ -20,7 +20,7 @@ contains
    pure subroutine layout_bodies(solid, given, equation, body, n_body, is_alive)
       type(solid_t), intent(in) :: solid
       type(given_sum_t), intent(in) :: given
-      type(equation_t), intent(in) :: equation(:)
+      type(equation_t), intent(in) :: equation(:)   !! (any) of the scene
       integer, allocatable, intent(out) :: body(:)           !! (n_node) connected part; 0: of none
       integer, intent(out) :: n_body             !! largest number in `body`
       logical, allocatable, intent(out) :: is_alive(:, :)    !! (2, n_node)
