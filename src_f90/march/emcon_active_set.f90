@@ -96,7 +96,7 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)       !! (2, n_node) [L]
-      logical, intent(in) :: is_meant
+      logical, intent(in) :: is_meant            !! the step resolves what is closed
       integer :: pair
 
       self%overclosure = 0.0_wp
@@ -259,7 +259,7 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
-      logical, intent(out) :: is_done
+      logical, intent(out) :: is_done            !! else solve the step again with the next set
       integer, intent(out) :: status                     !! one of the `step_` codes
       logical :: has_changed
 
@@ -475,7 +475,7 @@ contains
    !> `redundant` of the set; of constraints that depend on each other the last ones go.
    pure subroutine active_set_drop(self, redundant)
       type(active_set_t), intent(inout) :: self
-      integer, intent(in) :: redundant(:)
+      integer, intent(in) :: redundant(:)        !! (any) places in the set, from 1
 
       self%is_dropped(self%set%id(redundant)) = .true.
       self%is_active = self%is_active .and. .not. self%is_dropped

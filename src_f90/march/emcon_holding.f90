@@ -146,7 +146,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(in) :: motion                       !! placed
       logical, intent(in) :: is_active(:)                        !! (n_constraint)
-      logical, intent(out) :: is_held
+      logical, intent(out) :: is_held            !! no motion is free, or one that may stay
       type(look_t) :: look
       type(free_t), allocatable :: free(:)
       integer :: i, k

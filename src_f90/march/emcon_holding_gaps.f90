@@ -74,7 +74,7 @@ contains
    pure subroutine gaps_next_to_close(set, way, time, is_next)
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: way(:, :)          !! (2, n_node) per time
-      real(wp), intent(out) :: time
+      real(wp), intent(out) :: time              !! >= 0, in the unit of `way`
       logical, intent(out) :: is_next(:)         !! (n_constraint)
       real(wp) :: rate(set%n), gap(set%n)
       integer :: k

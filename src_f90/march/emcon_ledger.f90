@@ -27,7 +27,7 @@ contains
    subroutine ledger_measure(self, system, x, state)
       type(ledger_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      real(wp), intent(in), contiguous :: x(:, :)
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(state_t), intent(in) :: state
       integer :: i
 
@@ -52,7 +52,7 @@ contains
    !> Linear and angular momentum of each body: rows px, py, lz.
    subroutine body_momenta(system, x, state, momenta)
       type(system_t), intent(inout) :: system
-      real(wp), intent(in), contiguous :: x(:, :)
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(state_t), intent(in) :: state
       real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
       integer :: i

@@ -83,7 +83,7 @@ contains
    !> From now on `is_interrupted` is asked before each iteration of Newton's method.
    subroutine march_watch(self, is_interrupted)
       type(march_t), intent(inout) :: self
-      procedure(interrupt_interface) :: is_interrupted
+      procedure(interrupt_interface) :: is_interrupted   !! has the user asked to stop?
 
       self%is_interrupted => is_interrupted
       self%newton%is_interrupted => is_interrupted
@@ -93,7 +93,7 @@ contains
    subroutine march_begin_step(self, scene, i_step, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: i_step
+      integer, intent(in) :: i_step              !! from 1
       type(error_t), allocatable, intent(out) :: error
 
       self%state%i_step = i_step
@@ -374,7 +374,7 @@ contains
    subroutine march_free_increment(self, scene, h, increment, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: h
+      real(wp), intent(in) :: h                  !! > 0 [T]
       type(increment_t), intent(out) :: increment
       type(error_t), allocatable, intent(out) :: error
       type(state_t) :: before
@@ -400,7 +400,7 @@ contains
    subroutine march_set_time(self, scene, time)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: time
+      real(wp), intent(in) :: time               !! >= 0 [T]
       integer :: n
 
       associate (state => self%state, step => scene%step(self%state%i_step))

@@ -86,10 +86,10 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(instant_t), intent(in) :: start
-      real(wp), intent(in) :: h
-      logical, intent(in) :: may_cut
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      logical, intent(in) :: may_cut             !! a smaller step is possible
       type(increment_t), intent(inout) :: increment
-      integer, intent(out) :: status
+      integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
       integer :: attempt
@@ -203,7 +203,7 @@ contains
    subroutine cycling_text(self, scene, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
-      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable, intent(out) :: text   !! names nodes by their labels
 
       call nodes_text(self, scene, self%active%comes_and_goes, text)
       text = "contact opens and closes in turn at slave nodes " // text
@@ -234,7 +234,7 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(instant_t), intent(in) :: start
-      real(wp), intent(in) :: h
+      real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: is_at_rest          !! free nodes do not move in the guess
       type(instant_t) :: finish
       real(wp) :: u, v

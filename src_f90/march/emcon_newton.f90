@@ -89,9 +89,10 @@ contains
    !> Set up for `n_unknown` unknowns.
    subroutine newton_init(self, n_unknown, n_node, tolerance, maximum)
       type(newton_t), intent(out) :: self
-      integer, intent(in) :: n_unknown, n_node
-      real(wp), intent(in) :: tolerance
-      integer, intent(in) :: maximum
+      integer, intent(in) :: n_unknown           !! >= 0
+      integer, intent(in) :: n_node              !! of the scene
+      real(wp), intent(in) :: tolerance          !! > 0, of the relative residual
+      integer, intent(in) :: maximum             !! iterations at most
 
       self%tolerance = tolerance
       self%maximum = maximum

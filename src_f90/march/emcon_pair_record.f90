@@ -45,7 +45,7 @@ contains
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (2, n_node)
-      real(wp), intent(in) :: lag
+      real(wp), intent(in) :: lag                !! 0 or 1/2
       integer :: k, first, last
 
       self%total = pair_total_t()

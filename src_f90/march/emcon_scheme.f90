@@ -29,7 +29,9 @@ module emcon_scheme
       elemental function velocity_interface(self, h, v0, du) result(v1)
          import :: scheme_t, wp
          class(scheme_t), intent(in) :: self
-         real(wp), intent(in) :: h, v0, du
+         real(wp), intent(in) :: h               !! > 0 [T]
+         real(wp), intent(in) :: v0              !! at the start [L/T]
+         real(wp), intent(in) :: du              !! [L]
          real(wp) :: v1
       end function velocity_interface
 

@@ -19,7 +19,7 @@ contains
    pure function energy_momentum_pose(self, start, h) result(pose)
       class(scheme_energy_momentum_t), intent(in) :: self
       type(instant_t), intent(in) :: start
-      real(wp), intent(in) :: h
+      real(wp), intent(in) :: h                  !! > 0 [T]
       type(pose_t) :: pose
 
       pose%mass_scale = 1.0_wp/h
@@ -30,7 +30,7 @@ contains
 
    elemental function energy_momentum_velocity(self, h, v0, du) result(v1)
       class(scheme_energy_momentum_t), intent(in) :: self
-      real(wp), intent(in) :: h, v0, du
+      real(wp), intent(in) :: h, v0, du          !! [T], [L/T], [L]
       real(wp) :: v1
 
       v1 = (2.0_wp/h)*du - v0

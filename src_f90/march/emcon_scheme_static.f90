@@ -18,7 +18,7 @@ contains
    pure function static_pose(self, start, h) result(pose)
       class(scheme_static_t), intent(in) :: self
       type(instant_t), intent(in) :: start
-      real(wp), intent(in) :: h
+      real(wp), intent(in) :: h                  !! > 0 [T]
       type(pose_t) :: pose
 
       pose%is_end = .true.
@@ -28,7 +28,7 @@ contains
    !> A body in equilibrium is at rest.
    elemental function static_velocity(self, h, v0, du) result(v1)
       class(scheme_static_t), intent(in) :: self
-      real(wp), intent(in) :: h, v0, du
+      real(wp), intent(in) :: h, v0, du          !! [T], [L/T], [L]
       real(wp) :: v1
 
       v1 = 0.0_wp

@@ -53,8 +53,8 @@ contains
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(inout), contiguous :: v(:, :)     !! (2, n_node)
-      real(wp), intent(out) :: restored
-      logical, intent(out) :: has_root
+      real(wp), intent(out) :: restored          !! >= 0 [M L^2/T^2]
+      logical, intent(out) :: has_root           !! .false.: `v` is left as it is
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: lost, noise, a, b, root
       integer :: k

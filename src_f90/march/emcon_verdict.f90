@@ -173,7 +173,7 @@ contains
    !> Judge the run: it has come to its end, or was ended by the error of text `message`.
    subroutine verdict_end(self, message)
       type(verdict_t), intent(inout) :: self
-      character(len=*), intent(in), optional :: message
+      character(len=*), intent(in), optional :: message   !! present: the run failed
 
       self%is_complete = .not. present(message)
       self%message = ""
@@ -211,7 +211,7 @@ contains
    !> The verdict in a line.
    subroutine verdict_line(self, line)
       type(verdict_t), intent(in) :: self
-      character(len=:), allocatable, intent(out) :: line
+      character(len=:), allocatable, intent(out) :: line   !! "verdict: good ..." or what is bad
       integer :: i
 
       if (.not. self%is_complete) then
@@ -290,8 +290,8 @@ contains
 
    !> What these pairs can do to need no guards.
    pure subroutine guard_advice(pair, advice)
-      type(contact_pair_t), intent(in) :: pair(:)
-      character(len=:), allocatable, intent(out) :: advice
+      type(contact_pair_t), intent(in) :: pair(:)   !! (any) of the scene
+      character(len=:), allocatable, intent(out) :: advice   !! a list, ends without a full stop
       logical :: is_nodes(size(pair)), is_one_sided, is_integrated
 
       is_nodes = pair%formulation == formulation_nts

@@ -38,7 +38,7 @@ contains
    !> Take the constraints `id` as the active ones; multipliers start at zero.
    pure subroutine constraints_select(self, id)
       type(constraint_set_t), intent(inout) :: self
-      integer, intent(in) :: id(:)
+      integer, intent(in) :: id(:)               !! (n) ascending, from 1
 
       self%n = size(id)
       self%n_linear = 0
@@ -54,8 +54,9 @@ contains
    !> Pair and number within the pair of constraint `id`; pair 0: a linear one.
    pure subroutine constraint_place(system, id, pair, i)
       type(system_t), intent(in) :: system
-      integer, intent(in) :: id
-      integer, intent(out) :: pair, i
+      integer, intent(in) :: id                  !! from 1
+      integer, intent(out) :: pair               !! 0: linear
+      integer, intent(out) :: i                  !! row, or number within the pair
 
       pair = count(system%first_constraint < id)
       i = id
@@ -300,7 +301,7 @@ contains
    !> the sum of their sizes.
    pure subroutine constraints_force(self, first, force, magnitude)
       type(constraint_set_t), intent(in) :: self
-      integer, intent(in) :: first
+      integer, intent(in) :: first               !! place in the set, from 1
       real(wp), intent(out), contiguous :: force(:, :)                   !! (2, n_node)
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (2, n_node), added to
       real(wp) :: part(size(force, 1))

@@ -147,7 +147,7 @@ contains
    subroutine system_begin_step(self, scene, i_step, error)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: i_step
+      integer, intent(in) :: i_step              !! from 1
       type(error_t), allocatable, intent(out) :: error
       logical :: is_too_full
 
@@ -228,7 +228,7 @@ contains
    subroutine system_respond(self, motion, with_tangent)
       type(system_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion
-      logical, intent(in) :: with_tangent
+      logical, intent(in) :: with_tangent        !! else the matrix is left as it is
 
       if (allocated(self%refusal)) deallocate(self%refusal)
       if (allocated(self%failure)) deallocate(self%failure)
@@ -351,7 +351,7 @@ contains
    !> An error if the last response was none, for the displacements that the words `by` name.
    subroutine system_check_response(self, by, error)
       type(system_t), intent(in) :: self
-      character(len=*), intent(in) :: by
+      character(len=*), intent(in) :: by         !! stands behind "by the displacements"
       type(error_t), allocatable, intent(out) :: error
 
       if (allocated(self%failure)) then
