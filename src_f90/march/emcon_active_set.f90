@@ -9,7 +9,7 @@
 !> with sharp convex corners before. Linear constraints that are not eliminated act always. Source: docs/theory.md, section 6.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
-   use emcon_contact, only : deepest_arrival, gap_state_t
+   use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
    use emcon_holding, only : holding_complete, holding_find_free, holding_forget, holding_t
@@ -334,17 +334,18 @@ contains
       end do
    end subroutine active_set_select
 
-   !> The next set, from the gaps and multipliers of the converged one.
+   !> The next set, from the gaps and multipliers of the converged one. Of the conditions gap >= 0,
+   !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does not
+   !> is taken in where gap < 0.
    subroutine update(self, system, motion, state, has_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
       logical, intent(out) :: has_changed
-      integer, intent(out) :: status
-      type(gap_state_t) :: gap
+      integer, intent(out) :: status             !! one of the `step_` codes
+      logical :: changes
       integer :: pair, i, id, k
-      real(wp) :: noise, allowed(0:1)
 
       status = step_done
       has_changed = .false.
@@ -357,82 +358,105 @@ contains
             call contact%measure(motion%x, motion%u0, motion%du)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
-               gap = contact%state(i)
-               allowed = self%left*self%overclosure(id) + gap%closed
                if (self%is_active(id)) then
                   k = k + 1
-                  if (.not. gap%is_covered) status = step_too_far
-                  if (self%holds_gap .and. .not. state%is_active(id)) then
-                     if (stands_off(gap)) status = step_stands_off
-                  end if
-                  self%is_stale = self%is_stale .or. has_drifted(k, gap)
-                  noise = force_noise*sum(system%magnitude(:, contact%node(i)))
-                  if (.not. self%has_inertia) noise = noise + force_noise &
-                     *sum(system%response%rounding(:, contact%node(i)))
-                  if (.not. gap%is_leaving .and. &
-                     (self%only_adds .or. self%set%lam(k) >= -noise)) cycle
-                  self%is_active(id) = .false.
-                  if (self%holding%is_needed) self%holding%has_pulled(id) = .true.
+                  call look_at_active(self, contact%state(i), k, state%is_active(id), status)
+                  changes = is_let_go(self, system, contact, i, k)
+                  if (changes .and. self%holding%is_needed) self%holding%has_pulled(id) = .true.
                else
-                  if (.not. (gap%is_near .and. gap%is_over)) cycle
-                  if (self%is_dropped(id)) then
-                     if (goes_through(gap, allowed(1))) status = step_too_far
-                     cycle
-                  end if
-                  if (gap%is_arriving .and. self%has_inertia) then
-                     ! With nothing to hold at its start, a contact begins with the next step, or in
-                     ! a smaller one; in the smallest it begins at once.
-                     if (.not. gap%was_open) cycle
-                     if (gap%gap1 >= -deepest_arrival*gap%size) cycle
-                     if (self%may_cut) then
-                        status = step_too_far
-                        cycle
-                     end if
-                  end if
-                  if (gap%gap0 - allowed(0) < -contact%deepest_start*gap%size .and. &
-                     .not. state%is_active(id)) cycle
-                  if (gap%gap1 - allowed(1) >= -gap_noise*gap%size) cycle
+                  call look_at_open(self, contact, i, id, state%is_active(id), changes, status)
                   ! What the pairs take in may hold the bodies away from their guards.
-                  if (contact%slack > 0.0_wp .and. has_changed) cycle
-                  if (.not. gap%is_covered .or. (self%has_inertia .and. &
-                     gap%gap0 > contact%farthest_start)) status = step_too_far
-                  self%is_active(id) = .true.
+                  if (contact%slack > 0.0_wp .and. has_changed) changes = .false.
+                  if (changes .and. begins_unseen(self, contact, i)) status = step_too_far
                end if
-               has_changed = .true.
+               if (changes) self%is_active(id) = .not. self%is_active(id)
+               has_changed = has_changed .or. changes
             end do
          end associate
       end do
-
-   contains
-
-      !> Is the gap of active constraint `k` another one with the stencils for the motion that came
-      !> out than with those for the motion that was expected?
-      pure logical function has_drifted(k, gap)
-         integer, intent(in) :: k
-         type(gap_state_t), intent(in) :: gap
-         real(wp) :: held
-
-         held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
-         has_drifted = .not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size
-      end function has_drifted
-
-      !> Does a contact that was left out close all the same? Then it does not follow from others:
-      !> it had lost its surface in an iteration.
-      pure logical function goes_through(gap, least)
-         type(gap_state_t), intent(in) :: gap
-         real(wp), intent(in) :: least           !! gap that is closed [L]
-
-         goes_through = self%may_cut .and. gap%gap1 < min(gap%gap0, least) - touch_tol*gap%size
-      end function goes_through
-
-      !> Would a new contact be held at a larger distance than the deck allows?
-      pure logical function stands_off(gap)
-         type(gap_state_t), intent(in) :: gap
-
-         stands_off = self%gap_tolerance > 0.0_wp .and. gap%gap0 > self%gap_tolerance*gap%size
-      end function stands_off
-
    end subroutine update
+
+   !> Can the step stand on constraint `k` of the set, which acts? If its stencil has moved on, the
+   !> step is solved again with that for the motion that came out.
+   pure subroutine look_at_active(self, gap, k, was_active, status)
+      type(active_set_t), intent(inout) :: self
+      type(gap_state_t), intent(in) :: gap
+      integer, intent(in) :: k
+      logical, intent(in) :: was_active          !! in the step before
+      integer, intent(inout) :: status
+      real(wp) :: held
+
+      if (.not. gap%is_covered) status = step_too_far
+      ! A new contact may not be held at a larger distance than the deck allows.
+      if (self%holds_gap .and. .not. was_active .and. self%gap_tolerance > 0.0_wp &
+         .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
+      held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
+      self%is_stale = self%is_stale .or. &
+         (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
+   end subroutine look_at_active
+
+   !> Has constraint `k` of the set, the `i`-th of `contact`, lost its surface, or does it pull?
+   pure logical function is_let_go(self, system, contact, i, k)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i, k
+      real(wp) :: noise
+
+      noise = force_noise*sum(system%magnitude(:, contact%node(i)))
+      if (.not. self%has_inertia) noise = noise + force_noise &
+         *sum(system%response%rounding(:, contact%node(i)))
+      is_let_go = contact%state(i)%is_leaving .or. &
+         .not. (self%only_adds .or. self%set%lam(k) >= -noise)
+   end function is_let_go
+
+   !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact that
+   !> was left out and closes all the same does not follow from others: it had lost its surface.
+   pure subroutine look_at_open(self, contact, i, id, was_active, closes, status)
+      type(active_set_t), intent(in) :: self
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i, id
+      logical, intent(in) :: was_active          !! in the step before
+      logical, intent(out) :: closes
+      integer, intent(inout) :: status
+      real(wp) :: allowed(0:1)
+
+      closes = .false.
+      associate (gap => contact%state(i))
+         if (.not. (gap%is_near .and. gap%is_over)) return
+         allowed = self%left*self%overclosure(id) + gap%closed
+         if (self%is_dropped(id)) then
+            if (self%may_cut .and. gap%gap1 < min(gap%gap0, allowed(1)) - touch_tol*gap%size) &
+               status = step_too_far
+         else if (gap%is_arriving .and. self%has_inertia .and. .not. may_arrive(gap)) then
+            return
+         else if (gap%is_arriving .and. self%has_inertia .and. self%may_cut) then
+            status = step_too_far
+         else if (was_active .or. .not. gap%gap0 - allowed(0) < -contact%deepest_start*gap%size) then
+            closes = .not. gap%gap1 - allowed(1) >= -gap_noise*gap%size
+         end if
+      end associate
+   end subroutine look_at_open
+
+   !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one; in
+   !> the smallest it begins at once, if it is deep.
+   pure logical function may_arrive(gap)
+      type(gap_state_t), intent(in) :: gap
+
+      may_arrive = gap%was_open .and. .not. gap%gap1 >= -deepest_arrival*gap%size
+   end function may_arrive
+
+   !> Would the `i`-th constraint of `contact` begin to act with a stencil chosen for another motion?
+   pure logical function begins_unseen(self, contact, i)
+      type(active_set_t), intent(in) :: self
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i
+
+      associate (gap => contact%state(i))
+         begins_unseen = .not. gap%is_covered .or. &
+            (self%has_inertia .and. gap%gap0 > contact%farthest_start)
+      end associate
+   end function begins_unseen
 
    !> Newton's method has not converged: let go of the contacts that pull in its last iterate, each
    !> once in a step, and start again with the multipliers `lam` from where it started. `is_done` if
