@@ -18,7 +18,7 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 ROOMS = (
-    "base algebra dgrad scene deck space solid contact terms system eliminate prepare march "
+    "base algebra dgrad laws scene deck space solid contact terms system eliminate prepare march "
     "results stepper record border app".split()
 )
 # The program knows runs and the stepper only; texts and errors of base are common to all.
@@ -213,7 +213,7 @@ BAD = {
         "scene/a.inc": "   USE emcon_stepper, ONLY : x\n",
     },
     "arrows up, program": {
-        "solid/emcon_law.f90": "module emcon_law\nend module emcon_law\n",
+        "laws/emcon_law.f90": "module emcon_law\nend module emcon_law\n",
         "app/emcon.f90": "program emcon\n   use emcon_law\nend program\n",
     },
     "cycles": {

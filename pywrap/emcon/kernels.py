@@ -11,8 +11,29 @@ from . import _core
 
 _flat = _core.emcon_flat
 
-#: Constitutive laws by name: the constants are (E, nu), (C10, D1), (E, nu).
-LAWS = {"linear": 1, "neo hooke": 2, "coupled neo hooke": 3}
+
+
+@dataclass(frozen=True)
+class Law:
+    """A row of the library's table of laws: what decks call it, and its constants."""
+
+    code: int
+    keyword: str
+    variant: str
+    constants: tuple[str, ...]
+
+
+def _laws() -> dict[str, Law]:
+    laws = {}
+    for i in range(_flat.count_laws()):
+        code, *texts = _flat.get_law_row(i + 1)
+        name, keyword, variant, constants = (text.decode().strip() for text in texts)
+        laws[name] = Law(code, keyword, variant, tuple(constants.split()))
+    return laws
+
+
+#: Constitutive laws by name.
+LAWS = _laws()
 
 
 @dataclass(frozen=True)
@@ -29,11 +50,14 @@ def law_response(law: str, constants: ArrayLike, strain: ArrayLike,
     """Response of `law` to a Green-Lagrange strain that goes from `strain` to `strain + dstrain`.
 
     Components 11, 22, 2*12; plane strain. The stress S satisfies S.dstrain = W1 - W0 exactly and
-    is the stress itself for dstrain = 0. Raises `ValueError` for an unknown law.
+    is the stress itself for dstrain = 0. Raises `ValueError` for an unknown law and for
+    constants that it refuses.
     """
     if law not in LAWS:
         raise ValueError(f"there is no law '{law}'; known: {', '.join(LAWS)}")
-    energy, stress, tangent, _ = _flat.law_kernel(LAWS[law], constants, strain, dstrain)
+    energy, stress, tangent, ierr = _flat.law_kernel(LAWS[law].code, constants, strain, dstrain)
+    if ierr:
+        raise ValueError(f"the law '{law}' ({', '.join(LAWS[law].constants)}) refuses {constants}")
     return LawResponse(float(energy), stress, tangent)
 
 

@@ -275,6 +275,9 @@ class Model(Cards):
                  elastic: Sequence[Number] | None = None,
                  neo_hooke: Sequence[Number] | None = None,
                  coupled_neo_hooke: Sequence[Number] | None = None,
+                 mooney_rivlin: Sequence[Number] | None = None,
+                 yeoh: Sequence[Number] | None = None,
+                 ogden: Sequence[Number] | None = None,
                  user: Sequence[Number] | None = None,
                  law: PointFunction | None = None) -> Model:
         """`*MATERIAL` with one law; stresses in [M/(L T^2)].
@@ -283,6 +286,9 @@ class Model(Cards):
         elastic             (E, nu): St. Venant-Kirchhoff under NLGEOM, linear without
         neo_hooke           (C10, D1): C10 (J^(-2/3) tr C - 3) + (J - 1)^2/D1
         coupled_neo_hooke   (E, nu): mu/2 (tr C - 3) - mu ln J + lambda/2 ln^2 J
+        mooney_rivlin       (C10, C01, D1)
+        yeoh                (C10, C20, C30, D1, D2, D3)
+        ogden               (mu1, alpha1, .., muN, alphaN, D1, .., DN), N = 1 to 3
         law                 a function of strains (n, 3), E11, E22, 2 E12 of Green and Lagrange (the
                             small ones without NLGEOM), that returns energies per reference volume
                             (n,), stresses (n, 3) and tangents (n, 3, 3), the first and second
@@ -293,19 +299,26 @@ class Model(Cards):
         if law is not None and user is None:
             user = ()
         kinds = {"ELASTIC": elastic, "HYPERELASTIC, NEO HOOKE": neo_hooke,
-                 "HYPERELASTIC, COUPLED NEO HOOKE": coupled_neo_hooke, "USER MATERIAL": user}
+                 "HYPERELASTIC, COUPLED NEO HOOKE": coupled_neo_hooke, "USER MATERIAL": user,
+                 "HYPERELASTIC, MOONEY-RIVLIN": mooney_rivlin, "HYPERELASTIC, YEOH": yeoh,
+                 "HYPERELASTIC, OGDEN": ogden}
         chosen = [(kind, values) for kind, values in kinds.items() if values is not None]
         if len(chosen) != 1:
             raise InputError(f"material {name} has one law, not {len(chosen)}")
         kind, values = chosen[0]
         constants = list(values)
-        if kind != "USER MATERIAL" and len(constants) != 2:
-            raise InputError(f"material {name}: {kind} has 2 constants, not {len(constants)}")
+        known = {"HYPERELASTIC, MOONEY-RIVLIN": (3,), "HYPERELASTIC, YEOH": (6,),
+                 "HYPERELASTIC, OGDEN": (3, 6, 9)}.get(kind, (2,))
+        if kind != "USER MATERIAL" and len(constants) not in known:
+            raise InputError(f"material {name}: {kind} has {' or '.join(map(str, known))} "
+                             f"constants, not {len(constants)}")
         options: dict[str, object] = {}
         if kind == "ELASTIC":
             options = {"TYPE": "ISO"}
         elif kind == "USER MATERIAL":
             options = {"CONSTANTS": len(constants)}
+        elif kind == "HYPERELASTIC, OGDEN":
+            options = {"N": len(constants)//3}
         text = card("MATERIAL", {"NAME": name})
         text += card(kind, options, [constants[k:k + 8] for k in range(0, len(constants), 8)])
         if law is not None:
@@ -448,7 +461,7 @@ class Model(Cards):
     def step(self, procedure: Literal["STATIC", "DYNAMIC"], h: Number = 1.0,
              duration: Number = 1.0, h_min: Number | None = None, h_max: Number | None = None, *,
              direct: bool = False, nlgeom: bool | None = None, increments: int | str | None = None,
-             amplitude: Literal["RAMP", "STEP"] | None = None) -> Step:
+             amplitude: Literal["RAMP", "STEP"] | None = None, solver: str | None = None) -> Step:
         """`*STEP`: a further step, to which conditions, settings and output are added.
 
         h, duration    increment and length of the step [T]
@@ -457,11 +470,13 @@ class Model(Cards):
         nlgeom         large displacements; stays on for later steps
         increments     most increments of the step; default no limit
         amplitude      RAMP in static steps, STEP in dynamic ones: what holds anyway
+        solver         DEFAULT, UMFPACK or MUMPS
         """
         options: dict[str, object] = {
             "NLGEOM": "NO" if nlgeom is False else nlgeom, "INC": increments,
             "AMPLITUDE": amplitude}
-        step = Step(self, options, procedure, {"DIRECT": direct}, (h, duration, h_min, h_max))
+        step = Step(self, options, procedure, {"DIRECT": direct, "SOLVER": solver},
+                    (h, duration, h_min, h_max))
         self._steps.append(step)
         return step
 

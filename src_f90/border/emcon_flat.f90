@@ -11,13 +11,12 @@ module emcon_flat
       handle_read, model_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
-   use emcon_law_registry, only : law_create
-   use emcon_materials, only : material_t
+   use emcon_law_registry, only : law_create, law_rows, n_constant
    use emcon_nts_gap, only : nts_gap
    implicit none
    private
    public :: new_model, read_deck, build_model, close_model, last_error, model_size, get_positions
-   public :: count_notes, get_note, law_kernel, nts_kernel
+   public :: count_notes, get_note, count_laws, get_law_row, law_kernel, nts_kernel
 
 contains
 
@@ -134,17 +133,46 @@ contains
       if (i > n) text = model%stepper%notes%item(i - n)%text
    end subroutine get_note
 
-   !> Response of a law (1 linear, 2 neo-Hooke, 3 coupled neo-Hooke) to a strain that goes from
-   !> `strain` to `strain + dstrain`; components 11, 22, 2*12.
-   subroutine law_kernel(law, constants, strain, dstrain, energy, stress, tangent, ierr)
+   !> Number of rows of the table of laws.
+   subroutine count_laws(n)
+      integer(c_int), intent(out) :: n
+
+      n = size(law_rows)
+   end subroutine count_laws
+
+   !> Row `i` of the table of laws, from 1: its name, its keyword and parameter in decks, and the
+   !> names of its constants, separated by blanks.
+   subroutine get_law_row(i, code, name, keyword, variant, constants)
+      integer(c_int), intent(in) :: i
+      integer(c_int), intent(out) :: code
+      character(len=32), intent(out) :: name, keyword, variant
+      character(len=128), intent(out) :: constants
+      integer :: k
+
+      associate (row => law_rows(i))
+         code = row%code
+         name = row%name
+         keyword = row%keyword
+         variant = row%variant
+         constants = ""
+         do k = 1, n_constant(row)
+            constants = trim(constants) // " " // row%constant(k)
+         end do
+         constants = adjustl(constants)
+      end associate
+   end subroutine get_law_row
+
+   !> Response of a law, by its code in the table, to a strain that goes from `strain` to
+   !> `strain + dstrain`; components 11, 22, 2*12.
+   subroutine law_kernel(law, n, constants, strain, dstrain, energy, stress, tangent, ierr)
       integer(c_int), intent(in) :: law
-      real(c_double), intent(in) :: constants(2)
+      integer(c_int), intent(in) :: n            !! number of constants
+      real(c_double), intent(in) :: constants(n)
       real(c_double), intent(in) :: strain(3), dstrain(3)
       real(c_double), intent(out) :: energy
       real(c_double), intent(out) :: stress(3)
       real(c_double), intent(out) :: tangent(3, 3)
       integer(c_int), intent(out) :: ierr
-      type(material_t) :: material
       class(law_t), allocatable :: object
       type(law_response_t) :: response
       type(error_t), allocatable :: error
@@ -153,10 +181,7 @@ contains
       stress = 0.0_c_double
       tangent = 0.0_c_double
       ierr = err_none
-      material%name = "KERNEL"
-      material%law = law
-      material%constant = real(constants, wp)
-      call law_create(material, object, error)
+      call law_create(law, real(constants, wp), object, error)
       if (allocated(error)) ierr = error%code
       if (allocated(error)) return
       call law_response_plane(object, real(strain, wp), real(dstrain, wp), response)

@@ -3,11 +3,11 @@ module emcon_deck_cards
    use emcon_deck_keywords, only : find_keyword, in_model, in_step, is_neutral, keyword_names, &
       keyword_t, keywords, mark_flag, mark_none, mark_unsupported, mark_value, &
       mark_without_effect, parameter_mark, parameter_names, parameter_reason
-   use emcon_deck_laws, only : law_variants
    use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
       substitute_parameters, unused_override
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, option_t, reader_t
    use emcon_diagnostics, only : add_error, quoted, suggestion
+   use emcon_law_registry, only : law_variants
    use emcon_origin, only : origin_t
    use emcon_text, only : squeezed, string_t, stripped, to_text
    implicit none

@@ -52,7 +52,7 @@ module emcon_deck_keywords
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
       keyword_t("ELASTIC", in_model, "TYPE=,~MODULI,!DEPENDENCIES:0"), &
-      keyword_t("HYPERELASTIC", in_model, "!OGDEN,!MOONEY-RIVLIN,!YEOH,!POLYNOMIAL,!N:1," &
+      keyword_t("HYPERELASTIC", in_model, "N=,!POLYNOMIAL,!REDUCEDPOLYNOMIAL,!ARRUDA-BOYCE,!VANDERWAALS,!MARLOW," &
          // "~MODULI,!DEPENDENCIES:0"), &
       keyword_t("USER MATERIAL", in_model, "CONSTANTS=,~UNSYMM,!TYPE:MECHANICAL," &
          // "!HYBRIDFORMULATION"), &
@@ -276,8 +276,8 @@ contains
          reason = " (equations hold in all steps)"
       case ("TIMEDELAY")
          reason = " (shift the times of the amplitude)"
-      case ("OGDEN", "MOONEY-RIVLIN", "YEOH", "POLYNOMIAL")
-         reason = " (use NEO HOOKE or COUPLED NEO HOOKE)"
+      case ("POLYNOMIAL", "REDUCEDPOLYNOMIAL", "ARRUDA-BOYCE", "VANDERWAALS", "MARLOW")
+         reason = " (use NEO HOOKE, MOONEY-RIVLIN, YEOH or OGDEN)"
       case ("READ")
          reason = " (use: emcon restart NAME.rst.h5)"
       case ("INPUT")

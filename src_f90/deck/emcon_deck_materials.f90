@@ -2,18 +2,22 @@
 module emcon_deck_materials
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, is_blank, next_line
-   use emcon_deck_laws, only : constant_fault, law_rows
    use emcon_deck_named, only : find_set, hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
       option_count, option_name, reader_t, refuse_option
    use emcon_diagnostics, only : label_list, quoted, suggestion
+   use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_materials, only : law_given, law_neo_hooke, material_t
+   use emcon_law, only : law_t
+   use emcon_law_registry, only : find_law_row, law_create, law_given, law_rows, n_constant
+   use emcon_materials, only : material_t
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private
    public :: read_materials, read_sections
+
+   integer, parameter :: per_line = 8             !! constants in a data line
 
 contains
 
@@ -94,40 +98,63 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(material_t), intent(inout) :: material
-      real(wp) :: value(size(law_rows(1)%constant))
-      integer :: i, i_row
+      real(wp), allocatable :: value(:)
+      type(error_t), allocatable :: error
+      class(law_t), allocatable :: law
+      integer :: i_row
       logical :: ok
-      character(len=:), allocatable :: fault, variants
+
+      call choose_law(reader, card, material%law, i_row)
+      if (card%name == "ELASTIC") call check_isotropic(reader, card)
+      if (i_row == 0) return
+      associate (row => law_rows(i_row))
+         allocate(value(n_constant(row)))
+         call read_constants(reader, card, row%constant(:size(value)), value, ok)
+         if (.not. ok) return
+         call law_create(row%code, value, law, error)
+         if (allocated(error)) then
+            call card_error(reader, card, error%message)
+         else
+            call replace_incompressible(reader, card, law, row%constant(:size(value)), value)
+         end if
+         material%constant = value
+      end associate
+   end subroutine read_law
+
+   !> Code and row of the law; row 0: refused. A law is there, even if it is wrong: that none is
+   !> given need not be told as well.
+   subroutine choose_law(reader, card, code, i_row)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      integer, intent(out) :: code, i_row
+      character(len=:), allocatable :: variants, chosen
+      integer :: i, order, most
+      logical :: ok
 
       i_row = 0
+      chosen = ""
       variants = ""
-      do i = 1, size(law_rows)
-         if (law_rows(i)%keyword /= card%name) cycle
-         ok = law_rows(i)%variant == ""
-         if (.not. ok) ok = has_option(card, trim(law_rows(i)%variant))
-         if (ok .and. i_row > 0) call card_error(reader, card, "more than one law is chosen")
-         if (ok) i_row = i
-         variants = variants // " " // trim(law_rows(i)%variant)
+      do i = size(law_rows), 1, -1
+         associate (row => law_rows(i))
+            if (row%keyword /= card%name .or. row%order > 1) cycle
+            ok = row%variant == ""
+            if (.not. ok) ok = has_option(card, trim(row%variant))
+            if (ok .and. i_row > 0) call card_error(reader, card, "more than one law is chosen")
+            if (ok) i_row = i
+            variants = " " // trim(row%variant) // variants
+         end associate
       end do
-      ! A law is there, even if it is wrong: that none is given need not be told as well.
-      material%law = law_rows(max(i_row, 1))%law
+      code = law_rows(max(i_row, 1))%code
       if (i_row == 0) then
          if (size(card%option) == 0) call card_error(reader, card, "needs one of" // variants)
          return
       end if
-      if (card%name == "ELASTIC") call check_isotropic(reader, card)
-      associate (row => law_rows(i_row))
-         call read_constants(reader, card, row%constant(:row%n_constant), value, ok)
-         if (.not. ok) return
-         do i = 1, row%n_constant
-            call constant_fault(trim(row%constant(i)), value(i), fault)
-            if (fault /= "") call card_error(reader, card, trim(row%constant(i)) // " = " &
-               // to_text(value(i)) // " " // fault)
-         end do
-         if (row%law == law_neo_hooke) call replace_incompressible(reader, card, value)
-         material%constant = value(:row%n_constant)
-      end associate
-   end subroutine read_law
+      chosen = trim(law_rows(i_row)%variant)
+      most = maxval(law_rows%order, law_rows%code == code)
+      order = merge(0, 1, has_option(card, "N"))
+      call option_count(reader, card, "N", 1, order, max(most, 1))
+      i_row = find_law_row(card%name, chosen, order)
+   end subroutine choose_law
 
    !> A law that a program gives: its constants, in any number of lines.
    subroutine read_given(reader, card, material)
@@ -168,21 +195,25 @@ contains
       end select
    end subroutine check_isotropic
 
-   !> D1 = 0 means incompressible, which displacement elements cannot be. CalculiX takes
-   !> D1 = 0.1/(2 C10), about nu = 0.475, and so do we.
-   subroutine replace_incompressible(reader, card, value)
+   !> D1 = 0 means incompressible, which displacement elements cannot be. CalculiX takes D1 = 0.1
+   !> over the shear modulus at rest, about nu = 0.475, and so do we.
+   subroutine replace_incompressible(reader, card, law, name, value)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      real(wp), intent(inout) :: value(:)          !! C10, D1
+      class(law_t), intent(in) :: law
+      character(len=*), intent(in) :: name(:)      !! of the constants
+      real(wp), intent(inout) :: value(:)
+      integer :: i
 
-      if (value(2) /= 0.0_wp .or. value(1) <= 0.0_wp) return
-      if (value(1) < 1.0_wp/huge(1.0_wp)) return
-      value(2) = 0.05_wp/value(1)
-      call card_warning(reader, card, "D1 = 0 (incompressible) is replaced by 0.05/C10 = " &
-         // to_text(value(2)) // ", about nu = 0.475, as CalculiX does")
+      i = findloc(name, "D1", 1)
+      if (i == 0 .or. law%shear < 1.0_wp/huge(1.0_wp)) return
+      if (abs(value(i)) > 0.0_wp) return
+      value(i) = 0.1_wp/law%shear
+      call card_warning(reader, card, "D1 = 0 (incompressible) is replaced by 0.1/mu0 = " &
+         // to_text(value(i)) // " with the shear modulus mu0, about nu = 0.475, as CalculiX does")
    end subroutine replace_incompressible
 
-   !> The one data line of constants; one more value, a temperature, has no effect.
+   !> The constants, eight a line; one more value, a temperature, has no effect.
    subroutine read_constants(reader, card, name, value, ok)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -192,38 +223,62 @@ contains
       type(data_t) :: data
       character(len=:), allocatable :: list
       real(wp) :: temperature
-      integer :: i, n
+      integer :: first, last, n
 
       n = size(name)
       value = 0.0_wp
-      list = ""
-      do i = 1, n
-         list = list // trim(name(i)) // ", "
-      end do
-      list = list(:len(list) - 2)
       call data_open(data, card)
-      ok = next_line(reader, data)
-      if (.not. ok) then
-         call card_error(reader, card, "the data line with " // list // " is missing")
-         return
-      end if
-      call check_count(reader, data, 1, n + 1, list)
-      do i = 1, n
-         if (is_blank(data, i)) then
-            ! Abaqus decks leave out a last constant that is 0.
-            if (name(i) /= "D1") call data_error(reader, data, trim(name(i)) // " is missing")
-         else
-            call get_real(reader, data, i, trim(name(i)), value(i))
+      do first = 1, n, per_line
+         last = min(first + per_line - 1, n)
+         call name_list(name(first:last), list)
+         ok = next_line(reader, data)
+         if (.not. ok) then
+            call card_error(reader, card, "the data line with " // list // " is missing")
+            return
          end if
+         call check_count(reader, data, 1, last - first + merge(2, 1, last == n), list)
+         call read_line(reader, data, name(first:last), value(first:last))
+         ok = data%ok
+         if (.not. ok) return
       end do
       temperature = 0.0_wp
-      call get_real(reader, data, n + 1, "temperature", temperature)
+      call get_real(reader, data, last - (last - 1)/per_line*per_line + 1, "temperature", &
+         temperature)
       ok = data%ok
       if (ok .and. abs(temperature) > 0.0_wp) call data_warning(reader, data, &
          "the temperature has no effect")
       if (next_line(reader, data)) call data_error(reader, data, &
          "only one data line is read: constants do not depend on temperature")
    end subroutine read_constants
+
+   !> "A, B, C"
+   pure subroutine name_list(name, list)
+      character(len=*), intent(in) :: name(:)
+      character(len=:), allocatable, intent(out) :: list
+      integer :: i
+
+      list = trim(name(1))
+      do i = 2, size(name)
+         list = list // ", " // trim(name(i))
+      end do
+   end subroutine name_list
+
+   !> The constants of one line. Abaqus decks leave out last constants D that are 0.
+   subroutine read_line(reader, data, name, value)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      character(len=*), intent(in) :: name(:)
+      real(wp), intent(inout) :: value(:)
+      integer :: i
+
+      do i = 1, size(name)
+         if (.not. is_blank(data, i)) then
+            call get_real(reader, data, i, trim(name(i)), value(i))
+         else if (name(i)(1:1) /= "D") then
+            call data_error(reader, data, trim(name(i)) // " is missing")
+         end if
+      end do
+   end subroutine read_line
 
    !> All *SOLID SECTION cards.
    subroutine read_sections(reader, scene)

@@ -5,17 +5,12 @@ module emcon_materials
    implicit none
    private
    public :: material_t, section_t
-   public :: law_linear, law_neo_hooke, law_coupled_neo_hooke, law_given
-
-   !> Constitutive laws. `law_linear` is linear elasticity, under NLGEOM St. Venant-Kirchhoff;
-   !> `law_given` is a function that a program gives.
-   integer, parameter :: law_linear = 1, law_neo_hooke = 2, law_coupled_neo_hooke = 3, law_given = 4
 
    type :: material_t
       character(len=:), allocatable :: name
       type(origin_t) :: origin
-      integer :: law = 0                             !! one of `law_`; 0: none was given
-      real(wp), allocatable :: constant(:)           !! as in the deck: E, nu | C10, D1 | any
+      integer :: law = 0                             !! of a row of `law_rows`; 0: none was given
+      real(wp), allocatable :: constant(:)           !! as the row of the law names them | any
       real(wp) :: density = 0.0_wp                   !! [M/L^3]
    end type material_t
 

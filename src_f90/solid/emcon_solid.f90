@@ -8,8 +8,7 @@ module emcon_solid
       given_response_t, given_rest_stiffness, given_state
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
-   use emcon_law_registry, only : law_create
-   use emcon_materials, only : law_given
+   use emcon_law_registry, only : law_create, law_given
    use emcon_motion, only : motion_t
    use emcon_point_function, only : point_failed, point_gradient, point_ok
    use emcon_scene, only : scene_t
@@ -119,8 +118,13 @@ contains
             call given_law_take(scene, scene%material(k), self%given(k), error, given)
             if (.not. allocated(error)) call given_rest_stiffness(self%given(k), at_rest(k), error)
          case default
-            call law_create(scene%material(k), self%law(k)%law, error)
-            if (allocated(error)) return
+            call law_create(scene%material(k)%law, scene%material(k)%constant, self%law(k)%law, &
+               error)
+            if (allocated(error)) then
+               error%message = "material " // scene%material(k)%name // ": " // error%message
+               return
+            end if
+            self%law(k)%law%density = scene%material(k)%density
             call law_response_plane(self%law(k)%law, rest, rest, state)
             at_rest(k) = maxval(abs(state%tangent))
          end select

@@ -9,7 +9,7 @@ module emcon_stepper_given
    use emcon_given, only : given_add_force, given_add_law
    use emcon_given_check, only : given_check_force, given_check_mass
    use emcon_given_force, only : given_force_t
-   use emcon_materials, only : law_given
+   use emcon_law_registry, only : law_given
    use emcon_node_potential, only : node_potential_init, node_potential_t
    use emcon_point_function, only : point_function_t
    use emcon_scene, only : where_text

@@ -16,7 +16,7 @@ module emcon_system
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_loads, only : loads_add, loads_init, loads_t
    use emcon_mass, only : mass_init, mass_place
-   use emcon_materials, only : law_linear
+   use emcon_law_registry, only : law_linear
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_point_function, only : point_failed

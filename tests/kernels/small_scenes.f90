@@ -3,7 +3,7 @@ module small_scenes
    use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_materials, only : law_coupled_neo_hooke
+   use emcon_law_registry, only : law_coupled_neo_hooke
    use emcon_mesh, only : surface_t
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t

@@ -6,7 +6,7 @@ module test_element
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
-   use emcon_materials, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
+   use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_text, only : to_text

@@ -6,9 +6,9 @@ module test_given_law
    use emcon_diagnostics, only : diagnostics_t
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_kinds, only : dp, wp
-   use emcon_law_linear, only : lame_constants
+   use emcon_law, only : lame_constants
+   use emcon_law_registry, only : law_coupled_neo_hooke, law_given, law_linear
    use emcon_march, only : increment_t
-   use emcon_materials, only : law_coupled_neo_hooke, law_given, law_linear
    use emcon_motion, only : motion_of, pose_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_restart, only : restart_t

@@ -1,14 +1,11 @@
 !> Constitutive laws against their textbook formulas in quadruple precision.
 module test_law
    use check, only : check_error, check_near, test_case_t
-   use emcon_errors, only : err_internal, error_t
+   use emcon_errors, only : err_input, err_internal, error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
-   use emcon_law_coupled_neo_hooke, only : law_coupled_neo_hooke_t
-   use emcon_law_linear, only : law_linear_t
-   use emcon_law_neo_hooke, only : law_neo_hooke_t
-   use emcon_law_registry, only : law_create
-   use emcon_materials, only : law_coupled_neo_hooke, law_linear, law_neo_hooke, material_t
+   use emcon_law_registry, only : find_law_row, law_create, law_given, law_mooney_rivlin, &
+      law_neo_hooke, law_ogden, law_rows, law_yeoh, n_constant
    use emcon_text, only : to_text
    use referee, only : increment_of, qp, slopes_of
    implicit none
@@ -18,11 +15,22 @@ module test_law
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> 40 roundings; E:E = e1^2 - 2 e2 and its like lose a factor of at most 2.
    real(wp), parameter :: tol = 40.0_wp*eps
-   integer, parameter :: n_law = 3
-   character(len=18), parameter :: name(n_law) = [character(len=18) :: "linear", "neo Hooke", &
-      "coupled neo Hooke"]
-   !> Constants of all laws; with `d1` the three agree at small strains.
+   integer, parameter :: n_law = size(law_rows)
+   character(len=18), parameter :: name(n_law) = law_rows%name
+   !> Constants of all laws; with `d1` they agree at small strains.
    real(wp), parameter :: lam = 2.5_wp, mu = 1.5_wp, c10 = 0.5_wp*mu, d1 = 2.0_wp/(lam + mu/1.5_wp)
+   real(wp), parameter :: young = mu*(3.0_wp*lam + 2.0_wp*mu)/(lam + mu), &
+      nu = 0.5_wp*lam/(lam + mu)
+   real(wp), parameter :: c01 = 0.25_wp*mu, c20 = -0.05_wp*mu, c30 = 0.02_wp*mu, &
+      d2 = 3.0_wp, d3 = 5.0_wp
+   real(wp), parameter :: mu_ogden(3) = mu*[0.75_wp, 0.125_wp, 0.125_wp], &
+      alpha(3) = [1.3_wp, 4.0_wp, -2.0_wp]
+   !> In the order of the rows. Ogden's law of one term is neo-Hooke's, that of two Mooney's.
+   integer, parameter :: first(n_law + 1) = [1, 3, 5, 7, 10, 16, 19, 25, 34]
+   real(wp), parameter :: constants(33) = [young, nu, c10, d1, young, nu, c10 - c01, c01, d1, &
+      c10, c20, c30, d1, d2, d3, mu, 2.0_wp, d1, &
+      2.0_wp*(c10 - c01), 2.0_wp, 2.0_wp*c01, -2.0_wp, d1, 0.0_wp, &
+      mu_ogden(1), alpha(1), mu_ogden(2), alpha(2), mu_ogden(3), alpha(3), d1, d2, d3]
 
 contains
 
@@ -37,22 +45,41 @@ contains
          test_case_t("small strains are linear elastic", test_small_strain), &
          test_case_t("stress normal to the plane", test_stress_33), &
          test_case_t("units of stress by powers of two", test_scaling), &
-         test_case_t("registry", test_registry)]
+         test_case_t("registry", test_registry), &
+         test_case_t("Ogden's law is neo-Hooke's and Mooney's", test_ogden_special), &
+         test_case_t("equal principal stretches", test_equal_stretches), &
+         test_case_t("simple shear and stretch in closed form", test_closed_form), &
+         test_case_t("constants refused", test_refusals)]
    end subroutine collect_law
 
-   subroutine make_laws(box)
+   subroutine make_laws(box, unit)
       type(law_box_t), intent(out) :: box(n_law)
+      real(wp), intent(in), optional :: unit         !! of stress
+      real(wp), allocatable :: constant(:)
+      type(error_t), allocatable :: raised
+      integer :: i, k
 
-      allocate(box(1)%law, source=law_linear_t(lam=lam, mu=mu))
-      allocate(box(2)%law, source=law_neo_hooke_t(c10=c10, d1=d1))
-      allocate(box(3)%law, source=law_coupled_neo_hooke_t(lam=lam, mu=mu))
+      do i = 1, n_law
+         constant = constants(first(i):first(i + 1) - 1)
+         do k = 1, size(constant)
+            if (.not. present(unit)) cycle
+            select case (law_rows(i)%constant(k)(1:1))
+            case ("E", "C", "m")
+               constant(k) = constant(k)*unit
+            case ("D")
+               constant(k) = constant(k)/unit
+            end select
+         end do
+         call law_create(law_rows(i)%code, constant, box(i)%law, raised)
+      end do
    end subroutine make_laws
 
    !> W(E11, E22, 2 E12) as printed in textbooks; negative numbers: (W(E) + W(-E))/2.
    pure function textbook(which, x) result(w)
       integer, intent(in) :: which
       real(qp), intent(in) :: x(3)
-      real(qp) :: w, trace, j
+      real(qp) :: w, trace, j, i1, i2, stretch(3)
+      integer :: i, n
 
       trace = x(1) + x(2)
       j = sqrt((1.0_qp + 2.0_qp*x(1))*(1.0_qp + 2.0_qp*x(2)) - x(3)*x(3))
@@ -63,10 +90,48 @@ contains
       case (2)
          w = real(c10, qp)*((2.0_qp*trace + 3.0_qp)/j**(2.0_qp/3.0_qp) - 3.0_qp) &
             + (j - 1.0_qp)**2/real(d1, qp)
-      case default
+      case (3)
          w = real(mu, qp)*trace - real(mu, qp)*log(j) + 0.5_qp*real(lam, qp)*log(j)**2
+      case (4)
+         i1 = (2.0_qp*trace + 3.0_qp)/j**(2.0_qp/3.0_qp)
+         i2 = (2.0_qp*trace + 2.0_qp + j*j)/j**(4.0_qp/3.0_qp)
+         w = real(c10 - c01, qp)*(i1 - 3.0_qp) + real(c01, qp)*(i2 - 3.0_qp) &
+            + (j - 1.0_qp)**2/real(d1, qp)
+      case (5)
+         i1 = (2.0_qp*trace + 3.0_qp)/j**(2.0_qp/3.0_qp) - 3.0_qp
+         w = real(c10, qp)*i1 + real(c20, qp)*i1**2 + real(c30, qp)*i1**3 + volume_part(j, 3)
+      case default
+         n = which - 5
+         stretch = stretches(x, j)
+         w = volume_part(j, merge(3, 1, n == 3))
+         do i = 1, n
+            associate (m => real(constants(first(which) + 2*i - 2), qp), &
+                  a => real(constants(first(which) + 2*i - 1), qp))
+               w = w + 2.0_qp*m/a**2*(sum(stretch**a) - 3.0_qp)
+            end associate
+         end do
       end select
    end function textbook
+
+   !> Sum of (J - 1)^(2 i)/D_i, i <= n.
+   pure real(qp) function volume_part(j, n)
+      real(qp), intent(in) :: j
+      integer, intent(in) :: n
+      real(qp), parameter :: d(3) = real([d1, d2, d3], qp)
+      integer :: i
+
+      volume_part = sum([((j - 1.0_qp)**(2*i)/d(i), i = 1, n)])
+   end function volume_part
+
+   !> Principal stretches times J^(-1/3).
+   pure function stretches(x, j) result(stretch)
+      real(qp), intent(in) :: x(3), j
+      real(qp) :: stretch(3), apart
+
+      apart = sqrt((x(1) - x(2))**2 + x(3)**2)
+      stretch = sqrt([1.0_qp + x(1) + x(2) + apart, 1.0_qp + x(1) + x(2) - apart, 1.0_qp])
+      stretch = stretch/j**(1.0_qp/3.0_qp)
+   end function stretches
 
    !> W to the relative accuracy of `wp`: below 1e-5 the formula loses its digits even here, so
    !> W(s E) = s^2 W2 + s^3 W3 + s^4 W4 with coefficients from strains of 1e-5 and 2e-5.
@@ -99,11 +164,22 @@ contains
       real(wp), intent(in) :: s, ds
       real(wp), intent(out) :: strain(3), dstrain(3)
 
-      call random_number(strain)
-      call random_number(dstrain)
-      strain = 0.5_wp*s*(strain - 0.5_wp)
-      dstrain = ds*(dstrain - 0.5_wp)
+      do
+         call random_number(strain)
+         call random_number(dstrain)
+         strain = 0.5_wp*s*(strain - 0.5_wp)
+         dstrain = ds*(dstrain - 0.5_wp)
+         if (has_volume(strain + dstrain)) exit
+      end do
    end subroutine draw
+
+   !> Is C positive definite, and clearly so?
+   pure logical function has_volume(x)
+      real(wp), intent(in) :: x(3)
+
+      has_volume = min(1.0_wp + 2.0_wp*x(1), 1.0_wp + 2.0_wp*x(2), &
+         (1.0_wp + 2.0_wp*x(1))*(1.0_wp + 2.0_wp*x(2)) - x(3)**2) > 0.2_wp
+   end function has_volume
 
    subroutine test_energy(error)
       type(error_t), allocatable, intent(out) :: error
@@ -203,7 +279,7 @@ contains
       end do
    end subroutine test_tangent
 
-   !> S = D (E0 + E1)/2 up to terms of the order of the strain, also for the two neo-Hookean laws.
+   !> S = D (E0 + E1)/2 up to terms of the order of the strain, for all laws.
    subroutine test_small_strain(error)
       type(error_t), allocatable, intent(out) :: error
       type(law_box_t) :: box(n_law)
@@ -231,7 +307,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(law_box_t) :: box(n_law)
       type(law_response_t) :: response
-      real(wp) :: strain(3), zero(3), expected(n_law), trace, j
+      real(wp) :: strain(3), zero(3), expected(3), trace, j
       integer :: i, k
 
       call make_laws(box)
@@ -241,12 +317,52 @@ contains
          j = sqrt((1.0_wp + 2.0_wp*strain(1))*(1.0_wp + 2.0_wp*strain(2)) - strain(3)**2)
          expected = [lam*trace, 2.0_wp*c10*exp(-log(j)/1.5_wp)*(-2.0_wp*trace/3.0_wp) &
             + 2.0_wp/d1*(j - 1.0_wp)*j, lam*log(j)]
-         do i = 1, n_law
+         do i = 1, 3
             call law_response_plane(box(i)%law, strain, zero, response)
             call check_near(error, response%stress_33, expected(i), tol, lam + mu, trim(name(i)))
          end do
+         do i = 4, n_law
+            call law_response_plane(box(i)%law, strain, zero, response)
+            call check_near(error, response%stress_33, normal_stress(i, strain), tol, lam + mu, &
+               trim(name(i)))
+         end do
       end do
    end subroutine test_stress_33
+
+   !> 2 dW/dC33 at C33 = 1 in quadruple precision.
+   pure real(wp) function normal_stress(which, strain)
+      integer, intent(in) :: which
+      real(wp), intent(in) :: strain(3)
+      real(qp) :: x(3), trace, j, i1, i2, s, stretch(3)
+      real(qp), parameter :: d(3) = real([d1, d2, d3], qp)
+      integer :: i, n
+
+      x = real(strain, qp)
+      trace = x(1) + x(2)
+      j = sqrt((1.0_qp + 2.0_qp*x(1))*(1.0_qp + 2.0_qp*x(2)) - x(3)*x(3))
+      i1 = (2.0_qp*trace + 3.0_qp)/j**(2.0_qp/3.0_qp)
+      i2 = (2.0_qp*trace + 2.0_qp + j*j)/j**(4.0_qp/3.0_qp)
+      n = merge(3, 1, which == 5 .or. which == 8)
+      s = j*sum([(2*i*(j - 1.0_qp)**(2*i - 1)/d(i), i = 1, n)])
+      n = which - 5
+      if (which == 4) then
+         s = s + 2.0_qp*real(c10 - c01, qp)*(j**(-2.0_qp/3.0_qp) - i1/3.0_qp) &
+            + 2.0_qp*real(c01, qp)*((2.0_qp*trace + 2.0_qp)*j**(-4.0_qp/3.0_qp) - 2.0_qp*i2/3.0_qp)
+      else if (which == 5) then
+         i2 = i1 - 3.0_qp
+         s = s + 2.0_qp*(j**(-2.0_qp/3.0_qp) - i1/3.0_qp) &
+            *(real(c10, qp) + 2.0_qp*i2*real(c20, qp) + 3.0_qp*i2*i2*real(c30, qp))
+      else
+         stretch = stretches(x, j)
+         do i = 1, n
+            associate (m => real(constants(first(which) + 2*i - 2), qp), &
+                  a => real(constants(first(which) + 2*i - 1), qp))
+               s = s + 2.0_qp*m/a*(stretch(3)**a - sum(stretch**a)/3.0_qp)
+            end associate
+         end do
+      end if
+      normal_stress = real(s, wp)
+   end function normal_stress
 
    !> Constants times 2^40: energy, stress and tangent change by that factor, bit for bit.
    subroutine test_scaling(error)
@@ -258,9 +374,7 @@ contains
       integer :: i, k
 
       call make_laws(box)
-      allocate(scaled(1)%law, source=law_linear_t(lam=unit*lam, mu=unit*mu))
-      allocate(scaled(2)%law, source=law_neo_hooke_t(c10=unit*c10, d1=d1/unit))
-      allocate(scaled(3)%law, source=law_coupled_neo_hooke_t(lam=unit*lam, mu=unit*mu))
+      call make_laws(scaled, unit)
       do i = 1, n_law
          do k = 1, 50
             call draw(0.8_wp, 0.5_wp, strain, dstrain)
@@ -274,31 +388,145 @@ contains
       end do
    end subroutine test_scaling
 
-   !> E and nu become Lame's constants, C10 and D1 stay; a material without law is our own bug.
+   !> Rows and their constants fit; a law that is not in the table is our own bug.
    subroutine test_registry(error)
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: raised
-      type(law_box_t) :: created, expected(n_law)
-      type(law_response_t) :: one, other
-      real(wp) :: constant(2, n_law), dstrain(3)
-      integer, parameter :: kind(n_law) = [law_linear, law_neo_hooke, law_coupled_neo_hooke]
-      integer :: i
+      type(law_box_t) :: created
+      integer :: i, n
 
-      call make_laws(expected)
-      constant(:, 1) = [mu*(3.0_wp*lam + 2.0_wp*mu)/(lam + mu), 0.5_wp*lam/(lam + mu)]
-      constant(:, 2) = [c10, d1]
-      constant(:, 3) = constant(:, 1)
-      dstrain = [0.1_wp, 0.2_wp, -0.3_wp]
       do i = 1, n_law
-         call law_create(material_t(name="M", law=kind(i), constant=constant(:, i), &
-            density=7.0_wp), created%law, raised)
-         call law_response_plane(created%law, 0.5_wp*dstrain, dstrain, one)
-         call law_response_plane(expected(i)%law, 0.5_wp*dstrain, dstrain, other)
-         call check_near(error, one%stress, other%stress, tol, lam + mu, name(i))
-         call check_near(error, created%law%density, 7.0_wp, 0.0_wp, 1.0_wp, "density")
+         n = n_constant(law_rows(i))
+         if (first(i) + n /= first(i + 1)) error stop "test_law: constants do not fit the rows"
+         call law_create(law_rows(i)%code, constants(first(i):first(i + 1) - 1), created%law, raised)
+         call check_near(error, created%law%shear, mu, tol, mu, name(i))
+         call law_create(law_rows(i)%code, spread(1.0_wp, 1, n + 1), created%law, raised)
+         call check_error(error, raised, err_input, "too many or too few", name(i))
+         associate (row => law_rows(i))
+            call check_near(error, real(find_law_row(row%keyword, row%variant, max(row%order, 1)), &
+               wp), real(i, wp), 0.0_wp, 1.0_wp, name(i))
+         end associate
       end do
-      call law_create(material_t(name="EMPTY"), created%law, raised)
-      call check_error(error, raised, err_internal, "EMPTY", "material without law")
+      call check_near(error, real(find_law_row("HYPERELASTIC", "OGDEN", 4), wp), 0.0_wp, 0.0_wp, &
+         1.0_wp, "no such order")
+      call law_create(law_given, [1.0_wp], created%law, raised)
+      call check_error(error, raised, err_internal, "no such law", "law that is given")
    end subroutine test_registry
+
+   !> With alpha = 2, and with 2 and -2, energy and stress are those of laws in I1 and I2.
+   subroutine test_ogden_special(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(law_box_t) :: box(n_law)
+      type(law_response_t) :: one, other
+      real(wp) :: strain(3), dstrain(3)
+      integer :: i, k
+      integer, parameter :: pair(2, 2) = reshape([6, 2, 7, 4], [2, 2])
+
+      call make_laws(box)
+      do i = 1, 2
+         do k = 0, 100
+            call draw(0.8_wp, 0.0_wp, strain, dstrain)
+            call law_response_plane(box(pair(1, i))%law, strain, dstrain, one)
+            call law_response_plane(box(pair(2, i))%law, strain, dstrain, other)
+            call check_near(error, one%energy, other%energy, tol, lam + mu, "energy")
+            call check_near(error, one%stress, other%stress, tol, lam + mu, "stress")
+            call check_near(error, one%stress_33, other%stress_33, tol, lam + mu, "S33")
+            ! The series of coth is cut at 2e-13.
+            call check_near(error, one%tangent, other%tangent, 1.0e-12_wp, lam + mu, "tangent")
+         end do
+      end do
+   end subroutine test_ogden_special
+
+   !> Steps from, to and through states where the principal stretches are equal or nearly so: the
+   !> identity and the tangent hold as elsewhere.
+   subroutine test_equal_stretches(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(law_box_t) :: box(n_law)
+      type(law_response_t) :: response, up, down
+      real(wp) :: strain(3), dstrain(3), way(3), step, off
+      integer :: i, j, k
+
+      call make_laws(box)
+      step = eps**(1.0_wp/3.0_wp)
+      do i = 6, n_law
+         do k = 0, 60, 3
+            off = 0.3_wp*2.0_wp**(-k)
+            do j = 1, 6
+               strain = 0.1_wp*[1.0_wp, 1.0_wp, 0.0_wp]
+               dstrain = 0.05_wp*[1.0_wp, 1.0_wp, 0.0_wp]
+               if (mod(j, 2) == 0) strain = strain + [off, 0.0_wp, -off]
+               if (j > 2) dstrain = dstrain + [0.0_wp, off, off]
+               if (j > 4) dstrain = dstrain*off
+               call law_response_plane(box(i)%law, strain, dstrain, response)
+               call check_near(error, dot_product(response%stress, dstrain), &
+                  increment_of(textbook, i, strain, dstrain), tol, &
+                  (lam + mu)*sum(abs(dstrain)), trim(name(i)) // " at 2^-" // to_text(k))
+               way = 0.0_wp
+               way(1 + mod(k, 3)) = step
+               call law_response_plane(box(i)%law, strain, dstrain + way, up)
+               call law_response_plane(box(i)%law, strain, dstrain - way, down)
+               call check_near(error, matmul(response%tangent, way)/step, &
+                  (up%stress - down%stress)/(2.0_wp*step), 200.0_wp*step**2, lam + mu, &
+                  trim(name(i)) // ", tangent at 2^-" // to_text(k))
+            end do
+         end do
+      end do
+   end subroutine test_equal_stretches
+
+   !> Simple shear by g, F = [1 g; 0 1]: sigma12 = dW/dg, with stretches l and 1/l, g = l - 1/l, so
+   !> of Ogden's law sum of 2 mu/alpha (l^alpha - l^-alpha)/(l + 1/l), of the laws in I1 and I2
+   !> (both 3 + g^2) 2 (W1 + W2) g. Uniform stretch of the plane by l: S11 = S22 from J = l^2.
+   subroutine test_closed_form(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(law_box_t) :: box(n_law)
+      type(law_response_t) :: response
+      real(wp) :: g, l, expected(4:n_law), s(2, 2), sigma
+      integer :: i, k
+
+      call make_laws(box)
+      do k = 1, 20
+         g = 0.1_wp*k
+         l = 0.5_wp*(g + sqrt(g*g + 4.0_wp))
+         expected(4) = 2.0_wp*c10*g
+         expected(5) = 2.0_wp*g*(c10 + 2.0_wp*c20*g**2 + 3.0_wp*c30*g**4)
+         do i = 6, n_law
+            associate (m => constants(first(i):first(i) + 2*(i - 5) - 2:2), &
+                  a => constants(first(i) + 1:first(i) + 2*(i - 5) - 1:2))
+               expected(i) = sum(2.0_wp*m/a*(l**a - l**(-a)))/(l + 1.0_wp/l)
+            end associate
+         end do
+         do i = 4, n_law
+            call law_response_plane(box(i)%law, [0.0_wp, 0.5_wp*g*g, g], spread(0.0_wp, 1, 3), &
+               response)
+            s = reshape(response%stress([1, 3, 3, 2]), [2, 2])
+            sigma = s(1, 2) + g*s(2, 2)            ! of F S F^T
+            call check_near(error, sigma, expected(i), tol, 10.0_wp*(lam + mu), trim(name(i)))
+         end do
+      end do
+   end subroutine test_closed_form
+
+   subroutine test_refusals(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call refuse(law_neo_hooke, [-1.0_wp, 1.0_wp], "C10 = -1 must be positive")
+      call refuse(law_mooney_rivlin, [1.0_wp, -2.0_wp, 1.0_wp], "C10 + C01 = -1 must be positive")
+      call refuse(law_yeoh, [1.0_wp, 0.0_wp, 0.0_wp, -1.0_wp, 0.0_wp, 0.0_wp], "D1 = -1 must not")
+      call refuse(law_ogden, [1.0_wp, 0.0_wp, 1.0_wp], "alpha = 0 must not be 0")
+      call refuse(law_ogden, [1.0_wp, 2.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], "sum of all mu = 0")
+
+   contains
+
+      subroutine refuse(code, constant, text)
+         integer, intent(in) :: code
+         real(wp), intent(in) :: constant(:)
+         character(len=*), intent(in) :: text
+         type(law_box_t) :: created
+         type(error_t), allocatable :: raised
+
+         call law_create(code, constant, created%law, raised)
+         call check_error(error, raised, err_input, text, text)
+      end subroutine refuse
+
+   end subroutine test_refusals
 
 end module test_law

@@ -5,16 +5,21 @@
 !> tangent follow here for all laws. In terms of E nothing cancels at small strains, as
 !> det C - 1 = 2 e1 + 4 e2 + 8 e3. Source: docs/theory.md, eq. (7).
 module emcon_law
-   use emcon_dgrad3, only : dg_t, dg_variable, operator(+), operator(*)
+   use emcon_dgrad3, only : dg_excess, dg_log1p, dg_sqrt, dg_t, dg_variable, operator(+), &
+      operator(*), operator(-), operator(/)
    use emcon_kinds, only : wp
+   use emcon_text, only : to_text
    implicit none
    private
    public :: law_t, law_box_t, law_response_t, law_response_plane, volume_excess
+   public :: claim, isochoric_excess, lame_constants, volume_energy
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
+      real(wp) :: shear = 0.0_wp                 !! shear modulus at rest [M/(L T^2)]
       logical :: has_volume = .true.             !! W is infinite where det C = 0
    contains
+      procedure(take_interface), deferred :: take
       procedure(energy_interface), deferred :: energy
    end type law_t
 
@@ -24,6 +29,14 @@ module emcon_law
    end type law_box_t
 
    abstract interface
+      !> Take the constants as a deck gives them, `shear` with them, or say what is wrong with one.
+      pure subroutine take_interface(self, constant, fault)
+         import :: law_t, wp
+         class(law_t), intent(inout) :: self
+         real(wp), intent(in) :: constant(:)     !! as many as the law's row has names
+         character(len=:), allocatable, intent(out) :: fault   !! empty: nothing
+      end subroutine take_interface
+
       !> Strain energy per reference volume.
       pure function energy_interface(self, e1, e2, e3) result(w)
          import :: dg_t, law_t
@@ -82,5 +95,62 @@ contains
 
       y = 2.0_wp*e1 + 4.0_wp*e2 + 8.0_wp*e3
    end function volume_excess
+
+   !> z with 3 exp(z) = J^(-2k/3) I_k, an invariant of C without its change of volume:
+   !> z = ln(1 + a) - k/3 ln(1 + y), a = I_k/3 - 1. At small strains only second-order terms may be
+   !> left: z = k/3 phi(y) - phi(a) + rest, phi(x) = x - ln(1 + x); at large ones it is these that
+   !> would cancel. Source: docs/theory.md, eq. (8).
+   pure function isochoric_excess(k, a, y, rest) result(z)
+      integer, intent(in) :: k                   !! 1: I_1 = tr C; 2: I_2 = tr cof C
+      type(dg_t), intent(in) :: a, y             !! y = det C - 1
+      type(dg_t), intent(in) :: rest             !! a - k y/3
+      type(dg_t) :: z
+      real(wp) :: part
+      real(wp), parameter :: third = 1.0_wp/3.0_wp, small = 0.5_wp
+
+      part = real(k, wp)*third
+      if (max(abs(a%f0), abs(a%f1), abs(y%f0), abs(y%f1)) < small) then
+         z = part*dg_excess(y) - dg_excess(a) + rest
+      else
+         z = dg_log1p(a) - part*dg_log1p(y)
+      end if
+   end function isochoric_excess
+
+   !> Sum of (J - 1)^(2 i)/D_i; a D_i of 0 has no term.
+   pure function volume_energy(d, y) result(w)
+      real(wp), intent(in) :: d(:)               !! [L T^2/M]
+      type(dg_t), intent(in) :: y                !! J^2 - 1
+      type(dg_t) :: w, volume, square, power
+      integer :: i
+
+      volume = y/(dg_sqrt(y + 1.0_wp) + 1.0_wp)
+      square = volume*volume
+      power = square
+      do i = 1, size(d)
+         if (i > 1) power = power*square
+         if (abs(d(i)) > 0.0_wp) w = w + (1.0_wp/d(i))*power
+      end do
+   end function volume_energy
+
+   !> Lame's constants from Young's modulus and Poisson's ratio.
+   pure subroutine lame_constants(young, nu, lam, mu)
+      real(wp), intent(in) :: young, nu          !! E > 0; nu in (-1, 0.5)
+      real(wp), intent(out) :: lam, mu           !! [M/(L T^2)]
+
+      lam = young*nu/((1.0_wp + nu)*(1.0_wp - 2.0_wp*nu))
+      mu = 0.5_wp*young/(1.0_wp + nu)
+   end subroutine lame_constants
+
+   !> Note in `fault` that the constant `name` is not what the `rule` says; the first one stays.
+   pure subroutine claim(holds, name, value, rule, fault)
+      logical, intent(in) :: holds
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: value
+      character(len=*), intent(in) :: rule       !! "must ..."
+      character(len=:), allocatable, intent(inout) :: fault
+
+      if (.not. allocated(fault)) fault = ""
+      if (.not. holds .and. fault == "") fault = name // " = " // to_text(value) // " " // rule
+   end subroutine claim
 
 end module emcon_law

@@ -2,28 +2,34 @@
 module emcon_law_linear
    use emcon_dgrad3, only : dg_t, operator(*), operator(-), operator(+)
    use emcon_kinds, only : wp
-   use emcon_law, only : law_t
+   use emcon_law, only : claim, lame_constants, law_t
    implicit none
    private
-   public :: law_linear_t, lame_constants
+   public :: law_linear_t
 
    type, extends(law_t) :: law_linear_t
       real(wp) :: lam = 0.0_wp                   !! [M/(L T^2)]
       real(wp) :: mu = 0.0_wp
    contains
+      procedure :: take => linear_take
       procedure :: energy => linear_energy
    end type law_linear_t
 
 contains
 
-   !> Lame's constants from Young's modulus and Poisson's ratio.
-   pure subroutine lame_constants(young, nu, lam, mu)
-      real(wp), intent(in) :: young, nu          !! E > 0; nu in (-1, 0.5)
-      real(wp), intent(out) :: lam, mu           !! [M/(L T^2)]
+   pure subroutine linear_take(self, constant, fault)
+      class(law_linear_t), intent(inout) :: self
+      real(wp), intent(in) :: constant(:)        !! E, nu
+      character(len=:), allocatable, intent(out) :: fault
 
-      lam = young*nu/((1.0_wp + nu)*(1.0_wp - 2.0_wp*nu))
-      mu = 0.5_wp*young/(1.0_wp + nu)
-   end subroutine lame_constants
+      call claim(constant(1) > 0.0_wp, "E", constant(1), "must be positive", fault)
+      call claim(constant(2) > -1.0_wp .and. constant(2) < 0.5_wp, "nu", constant(2), &
+         "must lie between -1 and 0.5", fault)
+      if (fault /= "") return
+      call lame_constants(constant(1), constant(2), self%lam, self%mu)
+      self%shear = self%mu
+      self%has_volume = .false.
+   end subroutine linear_take
 
    !> E:E = e1^2 - 2 e2.
    pure function linear_energy(self, e1, e2, e3) result(w)

@@ -2,7 +2,7 @@
 module emcon_law_coupled_neo_hooke
    use emcon_dgrad3, only : dg_t, dg_excess, dg_log1p, operator(*), operator(-), operator(+)
    use emcon_kinds, only : wp
-   use emcon_law, only : law_t, volume_excess
+   use emcon_law, only : claim, lame_constants, law_t, volume_excess
    implicit none
    private
    public :: law_coupled_neo_hooke_t
@@ -11,10 +11,24 @@ module emcon_law_coupled_neo_hooke
       real(wp) :: lam = 0.0_wp                   !! [M/(L T^2)]
       real(wp) :: mu = 0.0_wp
    contains
+      procedure :: take => coupled_neo_hooke_take
       procedure :: energy => coupled_neo_hooke_energy
    end type law_coupled_neo_hooke_t
 
 contains
+
+   pure subroutine coupled_neo_hooke_take(self, constant, fault)
+      class(law_coupled_neo_hooke_t), intent(inout) :: self
+      real(wp), intent(in) :: constant(:)        !! E, nu
+      character(len=:), allocatable, intent(out) :: fault
+
+      call claim(constant(1) > 0.0_wp, "E", constant(1), "must be positive", fault)
+      call claim(constant(2) > -1.0_wp .and. constant(2) < 0.5_wp, "nu", constant(2), &
+         "must lie between -1 and 0.5", fault)
+      if (fault /= "") return
+      call lame_constants(constant(1), constant(2), self%lam, self%mu)
+      self%shear = self%mu
+   end subroutine coupled_neo_hooke_take
 
    !> With y = J^2 - 1 = 2 e1 + 4 e2 + 8 e3, so that no first-order terms are left to cancel:
    !> W = mu/2 (y - ln(1+y)) - 2 mu e2 - 4 mu e3 + lam/8 ln^2(1+y).
