@@ -12,7 +12,7 @@ module emcon_law
    implicit none
    private
    public :: law_t, law_box_t, law_response_t, law_response_plane, volume_excess
-   public :: claim, isochoric_excess, lame_constants, volume_energy
+   public :: claim, isochoric_excess, lame_constants, take_elastic, volume_energy
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
@@ -100,15 +100,13 @@ contains
    !> z = ln(1 + a) - k/3 ln(1 + y), a = I_k/3 - 1. At small strains only second-order terms may be
    !> left: z = k/3 phi(y) - phi(a) + rest, phi(x) = x - ln(1 + x); at large ones it is these that
    !> would cancel. Source: docs/theory.md, eq. (8).
-   pure function isochoric_excess(k, a, y, rest) result(z)
-      integer, intent(in) :: k                   !! 1: I_1 = tr C; 2: I_2 = tr cof C
+   pure function isochoric_excess(part, a, y, rest) result(z)
+      real(wp), intent(in) :: part               !! k/3; k = 1: I_1 = tr C; k = 2: I_2 = tr cof C
       type(dg_t), intent(in) :: a, y             !! y = det C - 1
       type(dg_t), intent(in) :: rest             !! a - k y/3
       type(dg_t) :: z
-      real(wp) :: part
-      real(wp), parameter :: third = 1.0_wp/3.0_wp, small = 0.5_wp
+      real(wp), parameter :: small = 0.5_wp
 
-      part = real(k, wp)*third
       if (max(abs(a%f0), abs(a%f1), abs(y%f0), abs(y%f1)) < small) then
          z = part*dg_excess(y) - dg_excess(a) + rest
       else
@@ -140,6 +138,21 @@ contains
       lam = young*nu/((1.0_wp + nu)*(1.0_wp - 2.0_wp*nu))
       mu = 0.5_wp*young/(1.0_wp + nu)
    end subroutine lame_constants
+
+   !> Lame's constants of the two that decks give, or what is wrong with these.
+   pure subroutine take_elastic(constant, lam, mu, fault)
+      real(wp), intent(in) :: constant(:)        !! E, nu
+      real(wp), intent(out) :: lam, mu           !! [M/(L T^2)]
+      character(len=:), allocatable, intent(out) :: fault   !! empty: nothing
+
+      lam = 0.0_wp
+      mu = 0.0_wp
+      associate (young => constant(1), nu => constant(2))
+         call claim(young > 0.0_wp, "E", young, "must be positive", fault)
+         call claim(nu > -1.0_wp .and. nu < 0.5_wp, "nu", nu, "must lie between -1 and 0.5", fault)
+         if (fault == "") call lame_constants(young, nu, lam, mu)
+      end associate
+   end subroutine take_elastic
 
    !> Note in `fault` that the constant `name` is not what the `rule` says; the first one stays.
    pure subroutine claim(holds, name, value, rule, fault)

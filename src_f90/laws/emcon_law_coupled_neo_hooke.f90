@@ -2,7 +2,7 @@
 module emcon_law_coupled_neo_hooke
    use emcon_dgrad3, only : dg_t, dg_excess, dg_log1p, operator(*), operator(-), operator(+)
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, lame_constants, law_t, volume_excess
+   use emcon_law, only : law_t, take_elastic, volume_excess
    implicit none
    private
    public :: law_coupled_neo_hooke_t
@@ -22,11 +22,7 @@ contains
       real(wp), intent(in) :: constant(:)        !! E, nu
       character(len=:), allocatable, intent(out) :: fault
 
-      call claim(constant(1) > 0.0_wp, "E", constant(1), "must be positive", fault)
-      call claim(constant(2) > -1.0_wp .and. constant(2) < 0.5_wp, "nu", constant(2), &
-         "must lie between -1 and 0.5", fault)
-      if (fault /= "") return
-      call lame_constants(constant(1), constant(2), self%lam, self%mu)
+      call take_elastic(constant, self%lam, self%mu, fault)
       self%shear = self%mu
    end subroutine coupled_neo_hooke_take
 

@@ -28,7 +28,7 @@ contains
       self%c01 = constant(2)
       self%d1 = constant(3)
       self%shear = 2.0_wp*(self%c10 + self%c01)
-      call claim(self%shear > 0.0_wp, "C10 + C01", constant(1) + constant(2), &
+      call claim(self%shear > 0.0_wp, "C10 + C01", self%c10 + self%c01, &
          "must be positive", fault)
       call claim(self%d1 >= 0.0_wp, "D1", self%d1, "must not be negative", fault)
    end subroutine mooney_rivlin_take
@@ -42,8 +42,8 @@ contains
       real(wp), parameter :: third = 1.0_wp/3.0_wp
 
       y = volume_excess(e1, e2, e3)
-      z1 = isochoric_excess(1, (2.0_wp*third)*e1, y, -((4.0_wp*third)*e2) - (8.0_wp*third)*e3)
-      z2 = isochoric_excess(2, (4.0_wp*third)*(e1 + e2), y, &
+      z1 = isochoric_excess(third, (2.0_wp*third)*e1, y, -((4.0_wp*third)*e2) - (8.0_wp*third)*e3)
+      z2 = isochoric_excess(2.0_wp*third, (4.0_wp*third)*(e1 + e2), y, &
          -((4.0_wp*third)*e2) - (16.0_wp*third)*e3)
       w = (3.0_wp*self%c10)*dg_expm1(z1) + (3.0_wp*self%c01)*dg_expm1(z2) &
          + volume_energy([self%d1], y)

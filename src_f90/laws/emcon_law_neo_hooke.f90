@@ -22,11 +22,11 @@ contains
       real(wp), intent(in) :: constant(:)        !! C10, D1
       character(len=:), allocatable, intent(out) :: fault
 
-      call claim(constant(1) > 0.0_wp, "C10", constant(1), "must be positive", fault)
-      call claim(constant(2) >= 0.0_wp, "D1", constant(2), "must not be negative", fault)
       self%c10 = constant(1)
-      self%d1 = constant(2)
+      self%d1 = constant(size(constant))
       self%shear = 2.0_wp*self%c10
+      call claim(self%c10 > 0.0_wp, "C10", self%c10, "must be positive", fault)
+      call claim(self%d1 >= 0.0_wp, "D1", self%d1, "must not be negative", fault)
    end subroutine neo_hooke_take
 
    !> J^(-2/3) I1 = 3 exp(z); docs/theory.md, eq. (8).
@@ -37,7 +37,7 @@ contains
       real(wp), parameter :: third = 1.0_wp/3.0_wp
 
       y = volume_excess(e1, e2, e3)
-      z = isochoric_excess(1, (2.0_wp*third)*e1, y, -((4.0_wp*third)*e2) - (8.0_wp*third)*e3)
+      z = isochoric_excess(third, (2.0_wp*third)*e1, y, -((4.0_wp*third)*e2) - (8.0_wp*third)*e3)
       w = (3.0_wp*self%c10)*dg_expm1(z) + volume_energy([self%d1], y)
    end function neo_hooke_energy
 

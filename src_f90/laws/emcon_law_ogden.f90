@@ -94,15 +94,17 @@ contains
       class(law_ogden_t), intent(in) :: self
       type(dg_t), intent(in) :: e1, e2, y, s
       type(dg_t), intent(inout) :: w
-      real(wp) :: s33, logarithm, volume, half
+      real(wp) :: s33, logarithm, volume, power, half
       integer :: i
 
       w%g(3) = 0.0_wp
       if (abs(e2%f1) <= epsilon(1.0_wp)*e1%f1**2) return
       volume = y%f1/(sqrt(1.0_wp + y%f1) + 1.0_wp)
       s33 = 0.0_wp
-      do i = self%order, 1, -1
-         if (abs(self%d(i)) > 0.0_wp) s33 = s33 + (2.0_wp*i/self%d(i))*volume**(2*i - 1)
+      power = volume
+      do i = 1, self%order
+         if (abs(self%d(i)) > 0.0_wp) s33 = s33 + real(i + i, wp)/self%d(i)*power
+         power = power*volume*volume
       end do
       s33 = s33*(1.0_wp + volume)
       logarithm = 0.5_wp*log1p_of(y%f1)
@@ -111,7 +113,7 @@ contains
          s33 = s33 + (2.0_wp*self%mu(i)/(3.0_wp*half))*exp(half*logarithm/3.0_wp) &
             *(expm1_of(-half*logarithm) - cosh_excess(half, s%f1))
       end do
-      w%g(3) = (s33 - w%g(1) - w%g(2)*e1%f1)/e2%f1
+      w%g(3) = (s33 - dot_product(w%g, [1.0_wp, e1%f1, 0.0_wp]))/e2%f1
    end subroutine set_normal_slope
 
 end module emcon_law_ogden

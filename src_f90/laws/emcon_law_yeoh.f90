@@ -34,15 +34,19 @@ contains
    pure function yeoh_energy(self, e1, e2, e3) result(w)
       class(law_yeoh_t), intent(in) :: self
       type(dg_t), intent(in) :: e1, e2, e3
-      type(dg_t) :: w, y, excess, square
+      type(dg_t) :: w, y, excess, power
+      integer :: i
       real(wp), parameter :: third = 1.0_wp/3.0_wp
 
       y = volume_excess(e1, e2, e3)
-      excess = 3.0_wp*dg_expm1(isochoric_excess(1, (2.0_wp*third)*e1, y, &
+      excess = 3.0_wp*dg_expm1(isochoric_excess(third, (2.0_wp*third)*e1, y, &
          -((4.0_wp*third)*e2) - (8.0_wp*third)*e3))
-      square = excess*excess
-      w = self%c(1)*excess + self%c(2)*square + self%c(3)*(square*excess) &
-         + volume_energy(self%d, y)
+      w = volume_energy(self%d, y)
+      power = excess
+      do i = 1, size(self%c)
+         if (i > 1) power = power*excess
+         w = w + self%c(i)*power
+      end do
    end function yeoh_energy
 
 end module emcon_law_yeoh
