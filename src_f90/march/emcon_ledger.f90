@@ -7,7 +7,8 @@ module emcon_ledger
    private
    public :: ledger_t, ledger_measure, body_momenta
 
-   !> total = kinetic + strain + potential - external_work stays constant up to the work of contact.
+   !> total = kinetic + strain + potential - external_work stays constant up to the work of contact:
+   !> docs/theory.md, eqs. (23) and (24).
    type :: ledger_t
       real(wp) :: kinetic = 0.0_wp               !! [M L^2/T^2]
       real(wp) :: strain = 0.0_wp

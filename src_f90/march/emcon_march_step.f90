@@ -229,7 +229,8 @@ contains
       text = joined(found(:n), ", ", most_named)
    end subroutine nodes_text
 
-   !> First guess of the motion, and the motion and velocity of prescribed freedoms.
+   !> First guess of the motion, and the motion and velocity of prescribed freedoms, with the offset
+   !> of docs/theory.md, eq. (4).
    subroutine march_guess(self, scene, start, h, is_at_rest)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -387,7 +388,7 @@ contains
    end subroutine tell_stabilized
 
    !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
-   !> docs/theory.md, section 7); in statics forces are taken as linear over the step.
+   !> docs/theory.md, eq. (23)); in statics forces are taken as linear over the step.
    subroutine book_work(self)
       type(march_t), intent(inout) :: self
       real(wp) :: contact_work

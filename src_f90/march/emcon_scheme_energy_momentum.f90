@@ -1,4 +1,5 @@
 !> The energy-momentum scheme, paper eq. (4): discrete gradients, mid-point inertia.
+!> Source: docs/theory.md, eqs. (2) and (3).
 module emcon_scheme_energy_momentum
    use emcon_kinds, only : wp
    use emcon_motion, only : instant_t, pose_t

@@ -2,7 +2,8 @@
 !>
 !> Along p = M^-1 sum w_k grad gap_k, w_k = lam_k gap_k(q0) >= 0, the kinetic energy changes by
 !> s b + s^2 a/2; the positive root of s b + s^2 a/2 = lost energy is taken. The jump pushes the
-!> bodies apart and keeps the momenta. Source: Laursen & Love (2002); docs/theory.md, section 6.
+!> bodies apart and keeps the momenta. Source: Laursen & Love (2002); docs/theory.md,
+!> eqs. (21) and (22).
 module emcon_velocity_update
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t

@@ -1,7 +1,7 @@
 !> The discrete system of one step: numbered unknowns, forces, mass, tangent, contact pairs.
 !>
 !> It knows configurations and weights, not time stepping: a scheme asks for
-!> r = s M (b du - w v0) + f_int - f_ext and its tangent.
+!> r = s M (b du - w v0) + f_int - f_ext and its tangent: docs/theory.md, eqs. (2) and (16).
 module emcon_system
    use emcon_contact, only : contact_box_t
    use emcon_contact_registry, only : new_contact
