@@ -156,11 +156,11 @@ contains
 
    !> Note in `fault` that the constant `name` is not what the `rule` says; the first one stays.
    pure subroutine claim(holds, name, value, rule, fault)
-      logical, intent(in) :: holds
-      character(len=*), intent(in) :: name
-      real(wp), intent(in) :: value
+      logical, intent(in) :: holds               !! does the constant follow the rule?
+      character(len=*), intent(in) :: name       !! of the constant
+      real(wp), intent(in) :: value              !! of the constant
       character(len=*), intent(in) :: rule       !! "must ..."
-      character(len=:), allocatable, intent(inout) :: fault
+      character(len=:), allocatable, intent(inout) :: fault   !! empty: nothing so far
 
       if (.not. allocated(fault)) fault = ""
       if (.not. holds .and. fault == "") fault = name // " = " // to_text(value) // " " // rule

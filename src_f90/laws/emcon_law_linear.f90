@@ -20,7 +20,7 @@ contains
    pure subroutine linear_take(self, constant, fault)
       class(law_linear_t), intent(inout) :: self
       real(wp), intent(in) :: constant(:)        !! E, nu
-      character(len=:), allocatable, intent(out) :: fault
+      character(len=:), allocatable, intent(out) :: fault   !! what is wrong; empty: nothing
 
       call take_elastic(constant, self%lam, self%mu, fault)
       self%shear = self%mu

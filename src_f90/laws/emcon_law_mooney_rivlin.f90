@@ -22,7 +22,7 @@ contains
    pure subroutine mooney_rivlin_take(self, constant, fault)
       class(law_mooney_rivlin_t), intent(inout) :: self
       real(wp), intent(in) :: constant(:)        !! C10, C01, D1
-      character(len=:), allocatable, intent(out) :: fault
+      character(len=:), allocatable, intent(out) :: fault   !! what is wrong; empty: nothing
 
       self%c10 = constant(1)
       self%c01 = constant(2)

@@ -20,7 +20,7 @@ contains
    pure subroutine neo_hooke_take(self, constant, fault)
       class(law_neo_hooke_t), intent(inout) :: self
       real(wp), intent(in) :: constant(:)        !! C10, D1
-      character(len=:), allocatable, intent(out) :: fault
+      character(len=:), allocatable, intent(out) :: fault   !! what is wrong; empty: nothing
 
       self%c10 = constant(1)
       self%d1 = constant(size(constant))

@@ -28,7 +28,7 @@ contains
    pure subroutine ogden_take(self, constant, fault)
       class(law_ogden_t), intent(inout) :: self
       real(wp), intent(in) :: constant(:)        !! mu1, alpha1, .., muN, alphaN, D1, .., DN
-      character(len=:), allocatable, intent(out) :: fault
+      character(len=:), allocatable, intent(out) :: fault   !! what is wrong; empty: nothing
       integer :: i, n
 
       n = size(constant)/3

@@ -62,8 +62,8 @@ contains
 
    !> The parameters that choose among the laws of a keyword: ",A,B", ready for its list.
    pure subroutine law_variants(keyword, list)
-      character(len=*), intent(in) :: keyword
-      character(len=:), allocatable, intent(out) :: list
+      character(len=*), intent(in) :: keyword    !! without asterisk, upper case
+      character(len=:), allocatable, intent(out) :: list   !! empty: none
       integer :: i
 
       list = ""
@@ -76,7 +76,7 @@ contains
 
    !> Row of a law of the `order`; an order that there is not: 0.
    pure integer function find_law_row(keyword, variant, order) result(i)
-      character(len=*), intent(in) :: keyword, variant
+      character(len=*), intent(in) :: keyword, variant   !! upper case, `variant` without blanks
       integer, intent(in) :: order               !! not looked at for a law that has none
 
       do i = size(law_rows), 1, -1

@@ -21,7 +21,7 @@ contains
    pure subroutine yeoh_take(self, constant, fault)
       class(law_yeoh_t), intent(inout) :: self
       real(wp), intent(in) :: constant(:)        !! C10, C20, C30, D1, D2, D3
-      character(len=:), allocatable, intent(out) :: fault
+      character(len=:), allocatable, intent(out) :: fault   !! what is wrong; empty: nothing
 
       self%c = constant(:3)
       self%d = constant(4:)

@@ -1,8 +1,8 @@
 !> Newton's method for one step with a given set of active constraints.
 !>
 !> Forces are measured against the sum of their contributions before these cancel, docs/theory.md,
-!> eq. (25), so that no unit and no absolute size enters. After the tolerance is met, corrections with the last
-!> factorisation go on down to round-off: energy is lost to what the residual leaves.
+!> eq. (25), so that no unit and no absolute size enters. After the tolerance is met, corrections
+!> with the last factorisation go on down to round-off: energy is lost to what the residual leaves.
 module emcon_newton
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
