@@ -13,7 +13,8 @@
 !>    `[passage_t()]`), then `stepper_build`. After a failure
 !>    `stepper%diagnostic` holds all that is wrong with the deck. What a deck cannot say is given
 !>    between reading and building: by `stepper_give_law` and `stepper_give_potential` an energy at
-!>    points, a type that extends `point_function_t`; by `stepper_give_force` and
+!>    points, a type that extends `point_function_t`, or a law of the invariants of strain, one
+!>    that extends `law_t` of `emcon_law`; by `stepper_give_force` and
 !>    `stepper_give_mass` the solid of a host code, a type that extends `given_force_t`.
 !> 2. `stepper_advance` until `stepper_is_done`: the grid of the deck. Or `stepper_step` with sizes
 !>    of the program's own, and `stepper_next_step` for the next step of the deck.

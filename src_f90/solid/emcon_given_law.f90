@@ -1,10 +1,11 @@
-!> Constitutive laws that a program gives: the strain energy as a function of the strain at a point.
+!> Constitutive laws that a program gives: the strain energy as a function of the strain at a point,
+!> or a type of its own that extends `law_t`.
 !>
 !> Source: docs/theory.md, section 2 (functions given at points).
 module emcon_given_law
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_law, only : law_response_t
+   use emcon_law, only : law_response_t, law_t
    use emcon_materials, only : material_t
    use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
       point_response_t
@@ -15,11 +16,12 @@ module emcon_given_law
    public :: given_law_t, given_points_t, given_response_t
    public :: given_law_take, given_points_make_room, given_rest_stiffness, given_state
 
-   !> The energy W(E11, E22, 2 E12) per reference volume [M/(L T^2)] of a material. Without NLGEOM
-   !> the strain is the small one.
+   !> One of two: the energy W(E11, E22, 2 E12) per reference volume [M/(L T^2)] of a material, or
+   !> `law`, which takes the constants of its card. Without NLGEOM the strain is the small one.
    type :: given_law_t
       character(len=:), allocatable :: material  !! its name
       class(point_function_t), allocatable :: energy
+      class(law_t), allocatable :: law
    end type given_law_t
 
    !> All quadrature points of the elements of one law.
@@ -45,14 +47,23 @@ contains
       type(given_law_t), intent(inout) :: law
       type(error_t), allocatable, intent(out) :: error
       type(given_law_t), intent(in), optional :: given(:)   !! one for each such material
+      character(len=:), allocatable :: fault
       integer :: i
 
       if (present(given)) then
          do i = 1, size(given)
             if (given(i)%material /= material%name) cycle
             law%material = material%name
-            allocate(law%energy, source=given(i)%energy)
+            if (allocated(given(i)%energy)) allocate(law%energy, source=given(i)%energy)
+            if (allocated(given(i)%law)) allocate(law%law, source=given(i)%law)
          end do
+      end if
+      if (allocated(law%law)) then
+         call law%law%take(material%constant, fault)
+         law%law%density = material%density
+         if (fault /= "") call raise(error, err_input, where_text(scene, material%origin) &
+            // ": error: material " // material%name // ": " // fault)
+         return
       end if
       if (.not. allocated(law%energy)) then
          call raise(error, err_input, where_text(scene, material%origin) // ": error: material " &

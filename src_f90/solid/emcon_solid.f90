@@ -116,7 +116,10 @@ contains
             cycle
          case (law_given)
             call given_law_take(scene, scene%material(k), self%given(k), error, given)
-            if (.not. allocated(error)) call given_rest_stiffness(self%given(k), at_rest(k), error)
+            if (allocated(error)) return
+            call move_alloc(self%given(k)%law, self%law(k)%law)
+            if (allocated(self%given(k)%energy)) call given_rest_stiffness(self%given(k), &
+               at_rest(k), error)
          case default
             call law_create(scene%material(k)%law, scene%material(k)%constant, self%law(k)%law, &
                error)
@@ -125,10 +128,11 @@ contains
                return
             end if
             self%law(k)%law%density = scene%material(k)%density
-            call law_response_plane(self%law(k)%law, rest, rest, state)
-            at_rest(k) = maxval(abs(state%tangent))
          end select
          if (allocated(error)) return
+         if (.not. allocated(self%law(k)%law)) cycle
+         call law_response_plane(self%law(k)%law, rest, rest, state)
+         at_rest(k) = maxval(abs(state%tangent))
       end do
    end subroutine init_laws
 

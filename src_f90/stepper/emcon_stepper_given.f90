@@ -9,6 +9,7 @@ module emcon_stepper_given
    use emcon_given, only : given_add_force, given_add_law
    use emcon_given_check, only : given_check_force, given_check_mass
    use emcon_given_force, only : given_force_t
+   use emcon_law, only : law_t
    use emcon_law_registry, only : law_given
    use emcon_node_potential, only : node_potential_init, node_potential_t
    use emcon_point_function, only : point_function_t
@@ -19,11 +20,16 @@ module emcon_stepper_given
    private
    public :: stepper_give_law, stepper_give_potential, stepper_give_force, stepper_give_mass
 
+   !> Give the law of a *USER MATERIAL: its strain energy at points, or a type that extends `law_t`.
+   interface stepper_give_law
+      module procedure give_energy, give_law
+   end interface stepper_give_law
+
 contains
 
    !> Give the strain energy of the *USER MATERIAL called `name`: W(E11, E22, 2 E12) per reference
    !> volume [M/(L T^2)].
-   subroutine stepper_give_law(self, name, energy, error)
+   subroutine give_energy(self, name, energy, error)
       type(stepper_t), intent(inout) :: self
       character(len=*), intent(in) :: name           !! small or capital letters
       class(point_function_t), intent(in) :: energy
@@ -33,8 +39,22 @@ contains
       material = to_upper(trim(adjustl(name)))
       call check_stage(self, error)
       if (.not. allocated(error)) call check_material(self, material, error)
-      if (.not. allocated(error)) call given_add_law(self%given, material, energy)
-   end subroutine stepper_give_law
+      if (.not. allocated(error)) call given_add_law(self%given, material, energy=energy)
+   end subroutine give_energy
+
+   !> Give a law for the *USER MATERIAL called `name`. It takes the constants of that card.
+   subroutine give_law(self, name, law, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name           !! small or capital letters
+      class(law_t), intent(in) :: law
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+      character(len=:), allocatable :: material
+
+      material = to_upper(trim(adjustl(name)))
+      call check_stage(self, error)
+      if (.not. allocated(error)) call check_material(self, material, error)
+      if (.not. allocated(error)) call given_add_law(self%given, material, law=law)
+   end subroutine give_law
 
    !> Can a law be given for the material `name`?
    subroutine check_material(self, name, error)

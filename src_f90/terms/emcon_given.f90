@@ -3,6 +3,7 @@ module emcon_given
    use emcon_csr, only : csr_t
    use emcon_given_force, only : given_force_box_t, given_force_t
    use emcon_given_law, only : given_law_t
+   use emcon_law, only : law_t
    use emcon_point_function, only : point_function_t
    implicit none
    private
@@ -43,11 +44,12 @@ contains
       if (allocated(self%force)) n(1) = size(self%force)
    end function given_count
 
-   !> Append a copy of the strain energy of the material `name`.
-   subroutine given_add_law(self, name, energy)
+   !> Append a copy of the strain energy, or of the law, of the material `name`.
+   subroutine given_add_law(self, name, energy, law)
       type(given_t), intent(inout) :: self
       character(len=*), intent(in) :: name       !! as in `material_t`
-      class(point_function_t), intent(in) :: energy
+      class(point_function_t), intent(in), optional :: energy
+      class(law_t), intent(in), optional :: law   !! one of the two is there
       type(given_law_t), allocatable :: longer(:)
       integer :: i, n
 
@@ -57,9 +59,11 @@ contains
       do i = 1, n
          longer(i)%material = self%law(i)%material
          call move_alloc(self%law(i)%energy, longer(i)%energy)
+         call move_alloc(self%law(i)%law, longer(i)%law)
       end do
       longer(n + 1)%material = name
-      allocate(longer(n + 1)%energy, source=energy)
+      if (present(energy)) allocate(longer(n + 1)%energy, source=energy)
+      if (present(law)) allocate(longer(n + 1)%law, source=law)
       call move_alloc(longer, self%law)
    end subroutine given_add_law
 

@@ -24,6 +24,13 @@ def run(*command: object, **more: object) -> str:
     return done.stdout
 
 
+def install(prefix: Path) -> dict[str, str]:
+    """Install the library under `prefix`; the environment of programs that use it."""
+    run("make", "install", f"PREFIX={prefix}", cwd=ROOT)
+    return os.environ | {"PKG_CONFIG_PATH": str(prefix/"lib"/"pkgconfig"),
+                         "LD_LIBRARY_PATH": str(prefix/"lib"), "PREFIX": str(prefix)}
+
+
 def need(program: str) -> None:
     if not shutil.which(program):
         pytest.skip(f"there is no {program} here")
