@@ -286,12 +286,9 @@ contains
       real(wp), intent(in) :: h
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: restored
-      logical :: has_root
       integer :: i, a, k
 
-      associate (state => self%state, system => self%system, set => self%active%set, &
-            step => scene%step(self%state%i_step))
+      associate (state => self%state, system => self%system, set => self%active%set)
          system%residual = system%residual - self%newton%contact
          call gather_dependent(system%numbering, system%residual)
          call book_stabilization(self, increment)
@@ -308,17 +305,9 @@ contains
          state%reaction = system%residual
          if (set%n_linear > 0) call constraints_force(set, set%n_linear + 1, self%newton%contact)
          call book_work(self)
-         restored = 0.0_wp
-         if (step%initiation == initiation_velocity_update .and. self%scheme%has_inertia) then
-            call velocity_update_apply(self%velocity_update, system, set, self%v1, restored, &
-               has_root, error)
-            if (allocated(error)) return
-            self%ledger%contact_work = self%ledger%contact_work + restored
-            if (restored > 0.0_wp) call note_add(increment%notes, &
-               "velocity update restores an energy of " // to_text(restored))
-            if (.not. has_root) call note_add(increment%notes, &
-               "velocity update: no root, the energy lost in this step is not restored")
-         end if
+         if (scene%step(state%i_step)%initiation == initiation_velocity_update &
+            .and. self%scheme%has_inertia) call restore_energy(self, increment%notes, error)
+         if (allocated(error)) return
          state%u = state%u + self%motion%du
          state%v = self%v1
          state%contact = self%newton%contact
@@ -346,6 +335,24 @@ contains
          end do
       end associate
    end subroutine commit
+
+   !> Give back by a jump of the velocities what closing contacts have taken.
+   subroutine restore_energy(self, notes, error)
+      type(march_t), intent(inout) :: self
+      type(notes_t), intent(inout) :: notes      !! for the log
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: restored
+      logical :: has_root
+
+      call velocity_update_apply(self%velocity_update, self%system, self%active%set, self%v1, &
+         restored, has_root, error)
+      if (allocated(error)) return
+      self%ledger%contact_work = self%ledger%contact_work + restored
+      if (restored > 0.0_wp) call note_add(notes, "velocity update restores an energy of " // &
+         to_text(restored))
+      if (.not. has_root) call note_add(notes, &
+         "velocity update: no root, the energy lost in this step is not restored")
+   end subroutine restore_energy
 
    !> Tell of what moves with nothing to hold it, and of what was brought into contact without load.
    !> The stiffness of STABILIZE is in the tangent alone: it bears what the balance leaves over.

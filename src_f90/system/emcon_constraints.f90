@@ -33,6 +33,14 @@ module emcon_constraints
       type(csr_t) :: gap_rows                    !! (n x n_unknown) gradients at the end
    end type constraint_set_t
 
+   !> One row while it is made.
+   type :: row_t
+      integer :: n = 0
+      integer, allocatable :: column(:)          !! (>= n) from 0
+      real(wp), allocatable :: g(:)              !! (>= n) discrete gradient
+      real(wp), allocatable :: c(:)              !! (>= n) gradient at the end
+   end type row_t
+
 contains
 
    !> Take the constraints `id` as the active ones; multipliers start at zero.
@@ -103,96 +111,108 @@ contains
    subroutine constraints_rows(self, numbering)
       type(constraint_set_t), intent(inout) :: self
       type(numbering_t), intent(in) :: numbering
-      integer :: k, i, a, n, m, most
-      integer, allocatable :: column(:), order(:)
-      real(wp), allocatable :: g(:), c(:)
+      type(row_t) :: row
+      integer, allocatable :: order(:)
+      integer :: room(self%n), k, n
 
-      most = 0
       do k = 1, self%n
-         most = max(most, room(k))
+         room(k) = entries_of(self%item(k), numbering)
       end do
-      allocate(column(most), order(most), g(most), c(most))
-      call reset(self%force_rows)
-      call reset(self%gap_rows)
+      n = maxval([0, room])
+      allocate(row%column(n), row%g(n), row%c(n), order(n))
+      call make_room(self%force_rows, self%n, numbering%n_unknown, sum(room))
+      call make_room(self%gap_rows, self%n, numbering%n_unknown, sum(room))
       n = 0
       do k = 1, self%n
-         m = 0
-         do i = 1, self%item(k)%n_node
-            do a = 1, 2
-               call add_terms(2*(self%item(k)%node(i) - 1) + a, self%item(k)%g(a, i), &
-                  self%item(k)%c(a, i))
-            end do
-         end do
-         order(:m) = insertion_order(column(:m))
-         self%force_rows%column(n + 1:n + m) = column(order(:m))
-         self%force_rows%value(n + 1:n + m) = real(g(order(:m)), dp)
-         self%gap_rows%value(n + 1:n + m) = real(c(order(:m)), dp)
-         n = n + m
+         ! A linear constraint stands on single freedoms.
+         call fill_row(row, self%item(k), numbering, leaves_zeros=k > self%n_linear)
+         associate (m => row%n)
+            order(:m) = insertion_order(row%column(:m))
+            self%force_rows%column(n + 1:n + m) = row%column(order(:m))
+            self%force_rows%value(n + 1:n + m) = real(row%g(order(:m)), dp)
+            self%gap_rows%value(n + 1:n + m) = real(row%c(order(:m)), dp)
+            n = n + m
+         end associate
          self%force_rows%row_start(k + 1) = n
       end do
       self%gap_rows%row_start = self%force_rows%row_start
       self%gap_rows%column = self%force_rows%column
-
-   contains
-
-      !> Entries of constraint `k` at most.
-      pure integer function room(k)
-         integer, intent(in) :: k
-         integer :: i
-
-         room = 0
-         do i = 1, self%item(k)%n_node
-            associate (node => self%item(k)%node(i))
-               room = room + numbering%start(2*node + 1) - numbering%start(2*node - 1)
-            end associate
-         end do
-      end function room
-
-      !> Share out the derivatives by freedom `dof`; unknowns that are met again are summed up.
-      subroutine add_terms(dof, dg, dc)
-         integer, intent(in) :: dof
-         real(wp), intent(in) :: dg, dc
-         integer :: t, place
-
-         ! A linear constraint stands on single freedoms.
-         if (k <= self%n_linear .and. abs(dg) <= 0.0_wp) return
-         do t = numbering%start(dof) + 1, numbering%start(dof + 1)
-            if (numbering%column(t) == 0) cycle
-            place = 0
-            if (numbering%n_dependent > 0) place = findloc(column(:m), numbering%column(t) - 1, 1)
-            if (place == 0) then
-               m = m + 1
-               place = m
-               column(m) = numbering%column(t) - 1
-               g(m) = 0.0_wp
-               c(m) = 0.0_wp
-            end if
-            g(place) = g(place) + numbering%weight(t)*dg
-            c(place) = c(place) + numbering%weight(t)*dc
-         end do
-      end subroutine add_terms
-
-      !> Room for all entries of all constraints.
-      subroutine reset(rows)
-         type(csr_t), intent(inout) :: rows
-         integer :: n_entry, k
-
-         n_entry = 0
-         do k = 1, self%n
-            n_entry = n_entry + room(k)
-         end do
-         rows%n_row = self%n
-         rows%n_col = numbering%n_unknown
-         if (allocated(rows%row_start)) then
-            if (size(rows%row_start) == self%n + 1 .and. size(rows%column) == n_entry) return
-            deallocate(rows%row_start, rows%column, rows%value)
-         end if
-         allocate(rows%row_start(self%n + 1), source=0)
-         allocate(rows%column(n_entry), source=0)
-         allocate(rows%value(n_entry), source=0.0_dp)
-      end subroutine reset
-
    end subroutine constraints_rows
+
+   !> So many unknowns a condition stands on, at most.
+   pure integer function entries_of(item, numbering)
+      type(condition_t), intent(in) :: item
+      type(numbering_t), intent(in) :: numbering
+      integer :: i
+
+      entries_of = 0
+      do i = 1, item%n_node
+         associate (node => item%node(i), n_dim => size(item%g, 1))
+            entries_of = entries_of + numbering%start(n_dim*node + 1) &
+               - numbering%start(n_dim*(node - 1) + 1)
+         end associate
+      end do
+   end function entries_of
+
+   !> Rows of `n` constraints with `n_entry` entries at most; what fits is kept.
+   pure subroutine make_room(rows, n, n_unknown, n_entry)
+      type(csr_t), intent(inout) :: rows
+      integer, intent(in) :: n, n_unknown, n_entry
+
+      rows%n_row = n
+      rows%n_col = n_unknown
+      if (allocated(rows%row_start)) then
+         if (size(rows%row_start) == n + 1 .and. size(rows%column) == n_entry) return
+         deallocate(rows%row_start, rows%column, rows%value)
+      end if
+      allocate(rows%row_start(n + 1), source=0)
+      allocate(rows%column(n_entry), source=0)
+      allocate(rows%value(n_entry), source=0.0_dp)
+   end subroutine make_room
+
+   !> The derivatives of a condition by the unknowns, in the order in which these are met.
+   pure subroutine fill_row(row, item, numbering, leaves_zeros)
+      type(row_t), intent(inout) :: row
+      type(condition_t), intent(in) :: item
+      type(numbering_t), intent(in) :: numbering
+      logical, intent(in) :: leaves_zeros        !! also freedoms that it does not depend on
+      integer :: i, a
+
+      row%n = 0
+      do i = 1, item%n_node
+         do a = 1, size(item%g, 1)
+            if (.not. leaves_zeros .and. abs(item%g(a, i)) <= 0.0_wp) cycle
+            call share_out(row, numbering, size(item%g, 1)*(item%node(i) - 1) + a, &
+               item%g(a, i), item%c(a, i))
+         end do
+      end do
+   end subroutine fill_row
+
+   !> Share out the derivatives by freedom `dof`; unknowns that are met again are summed up.
+   pure subroutine share_out(row, numbering, dof, dg, dc)
+      type(row_t), intent(inout) :: row
+      type(numbering_t), intent(in) :: numbering
+      integer, intent(in) :: dof
+      real(wp), intent(in) :: dg, dc             !! discrete gradient, gradient at the end
+      integer :: t, place
+
+      do t = numbering%start(dof) + 1, numbering%start(dof + 1)
+         associate (column => numbering%column(t) - 1, weight => numbering%weight(t))
+            if (column < 0) cycle
+            place = 0
+            if (numbering%n_dependent > 0) place = findloc(row%column(:row%n), column, 1)
+            if (place == 0) then
+               row%n = row%n + 1
+               place = row%n
+               row%column(place) = column
+               row%g(place) = 0.0_wp
+               row%c(place) = 0.0_wp
+            end if
+            row%g(place) = row%g(place) + weight*dg
+            row%c(place) = row%c(place) + weight*dc
+         end associate
+      end do
+   end subroutine share_out
 
    !> The order that sorts a short list.
    pure function insertion_order(key) result(order)
