@@ -173,9 +173,10 @@ def main():
                 print(f"{path}:{': '.join(map(str, finding))}")
         return
     found, record = counts(ROOT), json.loads(RECORD.read_text())
-    for kind, rooms in record.items():
-        for room, most in rooms.items():
-            print(f"{kind:18} {room:10} {found[kind].get(room, 0):5} of {most}")
+    for kind, rooms in found.items():
+        for room in sorted({*rooms, *record[kind]}):
+            most = record[kind].get(room, 0)
+            print(f"{kind:18} {room:10} {rooms.get(room, 0):5} of {most}")
     if faults := list(risen(found, record)):
         sys.exit("\n".join(faults))
     if options.update:

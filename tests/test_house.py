@@ -138,14 +138,19 @@ def hidden(root):
 
 
 def theory_numbers(root):
-    """Equations that sources cite and docs/theory.md does not have; the paper has its own."""
-    numbers = set(re.findall(r"\\tag\{(\w+)\}", (root / "docs/theory.md").read_text()))
+    """Equations and sections that sources cite and docs/theory.md does not have."""
+    theory = (root / "docs/theory.md").read_text()
+    numbers = set(re.findall(r"\\tag\{(\w+)\}", theory))
+    sections = set(re.findall(r"^##+ ([\d.]+) ", theory, re.M))
     for path in sources(root):
         comments = " ".join(re.findall(r"!+[<>]?\s?(.*)", path.read_text()))
         for kind, cited in re.findall(CITED, comments):
             for number in re.findall(r"\w+", re.sub(r"and|to", "", cited)):
                 if not kind.startswith("paper") and number not in numbers:
                     yield f"{path.relative_to(root)}: eq. ({number}) is not in docs/theory.md"
+        for cited in re.findall(r"theory\.md, sections? ((?:\d[\d.]*(?:, | and )?)+)", comments):
+            for number in set(re.findall(r"\d+(?:\.\d+)?", cited)) - sections:
+                yield f"{path.relative_to(root)}: section {number} is not in docs/theory.md"
 
 
 CHECKS = {
@@ -190,6 +195,7 @@ def test_one_version():
 GOOD = {
     "base/emcon_kinds.F90": "module emcon_kinds ! the kinds\nend module emcon_kinds\n",
     "base/emcon_text.f90": "!> Source: docs/theory.md, eqs. (1) and (2b); paper eq. (9).\n"
+    "!> Source: docs/theory.md, section 4.\n"
     "module emcon_text\n   use emcon_kinds, only : wp\n"
     "   ! stop\n   text = 'stop'; stop_at = 1\nend module emcon_text\n",
     "stepper/emcon_stepper.f90": "module emcon_stepper\n   use :: emcon_text\n"
@@ -199,6 +205,9 @@ GOOD = {
 }
 BAD = {
     "theory": {"base/emcon_a.f90": "module emcon_a ! eqs. (1) and (3a)\nend module emcon_a\n"},
+    "theory, section": {
+        "base/emcon_a.f90": "module emcon_a ! docs/theory.md, sections 4 and 4.2.\nend module\n"
+    },
     "theory, two lines": {
         "base/emcon_a.f90": "!> Source: docs/theory.md,\n!> eq. (4).\nmodule emcon_a\nend module\n"
     },
@@ -236,7 +245,7 @@ def build(root, files):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     (root / "docs").mkdir(exist_ok=True)
-    (root / "docs/theory.md").write_text("$$x = 1 \\tag{1}$$\n$$y = 2, \\tag{2b}$$\n")
+    (root / "docs/theory.md").write_text("## 4 X\n$$x = 1 \\tag{1}$$\n$$y = 2, \\tag{2b}$$\n")
     return root
 
 
