@@ -205,16 +205,18 @@ kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/ker
 PY_READY := .venv/run.stamp
 P := $(BUILD)/py
 PACKAGE := pywrap/emcon
-FLAT := $(wildcard src_f90/border/emcon_flat*.f90)
+HEADERS := src_f90/border/emcon.h src_f90/border/emcon_interface.h
 
-# One run writes both files. A kind that f2py does not know becomes C float without an error.
-$(P)/_coremodule.c $(P)/_core-f2pywrappers2.f90 $(P)/fortranobject.c $(P)/include.txt &: \
-		$(FLAT) $(BUILD)/sources.txt $(PY_READY)
-	@echo "  F2PY  $(FLAT)"
+# What C has is what Python calls: the signatures are made from the headers.
+$(P)/_core.pyf: pywrap/make_pyf.py $(HEADERS) $(PY_READY)
+	@echo "  PYF   $(HEADERS)"
 	$(Q)mkdir -p $(P)
-	$(Q)$(PY) -m numpy.f2py $(FLAT) -m _core --build-dir $(P) > $(P)/f2py.log 2>&1 \
+	$(Q)$(PY) $< $(HEADERS) > $@
+
+$(P)/_coremodule.c $(P)/fortranobject.c $(P)/include.txt &: $(P)/_core.pyf
+	@echo "  F2PY  $<"
+	$(Q)$(PY) -m numpy.f2py $< --build-dir $(P) > $(P)/f2py.log 2>&1 \
 		|| { cat $(P)/f2py.log; exit 1; }
-	$(Q)if grep -n 'is mapped to C "float"' $(P)/f2py.log; then exit 1; fi
 	$(Q)cp $$($(PY) -c 'import numpy.f2py as f; print(f.get_include())')/fortranobject.[ch] $(P)
 	$(Q)$(PY) -c 'import numpy; print("-I" + numpy.get_include())' > $(P)/include.txt
 
@@ -223,16 +225,11 @@ $(PYTHON_INCLUDE)/Python.h:
 
 $(P)/%.o: $(P)/%.c $(P)/include.txt $(PYTHON_INCLUDE)/Python.h $(BUILD)/flags.txt
 	@echo "  CC    $<"
-	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) @$(P)/include.txt $(CFLAGS) -c $< -o $@
+	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) -Isrc_f90/border @$(P)/include.txt $(CFLAGS) -c $< -o $@
 
-$(P)/_core-f2pywrappers2.o: $(P)/_core-f2pywrappers2.f90 $(call objects,$(FLAT))
-	@echo "  FC    $<"
-	$(Q)$(FC) -O2 -g -fPIC -I$(BUILD)/mod -J$(P) $(FFLAGS) -c $< -o $@
-
-$(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o _core-f2pywrappers2.o fortranobject.o) \
-		$(BUILD)/$(SHARED)
+$(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o fortranobject.o) $(BUILD)/$(SHARED)
 	@echo "  LINK  $@"
-	$(Q)$(FC) -shared -o $@ $^ -Wl,-rpath,'$$ORIGIN'
+	$(Q)$(CC) -shared -o $@ $^ -Wl,-rpath,'$$ORIGIN'
 
 # The package holds the extension of the mode made last. `install` replaces a file, where `cp`
 # would write into one that a running Python has mapped.

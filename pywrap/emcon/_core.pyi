@@ -1,12 +1,10 @@
-"""The compiled extension: one object for each module of flat calls. Their signatures: `__doc__`."""
+"""The compiled extension: the functions of emcon.h and emcon_interface.h, and their constants.
+
+It is made from these headers. Signatures: `__doc__` of each function.
+"""
 
 from typing import Any
 
-emcon_flat: Any
-emcon_flat_conditions: Any
-emcon_flat_given: Any
-emcon_flat_interface: Any
-emcon_flat_interface_step: Any
-emcon_flat_query: Any
-emcon_flat_source: Any
-emcon_flat_state: Any
+STRUCTURES: str
+
+def __getattr__(name: str) -> Any: ...

@@ -10,8 +10,6 @@ from .arguments import labels, number, real_array
 from .errors import InputError
 from .handle import Handle
 
-_conditions = _core.emcon_flat_conditions
-
 
 class Conditions:
     """What a stepper offers to change loads and boundary values of the present step of the deck.
@@ -30,21 +28,21 @@ class Conditions:
 
         The arguments are numbers or lists, and the deck has such a load in the present step.
         """
-        self._set_loads(1, node, dof, value)
+        self._set_loads(_core.EMCON_LOAD_POINT, node, dof, value)
 
     def set_pressure(self, element: ArrayLike, face: ArrayLike, value: ArrayLike) -> None:
         """Give the pressure on `face` (1 to 4) of `element`, > 0 inwards, a new value [M/(L T^2)].
 
         The arguments are numbers or lists, and the deck has such a load in the present step.
         """
-        self._set_loads(2, element, face, value)
+        self._set_loads(_core.EMCON_LOAD_PRESSURE, element, face, value)
 
     def set_gravity(self, element: ArrayLike, value: ArrayLike) -> None:
         """Give the gravity on `element` a new value [L/T^2]; its direction stays.
 
         The arguments are numbers or lists, and the deck has such a load in the present step.
         """
-        self._set_loads(3, element, 0, value)
+        self._set_loads(_core.EMCON_LOAD_GRAVITY, element, 0, value)
 
     def _set_loads(self, kind: int, label: ArrayLike, place: ArrayLike, value: ArrayLike) -> None:
         label = labels(label, "the label")
@@ -59,18 +57,31 @@ class Conditions:
             raise InputError("labels, places and values are to be of the same number") from error
         if not label.size:
             raise InputError("no node or element is named")
-        self._handle.change(_conditions.set_loads, kind, label, place, value)
+        self._handle.change(_set_loads, kind, label.tolist(), place.tolist(), value.tolist())
 
     def prescribe(self, node: int, dof: int, value: float) -> None:
         """Prescribe displacement `dof` (1, 2) of `node` [L], whether it was free before or not.
 
         What was free gets no equation any more: `n_unknown` and `unknowns` change.
         """
-        self._handle.change(_conditions.prescribe, *_freedom(node, dof), number(value, "the value"))
+        value = number(value, "the value")
+        self._handle.change(_core.emcon_prescribe, *_freedom(node, dof), value)
 
     def release(self, node: int, dof: int) -> None:
         """Set displacement `dof` (1, 2) of `node` free, which was prescribed."""
-        self._handle.change(_conditions.release, *_freedom(node, dof))
+        self._handle.change(_core.emcon_remove_prescribed, *_freedom(node, dof))
+
+
+def _set_loads(address: int, kind: int, labels: list[int], places: list[int],
+               values: list[float]) -> int:
+    """The status of giving loads new values: none is changed before all are found."""
+    loads = []
+    for label, place in zip(labels, places):
+        status, load = _core.emcon_find_load(address, kind, label, place)
+        if status:
+            return int(status)
+        loads.append(load)
+    return max(_core.emcon_set_load(address, load, value) for load, value in zip(loads, values))
 
 
 def _freedom(node: int, dof: int) -> tuple[int, int]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import _core
+import ctypes
 
-_flat = _core.emcon_flat
+from . import _core
 
 
 class InputError(ValueError):
@@ -21,5 +21,11 @@ _KINDS = {2: InputError, 3: AnalysisError, 4: OSError}
 def check(handle: int, ierr: int) -> None:
     """Raise what the status `ierr` of a call with the model `handle` stands for; 0 is success."""
     if ierr:
-        text = _flat.last_error(handle).decode("utf-8", "replace").rstrip()
-        raise _KINDS.get(ierr, RuntimeError)(text)
+        raise _KINDS.get(ierr, RuntimeError)(message(handle))
+
+
+def message(handle: int) -> str:
+    """Text of the last failure of a model, all messages of a deck one per line."""
+    if not handle:
+        return "the model is closed"
+    return ctypes.string_at(_core.emcon_message(handle)).decode("utf-8", "replace").rstrip()

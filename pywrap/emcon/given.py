@@ -22,8 +22,8 @@ from . import _core
 from .csr import Csr
 from .errors import InputError, check
 from .given_matrices import as_csr, check_csr, fitting, is_sparse, keys_of, symmetric_pattern
-
-_flat = _core.emcon_flat_given
+from .memory import matrix_bytes, structure
+from .memory import reals as _view
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,6 @@ Array = NDArray[np.float64]
 PointFunction = Callable[[Array], tuple[ArrayLike, ArrayLike, ArrayLike]]
 
 _OK, _OUTSIDE, _FAILED = 0, 1, 2
-_REAL = np.dtype(float).str
 
 _INT, _POINTER = ctypes.c_int, ctypes.c_void_p
 _POINT = ctypes.CFUNCTYPE(_INT, _POINTER, _INT, _INT, _POINTER, _INT, _POINTER, _POINTER,
@@ -63,19 +62,6 @@ class Solid(Protocol):
         a step too: half the second derivative of E.
         """
         ...
-
-
-class _Memory:
-    """Reals of the library, as numpy finds them: no copy, and no type made for each size."""
-
-    def __init__(self, address: int, shape: tuple[int, ...]) -> None:
-        self.__array_interface__ = {"version": 3, "typestr": _REAL, "data": (address, False),
-                                    "shape": shape}
-
-
-def _view(address: int, *shape: int) -> Array:
-    """The array of the library at `address`; not to be used after the call."""
-    return np.asarray(_Memory(address, shape))
 
 
 def _check_three(result: Any, name: str, what: str) -> None:
@@ -169,7 +155,7 @@ class GivenLaw(GivenPoints):
         self.material = material
 
     def give(self, handle: int) -> None:
-        check(handle, _flat.give_law(handle, self.material.encode(), self.address))
+        check(handle, _core.emcon_give_law(handle, self.material.encode(), self.address, 0))
 
 
 class GivenPotential(GivenPoints):
@@ -181,19 +167,22 @@ class GivenPotential(GivenPoints):
         self.nodes = nodes
 
     def give(self, handle: int) -> None:
-        check(handle, _flat.give_potential(handle, self.name.encode(), self._indices(handle),
-                                           self.address))
+        check(handle, _core.emcon_give_potential(handle, self.name.encode(), self._indices(handle),
+                                                 self.address, 0))
 
     def _indices(self, handle: int) -> NDArray[np.int64]:
-        n = _status_last(handle, _flat.count_nodes(handle))[0]
+        n = count_nodes(handle)
         name = self.nodes if isinstance(self.nodes, str) else ""
         if isinstance(self.nodes, str) and not name.strip():
             raise InputError(f"{self.name}: {name!r} is not the name of a node set")
-        label, is_in = _status_last(handle, _flat.find_nodes(handle, name.encode(), n))
         if self.nodes is None:
             return np.arange(n)
         if name:
+            status, is_in = _core.emcon_find_nodes(handle, name.encode(), n)
+            check(handle, status)
             return np.flatnonzero(is_in)
+        status, label = _core.emcon_get_labels(handle, n)
+        check(handle, status)
         order = np.argsort(label)
         place = np.minimum(np.searchsorted(label, self.nodes, sorter=order), n - 1)
         found = order[place]
@@ -221,8 +210,8 @@ class GivenSolid(_Given):
         self._foreign: tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None = None
 
     def give(self, handle: int) -> None:
-        check(handle, _flat.give_force(handle, self.name.encode(), self.pattern.indptr,
-                                       self.pattern.indices, self.address))
+        check(handle, _core.emcon_give_force(handle, self.name.encode(),
+                                             matrix_bytes(self.pattern), self.address, 0))
 
     def _first_pattern(self) -> Csr:
         """Which freedoms depend on which: `solid.pattern`, or those of nodes that meet at rest.
@@ -353,6 +342,8 @@ def raise_kept(given: list[Any], status: int, failure: Callable[[], str]) -> Non
         del raised, exception      # its traceback has this frame
 
 
-def _status_last(handle: int, found: tuple[Any, ...]) -> tuple[Any, ...]:
-    check(handle, found[-1])
-    return found[:-1]
+def count_nodes(handle: int) -> int:
+    """Nodes of the library model `handle`, which was read."""
+    status, sizes = _core.emcon_get_sizes(handle)
+    check(handle, status)
+    return int(structure("emcon_sizes", sizes)["n_node"])

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from .csr import Csr
 from .errors import InputError, check
-
-_flat = _core.emcon_flat_given
+from .memory import matrix_bytes
 
 Array = NDArray[np.float64]
 
@@ -42,7 +41,7 @@ def give_masses(handle: int, masses: list[Csr]) -> None:
     data = np.bincount(place, np.concatenate([mass.data for mass in masses]),
                        len(keys)).astype(float)
     total = masses[0] if len(masses) == 1 else _sorted_csr(n, keys//n, keys % n, data)
-    check(handle, _flat.give_mass(handle, total.indptr, total.indices, total.data))
+    check(handle, _core.emcon_give_mass(handle, matrix_bytes(total)))
 
 
 def given_mass(matrix: Any, n_node: int) -> Csr:

@@ -5,24 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-import numpy as np
-
 from . import _core
-from .errors import InputError, check
+from .errors import InputError, check, message
 from .given import raise_kept, uninterrupted
-
-_flat = _core.emcon_flat
 
 
 class Handle:
-    """A library model without contents, to be read or built into; freed by `close`.
+    """A library model, none at first: to be read by `open`, freed by `close`.
 
     The library lets other threads run while it works, so a call while another one is under way
     raises `InputError` instead of meeting it in the same model.
     """
 
     def __init__(self) -> None:
-        self.address = int(_flat.new_model())
+        self.address = 0
         #: Counts what makes evaluations stale, and what replaces the report of constraints.
         self.n_changes = 0
         self.n_reports = 0
@@ -30,8 +26,13 @@ class Handle:
         #: Functions of Python that the model calls; they live as long as it does.
         self.given: list[Any] = []
 
+    def open(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Make the model by `function(*arguments)`, which returns the status and its address."""
+        status, self.address = function(*arguments)
+        check(self.address, status)
+
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """`function(address, *arguments)` without its last result, the status.
+        """`function(address, *arguments)` without its first result, the status.
 
         One result comes as it is, several as a tuple. Raises what the status stands for.
         """
@@ -42,20 +43,22 @@ class Handle:
                              "function of yours was called from")
         try:
             self._is_busy = True
+            if not self.address:
+                raise InputError(message(0))
             found = (uninterrupted(function, self.address, *arguments) if self.given
                      else function(self.address, *arguments))
             values = found if isinstance(found, tuple) else (found,)
-            raise_kept(self.given, values[-1], self._text)
-            check(self.address, values[-1])
+            raise_kept(self.given, values[0], self._text)
+            check(self.address, values[0])
         finally:
             self._is_busy = False
             for item in self.given:
                 item.exception = None
-        return values[0] if len(values) == 2 else values[:-1]
+        return values[1] if len(values) == 2 else values[1:]
 
     def _text(self) -> str:
         """Of the last error."""
-        return str(_flat.last_error(self.address).decode("utf-8", "replace").rstrip())
+        return message(self.address)
 
     def change(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """The same for calls after which evaluations no longer belong to the model."""
@@ -69,7 +72,7 @@ class Handle:
         address, self.address = self.address, 0
         self.n_changes += 1
         if address:
-            _flat.close_model(address)
+            _core.emcon_close(address)
         self.given = []
 
     def __reduce__(self) -> NoReturn:

@@ -41,19 +41,17 @@ from . import _core
 from .arguments import flag_array, number, real_array
 from .csr import Csr
 from .errors import _KINDS, InputError
+from .memory import copied, csr, made, matrix, structure, structures, text, whole
 
 __all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome"]
 
-_build = _core.emcon_flat_interface
-_step = _core.emcon_flat_interface_step
-
-_FORMULATIONS = {"node to segment": 1, "segment": 2, "mortar": 3}
-_INTEGRATIONS = {"segments": 1, "elements": 2}
-_MULTIPLIERS = {"standard": 1, "dual": 2}
-_NORMALS = {"edge": 1, "nodal": 2}
-_SMOOTHINGS = {"none": 1, "hermite": 2}
-_INITIATIONS = {"persistent": 1, "admissible": 2}
-_G, _C, _CURVATURE, _P, _DF, _LINKS, _D, _M = range(1, 9)
+_FORMULATIONS = {"node to segment": _core.EMCON_NODE_TO_SEGMENT, "segment": _core.EMCON_SEGMENT,
+                 "mortar": _core.EMCON_MORTAR}
+_INTEGRATIONS = {"segments": _core.EMCON_SEGMENTS, "elements": _core.EMCON_ELEMENTS}
+_MULTIPLIERS = {"standard": _core.EMCON_STANDARD, "dual": _core.EMCON_DUAL}
+_NORMALS = {"edge": _core.EMCON_EDGE_NORMAL, "nodal": _core.EMCON_NODAL_NORMAL}
+_SMOOTHINGS = {"none": _core.EMCON_UNSMOOTHED, "hermite": _core.EMCON_HERMITE}
+_INITIATIONS = {"persistent": _core.EMCON_PERSISTENT, "admissible": _core.EMCON_ADMISSIBLE}
 
 _Args = ParamSpec("_Args")
 _R = TypeVar("_R")
@@ -66,13 +64,13 @@ Ints = NDArray[np.int32]
 class Outcome(enum.Enum):
     """How the search for the active set ended."""
 
-    DONE = 0
+    DONE = _core.EMCON_STEP_DONE
     #: The sets repeat: try a smaller step.
-    CYCLING = 5
+    CYCLING = _core.EMCON_STEP_CYCLING
     #: The motion leaves what contact was chosen for: try a smaller step.
-    TOO_FAR = 6
+    TOO_FAR = _core.EMCON_STEP_TOO_FAR
     #: A contact would begin farther away than `gap_tolerance`: try a smaller step.
-    STANDS_OFF = 7
+    STANDS_OFF = _core.EMCON_STEP_STANDS_OFF
 
 
 @dataclass(frozen=True)
@@ -178,7 +176,7 @@ class Interface:
         self.n_contact = 0      #: contacts possible, known after `prepare`
         self.n_unknown = 0      #: freedoms neither held nor tied to others, known after `prepare`
         self._n_surface = self._n_tie = 0
-        self._handle = int(_build.new_interface(x.T)[0])
+        self._handle = _core.emcon_interface_new(x)[1]
 
     # ---- life ------------------------------------------------------------------------------------
 
@@ -187,7 +185,7 @@ class Interface:
         if self._is_busy:
             raise InputError("the interface is in use by another thread: it cannot be closed")
         handle, self._handle = self._handle, 0
-        _build.close_interface(handle)
+        _core.emcon_interface_free(handle)
 
     def __enter__(self) -> Interface:
         return self
@@ -201,13 +199,13 @@ class Interface:
             self.close()
 
     def _call(self, routine: Callable[..., Any], *arguments: Any) -> Any:
-        """The results of a routine but the status, which is last; raises what that means."""
+        """The results of a routine but the status, which is first; raises what that means."""
         found = routine(self._handle, *arguments)
         results = found if isinstance(found, tuple) else (found,)
-        if results[-1]:
-            text = _build.message(self._handle).decode("utf-8", "replace").rstrip()
-            raise _KINDS.get(results[-1], RuntimeError)(text)
-        return results[0] if len(results) == 2 else results[:-1]
+        if results[0]:
+            said = text(_core.emcon_interface_message(self._handle))
+            raise _KINDS.get(results[0], RuntimeError)(said)
+        return results[1] if len(results) == 2 else results[1:]
 
     # ---- to build it -----------------------------------------------------------------------------
 
@@ -224,7 +222,8 @@ class Interface:
         edge = _whole("edges", edges, 2, self.n_node)
         if edge.shape[1] != 2 or not len(edge):
             raise InputError(f"edges is to have the shape (k, 2), k > 0, not {edge.shape}")
-        self._n_surface = 1 + int(self._call(_build.add_surface, name.encode(), edge.T))
+        number = self._call(_core.emcon_interface_add_surface, name.encode(), edge)
+        self._n_surface = 1 + number
         return self._n_surface - 1
 
     @_exclusive(False)
@@ -250,7 +249,8 @@ class Interface:
                   number(smoothing_angle, "smoothing_angle") or np.nextafter(0.0, 1.0)]
         sides = self._surfaces(slave, master)
         kind = _choice("formulation", formulation, _FORMULATIONS)
-        self._call(_build.add_pair, *sides, kind, choice, angles)
+        options = made("emcon_pair_options", *choice, *angles)
+        self._call(_core.emcon_interface_add_pair, *sides, kind, options)
 
     @_exclusive(False)
     def add_tie(self, slave: int, master: int, *, multiplier: str = "dual",
@@ -264,7 +264,7 @@ class Interface:
             raise InputError(f"tolerance is {tolerance}, which is negative")
         sides = self._surfaces(slave, master)
         kind = _choice("multiplier", multiplier, _MULTIPLIERS)
-        self._call(_build.add_tie, *sides, kind, reach)
+        self._call(_core.emcon_interface_add_tie, *sides, kind, reach)
         self._n_tie += 1
         return self._n_tie - 1
 
@@ -285,8 +285,9 @@ class Interface:
         statics, gradients at the end of the step and closed gaps; set it before `prepare`, too.
         """
         kind = _choice("initiation", initiation, _INITIATIONS)
-        self._call(_build.set_options, kind, number(gap_tolerance, "gap_tolerance"),
-                   int(bool(is_last_try)), int(bool(is_end)))
+        settings = made("emcon_interface_settings", kind, number(gap_tolerance, "gap_tolerance"),
+                        bool(is_last_try), bool(is_end))
+        self._call(_core.emcon_interface_set, settings)
 
     @_exclusive(False)
     def prepare(self, held: ArrayLike | None = None) -> Floats:
@@ -299,11 +300,11 @@ class Interface:
         if held is None:
             held = np.zeros((self.n_node, 2), bool)
         flags = flag_array(held, "held", (self.n_node, 2))
-        self._call(_build.prepare, flags.T)
-        sizes = self._call(_build.sizes)
-        self.n_contact, self.n_unknown = int(sizes[4]), int(sizes[5])
+        self._call(_core.emcon_interface_prepare, flags)
+        sizes = self._sizes()
+        self.n_contact, self.n_unknown = sizes["n_contact"], sizes["n_unknown"]
         self._is_prepared = True
-        return self._call(_build.positions, self.n_node)[0].T
+        return self._call(_core.emcon_interface_get_positions, self.n_node)[0]
 
     @property
     def positions(self) -> Floats:
@@ -317,16 +318,14 @@ class Interface:
 
     @_exclusive(None)
     def _positions(self) -> tuple[Floats, float]:
-        x, move = self._call(_build.positions, self.n_node)
-        return x.T, float(move)
+        return self._call(_core.emcon_interface_get_positions, self.n_node)
 
     @property
     @_exclusive(None)
     def notes(self) -> list[str]:
         """Remarks on the ties, made by `prepare`."""
-        n = _build.notes(self._handle, 0)[0]
-        texts = [_build.notes(self._handle, i)[1] for i in range(n)]
-        return [text.decode("utf-8", "replace").rstrip() for text in texts]
+        lines = text(_core.emcon_interface_notes(self._handle))
+        return [line.rstrip() for line in lines.split("\n")] if lines else []
 
     @property
     def slave_nodes(self) -> Ints:
@@ -340,7 +339,7 @@ class Interface:
 
     @_exclusive()
     def _contacts(self) -> tuple[Ints, Ints]:
-        return self._call(_build.contacts, self.n_contact)
+        return self._call(_core.emcon_interface_get_contacts, self.n_contact)
 
     # ---- ties and held freedoms ------------------------------------------------------------------
 
@@ -349,8 +348,9 @@ class Interface:
         """D and M of a tie, (n_row, n_node) [L]: D x = M x in both directions."""
         if not self._n_tie:
             raise InputError("there is no tie")
-        self._call(_build.tie_matrices, _number("tie", tie, 0, self._n_tie - 1))
-        return self._matrix(_D), self._matrix(_M)
+        found = self._call(_core.emcon_interface_get_tie_matrices,
+                           _number("tie", tie, 0, self._n_tie - 1))
+        return matrix(found[0]), matrix(found[1])
 
     @_exclusive()
     def links(self) -> Csr:
@@ -358,22 +358,19 @@ class Interface:
 
         Rows of held freedoms are empty.
         """
-        self._call(_build.links)
-        return self._matrix(_LINKS)
+        return matrix(self._call(_core.emcon_interface_get_links))
 
     def follow(self, field: ArrayLike) -> Floats:
         """A displacement or velocity, (n_node, 2), whose tied freedoms follow the others."""
-        return self._changed(_build.follow, field)
+        return self._changed(_core.emcon_interface_follow, field)
 
     def gather(self, field: ArrayLike) -> Floats:
         """Forces, (n_node, 2); those on tied freedoms went to the ones that they follow."""
-        return self._changed(_build.gather, field)
+        return self._changed(_core.emcon_interface_gather, field)
 
     @_exclusive()
     def _changed(self, routine: Any, field: ArrayLike) -> Floats:
-        values = self._field("field", field).copy("F")
-        self._call(routine, values)
-        return values.T
+        return self._call(routine, self._field("field", field))
 
     # ---- a step from the displacements u0 by du, (n_node, 2) each [L] ----------------------------
 
@@ -385,20 +382,22 @@ class Interface:
         Returns those that still can.
         """
         was = self._flags("was_active", was_active)
-        return self._call(_step.begin_step, *self._motion(u0, du), was).astype(bool)
+        return self._call(_core.emcon_interface_begin_step, *self._motion(u0, du),
+                          was).astype(bool)
 
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
         """All gaps at both ends of the step."""
-        flag, gap = self._call(_step.gaps, *self._motion(u0, du), self.n_contact)
-        return Gaps(*flag.T.astype(bool), *gap.T)
+        data = self._call(_core.emcon_interface_get_gaps, *self._motion(u0, du), self.n_contact)
+        gaps = structures("emcon_gap", data)
+        return Gaps(gaps["is_near"].astype(bool), gaps["is_over"].astype(bool),
+                    *(gaps[part].copy() for part in ("gap_start", "gap_end", "edge")))
 
     @_exclusive()
     def select(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
         """Select the contacts `active`, (n_contact,) booleans; return how many there are."""
         flags = self._flags("active", active)
-        self._call(_step.select_active, *self._motion(u0, du), flags)
-        return int(flags.sum())
+        return self._call(_core.emcon_interface_select, *self._motion(u0, du), flags)
 
     @_exclusive()
     def choose(self, u0: ArrayLike, du: ArrayLike, contact: ArrayLike, target: ArrayLike) -> None:
@@ -410,16 +409,15 @@ class Interface:
         if (np.diff(numbers) <= 0).any():
             raise InputError("contact has numbers that do not ascend")
         gap = real_array(target, "target", (len(numbers),))
-        self._call(_step.choose, *self._motion(u0, du), numbers, gap)
+        self._call(_core.emcon_interface_choose, *self._motion(u0, du), numbers, gap)
 
     @_exclusive()
     def evaluate(self, u0: ArrayLike, du: ArrayLike) -> Constraints:
         """Values and gradients of the selected contacts."""
-        n = self._call(_step.evaluate, *self._motion(u0, du))
-        contact, values = self._call(_step.get_constraints, n)
-        target, start, end, change, defect, edge = values.T
-        return Constraints(contact, target, start, end, change, defect, edge, self._matrix(_G),
-                           self._matrix(_C))
+        n, contact, *values, g, c = structure("emcon_interface_constraints", self._call(
+            _core.emcon_interface_evaluate, *self._motion(u0, du))).values()
+        return Constraints(whole(contact, n), *(copied(place, n) for place in values), csr(g),
+                           csr(c))
 
     @_exclusive()
     def curvature(self, lam: ArrayLike) -> Csr:
@@ -427,14 +425,13 @@ class Interface:
 
         `lam`: multipliers of the selected contacts as last evaluated, (n,) [M L/T^2].
         """
-        self._call(_step.curvature, self._selected("lam", lam))
-        return self._matrix(_CURVATURE)
+        return matrix(self._call(_core.emcon_interface_get_curvature, self._selected("lam", lam)))
 
     @_exclusive()
     def second_times(self, lam: ArrayLike, direction: ArrayLike) -> Floats:
         """`curvature(lam)` times a direction, (n_node, 2) like the result."""
         along = self._field("direction", direction)
-        return self._call(_step.second_times, self._selected("lam", lam), along).T
+        return self._call(_core.emcon_interface_second_times, self._selected("lam", lam), along)
 
     @_exclusive()
     def update_active(self, u0: ArrayLike, du: ArrayLike, lam: ArrayLike, active: ArrayLike,
@@ -447,10 +444,10 @@ class Interface:
         """
         u, d = self._motion(u0, du)
         flags = self._flags("active", active)
-        sizes = u if magnitude is None else self._field("magnitude", magnitude)
-        is_done, outcome = self._call(_step.update_active, u, d, self._selected("lam", lam),
-                                      int(magnitude is not None), sizes, flags)
-        return flags.astype(bool), Outcome(int(outcome)) if is_done else None
+        sizes = np.empty((0, 2)) if magnitude is None else self._field("magnitude", magnitude)
+        flags, is_done, outcome = self._call(_core.emcon_interface_update_active, u, d,
+                                             self._selected("lam", lam), sizes, flags)
+        return flags.astype(bool), Outcome(outcome) if is_done else None
 
     @_exclusive()
     def areas(self, u1: ArrayLike) -> tuple[Floats, Floats]:
@@ -459,7 +456,7 @@ class Interface:
         The pressure of a contact is its multiplier over its area. The lengths, (n_contact,) [L],
         are those of slave surface that belong to the contacts at the end.
         """
-        return self._call(_step.areas, self._field("u1", u1), self.n_contact)
+        return self._call(_core.emcon_interface_get_areas, self._field("u1", u1), self.n_contact)
 
     # ---- without multipliers ---------------------------------------------------------------------
 
@@ -470,11 +467,11 @@ class Interface:
         Raises `AnalysisError` if there is no good choice of unknowns to eliminate: solve with the
         multipliers.
         """
-        n = self._call(_step.null_space)
-        redundant = self._call(_step.get_redundant, n)
+        p, df, n, place = self._call(_core.emcon_interface_get_null_space)
+        redundant = whole(place, n)
         if n:
             return NullSpace(None, None, redundant)
-        return NullSpace(self._matrix(_P), self._matrix(_DF), redundant)
+        return NullSpace(matrix(p), matrix(df), redundant)
 
     @_exclusive()
     def drop(self, redundant: ArrayLike) -> Flags:
@@ -483,13 +480,13 @@ class Interface:
         `redundant`: their places in the selection, as `null_space` tells.
         """
         place = _whole("redundant", redundant, 1, self._n_selected())
-        return self._call(_step.drop, place, self.n_contact).astype(bool)
+        return self._call(_core.emcon_interface_drop, place, self.n_contact).astype(bool)
 
     @_exclusive()
     def multipliers(self, residual: ArrayLike) -> Floats:
         """lam, (n,), after `null_space`, from the residual T^T r without contact, (n_unknown,)."""
         force = real_array(residual, "residual", (self.n_unknown,))
-        return self._call(_step.multipliers, force, self._n_selected())
+        return self._call(_core.emcon_interface_multipliers, force, self._n_selected())
 
     @_exclusive()
     def particular(self, defect: ArrayLike) -> Floats:
@@ -497,13 +494,14 @@ class Interface:
 
         After `null_space`. Newton's step is this plus DF times that of the others.
         """
-        return self._call(_step.particular, self._selected("defect", defect), self.n_unknown)
+        return self._call(_core.emcon_interface_particular, self._selected("defect", defect),
+                          self.n_unknown)
 
     # ---- helpers ---------------------------------------------------------------------------------
 
     def _field(self, name: str, values: ArrayLike) -> Floats:
-        """As the library wants it, (2, n_node), without a copy where that is possible."""
-        return real_array(values, name, (self.n_node, 2)).T
+        """As the library wants it, without a copy where that is possible."""
+        return real_array(values, name, (self.n_node, 2))
 
     def _motion(self, u0: ArrayLike, du: ArrayLike) -> tuple[Floats, Floats]:
         return self._field("u0", u0), self._field("du", du)
@@ -512,16 +510,14 @@ class Interface:
         return flag_array(values, name, (self.n_contact,))
 
     def _n_selected(self) -> int:
-        return int(self._call(_build.sizes)[6])
+        return self._sizes()["n_selected"]
+
+    def _sizes(self) -> dict[str, int]:
+        return structure("emcon_interface_sizes", self._call(_core.emcon_interface_get_sizes))
 
     def _selected(self, name: str, values: ArrayLike) -> Floats:
         """One number for each selected contact."""
         return real_array(values, name, (self._n_selected(),))
-
-    def _matrix(self, which: int) -> Csr:
-        """A copy of what the library keeps."""
-        n_row, n_column, n_entry = map(int, self._call(_build.matrix_size, which))
-        return Csr((n_row, n_column), *self._call(_build.get_matrix, which, n_row, n_entry))
 
 
 # ---- arguments -----------------------------------------------------------------------------------

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _core
 
-_flat = _core.emcon_flat
-
+#: Room for the texts of a law.
+_N_TEXT = 1024
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,11 @@ class Law:
 
 def _laws() -> dict[str, Law]:
     laws = {}
-    for i in range(_flat.count_laws()):
-        code, *texts = _flat.get_law_row(i + 1)
-        name, keyword, variant, constants = (text.decode().strip() for text in texts)
+    status, code, text = _core.emcon_get_law(0, _N_TEXT)
+    while status == 0:
+        name, keyword, variant, constants = text.tobytes().split(b"\0")[0].decode().split("\n")
         laws[name] = Law(code, keyword, variant, tuple(constants.split()))
+        status, code, text = _core.emcon_get_law(len(laws), _N_TEXT)
     return laws
 
 
@@ -55,8 +56,9 @@ def law_response(law: str, constants: ArrayLike, strain: ArrayLike,
     """
     if law not in LAWS:
         raise ValueError(f"there is no law '{law}'; known: {', '.join(LAWS)}")
-    energy, stress, tangent, ierr = _flat.law_kernel(LAWS[law].code, constants, strain, dstrain)
-    if ierr:
+    status, energy, stress, tangent = _core.emcon_law_response(LAWS[law].code, constants, strain,
+                                                               dstrain)
+    if status:
         raise ValueError(f"the law '{law}' ({', '.join(LAWS[law].constants)}) refuses {constants}")
     return LawResponse(float(energy), stress, tangent)
 
@@ -89,5 +91,5 @@ def nts_gap(x0: ArrayLike, dx: ArrayLike, *, before: bool = True, after: bool = 
     x0, dx = (np.asarray(a, dtype=float) for a in (x0, dx))
     if x0.shape != (5, 2) or dx.shape != (5, 2):
         raise ValueError(f"x0 and dx are (5, 2) arrays, not {x0.shape} and {dx.shape}")
-    gap, g, c, h = _flat.nts_kernel(x0.T, dx.T, int(before), int(after), rounding)
+    _, gap, g, c, h = _core.emcon_node_gap(x0, dx, int(before), int(after), rounding)
     return Gap(float(gap[0]), float(gap[1]), float(gap[2]), g, c, h)

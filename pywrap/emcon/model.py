@@ -28,9 +28,9 @@ from .cards import (Block, Cards, Dof, Number, Numbering, Where, array_of, calle
                     text_lines, whole)
 from .deck_text import number, table, write_text
 from .derivatives import check_law
-from .errors import InputError, check
+from .errors import InputError
 from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_function,
-                    check_solid)
+                    check_solid, count_nodes)
 from .given_matrices import give_masses, given_mass
 from .steps import Step
 
@@ -38,10 +38,6 @@ if TYPE_CHECKING:
     from .handle import Handle
     from .mesh import Mesh
     from .stepper import Stepper
-
-_flat = _core.emcon_flat
-_source = _core.emcon_flat_source
-_given = _core.emcon_flat_given
 
 #: Nodes of an element, by kind.
 _CORNERS = {"CPE3": 3, "CPE4": 4}
@@ -503,12 +499,12 @@ class Model(Cards):
         return Stepper(self)
 
     def build(self, handle: Handle) -> None:
-        """Read the model into a new library model, and build it.
+        """Read the model into a handle, and build it.
 
         Raises `InputError`, and what given functions raise.
         """
         self.read(handle)
-        handle.call(_flat.build_model)
+        handle.call(_core.emcon_build)
 
     def read(self, handle: Handle) -> None:
         """`build` without the building, for a state that is loaded instead."""
@@ -522,8 +518,10 @@ class Model(Cards):
                            for block in blocks] or [(0, 1, self._place[1], 0)], dtype=np.int32)
         names = "\n".join(file.replace("\n", "?") for file in files)
         overrides = "\n".join(f"{name}={value}" for name, value in self._overrides.items())
-        handle.call(_source.read_text, text, places.T, os.fsencode(names), overrides.encode(),
-                    int(self._lenient))
+        if b"\0" in text:
+            raise InputError("a card of the model holds a character 0, which no deck has")
+        handle.open(_core.emcon_read_passages, text, places, os.fsencode(names),
+                    overrides.encode(), int(self._lenient))
         handle.given = self._give(handle.address)
 
     def _give(self, handle: int) -> list[Any]:
@@ -532,11 +530,10 @@ class Model(Cards):
         given += [GivenPotential(f"potential {k}", function, nodes)
                   for k, (function, nodes) in enumerate(self._potentials, 1)]
         if self._hosts:
-            n, ierr = _given.count_nodes(handle)
-            check(handle, ierr)
-            given += [GivenSolid(f"solid {k}", solid, int(n))
+            n = count_nodes(handle)
+            given += [GivenSolid(f"solid {k}", solid, n)
                       for k, (solid, _) in enumerate(self._hosts, 1)]
-            give_masses(handle, [given_mass(mass, int(n)) for _, mass in self._hosts
+            give_masses(handle, [given_mass(mass, n) for _, mass in self._hosts
                                  if mass is not None])
         for item in given:
             item.give(handle)

@@ -14,10 +14,8 @@ from .arguments import flag_array, positive, real_array
 from .csr import Csr
 from .errors import InputError
 from .handle import Handle
+from .memory import copied, csr, matrix, structure, whole
 
-_query = _core.emcon_flat_query
-#: Where the library keeps which matrix.
-_MASS, _TANGENT, _LINKS, _P, _DF, _G, _C = range(1, 8)
 _NO_REALS = np.empty(0)
 _NO_FLAGS = np.empty(0, dtype=np.int32)
 
@@ -32,9 +30,8 @@ class Evaluation:
     def __init__(self, stepper: Queries, with_tangent: bool, *arguments: Any) -> None:
         self._handle = stepper._handle
         self._n_node, self._n_unknown = stepper.n_node, stepper.n_unknown
-        self._n_constraint = stepper.n_constraint
         self._has_null_space = False
-        self._handle.change(_query.evaluate, *arguments, int(with_tangent))
+        self._handle.change(_evaluate, int(with_tangent), *arguments)
         self._n_changes = self._handle.n_changes
 
     def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -48,11 +45,13 @@ class Evaluation:
 
         With `contact` also less contact forces. At prescribed freedoms it is the reaction.
         """
-        return self._call(_query.get_residual, int(contact), self._n_node).T
+        return self._call(lambda a: _core.emcon_residual(
+            a, int(contact), self._n_node, 0, no_unknown=1)[:2])
 
     def unknown_residual(self, *, contact: bool = True) -> NDArray[np.float64]:
         """The same on the unknowns, (n_unknown,): T^T r with the `links` T. 0 solves the step."""
-        return self._call(_query.get_unknown_residual, int(contact), self._n_unknown)
+        return self._call(lambda a: _core.emcon_residual(
+            a, int(contact), 0, self._n_unknown, no_nodal=1)[::2])
 
     def tangent(self, *, contact: bool = True) -> Csr:
         """Derivative of the residual on the unknowns by them at the end, for given multipliers.
@@ -60,7 +59,7 @@ class Evaluation:
         (n_unknown, n_unknown) [M/T^2]. With `contact` the second derivatives of the gaps are in
         it, times the multipliers. Needs an evaluation ``with_tangent``.
         """
-        return self._call(_made, _TANGENT, int(contact))
+        return self._call(_matrices, _core.emcon_tangent, int(contact))
 
     def null_space(self) -> tuple[Csr, Csr]:
         """P and DF, each (2 n_node, independent unknowns), for the constraints that act.
@@ -69,7 +68,7 @@ class Evaluation:
         Ties, equations and prescribed freedoms are taken account of. Raises `AnalysisError` if
         there is none: constraints that follow from others.
         """
-        return self._call(_null_space)
+        return self._call(_matrices, _core.emcon_null_space)
 
     def multipliers(self) -> NDArray[np.float64]:
         """The contact forces that the residual without them amounts to, (n_constraint,) [M L/T^2].
@@ -78,9 +77,9 @@ class Evaluation:
         does not act.
         """
         if not self._has_null_space:
-            self._call(_null_space)
+            self._call(_core.emcon_null_space)
             self._has_null_space = True
-        return self._call(_query.get_multipliers, self._n_constraint)
+        return self._call(_multipliers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +112,7 @@ class ConstraintReport:
         direction = real_array(direction, "the direction", (self._n_node, 2))
         if self._handle.address and self._n_reports != self._handle.n_reports:
             raise InputError("this report is stale: constraints were asked for again")
-        return self._handle.call(_query.curvature_times, factor, direction.T).T
+        return self._handle.call(_core.emcon_curvature_times, factor, direction)
 
 
 class Queries:
@@ -134,7 +133,7 @@ class Queries:
 
     def guess(self, h: float) -> NDArray[np.float64]:
         """Displacements from which a step of size h would start to iterate, (n_node, 2) [L]."""
-        return self._handle.call(_query.guess, positive(h, "h"), self.n_node).T
+        return self._handle.call(_core.emcon_guess, positive(h, "h"), self.n_node)
 
     def evaluate(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
                  active: ArrayLike | None = None, with_tangent: bool = True) -> Evaluation:
@@ -147,7 +146,7 @@ class Queries:
         u1 = real_array(u1, "u1", (self.n_node, 2))
         h = positive(h, "h")
         lam, active = contact_arguments(lam, active, self.n_constraint)
-        return Evaluation(self, with_tangent, h, u1.T, lam, active)
+        return Evaluation(self, with_tangent, h, u1, lam, active)
 
     def residual(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
                  active: ArrayLike | None = None, contact: bool = True) -> NDArray[np.float64]:
@@ -169,7 +168,7 @@ class Queries:
     @property
     def mass(self) -> Csr:
         """The consistent mass between nodes, the same in both directions, (n_node, n_node) [M]."""
-        return self._handle.call(_made, _MASS)
+        return self._handle.call(_matrices, _core.emcon_mass)
 
     @property
     def links(self) -> Csr:
@@ -178,12 +177,12 @@ class Queries:
         Row 2 i + a is direction a of node i, both from 0. That of a prescribed freedom is empty,
         that of a dependent one has the weights of those that it follows.
         """
-        return self._handle.call(_made, _LINKS)
+        return self._handle.call(_matrices, _core.emcon_links)
 
     @property
     def unknowns(self) -> NDArray[np.int32]:
         """Unknown of each freedom, (n_node, 2), from 0; -1: prescribed, dependent, no element."""
-        return self._handle.call(_query.get_unknowns, self.n_node).T - 1
+        return self._handle.call(_core.emcon_unknowns, self.n_node)
 
     def constraint(self, q0: ArrayLike | None = None, q1: ArrayLike | None = None, *,
                    u0: ArrayLike | None = None, u1: ArrayLike | None = None,
@@ -204,16 +203,12 @@ class Queries:
             u0, u1 = real_array(q0, "q0", shape) - x, real_array(q1, "q1", shape) - x
         u0, u1 = real_array(u0, "u0", shape), real_array(u1, "u1", shape)
         self._handle.n_reports += 1
-        place, values, gradient, jacobian = self._handle.change(_constraints, u0, u1,
-                                                                bool(keeps_gap))
-        numbers, pair, node = place.T
-        gap0, gap1, dgap, size = values.T
-        return ConstraintReport(numbers, pair, node, gap0, gap1, dgap, size, gradient, jacobian,
-                                self._handle, self._handle.n_reports, self.n_node)
+        report = self._handle.change(_constraints, u0, u1, int(bool(keeps_gap)))
+        return ConstraintReport(*report, self._handle, self._handle.n_reports, self.n_node)
 
     def body_momenta(self) -> NDArray[np.float64]:
         """px, py [M L/T] and lz about the origin [M L^2/T] of each body, (n_body, 3)."""
-        return self._handle.call(_query.get_momenta, self.n_body).T
+        return self._handle.call(_core.emcon_get_momenta, self.n_body)
 
 
 def contact_arguments(lam: ArrayLike | None, active: ArrayLike | None,
@@ -223,32 +218,56 @@ def contact_arguments(lam: ArrayLike | None, active: ArrayLike | None,
             _NO_FLAGS if active is None else flag_array(active, "active", (n,)))
 
 
-def _csr(address: int, place: int, sizes: NDArray[np.int32]) -> tuple[Csr, int]:
-    """Copy out the matrix that the library keeps at `place`."""
-    n_row, n_col, n_entry = (int(n) for n in sizes)
-    start, column, value, ierr = _query.get_csr(address, place, n_row, n_entry)
-    return Csr((n_row, n_col), start, column, value), ierr
+def _counts(address: int) -> tuple[int, int]:
+    """All constraints, and those of ties and equations, which stand before contact."""
+    _, sizes = _core.emcon_get_sizes(address)
+    counts = structure("emcon_sizes", sizes)
+    return counts["n_constraint"], counts["n_constraint"] - counts["n_contact"]
 
 
-def _made(address: int, place: int, contact: int = 0) -> tuple[Csr | None, int]:
-    """The matrix that the library makes for `place`."""
-    sizes, ierr = _query.make_matrix(address, place, contact)
-    return _csr(address, place, sizes) if ierr == 0 else (None, ierr)
+def of_all(address: int, lam: NDArray[np.float64], active: NDArray[np.int32]
+           ) -> tuple[int, int, NDArray[np.float64], NDArray[np.int32]]:
+    """The status, the number of all constraints, and `contact_arguments` for all of them.
+
+    Ties and equations keep what they have.
+    """
+    n, before = _counts(address)
+    if not before or not (lam.size or active.size):
+        return 0, n, lam, active
+    status, old, acted = _core.emcon_get_multipliers(address, n)
+    return (status, n, np.concatenate((old[:before], lam)) if lam.size else lam,
+            np.concatenate((acted[:before], active)) if active.size else active)
 
 
-def _null_space(address: int) -> tuple[tuple[Csr, Csr] | None, int]:
-    sizes, ierr = _query.make_null_space(address)
-    if ierr:
-        return None, ierr
-    (p, _), (d, ierr) = (_csr(address, place, sizes[:, k]) for k, place in enumerate((_P, _DF)))
-    return (p, d), ierr
+def _evaluate(address: int, with_tangent: int, h: float, u1: NDArray[np.float64],
+              lam: NDArray[np.float64], active: NDArray[np.int32]) -> int:
+    status, n, lam, active = of_all(address, lam, active)
+    return status or int(_core.emcon_evaluate(address, h, u1, with_tangent, n, lam, active))
+
+
+def _multipliers(address: int) -> tuple[int, NDArray[np.float64]]:
+    """Those of contact."""
+    n, before = _counts(address)
+    status, lam = _core.emcon_multipliers(address, n)
+    return status, lam[before:]
+
+
+def _matrices(address: int, function: Callable[..., Any], *arguments: Any) -> tuple[Any, ...]:
+    """The status and copies of the matrices that a function of the library makes."""
+    status, *found = function(address, *arguments)
+    if status:
+        return (status,)
+    copies = tuple(matrix(data) for data in found)
+    return 0, copies[0] if len(copies) == 1 else copies
 
 
 def _constraints(address: int, u0: NDArray[np.float64], u1: NDArray[np.float64],
-                 keeps_gap: bool) -> tuple[Any, ...]:
-    sizes, ierr = _query.constraints(address, u0.T, u1.T, int(keeps_gap))
-    if ierr:
-        return None, ierr
-    place, values, _ = _query.get_constraints(address, int(sizes[0, 0]))
-    (g, _), (c, ierr) = (_csr(address, place, sizes[:, k]) for k, place in enumerate((_G, _C)))
-    return place, values, g, c, ierr
+                 keeps_gap: int) -> tuple[Any, ...]:
+    """The status and the arrays of a report, in the order of `ConstraintReport`."""
+    status, data = _core.emcon_constraints(address, u0, u1, keeps_gap)
+    if status:
+        return (status,)
+    n, number, pair, node, *gaps, gradient, jacobian = structure(
+        "emcon_constraint_report", data).values()
+    return (0, whole(number, n) - np.int32(_counts(address)[1]), whole(pair, n), whole(node, n),
+            *(copied(place, n) for place in gaps), csr(gradient), csr(jacobian))

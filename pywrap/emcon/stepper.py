@@ -18,15 +18,12 @@ from .conditions import Conditions
 from .csr import Csr
 from .errors import AnalysisError, InputError
 from .handle import Handle
+from .memory import structure, text
 from .model import Model
-from .queries import ConstraintReport, Evaluation, Queries, contact_arguments
+from .queries import ConstraintReport, Evaluation, Queries, contact_arguments, of_all
 
 __all__ = ["AnalysisError", "ConstraintReport", "Csr", "Evaluation", "Increment", "InputError",
            "PairTotal", "Snapshot", "Stepper"]
-
-_flat = _core.emcon_flat
-_given = _core.emcon_flat_given
-_state = _core.emcon_flat_state
 
 #: Times that differ by less than this part are the same: sums of many steps are rounded.
 _SAME_TIME = 64*np.finfo(float).eps
@@ -74,7 +71,7 @@ class Snapshot:
 
     def __del__(self) -> None:
         if hasattr(self, "_address"):
-            _state.free_state(self._address)
+            _core.emcon_free_snapshot(self._address)
 
 
 class Stepper(Queries, Conditions):
@@ -104,12 +101,13 @@ class Stepper(Queries, Conditions):
         self._handle = Handle()
         try:
             build(self._handle)
-            sizes = self._handle.call(_flat.model_size)
+            sizes = self._sizes()
         except BaseException:
             self.close()
             raise
-        (self.n_node, self.n_element, self.n_constraint, self.n_body, _, self.n_step,
-         self.n_pair) = (int(size) for size in sizes)
+        self.n_node, self.n_element = sizes["n_node"], sizes["n_element"]
+        self.n_constraint, self.n_pair = sizes["n_contact"], sizes["n_pair"]
+        self.n_body, self.n_step = sizes["n_body"], sizes["n_step"]
 
     @classmethod
     def from_restart(cls, path: str | os.PathLike[str], model: Model | None = None) -> Stepper:
@@ -121,9 +119,11 @@ class Stepper(Queries, Conditions):
         name = path_bytes(path)
 
         def build(handle: Handle) -> None:
-            if model is not None:
+            if model is None:
+                handle.open(_core.emcon_load, name)
+            else:
                 model.read(handle)
-            handle.call(_state.read_restart, name)
+                handle.call(_core.emcon_resume, name)
 
         stepper = cls.__new__(cls)
         stepper._begin(build)
@@ -134,7 +134,7 @@ class Stepper(Queries, Conditions):
         name = path_bytes(path)
         if os.path.exists(name) and not os.path.isfile(name):
             raise OSError(f"{os.fsdecode(name)} is no file that could be replaced")
-        self._handle.call(_state.write_restart, name)
+        self._handle.call(_core.emcon_save, name)
 
     def close(self) -> None:
         """Free the model. Harmless when closed; any other call then raises `InputError`."""
@@ -157,14 +157,14 @@ class Stepper(Queries, Conditions):
         not help: with `h` the state is that before the call, else that of the last part.
         """
         if h is None:
-            counts, values = self._handle.change(_state.advance)
+            made = self._handle.change(_core.emcon_advance)
         else:
-            counts, values = self._handle.change(_state.step, positive(h, "h"))
-        return Increment(float(values[0]), float(values[1]), *map(int, counts), float(values[2]))
+            made = self._handle.change(_core.emcon_step, positive(h, "h"))
+        return Increment(*structure("emcon_increment", made).values())
 
     def next_step(self) -> None:
         """Begin the next step of the deck at the present time, wherever that is."""
-        self._handle.change(_state.next_step)
+        self._handle.change(_core.emcon_next_step)
 
     def run(self, until: float | None = None,
             callback: Callable[[Stepper, Increment], bool | None] | None = None) -> int:
@@ -199,55 +199,54 @@ class Stepper(Queries, Conditions):
     @property
     def is_done(self) -> bool:
         """True after the last increment of the last step."""
-        return bool(self._handle.call(_state.is_done))
+        return bool(self._handle.call(lambda address: (0, _core.emcon_is_done(address))))
 
     @property
     def time(self) -> float:
         """Total time [T]."""
-        return float(self._progress()[0])
+        return float(self._handle.call(_core.emcon_get_time))
 
     @property
     def deck_step(self) -> int:
         """The present step of the deck, from 1."""
-        return int(self._progress()[1][0])
+        return self._sizes()["i_step"]
 
     @property
     def n_unknown(self) -> int:
         """Equations of the present step of the deck."""
-        return int(self._progress()[1][2])
+        return self._sizes()["n_unknown"]
 
-    def _progress(self) -> tuple[float, NDArray[np.int32]]:
-        return self._handle.call(_state.get_progress)
+    def _sizes(self) -> dict[str, int]:
+        return structure("emcon_sizes", self._handle.call(_core.emcon_get_sizes))
 
     @property
     def notes(self) -> list[str]:
         """Warnings of the deck, and what was done before the first step: moved nodes and so on."""
-        count = int(self._handle.call(_flat.count_notes))
-        return [self._handle.call(_flat.get_note, i + 1).decode("utf-8", "replace").rstrip()
-                for i in range(count)]
+        lines: str = self._handle.call(_text, _core.emcon_get_notes)
+        return [line.rstrip() for line in lines.split("\n")] if lines else []
 
     def node_set(self, name: str) -> NDArray[np.intp]:
         """The rows of a node set in arrays of nodes, (k,). Raises `InputError` if there is none."""
         if not isinstance(name, str) or not name.strip():
             raise InputError(f"a node set has a name, not {name!r}")
-        return np.flatnonzero(self._handle.call(_given.find_nodes, name.encode(), self.n_node)[1])
+        return np.flatnonzero(self._handle.call(_core.emcon_find_nodes, name.encode(), self.n_node))
 
     # ---- state ------------------------------------------------------------------------------
 
     @property
     def positions(self) -> NDArray[np.float64]:
         """Reference positions X, (n_node, 2) [L]."""
-        return self._handle.call(_flat.get_positions, self.n_node)[0].T
+        return self._handle.call(_core.emcon_get_positions, self.n_node)
 
     @property
     def labels(self) -> NDArray[np.int32]:
         """Node numbers of the deck, (n_node,)."""
-        return self._handle.call(_flat.get_positions, self.n_node)[1]
+        return self._handle.call(_core.emcon_get_labels, self.n_node)
 
     @property
     def u(self) -> NDArray[np.float64]:
         """Displacements, (n_node, 2) [L]."""
-        return self._handle.call(_state.get_field, 1, self.n_node).T
+        return self._handle.call(lambda a: _core.emcon_get_state(a, self.n_node, no_v=1)[:2])
 
     @property
     def q(self) -> NDArray[np.float64]:
@@ -257,7 +256,7 @@ class Stepper(Queries, Conditions):
     @property
     def v(self) -> NDArray[np.float64]:
         """Velocities, (n_node, 2) [L/T]."""
-        return self._handle.call(_state.get_field, 2, self.n_node).T
+        return self._handle.call(lambda a: _core.emcon_get_state(a, self.n_node, no_u=1)[::2])
 
     @property
     def lam(self) -> NDArray[np.float64]:
@@ -282,14 +281,15 @@ class Stepper(Queries, Conditions):
         """
         shape = (self.n_node, 2)
         none = np.empty((0, 2))
+        u = none if u is None else real_array(u, "u", shape)
+        v = none if v is None else real_array(v, "v", shape)
         lam, active = contact_arguments(lam, active, self.n_constraint)
-        self._handle.change(_state.set_state, none.T if u is None else real_array(u, "u", shape).T,
-                            none.T if v is None else real_array(v, "v", shape).T, lam, active,
-                            0.0 if time is None else number(time, "time"), int(time is not None))
+        when = [] if time is None else [number(time, "time")]
+        self._handle.change(_set_state, self.n_node, u, v, lam, active, when)
 
     def save(self) -> Snapshot:
         """Keep the present state. It is freed with the object that is returned."""
-        return Snapshot(int(self._handle.call(_state.save_state)))
+        return Snapshot(self._handle.call(_core.emcon_take_snapshot))
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back, or forward, to a state of this stepper, or of one of the same deck.
@@ -298,7 +298,9 @@ class Stepper(Queries, Conditions):
         """
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"a state of save() is needed, not {type(snapshot).__name__}")
-        self._handle.change(_state.restore_state, snapshot._address)
+        if not snapshot._address:
+            raise InputError("the state was freed")
+        self._handle.change(_core.emcon_restore_snapshot, snapshot._address)
 
     # ---- what follows from the state --------------------------------------------------------
 
@@ -307,7 +309,7 @@ class Stepper(Queries, Conditions):
 
         All of shape (n_constraint,): of all pairs, then of their guards, whose nodes may come again.
         """
-        lam, active, label = self._handle.call(_state.get_contact, self.n_constraint)
+        lam, active, label, _ = self._handle.call(_core.emcon_get_contact, self.n_constraint)
         return lam, active.astype(bool), label
 
     def pressures(self) -> NDArray[np.float64]:
@@ -315,20 +317,22 @@ class Stepper(Queries, Conditions):
 
         `contact` tells the slave nodes.
         """
-        return self._handle.call(_state.get_contact_values, 1, self.n_constraint)
+        return self._handle.call(
+            lambda a: _core.emcon_get_pressures(a, self.n_constraint, no_gap=1)[:2])
 
     def gaps(self) -> NDArray[np.float64]:
         """Gaps, > 0 open, NaN where no surface is near, (n_constraint,) [L]: CDIS of the deck."""
-        return self._handle.call(_state.get_contact_values, 2, self.n_constraint)
+        return self._handle.call(
+            lambda a: _core.emcon_get_pressures(a, self.n_constraint, no_pressure=1)[::2])
 
     def pairs(self) -> list[PairTotal]:
         """Totals of the last increment, one for each contact pair in the order of the deck.
 
         A pair that holds both sides counts twice: behind it stands its reverse.
         """
-        total, active = self._handle.call(_state.get_pairs, self.n_pair)
+        total, active = self._handle.call(_core.emcon_get_pairs, self.n_pair)
         return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n))
-                for row, n in zip(total.T, active)]
+                for row, n in zip(total, active)]
 
     def verdict(self) -> dict[str, Any]:
         """The verdict on the increments that led to this state: `NAME.json` of a run of the deck.
@@ -337,9 +341,7 @@ class Stepper(Queries, Conditions):
         geometry found, the stand-off, the largest residual accepted, the energy error, and
         "warnings". A state that is restored has the verdict it had.
         """
-        length = int(self._handle.call(_state.ask_verdict))
-        text = self._handle.call(_state.get_verdict, length)
-        verdict: dict[str, Any] = json.loads(text.decode("utf-8", "replace"))
+        verdict: dict[str, Any] = json.loads(self._handle.call(_text, _core.emcon_get_verdict))
         return verdict
 
     @property
@@ -347,7 +349,8 @@ class Stepper(Queries, Conditions):
         """`energies` and `momenta` together."""
         names = ("kinetic", "strain", "potential", "external_work", "contact_work",
                  "stabilization", "total", "px", "py", "lz")
-        return dict(zip(names, map(float, self._handle.call(_state.get_ledger))))
+        found = structure("emcon_ledger", self._handle.call(_core.emcon_get_ledger))
+        return {name: found[name] for name in names}
 
     def energies(self) -> dict[str, float]:
         """Energies and works [M L^2/T^2]: kinetic, strain, potential, external_work, contact_work,
@@ -360,3 +363,15 @@ class Stepper(Queries, Conditions):
     def momenta(self) -> dict[str, float]:
         """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`."""
         return dict(list(self.ledger.items())[7:])
+
+
+def _text(address: int, function: Callable[..., Any]) -> tuple[int, str]:
+    """The text that a function of the library gives last, copied."""
+    status, *_, place = function(address)
+    return status, "" if status else text(place)
+
+
+def _set_state(address: int, n_node: int, u: NDArray[np.float64], v: NDArray[np.float64],
+               lam: NDArray[np.float64], active: NDArray[np.int32], time: list[float]) -> int:
+    status, n, lam, active = of_all(address, lam, active)
+    return status or int(_core.emcon_set_state(address, n_node, u, v, n, lam, active, time))

@@ -129,6 +129,13 @@ int emcon_read(const char *deck, const char *parameters, int is_lenient, emcon_m
 int emcon_read_text(const char *text, const char *name, const char *parameters, int is_lenient,
                     emcon_model **model);
 
+/* The same for a text whose lines stand in several files. A passage is four numbers: how many lines
+ * it has; which of the files `names`, one per line, it stands in, from 1; at which line there; and
+ * 1 if its lines are counted on from that one, 0 if all are told as that one. */
+int emcon_read_passages(const char *text, int n_passage, const int *passage /* n_passage x 4 */,
+                        const char *names, const char *parameters, int is_lenient,
+                        emcon_model **model);
+
 /* Build the model of the deck that was read, and begin its first step. After a failure the model
  * can only be closed. */
 int emcon_build(emcon_model *model);
@@ -174,8 +181,8 @@ int emcon_give_law(emcon_model *model, const char *name, emcon_point_function la
 
 /* A potential of the present position of each of n nodes, numbers from 0. `name`, for messages, may
  * be NULL. */
-int emcon_give_potential(emcon_model *model, const char *name, int n, const int *node,
-                         emcon_point_function potential, void *user);
+int emcon_give_potential(emcon_model *model, const char *name, int n,
+                         const int *node /* n */, emcon_point_function potential, void *user);
 
 /* Forces between nodes: `pattern` (2*n_node x 2*n_node, its values are not looked at) tells which
  * depend on which. Nodes of no element are part of the model where they stand in it. */
@@ -212,8 +219,11 @@ int emcon_next_step(emcon_model *model);
  * others; energies and momenta are measured anew, the works stand. `lam` is 0 where a constraint
  * does not act; `time` is not before the start of the present step of the deck. With `u` the forces
  * of the last step are forgotten. */
-int emcon_set_state(emcon_model *model, int n_node, const double *u, const double *v,
-                    int n_constraint, const double *lam, const int *is_active, const double *time);
+int emcon_set_state(emcon_model *model, int n_node, const double *u /* n_node x 2, or NULL */,
+                    const double *v /* n_node x 2, or NULL */, int n_constraint,
+                    const double *lam /* n_constraint, or NULL */,
+                    const int *is_active /* n_constraint, or NULL */,
+                    const double *time /* 1, or NULL */);
 
 /* Keep the present state; `*snapshot` is NULL after a failure. It outlives the model. */
 int emcon_take_snapshot(emcon_model *model, emcon_snapshot **snapshot);
@@ -226,9 +236,12 @@ int emcon_restore_snapshot(emcon_model *model, const emcon_snapshot *snapshot);
 void emcon_free_snapshot(emcon_snapshot *snapshot);
 
 /* Write deck, state and conditions of the present step to a file; emcon_load makes a model of it
- * that goes on with the same bits. `*model` has to be closed also after a failure. */
+ * that goes on with the same bits. `*model` has to be closed also after a failure. Laws, potentials
+ * and forces are not in the file: a model that was read and given them is built by emcon_resume, in
+ * place of emcon_build, as the file holds it. */
 int emcon_save(emcon_model *model, const char *path);
 int emcon_load(const char *path, emcon_model **model);
+int emcon_resume(emcon_model *model, const char *path);
 
 /* ---- what a model holds ---------------------------------------------------------------------- */
 
@@ -244,28 +257,44 @@ int emcon_get_ledger(emcon_model *model, emcon_ledger *ledger);
  * again, or the model is closed. A snapshot holds its verdict. */
 int emcon_get_verdict(emcon_model *model, int *is_good, const char **json);
 
+/* Remarks on the deck, and on what was done before the first step, one per line: `*text` as that of
+ * emcon_get_verdict. */
+int emcon_get_notes(emcon_model *model, const char **text);
+
+/* Which nodes are in the node set `name`: 1, else 0. */
+int emcon_find_nodes(emcon_model *model, const char *name, int n_node, int *is_in /* n_node */);
+
 /* Labels of the nodes, n_node. */
-int emcon_get_labels(emcon_model *model, int n_node, int *label);
+int emcon_get_labels(emcon_model *model, int n_node, int *label /* n_node */);
 
 /* Reference positions. emcon_build may move nodes, to close a tie or an initial contact. */
-int emcon_get_positions(emcon_model *model, int n_node, double *x);
+int emcon_get_positions(emcon_model *model, int n_node, double *x /* n_node x 2 */);
 
 /* Displacements and velocities. */
-int emcon_get_state(emcon_model *model, int n_node, double *u, double *v);
+int emcon_get_state(emcon_model *model, int n_node, double *u /* n_node x 2 */,
+                    double *v /* n_node x 2 */);
 
 /* Of each constraint: multiplier (force), and whether it acts. */
-int emcon_get_multipliers(emcon_model *model, int n_constraint, double *lam, int *is_active);
+int emcon_get_multipliers(emcon_model *model, int n_constraint, double *lam /* n_constraint */,
+                          int *is_active /* n_constraint */);
 
 /* The same of each possible contact, the label of its slave node, and the number of its pair. */
-int emcon_get_contact(emcon_model *model, int n_contact, double *lam, int *is_active, int *label,
-                      int *pair);
+int emcon_get_contact(emcon_model *model, int n_contact, double *lam /* n_contact */,
+                      int *is_active /* n_contact */, int *label /* n_contact */,
+                      int *pair /* n_contact */);
+
+/* Pressure of each possible contact, 0 where open, and its gap, NaN where no surface is near: CSTR
+ * and CDIS of the deck. */
+int emcon_get_pressures(emcon_model *model, int n_contact, double *pressure /* n_contact */,
+                        double *gap /* n_contact */);
 
 /* Of each pair: 7 numbers, force and moment about the origin on the slave side (fx, fy, m), the
  * same on the master side, length in contact; and the number of active contacts. */
-int emcon_get_pairs(emcon_model *model, int n_pair, double *total, int *n_active);
+int emcon_get_pairs(emcon_model *model, int n_pair, double *total /* n_pair x 7 */,
+                    int *n_active /* n_pair */);
 
 /* Of each body: px, py, and the angular momentum about the origin; 3*n_body. */
-int emcon_get_momenta(emcon_model *model, int n_body, double *momenta);
+int emcon_get_momenta(emcon_model *model, int n_body, double *momenta /* n_body x 3 */);
 
 /* ---- loads and boundary values --------------------------------------------------------------- */
 
@@ -281,9 +310,11 @@ int emcon_find_load(emcon_model *model, int kind, int label, int place, int *loa
 int emcon_set_load(emcon_model *model, int load, double value);
 
 /* Give the boundary condition on degree of freedom `dof` of node `label` a value; prescribe a free
- * one; set one free. The last two number the unknowns anew, and the state stays. */
+ * one; the one or the other, as it is; set one free. Where the unknowns become more or less they
+ * are numbered anew, and the state stays. */
 int emcon_set_prescribed(emcon_model *model, int label, int dof, double value);
 int emcon_add_prescribed(emcon_model *model, int label, int dof, double value);
+int emcon_prescribe(emcon_model *model, int label, int dof, double value);
 int emcon_remove_prescribed(emcon_model *model, int label, int dof);
 
 /* ---- what the engine computes for a step ----------------------------------------------------- */
@@ -293,7 +324,7 @@ int emcon_remove_prescribed(emcon_model *model, int label, int dof);
 
 /* Number of the unknown of each degree of freedom, 2*n_node; -1: prescribed, dependent, or of no
  * element. */
-int emcon_unknowns(emcon_model *model, int n_node, int *unknown);
+int emcon_unknowns(emcon_model *model, int n_node, int *unknown /* n_node x 2 */);
 
 /* T, 2*n_node x n_unknown: row 2*node + direction. */
 int emcon_links(emcon_model *model, emcon_csr *matrix);
@@ -302,19 +333,22 @@ int emcon_links(emcon_model *model, emcon_csr *matrix);
 int emcon_mass(emcon_model *model, emcon_csr *matrix);
 
 /* Where a step of the size h from the present state would start its iteration. */
-int emcon_guess(emcon_model *model, double h, int n_node, double *u1);
+int emcon_guess(emcon_model *model, double h, int n_node, double *u1 /* n_node x 2 */);
 
 /* Evaluate the step of the size h from the present state to displacements `u1`: what the functions
  * below give belongs to the last evaluation. Constraints that act are those of the state, or
  * `is_active` unless it is NULL, less those that have no surface near; their multipliers those of
  * the state, or `lam` unless it is NULL. */
-int emcon_evaluate(emcon_model *model, double h, int n_node, const double *u1, int with_tangent,
-                   int n_constraint, const double *lam, const int *is_active);
+int emcon_evaluate(emcon_model *model, double h, int n_node, const double *u1 /* n_node x 2 */,
+                   int with_tangent, int n_constraint,
+                   const double *lam /* n_constraint, or NULL */,
+                   const int *is_active /* n_constraint, or NULL */);
 
 /* Residual: inertia, internal forces less loads, and `with_contact` less those of the constraints.
  * At the nodes, where it is the reaction on prescribed freedoms; and T^T times it. */
-int emcon_residual(emcon_model *model, int with_contact, int n_node, double *nodal, int n_unknown,
-                   double *unknown);
+int emcon_residual(emcon_model *model, int with_contact, int n_node,
+                   double *nodal /* n_node x 2 */, int n_unknown,
+                   double *unknown /* n_unknown */);
 
 /* Derivative of the residual by the unknowns at the end of the step, n_unknown x n_unknown, for
  * fixed multipliers; `with_contact` with the second derivatives of the gaps. The evaluation has to
@@ -328,18 +362,43 @@ int emcon_null_space(emcon_model *model, emcon_csr *p, emcon_csr *df);
 
 /* The multipliers, n_constraint, that the residual without contact amounts to, by the dependent
  * unknowns of the last null space; 0 where a constraint does not act. */
-int emcon_multipliers(emcon_model *model, int n_constraint, double *lam);
+int emcon_multipliers(emcon_model *model, int n_constraint, double *lam /* n_constraint */);
 
 /* All contacts near from displacements u0 to u1. With `keeps_gap` they are those that hold the mean
  * gap of u0, as persistent contact does: all gaps are counted from there. The last evaluation is
  * forgotten. */
-int emcon_constraints(emcon_model *model, int n_node, const double *u0, const double *u1,
-                      int keeps_gap, emcon_constraint_report *report);
+int emcon_constraints(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                      const double *u1 /* n_node x 2 */, int keeps_gap,
+                      emcon_constraint_report *report);
 
 /* Sum over the n contacts of the last report of `factor` times the derivative of the discrete
  * gradient by u1 times `direction`; both fields have 2*n_node numbers. */
-int emcon_curvature_times(emcon_model *model, int n, const double *factor, int n_node,
-                          const double *direction, double *product);
+int emcon_curvature_times(emcon_model *model, int n, const double *factor /* n */, int n_node,
+                          const double *direction /* n_node x 2 */,
+                          double *product /* n_node x 2 */);
+
+/* ---- single kernels, for tests and for trying things out ------------------------------------- */
+
+/* Law number `i`, from 0: its code, and in `text` its name, its keyword and parameter in decks, and
+ * the names of its constants between blanks, with line ends between these four.
+ * EMCON_ERROR_INPUT behind the last law, and if there is too little room, or NULL. */
+int emcon_get_law(int i, int *code, int n_text, char *text /* n_text */);
+
+/* The law of this code, with its n constants, for a strain 11, 22, 2*12 that goes from `strain` by `dstrain`:
+ * the energy at the end, the algorithmic stress S with S . dstrain = change of energy, and its
+ * derivative by the strain at the end. EMCON_ERROR_INPUT for no such law, constants that it
+ * refuses, or NULL. */
+int emcon_law_response(int law, int n, const double *constant /* n */,
+                       const double *strain /* 3 */, const double *dstrain /* 3 */,
+                       double *energy, double *stress /* 3 */, double *tangent /* 3 x 3 */);
+
+/* Gap of a slave node over an edge and its neighbours, from positions `x0` by `dx` of the slave,
+ * the edge's start and end, and the nodes before and after it (not read unless `has_before`,
+ * `has_after`); corners are rounded over a length `rounding`. The gap at the start, at the end and
+ * their difference; discrete gradient g, gradient at the end c, derivative of g by the end. */
+int emcon_node_gap(const double *x0 /* 5 x 2 */, const double *dx /* 5 x 2 */, int has_before,
+                   int has_after, double rounding, double *gap /* 3 */, double *g /* 10 */,
+                   double *c /* 10 */, double *h /* 10 x 10 */);
 
 #ifdef __cplusplus
 }

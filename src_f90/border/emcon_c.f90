@@ -6,9 +6,10 @@ module emcon_c
    use emcon_c_border, only : address_of, as_increment, c_string, check_given, f_text, find_built, &
       find_model, find_read, put_increment, put_number
    use emcon_c_types, only : log_interface, progress_interface
-   use emcon_errors, only : err_input, err_interrupt, err_none, error_t
+   use emcon_deck_source, only : passage_t
+   use emcon_errors, only : err_input, err_interrupt, err_none, error_t, raise
    use emcon_handle, only : handle_build, handle_fail, handle_free, handle_new, handle_pass, &
-      handle_read, handle_read_text, model_t
+      handle_read, handle_read_passages, handle_read_text, model_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_run_log, only : model_lines
@@ -17,7 +18,8 @@ module emcon_c
    use emcon_version, only : version
    implicit none
    private
-   public :: emcon_version_c, emcon_read, emcon_read_text, emcon_build, emcon_open, emcon_close
+   public :: emcon_version_c, emcon_read, emcon_read_text, emcon_read_passages, emcon_build
+   public :: emcon_open, emcon_close
    public :: emcon_message, emcon_advance, emcon_is_done, emcon_run, new_handle
 
 contains
@@ -81,6 +83,31 @@ contains
       if (emcon_read_text == err_none) call handle_read_text(address_of(c_loc(model)), &
          f_text(text), f_text(name), f_text(parameters), is_lenient /= 0, emcon_read_text)
    end function emcon_read_text
+
+   integer(c_int) function emcon_read_passages(text, n_passage, passage, names, parameters, &
+      is_lenient, handle) bind(c)
+      type(c_ptr), value :: text, passage, names, parameters, handle
+      integer(c_int), value :: n_passage, is_lenient
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+      integer(c_int), pointer :: at(:, :)
+      integer :: k
+
+      emcon_read_passages = err_input
+      call new_handle(handle, model)
+      if (.not. associated(model)) return
+      call check_given("text", text, error)
+      call check_given("passage", passage, error)
+      call check_given("names", names, error)
+      if (.not. allocated(error) .and. n_passage < 1) call raise(error, err_input, &
+         "n_passage is not above 0")
+      call handle_pass(model, error, emcon_read_passages)
+      if (emcon_read_passages /= err_none) return
+      call c_f_pointer(passage, at, [4, int(n_passage)])
+      call handle_read_passages(address_of(c_loc(model)), f_text(text), &
+         [(passage_t(at(1, k), at(2, k), at(3, k), at(4, k) /= 0), k = 1, n_passage)], &
+         f_text(names), f_text(parameters), is_lenient /= 0, emcon_read_passages)
+   end function emcon_read_passages
 
    integer(c_int) function emcon_build(handle) bind(c)
       type(c_ptr), value :: handle

@@ -6,12 +6,14 @@ module emcon_c_conditions
    use emcon_errors, only : err_none, error_t
    use emcon_handle, only : handle_pass, model_t
    use emcon_kinds, only : wp
+   use emcon_stepper, only : stepper_t
    use emcon_stepper_conditions, only : stepper_add_prescribed, stepper_find_load, &
       stepper_remove_prescribed, stepper_set_load, stepper_set_prescribed
    implicit none
    private
    public :: emcon_find_load, emcon_set_load
-   public :: emcon_set_prescribed, emcon_add_prescribed, emcon_remove_prescribed
+   public :: emcon_set_prescribed, emcon_add_prescribed, emcon_prescribe, &
+      emcon_remove_prescribed
 
 contains
 
@@ -67,6 +69,33 @@ contains
       call stepper_add_prescribed(model%stepper, int(label), int(dof), real(value, wp), error)
       call handle_pass(model, error, emcon_add_prescribed)
    end function emcon_add_prescribed
+
+   integer(c_int) function emcon_prescribe(handle, label, dof, value) bind(c)
+      type(c_ptr), value :: handle
+      integer(c_int), value :: label, dof
+      real(c_double), value :: value
+      type(model_t), pointer :: model
+
+      call find_built(handle, model, emcon_prescribe)
+      if (emcon_prescribe /= err_none) return
+      if (is_prescribed(model%stepper, int(label), int(dof))) then
+         emcon_prescribe = emcon_set_prescribed(handle, label, dof, value)
+      else
+         emcon_prescribe = emcon_add_prescribed(handle, label, dof, value)
+      end if
+   end function emcon_prescribe
+
+   !> Is there a condition on this degree of freedom in the present step?
+   pure logical function is_prescribed(stepper, label, dof)
+      type(stepper_t), intent(in) :: stepper
+      integer, intent(in) :: label, dof
+      integer :: node
+
+      node = findloc(stepper%scene%node_label, label, 1)
+      associate (list => stepper%scene%step(stepper%march%state%i_step)%prescribed)
+         is_prescribed = any(list%node == node .and. list%dof == dof)
+      end associate
+   end function is_prescribed
 
    integer(c_int) function emcon_remove_prescribed(handle, label, dof) bind(c)
       type(c_ptr), value :: handle

@@ -1,20 +1,23 @@
 !> The C interface: what a model holds. What each function does is said in emcon.h.
 module emcon_c_state
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, c_ptr
-   use emcon_c_border, only : c_string, check_count, find_built, find_read, put_field, put_number, &
-      put_numbers, put_values
+   use emcon_c_border, only : c_string, check_count, check_given, f_text, find_built, find_read, &
+      put_field, put_number, put_numbers, put_values
    use emcon_c_types, only : ledger_c, sizes_c
-   use emcon_errors, only : err_none, error_t
+   use emcon_errors, only : err_input, err_none, error_t, raise
    use emcon_handle, only : handle_pass, model_t
    use emcon_kinds, only : wp
+   use emcon_quantities, only : contact_quantity
    use emcon_stepper_query, only : query_momenta
+   use emcon_text, only : to_upper
    use emcon_verdict_file, only : verdict_so_far
    implicit none
    private
    public :: emcon_get_sizes, emcon_get_time, emcon_get_ledger, emcon_get_verdict, &
       emcon_get_labels
    public :: emcon_get_positions, emcon_get_state, emcon_get_multipliers, emcon_get_contact
-   public :: emcon_get_pairs, emcon_get_momenta
+   public :: emcon_get_pairs, emcon_get_momenta, emcon_get_notes, emcon_find_nodes
+   public :: emcon_get_pressures
 
 contains
 
@@ -87,6 +90,56 @@ contains
       call c_f_pointer(json, place)
       place = c_loc(model%c_verdict)
    end function emcon_get_verdict
+
+   integer(c_int) function emcon_get_notes(handle, text) bind(c)
+      type(c_ptr), value :: handle, text
+      type(model_t), pointer :: model
+      type(c_ptr), pointer :: place
+      character(len=:), allocatable :: lines
+      integer :: i
+
+      call find_built(handle, model, emcon_get_notes)
+      if (emcon_get_notes /= err_none .or. .not. c_associated(text)) return
+      lines = ""
+      do i = 1, size(model%stepper%diagnostic)
+         lines = lines // model%stepper%diagnostic(i)%text // new_line("a")
+      end do
+      do i = 1, model%stepper%notes%n
+         lines = lines // model%stepper%notes%item(i)%text // new_line("a")
+      end do
+      model%c_notes = c_string(lines)
+      call c_f_pointer(text, place)
+      place = c_loc(model%c_notes)
+   end function emcon_get_notes
+
+   integer(c_int) function emcon_find_nodes(handle, name, n_node, is_in) bind(c)
+      type(c_ptr), value :: handle, name, is_in
+      integer(c_int), value :: n_node
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+      integer, allocatable :: flag(:)
+      integer :: k
+
+      call find_read(handle, model, emcon_find_nodes)
+      if (emcon_find_nodes /= err_none) return
+      associate (scene => model%stepper%scene)
+         call check_given("name", name, error)
+         call check_count("n_node", n_node, size(scene%x, 2), error)
+         if (.not. allocated(error)) then
+            do k = 1, size(scene%node_set)
+               if (scene%node_set(k)%name == to_upper(f_text(name))) exit
+            end do
+            if (k > size(scene%node_set)) then
+               call raise(error, err_input, "there is no node set " // f_text(name))
+            else
+               allocate(flag(size(scene%x, 2)), source=0)
+               flag(scene%node_set(k)%item) = 1
+               call put_numbers(flag, is_in)
+            end if
+         end if
+      end associate
+      call handle_pass(model, error, emcon_find_nodes)
+   end function emcon_find_nodes
 
    integer(c_int) function emcon_get_labels(handle, n_node, label) bind(c)
       type(c_ptr), value :: handle, label
@@ -176,6 +229,39 @@ contains
          call put_numbers(of_pair, pair)
       end associate
    end function emcon_get_contact
+
+   integer(c_int) function emcon_get_pressures(handle, n_contact, pressure, gap) bind(c)
+      type(c_ptr), value :: handle, pressure, gap
+      integer(c_int), value :: n_contact
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+      integer :: before
+
+      call find_built(handle, model, emcon_get_pressures)
+      if (emcon_get_pressures /= err_none) return
+      associate (system => model%stepper%march%system)
+         before = system%linear%n
+         call check_count("n_contact", n_contact, system%n_constraint - before, error)
+      end associate
+      if (.not. allocated(error)) then
+         call put_quantity("CSTR", pressure)
+         call put_quantity("CDIS", gap)
+      end if
+      call handle_pass(model, error, emcon_get_pressures)
+
+   contains
+
+      subroutine put_quantity(name, to)
+         character(len=*), intent(in) :: name
+         type(c_ptr), intent(in) :: to
+         real(wp), allocatable :: quantity(:, :)
+
+         if (.not. c_associated(to)) return
+         quantity = contact_quantity(model%stepper, name)
+         call put_values(quantity(1, before + 1:), to)
+      end subroutine put_quantity
+
+   end function emcon_get_pressures
 
    integer(c_int) function emcon_get_pairs(handle, n_pair, total, n_active) bind(c)
       type(c_ptr), value :: handle, total, n_active

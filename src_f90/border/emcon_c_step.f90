@@ -4,8 +4,8 @@ module emcon_c_step
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, &
       c_null_ptr, c_ptr
    use emcon_c, only : new_handle
-   use emcon_c_border, only : check_given, f_text, find_built, put_increment, take_field, &
-      take_flags, take_values
+   use emcon_c_border, only : check_given, f_text, find_built, find_read, put_increment, &
+      take_field, take_flags, take_values
    use emcon_errors, only : err_input, err_none, error_t
    use emcon_handle, only : handle_pass, model_t
    use emcon_kinds, only : wp
@@ -17,7 +17,7 @@ module emcon_c_step
       stepper_set_state, stepper_snapshot, stepper_step
    implicit none
    private
-   public :: emcon_step, emcon_next_step, emcon_set_state, emcon_save, emcon_load
+   public :: emcon_step, emcon_next_step, emcon_set_state, emcon_save, emcon_load, emcon_resume
    public :: emcon_take_snapshot, emcon_restore_snapshot, emcon_free_snapshot
 
 contains
@@ -140,18 +140,34 @@ contains
    integer(c_int) function emcon_load(path, handle) bind(c)
       type(c_ptr), value :: path, handle
       type(model_t), pointer :: model
-      type(error_t), allocatable :: error
-      type(restart_t) :: restart
 
       emcon_load = err_input
       call new_handle(handle, model)
-      if (.not. associated(model)) return
+      if (associated(model)) call load(model, path, emcon_load)
+   end function emcon_load
+
+   integer(c_int) function emcon_resume(handle, path) bind(c)
+      type(c_ptr), value :: handle, path
+      type(model_t), pointer :: model
+
+      call find_read(handle, model, emcon_resume)
+      if (emcon_resume == err_none) call load(model, path, emcon_resume)
+   end function emcon_resume
+
+   !> Build the model of a restart file, in the state that it holds.
+   subroutine load(model, path, ierr)
+      type(model_t), intent(inout) :: model
+      type(c_ptr), intent(in) :: path
+      integer(c_int), intent(out) :: ierr
+      type(error_t), allocatable :: error
+      type(restart_t) :: restart
+
       call check_given("path", path, error)
       if (.not. allocated(error)) call restart_read(restart, f_text(path), error)
       if (.not. allocated(error)) call stepper_load(model%stepper, restart, error)
       if (.not. allocated(error)) call conditions_load(model%stepper, restart, error)
       if (allocated(error)) model%stepper%is_read = .false.    ! there is nothing to work with
-      call handle_pass(model, error, emcon_load)
-   end function emcon_load
+      call handle_pass(model, error, ierr)
+   end subroutine load
 
 end module emcon_c_step

@@ -17,7 +17,7 @@ module emcon_handle
    implicit none
    private
    public :: model_t, handle_new, handle_free, handle_find, handle_fail, handle_pass
-   public :: handle_read, handle_read_text, handle_read_passages, handle_build, handle_fits
+   public :: handle_read, handle_read_text, handle_read_passages, handle_build
    public :: at_mass, at_tangent, at_links, at_p, at_df
 
    !> Places of the matrices that a model was asked for.
@@ -31,7 +31,7 @@ module emcon_handle
       character(len=:), allocatable :: message   !! of the last failure
       character(kind=c_char), allocatable :: c_text(:)   !! the same as C was given it
       character(len=:), allocatable :: verdict   !! asked for last
-      character(kind=c_char), allocatable :: c_verdict(:)
+      character(kind=c_char), allocatable :: c_verdict(:), c_notes(:)
       integer(c_int), allocatable :: c_place(:, :)       !! the numbers in `report`, from 0
       real(c_double), allocatable :: c_gap(:, :)         !! the gaps in it
    end type model_t
@@ -188,18 +188,5 @@ contains
       ierr = err_none
       if (allocated(error)) call handle_fail(model, error%message, error%code, ierr)
    end subroutine handle_pass
-
-   !> Is the size `n` of an array what the model has? If not, `ierr` and the message say so.
-   logical function handle_fits(model, n, expected, ierr)
-      type(model_t), intent(inout) :: model
-      integer(c_int), intent(in) :: n
-      integer, intent(in) :: expected
-      integer(c_int), intent(out) :: ierr
-
-      ierr = err_none
-      handle_fits = n == expected
-      if (.not. handle_fits) call handle_fail(model, &
-         "the arrays do not have the size of the model", err_input, ierr)
-   end function handle_fits
 
 end module emcon_handle

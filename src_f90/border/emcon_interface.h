@@ -76,7 +76,7 @@ typedef struct emcon_interface_sizes {
 
 /* An interface of nodes at the reference positions `x`, 2*n_node [L]. `*face` is to be freed also
  * after a failure, when it holds the message. */
-int emcon_interface_new(int n_node, const double *x, emcon_interface **face);
+int emcon_interface_new(int n_node, const double *x /* n_node x 2 */, emcon_interface **face);
 
 /* Free an interface; harmless for NULL. */
 void emcon_interface_free(emcon_interface *face);
@@ -91,7 +91,7 @@ const char *emcon_interface_notes(emcon_interface *face);
  * the outward normal is the edge turned by -90 degrees. Edges in any order, connected or in parts,
  * open or closed. `name` is for messages, NULL: its number. `*surface` is its number. */
 int emcon_interface_add_surface(emcon_interface *face, const char *name, int n_edge,
-                                const int *edge, int *surface);
+                                const int *edge /* n_edge x 2 */, int *surface);
 
 /* Add a contact pair; a surface in contact with itself is its own master. `options` NULL: the
  * defaults. Rigid obstacles are masters of held nodes. */
@@ -109,15 +109,17 @@ int emcon_interface_set(emcon_interface *face, const emcon_interface_settings *s
 /* Finish: from here on there are steps. `held`: 1 for freedoms that the host moves by itself,
  * 2*n_node, NULL: none. Slave nodes of ties are moved onto their masters: the host takes over
  * emcon_interface_get_positions. After a failure it may be called again. */
-int emcon_interface_prepare(emcon_interface *face, const int *held);
+int emcon_interface_prepare(emcon_interface *face, const int *held /* n_node x 2, or NULL */);
 
 int emcon_interface_get_sizes(emcon_interface *face, emcon_interface_sizes *sizes);
 
 /* Positions `x`, 2*n_node [L], and how far a slave node was moved onto its master at most [L]. */
-int emcon_interface_get_positions(emcon_interface *face, double *x, double *largest_move);
+int emcon_interface_get_positions(emcon_interface *face, double *x /* n_node x 2 */,
+                                  double *largest_move);
 
 /* Slave node and pair of each possible contact, n_contact each. */
-int emcon_interface_get_contacts(emcon_interface *face, int n_contact, int *node, int *pair);
+int emcon_interface_get_contacts(emcon_interface *face, int n_contact, int *node /* n_contact */,
+                                 int *pair /* n_contact */);
 
 /* ---- ties and held freedoms ------------------------------------------------------------------ */
 
@@ -130,8 +132,8 @@ int emcon_interface_get_links(emcon_interface *face, emcon_csr *t);
 
 /* Tied freedoms of a displacement or velocity follow the others; forces on tied freedoms go to
  * those that they follow. `field`: 2*n_node, changed in place, unchanged after a failure. */
-int emcon_interface_follow(emcon_interface *face, double *field);
-int emcon_interface_gather(emcon_interface *face, double *field);
+int emcon_interface_follow(emcon_interface *face, double *field /* n_node x 2, in and out */);
+int emcon_interface_gather(emcon_interface *face, double *field /* n_node x 2, in and out */);
 
 /* ---- a step from the displacements u0 by du, 2*n_node each [L] ------------------------------- */
 
@@ -171,47 +173,58 @@ enum {
 
 /* Begin a step with the motion that is expected. Flags of n_contact contacts: which acted at the
  * end of the step before, and which of them still can. One array may be given for both. */
-int emcon_interface_begin_step(emcon_interface *face, const double *u0, const double *du,
-                               int n_contact, const int *was_active, int *active);
+int emcon_interface_begin_step(emcon_interface *face, const double *u0 /* n_node x 2 */,
+                               const double *du /* n_node x 2 */, int n_contact,
+                               const int *was_active /* n_contact */,
+                               int *active /* n_contact */);
 
 /* All gaps, n_contact. */
-int emcon_interface_get_gaps(emcon_interface *face, const double *u0, const double *du,
-                             int n_contact, emcon_gap *gap);
+int emcon_interface_get_gaps(emcon_interface *face, const double *u0 /* n_node x 2 */,
+                             const double *du /* n_node x 2 */, int n_contact,
+                             emcon_gap *gap /* n_contact */);
 
 /* Select the contacts that act, by flags; `*n` becomes their number. */
-int emcon_interface_select(emcon_interface *face, const double *u0, const double *du,
-                           int n_contact, const int *active, int *n);
+int emcon_interface_select(emcon_interface *face, const double *u0 /* n_node x 2 */,
+                           const double *du /* n_node x 2 */, int n_contact,
+                           const int *active /* n_contact */, int *n);
 
 /* Select `n` contacts by their numbers, ascending, with gaps to hold of the host's own choice [L].
  * emcon_interface_update_active does not go with these. */
-int emcon_interface_choose(emcon_interface *face, const double *u0, const double *du, int n,
-                           const int *contact, const double *target);
+int emcon_interface_choose(emcon_interface *face, const double *u0 /* n_node x 2 */,
+                           const double *du /* n_node x 2 */, int n,
+                           const int *contact /* n */, const double *target /* n */);
 
 /* Values and gradients of the selected contacts. */
-int emcon_interface_evaluate(emcon_interface *face, const double *u0, const double *du,
-                              emcon_interface_constraints *constraints);
+int emcon_interface_evaluate(emcon_interface *face, const double *u0 /* n_node x 2 */,
+                             const double *du /* n_node x 2 */,
+                             emcon_interface_constraints *constraints);
 
 /* sum of lam[k] d g_k/d u1 (2*n_node x 2*n_node) as last evaluated, which the tangent of the step
  * gets with a minus sign; and the same times a direction, 2*n_node each. `lam`: n multipliers of
  * the selected contacts, forces, > 0 pressing [M L/T^2]. */
-int emcon_interface_get_curvature(emcon_interface *face, int n, const double *lam,
+int emcon_interface_get_curvature(emcon_interface *face, int n, const double *lam /* n */,
                                   emcon_csr *matrix);
-int emcon_interface_second_times(emcon_interface *face, int n, const double *lam,
-                                 const double *direction, double *product);
+int emcon_interface_second_times(emcon_interface *face, int n, const double *lam /* n */,
+                                 const double *direction /* n_node x 2 */,
+                                 double *product /* n_node x 2 */);
 
 /* The next active set from a solved step: takes in what would penetrate, releases what pulls.
  * `active`, flags of n_contact contacts: those selected, then the next ones. `*is_done`: the set
  * stands, or `*outcome` is not EMCON_STEP_DONE and the step cannot be ended. `magnitude`, 2*n_node:
  * sums of the sizes of the contributions to the residual, which tell signs of round-off from
  * tension; NULL: the contact forces themselves. */
-int emcon_interface_update_active(emcon_interface *face, const double *u0, const double *du, int n,
-                                  const double *lam, const double *magnitude, int n_contact,
-                                  int *active, int *is_done, int *outcome);
+int emcon_interface_update_active(emcon_interface *face, const double *u0 /* n_node x 2 */,
+                                  const double *du /* n_node x 2 */, int n,
+                                  const double *lam /* n */,
+                                  const double *magnitude /* n_node x 2, or NULL */,
+                                  int n_contact, int *active /* n_contact, in and out */,
+                                  int *is_done, int *outcome);
 
 /* Areas that the multipliers of the step to `u1` act on, n_contact each [L^2], so that the pressure
  * is lam/area, and lengths of slave surface that belong to them at its end [L]. */
-int emcon_interface_get_areas(emcon_interface *face, const double *u1, int n_contact, double *area,
-                              double *length);
+int emcon_interface_get_areas(emcon_interface *face, const double *u1 /* n_node x 2 */,
+                              int n_contact, double *area /* n_contact */,
+                              double *length /* n_contact */);
 
 /* ---- without multipliers --------------------------------------------------------------------- */
 
@@ -223,18 +236,20 @@ int emcon_interface_get_null_space(emcon_interface *face, emcon_csr *p, emcon_cs
                                    int *n_redundant, const int **redundant);
 
 /* Leave selected contacts out for the rest of the step; `active`, n_contact: what is left. */
-int emcon_interface_drop(emcon_interface *face, int n_redundant, const int *redundant,
-                         int n_contact, int *active);
+int emcon_interface_drop(emcon_interface *face, int n_redundant,
+                         const int *redundant /* n_redundant */, int n_contact,
+                         int *active /* n_contact */);
 
 /* After emcon_interface_get_null_space: n multipliers from the residual T^T r without contact
  * forces, n_unknown numbers. */
-int emcon_interface_multipliers(emcon_interface *face, int n_unknown, const double *residual,
-                                int n, double *lam);
+int emcon_interface_multipliers(emcon_interface *face, int n_unknown,
+                                const double *residual /* n_unknown */, int n,
+                                double *lam /* n */);
 
 /* After emcon_interface_get_null_space: the motion `dw`, n_unknown, of dependent unknowns alone
  * that closes the `defect`, n. Newton's step is this plus DF times that of the others. */
-int emcon_interface_particular(emcon_interface *face, int n, const double *defect, int n_unknown,
-                               double *dw);
+int emcon_interface_particular(emcon_interface *face, int n, const double *defect /* n */,
+                               int n_unknown, double *dw /* n_unknown */);
 
 #ifdef __cplusplus
 }

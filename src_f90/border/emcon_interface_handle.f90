@@ -16,8 +16,7 @@ module emcon_interface_handle
    implicit none
    private
    public :: host_t, host_new, host_find, host_free, host_pass, host_fit, host_put, host_index
-   public :: host_make, host_at, host_keep, host_contacts, host_selected, host_unknowns, &
-      host_has_nodes
+   public :: host_make, host_at, host_keep, host_contacts, host_selected, host_unknowns
    public :: handle_size, no_handle
 
    integer, parameter :: handle_size = 3
@@ -161,24 +160,6 @@ contains
       if (allocated(error) .or. actual == needed .or. needed < 0) return
       call raise(error, err_input, name // " is " // to_text(actual) // ", not " // to_text(needed))
    end subroutine host_fit
-
-   !> Whether fields of the host are over the nodes of the interface at an address. The code and
-   !> the text of an error, if not.
-   logical function host_has_nodes(address, n_node, ierr)
-      integer(c_int64_t), intent(in) :: address
-      integer(c_int), intent(in) :: n_node
-      integer(c_int), intent(out) :: ierr
-      type(host_t), pointer :: host
-      type(error_t), allocatable :: error
-
-      host_has_nodes = .false.
-      ierr = err_input
-      call host_at(address, host)
-      if (.not. associated(host)) return
-      call host_fit("n_node", n_node, host%face%n_node, error)
-      call host_pass(host, error, ierr)
-      host_has_nodes = .not. allocated(error)
-   end function host_has_nodes
 
    !> A matrix in the host's arrays, rows and columns from 1: row i has the entries row(i) to
    !> row(i + 1) - 1. If there is too little room, `n_entry` tells how much is needed.

@@ -125,18 +125,16 @@ def bench_steps(folder, n=5):
 def bench_opening(n=41):
     from emcon import _core
     from emcon.stepper import Stepper
-    flat = _core.emcon_flat
 
     def of_library():
-        handle = flat.new_model()
-        assert flat.read_deck(handle, os.fsencode(RING), b"", 0) == 0
-        assert flat.build_model(handle) == 0
-        flat.close_model(handle)
+        status, handle = _core.emcon_open(os.fsencode(RING), b"", 0)
+        assert status == 0
+        _core.emcon_close(handle)
 
     def of_python():
         Stepper(RING).close()
 
-    print(f"\nOpening the ring deck: read_deck and build_model of the library, and Stepper, "
+    print(f"\nOpening the ring deck: emcon_open of the library, and Stepper, "
           f"{n} pairs")
     row = table("library [ms]", "Stepper [ms]", "ratio", "spread", "emcon check [ms]")
     seconds = pairs(cpu_of(of_library), cpu_of(of_python), n)
@@ -165,37 +163,30 @@ def new_bytes(function):
 def bench_queries(n=41):
     from emcon import _core
     from emcon.stepper import Stepper
-    query, state = _core.emcon_flat_query, _core.emcon_flat_state
     with Stepper(RING) as ring:
         ring.run(1.0)
         a, n_node = ring._handle.address, ring.n_node
         u, u1 = ring.u, np.ascontiguousarray(ring.guess(0.01))
         none, flags = np.empty(0), np.empty(0, np.int32)
 
-        mass, tangent_place, gradient, jacobian = 1, 2, 6, 7    # where the library keeps them
-
-        def csr(number, size):
-            return query.get_csr(a, number, int(size[0]), int(size[2]))
+        n_unknown, n_constraint = ring.n_unknown, ring.n_constraint     # there are no ties
 
         def constraints():
-            found, _ = query.constraints(a, u.T, u1.T, 0)
-            query.get_constraints(a, int(found[0, 0]))
-            csr(gradient, found[:, 0])
-            csr(jacobian, found[:, 1])
+            _core.emcon_constraints(a, u, u1, 0)
 
         def tangent():
-            query.evaluate(a, 0.01, u1.T, none, flags, 1)
-            csr(tangent_place, query.make_matrix(a, tangent_place, 1)[0])
+            _core.emcon_evaluate(a, 0.01, u1, 1, n_constraint, none, flags)
+            _core.emcon_tangent(a, 1)
 
         def residual():
-            query.evaluate(a, 0.01, u1.T, none, flags, 0)
-            query.get_residual(a, 1, n_node)
+            _core.emcon_evaluate(a, 0.01, u1, 0, n_constraint, none, flags)
+            _core.emcon_residual(a, 1, n_node, n_unknown)
 
         calls = {
-            "u": (lambda: state.get_field(a, 1, n_node), lambda: ring.u),
+            "u": (lambda: _core.emcon_get_state(a, n_node), lambda: ring.u),
             "residual": (residual, lambda: ring.residual(u1, 0.01)),
             "tangent": (tangent, lambda: ring.tangent(u1, 0.01)),
-            "mass": (lambda: csr(mass, query.make_matrix(a, mass, 0)[0]), lambda: ring.mass),
+            "mass": (lambda: _core.emcon_mass(a), lambda: ring.mass),
             "constraint": (constraints, lambda: ring.constraint(u0=u, u1=u1)),
             "constraint q": (constraints, lambda: ring.constraint(ring.positions + u,
                                                                   ring.positions + u1)),

@@ -33,7 +33,9 @@ static void without_model(void)
    TELL(emcon_open("none.inp", NULL, 0, NULL));
    TELL(emcon_read("none.inp", NULL, 0, NULL));
    TELL(emcon_read_text("*NODE", "none.inp", NULL, 0, NULL));
+   TELL(emcon_read_passages("*NODE", 1, i, "none.inp", NULL, 0, NULL));
    TELL(emcon_load("none.h5", NULL));
+   TELL(emcon_resume(m, "none.h5"));
    TELL(emcon_give_law(m, "M", NULL, NULL));
    TELL(emcon_give_potential(m, NULL, 1, i, NULL, NULL));
    TELL(emcon_give_force(m, NULL, NULL, NULL, NULL));
@@ -52,17 +54,21 @@ static void without_model(void)
    TELL(emcon_get_time(m, x));
    TELL(emcon_get_ledger(m, &ledger));
    TELL(emcon_get_verdict(m, i, &json));
+   TELL(emcon_get_notes(m, &json));
+   TELL(emcon_find_nodes(m, "ALL", 1, i));
    TELL(emcon_get_labels(m, 1, i));
    TELL(emcon_get_positions(m, 1, x));
    TELL(emcon_get_state(m, 1, x, x));
    TELL(emcon_get_multipliers(m, 1, x, i));
    TELL(emcon_get_contact(m, 1, x, i, i, i));
+   TELL(emcon_get_pressures(m, 1, x, x));
    TELL(emcon_get_pairs(m, 1, x, i));
    TELL(emcon_get_momenta(m, 1, x));
    TELL(emcon_find_load(m, EMCON_LOAD_POINT, 1, 1, i));
    TELL(emcon_set_load(m, 0, 1));
    TELL(emcon_set_prescribed(m, 1, 1, 0));
    TELL(emcon_add_prescribed(m, 1, 1, 0));
+   TELL(emcon_prescribe(m, 1, 1, 0));
    TELL(emcon_remove_prescribed(m, 1, 1));
    TELL(emcon_unknowns(m, 1, i));
    TELL(emcon_links(m, &matrix));
@@ -75,6 +81,9 @@ static void without_model(void)
    TELL(emcon_multipliers(m, 1, x));
    TELL(emcon_constraints(m, 1, x, x, 0, &report));
    TELL(emcon_curvature_times(m, 1, x, 1, x, x));
+   TELL(emcon_get_law(0, i, 0, NULL));
+   TELL(emcon_law_response(1, 0, NULL, NULL, NULL, x, NULL, NULL));
+   TELL(emcon_node_gap(NULL, NULL, 0, 0, 0, NULL, NULL, NULL, NULL));
 }
 
 /* Nothing in place of arrays: outputs are left out, inputs are missed. */

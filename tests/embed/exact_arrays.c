@@ -81,12 +81,66 @@ static void evaluate(void)
    free(active);
 }
 
+/* Pressures, gaps and node sets; a count that does not fit, and a set that there is not. */
+static void ask(void)
+{
+   const int n = sizes.n_contact;
+   double *pressure = numbers(n), *gap = numbers(n);
+   int *is_in = calloc((size_t)sizes.n_node, sizeof *is_in);
+   const char *notes = NULL;
+   WORKS(emcon_get_pressures(m, n, pressure, gap));
+   WORKS(emcon_get_pressures(m, n, NULL, gap));
+   REFUSED(emcon_get_pressures(m, n + 1, pressure, gap));
+   REFUSED(emcon_find_nodes(m, "no such set", sizes.n_node, is_in));
+   need(strstr(emcon_message(m), "no such set") != NULL, "the message names the set");
+   REFUSED(emcon_find_nodes(m, "FLOOR", sizes.n_node - 1, is_in));
+   REFUSED(emcon_find_nodes(m, NULL, sizes.n_node, is_in));
+   WORKS(emcon_get_notes(m, &notes));
+   need(notes != NULL, "notes");
+   free(pressure);
+   free(gap);
+   free(is_in);
+}
+
+/* Kernels: along a straight edge the gap is what the slave moves across it, and a linear law gives
+ * half its stress times the strain; derivatives go along rows. */
+static void kernels(void)
+{
+   const double x0[10] = {0.5, -1, 0, 0, 1, 0, 0, 0, 0, 0}, dx[10] = {0, 0.25};
+   const double constant[2] = {2, 0}, none[3] = {0, 0, 0}, strain[3] = {1, 0, 0};
+   double *gap = numbers(3), *g = numbers(10), *c = numbers(10), *h = numbers(100);
+   double *stress = numbers(3), *tangent = numbers(9), energy = 0;
+   WORKS(emcon_node_gap(x0, dx, 0, 0, 0, gap, g, c, h));
+   need(gap[0] == 1 && gap[1] == 0.75 && gap[2] == -0.25 && g[1] == -1 && c[1] == -1, "gap");
+   const char *linear = "linear\nELASTIC\n\n E nu";
+   const int n_text = (int)strlen(linear) + 1;
+   char *text = malloc((size_t)n_text);
+   int law = 0;
+   WORKS(emcon_get_law(0, &law, n_text, text));
+   need(strcmp(text, linear) == 0, "the first law");
+   REFUSED(emcon_get_law(0, &law, n_text - 1, text));
+   REFUSED(emcon_get_law(1000, &law, n_text, text));
+   REFUSED(emcon_get_law(-1, &law, n_text, text));
+   free(text);
+   WORKS(emcon_law_response(law, 2, constant, none, strain, &energy, stress, tangent));
+   need(energy == 1 && stress[0] == 1 && tangent[0] == 1 && tangent[1] == 0, "law");
+   REFUSED(emcon_law_response(99, 2, constant, none, strain, &energy, stress, tangent));
+   free(gap);
+   free(g);
+   free(c);
+   free(h);
+   free(stress);
+   free(tangent);
+}
+
 int main(int argc, char **argv)
 {
    if (argc < 2) return 2;
    WORKS(emcon_open(argv[1], NULL, 0, &m));
    WORKS(emcon_get_sizes(m, &sizes));
    evaluate();
+   ask();
+   kernels();
    int *label = calloc((size_t)sizes.n_node, sizeof *label),
        *unknown = calloc(2*(size_t)sizes.n_node, sizeof *unknown);
    WORKS(emcon_get_labels(m, sizes.n_node, label));
@@ -94,10 +148,12 @@ int main(int argc, char **argv)
    int n_changed = 0, changed[3];
    for (int d = 0; d < 2*sizes.n_node && n_changed < 3; ++d) {
       if (unknown[d] < 0) continue;
-      WORKS(emcon_add_prescribed(m, label[d/2], d%2 + 1, 0));
+      WORKS(emcon_prescribe(m, label[d/2], d%2 + 1, 0));
       changed[n_changed++] = d;
       stale();
       evaluate();
+      WORKS(emcon_prescribe(m, label[d/2], d%2 + 1, 1e-9));
+      REFUSED(emcon_add_prescribed(m, label[d/2], d%2 + 1, 0));
    }
    WORKS(emcon_step(m, 1e-3, NULL));
    evaluate();

@@ -13,6 +13,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]/"pywrap"))
 
+from emcon import _core  # noqa: E402
 from emcon import interface as interface_module  # noqa: E402
 from emcon.interface import InputError, Interface, Outcome  # noqa: E402
 from interface_springs import collide  # noqa: E402
@@ -378,42 +379,40 @@ def test_calls_before_prepare_after_it_and_after_close() -> None:
 def test_fields_over_other_nodes_are_refused_below_python_too() -> None:
     """What the package hands over has been looked at there; the functions below look again."""
     face, u0, _ = two_strips()
-    build, step, handle = interface_module._build, interface_module._step, face._handle
-    fine, short = np.asfortranarray(u0.T), np.asfortranarray(u0.T[:, 1:])
+    handle, short = face._handle, u0[1:].copy()
     flags, contacts = np.zeros(short.shape, np.int32), np.zeros(face.n_contact, np.int32)
     numbers = np.zeros(0)
-    assert step.begin_step(handle, fine, fine, contacts)[-1] == 0
-    for routine, *arguments in (
-        (build.prepare, flags), (build.positions, short.shape[1]), (build.follow, short),
-        (build.gather, short), (step.begin_step, short, short, contacts),
-        (step.gaps, short, short, face.n_contact), (step.select_active, short, short, contacts),
-        (step.choose, short, short, contacts[:0], numbers), (step.evaluate, short, short),
-        (step.second_times, numbers, short),
-        (step.update_active, short, short, numbers, 0, short, contacts),
-        (step.areas, short, face.n_contact),
+    assert _core.emcon_interface_begin_step(handle, u0, u0, contacts)[0] == 0
+    for name, *arguments in (
+        ("prepare", flags), ("get_positions", len(short)), ("follow", short), ("gather", short),
+        ("begin_step", short, short, contacts), ("get_gaps", short, short, face.n_contact),
+        ("select", short, short, contacts), ("choose", short, short, contacts[:0], numbers),
+        ("evaluate", short, short), ("second_times", numbers, short),
+        ("update_active", short, short, numbers, short, contacts),
+        ("get_areas", short, face.n_contact),
     ):  # fmt: skip
-        answer = routine(handle, *arguments)
-        assert (answer[-1] if isinstance(answer, tuple) else answer) == 2, routine
-        assert b"n_node is 15, not 16" in build.message(handle), routine
-    assert step.evaluate(handle, fine, fine)[-1] == 0
+        answer = getattr(_core, f"emcon_interface_{name}")(handle, *arguments)
+        assert (answer[0] if isinstance(answer, tuple) else answer) == 2, name
+    with pytest.raises(_core.__core_error, match="len_du==n_node"):
+        _core.emcon_interface_evaluate(handle, u0, short)
+    assert _core.emcon_interface_evaluate(handle, u0, u0)[0] == 0
 
 
 def test_use_from_two_threads_at_once_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     face, u0, du = two_strips()
     choose_all(face, u0, du)
     inside, leave = threading.Event(), threading.Event()
-    step = interface_module._step
 
     class Slow:
         def __getattr__(self, name: str) -> object:
-            return getattr(step, name)
+            return getattr(_core, name)
 
-        def evaluate(self, *arguments: object) -> object:
+        def emcon_interface_evaluate(self, *arguments: object) -> object:
             inside.set()
             assert leave.wait(60)
-            return step.evaluate(*arguments)
+            return _core.emcon_interface_evaluate(*arguments)
 
-    monkeypatch.setattr(interface_module, "_step", Slow())
+    monkeypatch.setattr(interface_module, "_core", Slow())
     with face, ThreadPoolExecutor(1) as pool:
         found = pool.submit(face.evaluate, u0, du)
         assert inside.wait(60)

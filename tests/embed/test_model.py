@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT/"pywrap"))
 
-from emcon import _core  # noqa: E402
+from emcon import _core, errors  # noqa: E402
 from emcon.deck_text import number, table  # noqa: E402
 from emcon.mesh import block, read  # noqa: E402
 from emcon.model import Model  # noqa: E402
@@ -375,29 +375,18 @@ def test_many_errors_and_unlucky_text_do_no_harm() -> None:
     Model("Ünïcode in a heading is fine").cards("** Kommentar: ä").heading("zwei ß")
 
 
-def test_matrices_that_a_model_has_not_are_refused() -> None:
-    """Numbers that the package does not use."""
-    handle = int(_core.emcon_flat.new_model())
-    for place in (-1, 0, 99, 2**31 - 1):
-        assert _core.emcon_flat_query.make_matrix(handle, place, 0)[-1] == 2
-        assert _core.emcon_flat_query.get_csr(handle, place, 1, 1)[-1] == 2
-        assert f"no matrix {place}" in _core.emcon_flat.last_error(handle).decode()
-    _core.emcon_flat.close_model(handle)
-
-
 def test_lines_of_a_text_are_counted_where_that_is_asked_for(tmp_path: Path) -> None:
-    """`read_text` with the passages of a text in one file and in two."""
+    """`emcon_read_passages` with those of a text in one file and in two."""
     (tmp_path/"nodes.inp").write_text("*NODE\n1, 0., 0.\n2, 0., nan\n")
     text = f"*INCLUDE, INPUT={tmp_path}/nodes.inp\n*NSET, NSET=A\n1, 7\n*ELSET, ELSET=B\n8\n"
 
     def message(*places: tuple[int, int, int, int]) -> str:
-        handle = int(_core.emcon_flat.new_model())
-        ierr = _core.emcon_flat_source.read_text(
-            handle, text.encode(), np.array(places, dtype=np.int32).T, b"one\ntwo", b"", 0)
+        ierr, handle = _core.emcon_read_passages(
+            text.encode(), np.array(places, dtype=np.int32), b"one\ntwo", b"", 0)
         assert ierr == 2
-        found = _core.emcon_flat.last_error(handle).decode().rstrip()
-        _core.emcon_flat.close_model(handle)
-        return str(found)
+        found = errors.message(handle)
+        _core.emcon_close(handle)
+        return found
 
     counted = message((99, 1, 1, 1))
     assert "one:3: error" in counted and "one:5: error" in counted

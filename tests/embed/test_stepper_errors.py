@@ -206,7 +206,7 @@ def test_two_threads_in_one_stepper() -> None:
             other.start()
             begun.wait()
             for _ in range(8):
-                *_, ierr = _core.emcon_flat_state.advance(address)
+                ierr, _ = _core.emcon_advance(address)
             over.set()
             other.join()
             return ierr

@@ -1,0 +1,238 @@
+"""Write the signature file of the Python extension, from the headers of the C library.
+
+    python make_pyf.py HEADER... > _core.pyf
+
+Each function of the headers becomes one of the extension, with its name. It returns the status, or
+what else the C function returns, and then what C writes. Handles, functions and texts of the
+library are addresses; counts that an input array tells are left out. The size of an array stands
+behind it in the header: `double *u /* n_node x 2 */`. An input that may be NULL is so where it has
+no entries, one of several output arrays where `no_u=1` is given. Structures are bytes; the constant
+STRUCTURES says what they hold, in JSON for numpy, and enumerations are constants too. The C
+compiler holds all this against the headers.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+NUMBERS = {"int": "integer", "double": "double precision"}
+FORMATS = {"int": "i4", "double": "f8"}
+#: Functions that are over at once keep other Python threads waiting; all others let them run.
+QUICK = re.compile(r"emcon_(interface_)?(get_(?!gaps|null_space|curvature)|add_|set$|free|message"
+                   r"|notes|is_done|version|close|find_)")
+
+
+@dataclass
+class Headers:
+    """What the headers declare."""
+
+    functions: list[tuple[str, str, str]] = field(default_factory=list)   # result, name, arguments
+    structures: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
+    opaque: set[str] = field(default_factory=set)
+    pointers: set[str] = field(default_factory=set)                       # to functions
+    constants: list[str] = field(default_factory=list)
+
+    def read(self, text: str) -> None:
+        """Add a header. Of its comments those behind arguments stay, in brackets."""
+        text = re.sub(r"/\*((?:(?!\*/).)*)\*/(?=\s*[,)])", r"[\1]", text, flags=re.DOTALL)
+        text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        self.opaque |= set(re.findall(r"typedef struct (\w+) \1;", text))
+        self.pointers |= set(re.findall(r"typedef \w+ \(\*(\w+)\)", text))
+        self.constants += re.findall(r"\b(EMCON_\w+) = \d", text)
+        for body, name in re.findall(r"typedef struct \w+ \{(.*?)\} (\w+);", text, re.DOTALL):
+            self.structures[name] = [part for line in body.split(";") if line.strip()
+                                     for part in self._components(line.strip())]
+        self.functions += re.findall(r"^((?:const )?\w+ \*?)(emcon_\w+)\(([^;]*)\);", text,
+                                     re.MULTILINE)
+
+    def _components(self, line: str) -> list[tuple[str, str]]:
+        kind, rest = re.fullmatch(r"(?:const )?(\w+)\s+(.*)", line, re.DOTALL).groups()
+        known = {**FORMATS, **{name: name for name in self.structures}}
+        return [(name.strip().lstrip("*"), "u8" if "*" in name else known[kind])
+                for name in rest.split(",")]
+
+    def size(self, name: str) -> int:
+        return dtypes(self.structures)[name].itemsize
+
+
+def dtypes(structures: dict[str, list[tuple[str, str]]]) -> dict[str, np.dtype]:
+    """Structures as numpy sees them."""
+    found: dict[str, np.dtype] = {}
+    for name, parts in structures.items():
+        found[name] = np.dtype([(part, found.get(kind, kind)) for part, kind in parts], align=True)
+    return found
+
+
+class Argument:
+    """An argument of C, and what becomes of it."""
+
+    def __init__(self, text: str, headers: Headers) -> None:
+        match = re.fullmatch(r"(const )?(\w+)\s+(\**)(\w+)(?:\s*\[(.*)\])?", text.strip(),
+                             re.DOTALL)
+        if not match:
+            raise SystemExit(f"make_pyf.py: not understood: {text}")
+        const, self.kind, stars, self.name, comment = match.groups()
+        parts = [part.strip() for part in (comment or "").split(",")]
+        self.is_in, self.level = bool(const), len(stars)
+        self.or_null, self.in_out = "or NULL" in parts, "in and out" in parts
+        self.extents = parts[0].split(" x ") if parts[0] else []
+        self.is_structure, self.is_number = self.kind in headers.structures, self.kind in NUMBERS
+        #: The first extent, where it is not fixed.
+        self.extent = self.extents[0] if self.extents and (
+            self.or_null or not self.extents[0].isdigit()) else ""
+        is_input = self.is_in or self.in_out
+        self.is_input_array = bool(self.extent) and is_input and self.is_number
+        self.is_output_array = bool(self.extents) and not is_input and self.is_number
+        self.ctype = (const or "") + self.kind
+        self.before = self.after = ""
+        self.passed, self.declared = self._forms(headers)
+
+    def _forms(self, headers: Headers) -> tuple[str, str]:
+        """How C gets it, and its declaration."""
+        name = self.name
+        if self.level == 2:
+            self.before = f"{self.ctype} *at_{name} = NULL; "
+            self.after = f" {name} = (npy_intp)at_{name};"
+            return f"&at_{name}", f"integer*8 intent(out) :: {name}"
+        if self.kind == "char" and self.is_in:
+            return name, f"character*(*) intent(in,c) :: {name}"
+        if self.kind == "char":
+            return (f"(char *){name}",
+                    f"integer*1 dimension({self.extents[0]}),intent(out,c) :: {name}")
+        if self.kind in headers.opaque | headers.pointers | {"void"}:
+            stars = "*"*self.level
+            return f"({self.ctype} {stars})(npy_intp){name}", f"integer*8 intent(in,c) :: {name}"
+        if self.is_structure:
+            size = "*".join([str(headers.size(self.kind)), *self.extents])
+            way = "in" if self.is_in else "out"
+            return (f"({self.ctype} *){name}",
+                    f"integer*1 dimension({size}),intent({way},c) :: {name}")
+        if not self.is_number:
+            raise SystemExit(f"make_pyf.py: what is {self.kind}?")
+        number = NUMBERS[self.kind]
+        if self.level == 0:
+            return name, f"{number} intent(in,c) :: {name}"
+        if not self.extents:
+            return f"&{name}", f"{number} intent(out) :: {name}"
+        way = "in,out,copy" if self.in_out else "in" if self.is_in else "out"
+        extents = [f"len_{name}", *self.extents[1:]] if self.is_input_array else self.extents
+        passed = f"(len_{name} > 0 ? {name} : NULL)" if self.or_null else name
+        return passed, f"{number} dimension({','.join(extents)}),intent({way},c) :: {name}"
+
+    def may_be_left_out(self) -> None:
+        """Of an output array: there is an argument no_NAME."""
+        self.passed = f"(no_{self.name} ? NULL : {self.name})"
+        self.declared = re.sub(r"dimension\((\w+)", rf"dimension(\1*(1-no_{self.name})",
+                               self.declared)
+
+
+class Function:
+    """A function of C, and the block that stands for it."""
+
+    def __init__(self, headers: Headers, result: str, name: str, text: str) -> None:
+        self.name = name
+        self.arguments = [Argument(part, headers) for part in split(text)]
+        outputs = [a for a in self.arguments if a.is_output_array]
+        outputs = outputs if len(outputs) > 1 else []
+        for a in outputs:
+            a.may_be_left_out()
+        self.names = [a.name for a in self.arguments]
+        self.lines = [a.declared for a in self.arguments]
+        self.call = f"{name}({', '.join(a.passed for a in self.arguments)});"
+        if result.strip() != "void":
+            kind, cast = ("integer*8", "(npy_intp)") if "*" in result else ("integer", "")
+            self.names.insert(0, "status")
+            self.lines.insert(0, f"{kind} intent(out) :: status")
+            self.call = f"status = {cast}{self.call}"
+        for extent in dict.fromkeys(a.extent for a in self.arguments if a.extent):
+            self._count(extent)
+        for a in outputs:
+            self._add(f"no_{a.name}", f"integer intent(in,c),optional :: no_{a.name} = 0")
+
+    def _add(self, name: str, line: str) -> None:
+        self.names.append(name)
+        self.lines.append(line)
+
+    def _count(self, extent: str) -> None:
+        """Where the first extent of arrays is known from, and what holds them to it.
+
+        numpy takes an array without entries for one entry where its extent is given: each input
+        array has a length of its own.
+        """
+        inputs = [a for a in self.arguments if a.extent == extent and a.is_input_array]
+        needed = [a for a in inputs if not a.or_null]
+        is_told = extent in self.names or extent.isdigit()             # C knows it
+        is_known = is_told or bool(needed) or len(inputs) < sum(
+            a.extent == extent for a in self.arguments)
+        if needed:
+            self.lines = [line for line in self.lines if not line.endswith(f":: {extent}")]
+            line = (f"integer intent(hide),depend({needed[0].name}) :: {extent} = "
+                    f"shape({needed[0].name},0)")
+            self.names += [] if is_told else [extent]
+            self.lines.append(line)
+        elif is_known and not is_told:
+            self._add(extent, f"integer intent(in,c) :: {extent}")
+        for a in inputs:
+            length, also = f"len_{a.name}", f"len_{a.name}==0||" if a.or_null else ""
+            check = f",{extent}),check({also}{length}=={extent}" if is_known else ""
+            self._add(length, f"integer intent(hide),depend({a.name}{check}) :: {length} = "
+                              f"shape({a.name},0)")
+        if not is_told:
+            # C takes arrays of the size that the handle has. f2py reads `!` as a comment.
+            handle = self.arguments[0]
+            fits = f"sizes.{extent} == {extent}" if is_known else " && ".join(
+                f"(len_{a.name} == 0 || sizes.{extent} == len_{a.name})" for a in inputs)
+            self.call = (f"{handle.kind}_sizes sizes; status = {handle.kind}_get_sizes("
+                         f"{handle.passed}, &sizes); if (status == EMCON_OK) status = ({fits}) ? "
+                         f"{self.call.removeprefix('status = ')[:-1]} : EMCON_ERROR_INPUT;")
+
+    def block(self) -> str:
+        call = "{" + "".join(a.before for a in self.arguments) + self.call + "".join(
+            a.after for a in self.arguments) + "}"
+        safe = [] if QUICK.match(self.name) else ["threadsafe"]
+        block = [f"subroutine {self.name}({', '.join(self.names)})", "  fortranname",
+                 f"  callstatement {call}", "  callprotoargument void",
+                 *(f"  {line}" for line in safe + self.lines), f"end subroutine {self.name}"]
+        return "\n".join(f"    {line}" for line in block)
+
+
+def split(text: str) -> list[str]:
+    """Arguments at the commas that stand in no comment."""
+    return [part for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
+
+
+def main() -> None:
+    headers = Headers()
+    for path in map(Path, sys.argv[1:]):
+        headers.read(path.read_text(encoding="utf-8"))
+    sizes = "\n".join(f"typedef char fits_{name}[sizeof({name}) == {headers.size(name)} ? 1 : -1];"
+                      for name in headers.structures)
+    table = json.dumps(headers.structures).replace('"', '\\"')
+    constants = "\n".join(f'PyModule_AddIntConstant(m, "{name}", {name});'
+                          for name in headers.constants)
+    includes = "\n".join(f'#include "{Path(path).name}"' for path in sys.argv[1:])
+    print(f"""\
+!    -*- f90 -*-
+python module _core
+  usercode '''
+{includes}
+{sizes}
+'''
+  interface
+    usercode '''
+{constants}
+PyModule_AddStringConstant(m, "STRUCTURES", "{table}");
+'''
+""" + "\n".join(Function(headers, *found).block() for found in headers.functions) + """
+  end interface
+end python module _core""")
+
+
+if __name__ == "__main__":
+    main()
