@@ -227,7 +227,7 @@ class Stepper(Queries, Conditions):
 
     def node_set(self, name: str) -> NDArray[np.intp]:
         """The rows of a node set in arrays of nodes, (k,). Raises `InputError` if there is none."""
-        if not isinstance(name, str) or not name.strip():
+        if not isinstance(name, str) or not name.strip() or "\0" in name:
             raise InputError(f"a node set has a name, not {name!r}")
         return np.flatnonzero(self._handle.call(_core.emcon_find_nodes, name.encode(), self.n_node))
 
