@@ -10,6 +10,7 @@ module emcon_deck_contact
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
       formulation_segment
    use emcon_kinds, only : wp
+   use emcon_options, only : option_code, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : read_real, to_text
@@ -129,16 +130,14 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       integer, intent(out) :: formulation
-      character(len=*), parameter :: known = "NODE TO SURFACE, SEGMENT, MORTAR"
+      character(len=:), allocatable :: known
 
-      formulation = 0
+      formulation = formulation_nts
+      if (option_name(card, "TYPE") == "") return
+      formulation = option_code("formulation", option_name(card, "TYPE"))
+      if (formulation > 0) return
+      call option_words("formulation", known)
       select case (option_name(card, "TYPE"))
-      case ("", "NODETOSURFACE")
-         formulation = formulation_nts
-      case ("SEGMENT")
-         formulation = formulation_segment
-      case ("MORTAR", "LINMORTAR", "PGLINMORTAR", "SURFACETOSURFACE")
-         formulation = formulation_mortar
       case ("MASSLESS")
          call refuse_option(reader, card, "TYPE", known, "nodes keep their mass")
       case default

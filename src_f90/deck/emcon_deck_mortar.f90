@@ -3,11 +3,11 @@
 !> What a card does not name stays as it was; only POINTS belongs to the INTEGRATION it was given
 !> with. An option that no pair of the model heeds gives a warning.
 module emcon_deck_mortar
+   use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_t, card_warning, has_option, option_angle, &
-      option_count, option_name, reader_t, refuse_option
+      option_count, option_name, reader_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
-      formulation_segment, integration_elements, integration_segments, multiplier_dual, &
-      multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
+      formulation_segment, integration_elements, normal_edge, smoothing_none
    implicit none
    private
    public :: read_mortar, read_smoothing
@@ -24,26 +24,8 @@ contains
       type(contact_options_t), intent(inout) :: options
 
       call read_integration(reader, card, options)
-      select case (option_name(card, "MULTIPLIER"))
-      case ("")
-         continue
-      case ("STANDARD")
-         options%multiplier = multiplier_standard
-      case ("DUAL")
-         options%multiplier = multiplier_dual
-      case default
-         call refuse_option(reader, card, "MULTIPLIER", "STANDARD, DUAL", "")
-      end select
-      select case (option_name(card, "NORMAL"))
-      case ("")
-         continue
-      case ("EDGE")
-         options%normal = normal_edge
-      case ("NODAL")
-         options%normal = normal_nodal
-      case default
-         call refuse_option(reader, card, "NORMAL", "EDGE, NODAL", "")
-      end select
+      call choose_option(reader, card, "MULTIPLIER", "multiplier", options%multiplier)
+      call choose_option(reader, card, "NORMAL", "normal", options%normal)
       call option_angle(reader, card, options%normal_angle)
       if (.not. in_doubt(reader, pair)) call warn_of_mortar(reader, card, pair, options)
    end subroutine read_mortar
@@ -54,23 +36,12 @@ contains
       type(card_t), intent(in) :: card
       type(contact_options_t), intent(inout) :: options
       integer :: least
+      logical :: is_refused
 
-      least = merge(1, 2, options%integration == integration_elements)
-      select case (option_name(card, "INTEGRATION"))
-      case ("")
-         continue
-      case ("SEGMENTS")
-         options%integration = integration_segments
-         options%n_point = 0
-         least = 2
-      case ("ELEMENTS")
-         options%integration = integration_elements
-         options%n_point = 0
-         least = 1
-      case default
-         call refuse_option(reader, card, "INTEGRATION", "SEGMENTS, ELEMENTS", "")
-         least = 1
-      end select
+      call choose_option(reader, card, "INTEGRATION", "integration", options%integration, &
+         is_refused)
+      if (option_name(card, "INTEGRATION") /= "" .and. .not. is_refused) options%n_point = 0
+      least = merge(1, 2, is_refused .or. options%integration == integration_elements)
       call option_count(reader, card, "POINTS", least, options%n_point, most_points)
    end subroutine read_integration
 
@@ -130,20 +101,12 @@ contains
       type(contact_pair_t), intent(in) :: pair(:)
       type(contact_options_t), intent(inout) :: options
       character(len=:), allocatable :: kind
+      logical :: is_refused
 
       kind = option_name(card, "TYPE")
       call option_angle(reader, card, options%smoothing_angle)
-      select case (kind)
-      case ("")
-         continue
-      case ("NONE")
-         options%smoothing = smoothing_none
-      case ("HERMITE")
-         options%smoothing = smoothing_hermite
-      case default
-         call refuse_option(reader, card, "TYPE", "NONE, HERMITE", "")
-         return
-      end select
+      call choose_option(reader, card, "TYPE", "smoothing", options%smoothing, is_refused)
+      if (is_refused) return
       if (in_doubt(reader, pair)) return
       if (size(pair) == 0) then
          call card_warning(reader, card, "it has no effect: there is no *CONTACT PAIR")

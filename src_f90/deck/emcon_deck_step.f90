@@ -12,16 +12,18 @@ module emcon_deck_step
       next_line
    use emcon_deck_loads, only : read_boundary, read_cload, read_dload
    use emcon_deck_mortar, only : read_mortar, read_smoothing
+   use emcon_deck_options, only : choose_option
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
+   use emcon_options, only : option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_solver_registry, only : solvers
-   use emcon_steps, only : method_null_space, method_saddle_point, procedure_dynamic, &
+   use emcon_steps, only : method_null_space, procedure_dynamic, &
       procedure_static, step_t
    use emcon_text, only : to_text
    implicit none
@@ -258,17 +260,16 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
-      character(len=*), parameter :: known = "NULL SPACE, SADDLE POINT"
+      character(len=:), allocatable :: known
 
       select case (option_name(card, "TYPE"))
-      case ("", "NULLSPACE")
+      case ("")
          step%constraint_method = method_null_space
-      case ("SADDLEPOINT")
-         step%constraint_method = method_saddle_point
       case ("PENALTY", "AUGMENTEDLAGRANGE")
+         call option_words("method", known)
          call refuse_option(reader, card, "TYPE", known, "not in this version")
       case default
-         call refuse_option(reader, card, "TYPE", known, "")
+         call choose_option(reader, card, "TYPE", "method", step%constraint_method)
       end select
    end subroutine read_constraint_method
 

@@ -1,0 +1,34 @@
+!> Parameters of cards whose values are rows of a table.
+module emcon_deck_options
+   use emcon_deck_reader, only : card_t, option_name, reader_t, refuse_option
+   use emcon_options, only : option_code, option_words
+   implicit none
+   private
+   public :: choose_option
+
+contains
+
+   !> The value of a parameter; `code` stays as it is where the parameter is absent or refused.
+   subroutine choose_option(reader, card, parameter, kind, code, is_refused)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: parameter
+      character(len=*), intent(in) :: kind         !! of `option_rows`
+      integer, intent(inout) :: code
+      logical, intent(out), optional :: is_refused
+      character(len=:), allocatable :: known
+      integer :: found
+
+      if (present(is_refused)) is_refused = .false.
+      if (option_name(card, parameter) == "") return
+      found = option_code(kind, option_name(card, parameter))
+      if (found > 0) then
+         code = found
+         return
+      end if
+      if (present(is_refused)) is_refused = .true.
+      call option_words(kind, known)
+      call refuse_option(reader, card, parameter, known, "")
+   end subroutine choose_option
+
+end module emcon_deck_options
