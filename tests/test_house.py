@@ -26,6 +26,8 @@ ONLY = {"app": {"app", "record", "stepper", "base"}}
 TOP = set("Makefile src_f90 pywrap input_decks tests docs".split())
 TOP |= set("README.md LICENSE CHANGELOG.md CITATION.cff".split())
 
+COLUMNS = 100
+
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 COMMENT = re.compile(r"!.*")
 # At the start of a statement or behind a one-line `if (...)`.
@@ -104,6 +106,14 @@ def statements(root, pattern, rooms_free):
                 yield f"{path.relative_to(root)}:{number}: {line.strip()}"
 
 
+def long_lines(root):
+    """Lines of more columns than .fortitude.toml allows."""
+    for path in sources(root):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            if len(line) > COLUMNS:
+                yield f"{path.relative_to(root)}:{number}: {len(line)} columns"
+
+
 def top_level(root):
     """Entries at the top that the house does not know; ignored files do not count."""
     listed = subprocess.run(
@@ -160,6 +170,7 @@ CHECKS = {
     "cycles": cycles,
     "stop": lambda root: statements(root, STOP, {"app"}),
     "print": lambda root: statements(root, PRINT, {"app", "results"}),
+    "long lines": long_lines,
     "top level": top_level,
     "hidden": hidden,
 }
@@ -229,6 +240,7 @@ BAD = {
         "base/emcon_a.f90": "module emcon_a\n   use emcon_b\nend module emcon_a\n",
         "base/emcon_b.f90": "module emcon_b\n   use emcon_a\nend module emcon_b\n",
     },
+    "long lines": {"base/emcon_a.f90": f"module emcon_a ! {'a'*100}\nend module emcon_a\n"},
     "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
     "stop, exit": {"stepper/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},
     "print": {"deck/emcon_a.f90": "module emcon_a\n   write (*, *) x\nend module emcon_a\n"},

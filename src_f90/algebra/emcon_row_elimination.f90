@@ -4,7 +4,8 @@
 !> Two rows of one pattern are eliminated at once and with the same pivots, for constraints that
 !> have a gradient for the forces and another one for the motion; rows of which there is only one
 !> come twice. A row of which nothing but round-off is left depends on rows before it, one of which
-!> little is left nearly so: neither is kept. Columns past `n_free` never give a pivot. Source: docs/theory.md, section 5.
+!> little is left nearly so: neither is kept. Columns past `n_free` never give a pivot.
+!> Source: docs/theory.md, section 5.
 module emcon_row_elimination
    use emcon_kinds, only : dp, hp, wp
    implicit none
@@ -90,7 +91,7 @@ contains
       real(hp), intent(in) :: first(:), second(:)       !! (entries) both kinds of the row
       integer, intent(in) :: own(:)                     !! columns to take with preference
       integer, intent(out) :: fate                      !! one of `row_`
-      real(hp), intent(in), optional :: made_of(2)      !! largest terms that the entries are sums of
+      real(hp), intent(in), optional :: made_of(2)      !! largest terms that the entries sum up
       real(hp) :: left(2), largest(2)
       integer :: from, k
 

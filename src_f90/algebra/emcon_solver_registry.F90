@@ -35,13 +35,15 @@ module emcon_solver_registry
 
 contains
 
-   !> A solver for matrices of one kind, in place of the one that was there.
+   !> A solver for matrices of one kind, in place of another that was there: one of the same choice
+   !> and kind stays, with the pattern that it has analysed.
    subroutine solver_create(choice, symmetry, solver)
       integer, intent(in) :: choice              !! one of `solver_` that is built
       integer, intent(in) :: symmetry            !! one of `matrix_`
       class(sparse_solver_t), allocatable, intent(inout) :: solver
 
       if (allocated(solver)) then
+         if (solver%choice == choice .and. solver%symmetry == symmetry) return
          call solver%free()
          deallocate(solver)
       end if
@@ -56,6 +58,7 @@ contains
          allocate(umfpack_t :: solver)
       end if
 #endif
+      solver%choice = choice
       solver%symmetry = symmetry
    end subroutine solver_create
 

@@ -20,6 +20,7 @@ module emcon_sparse_solver
 
    type, abstract :: sparse_solver_t
       integer :: symmetry = matrix_general    !! one of `matrix_`, set before `analyse`
+      integer :: choice = -1                  !! by which it was created; < 0: by none
       !> Set before `analyse`: it is factorised often enough to pay for two analyses
       logical :: seeks_less_fill = .false.
       !> The last `factorise` met a zero pivot, or one that is not positive where it must be, or

@@ -41,7 +41,7 @@ module emcon_contact
       logical :: is_sharp = .false.                   !! but not in this step
       logical :: meets_statics = .false.              !! a step of the deck is static
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
-      real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at minus this, by the edge
+      real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
       !> from there on the other side of a thin body is meant.

@@ -10,14 +10,15 @@ module emcon_facing
    private
    public :: facing_allows
 
-   !> Cosine of the angle by which an edge may be turned away, as bodies are coarse and turn within a
-   !> step; far from that of two faces at a right angle.
+   !> Cosine of the angle by which an edge may be turned away, as bodies are coarse and turn within
+   !> a step; far from that of two faces at a right angle.
    real(wp), parameter :: least_cosine = 0.5_wp
 
 contains
 
-   !> Does the edge from node `first` to node `last`, with the body to its left, face node `k` of the
-   !> chain at x + u? At an end of the chain, where a face of the body is not known, any edge does.
+   !> Does the edge from node `first` to node `last`, with the body to its left, face node `k` of
+   !> the chain at x + u? At an end of the chain, where a face of the body is not known, any edge
+   !> does.
    pure logical function facing_allows(chain, k, edge, x, u) result(allows)
       type(chain_t), intent(in) :: chain
       integer, intent(in) :: k                   !! index into the nodes of `chain`

@@ -43,7 +43,7 @@ module emcon_nts
       integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
       integer, allocatable :: class(:)                !! (n_constraint) of bodies that it looks at
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
-      real(wp), allocatable :: own_size(:)            !! (n_constraint) shortest slave edge there [L]
+      real(wp), allocatable :: own_size(:)            !! (n_constraint) least slave edge there [L]
       integer, allocatable :: other(:)                !! (n_constraint) the other one at a corner
                                                       !! that the node stands over; 0: none
       type(polygon_stencil_t), allocatable :: polygon(:, :)   !! (2, n_constraint) over these
@@ -191,8 +191,8 @@ contains
          self%master%edge(:, e), x, u)
    end function bears
 
-   !> Finish the choice for constraint `i`, with the stencils: a node beside its edge, over others of
-   !> its own surface that it must not touch, has none.
+   !> Finish the choice for constraint `i`, with the stencils: a node beside its edge, over others
+   !> of its own surface that it must not touch, has none.
    pure subroutine settle(self, i, x, u0)
       type(nts_t), intent(inout) :: self
       integer, intent(in) :: i

@@ -61,8 +61,8 @@ contains
       depth = sign(sqrt(self%square), left)
    end function nearest_depth
 
-   !> Do two edges cross, where along `a`, and does it go behind the other there? Ways from the first
-   !> node of `a`: to its last node, and to the first and the last node of `b`.
+   !> Do two edges cross, where along `a`, and does it go behind the other there? Ways from the
+   !> first node of `a`: to its last node, and to the first and the last node of `b`.
    pure subroutine crossing_find(a, to_b, crosses, share, enters)
       real(wp), intent(in) :: a(2), to_b(2, 2)   !! [L]
       logical, intent(out) :: crosses            !! is there a common point inside both?

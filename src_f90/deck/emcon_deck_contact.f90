@@ -325,8 +325,8 @@ contains
       case default
          call refuse_option(reader, card, "GUARD", "YES, NO", "")
       end select
-      if (both_sides .and. has_option(card, "GUARD")) call card_error(reader, card, "GUARD has no " &
-         // "meaning where the nodes of both surfaces are held; take it out, or say SIDES=ONE")
+      if (both_sides .and. has_option(card, "GUARD")) call card_error(reader, card, "GUARD has " &
+         // "no meaning where the nodes of both surfaces are held; take it out, or say SIDES=ONE")
    end subroutine read_guard
 
    !> ADJUST= a distance or a node set.

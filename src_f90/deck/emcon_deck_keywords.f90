@@ -52,8 +52,8 @@ module emcon_deck_keywords
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
       keyword_t("ELASTIC", in_model, "TYPE=,~MODULI,!DEPENDENCIES:0"), &
-      keyword_t("HYPERELASTIC", in_model, "N=,!POLYNOMIAL,!REDUCEDPOLYNOMIAL,!ARRUDA-BOYCE,!VANDERWAALS,!MARLOW," &
-         // "~MODULI,!DEPENDENCIES:0"), &
+      keyword_t("HYPERELASTIC", in_model, "N=,!POLYNOMIAL,!REDUCEDPOLYNOMIAL," &
+         // "!ARRUDA-BOYCE,!VANDERWAALS,!MARLOW,~MODULI,!DEPENDENCIES:0"), &
       keyword_t("USER MATERIAL", in_model, "CONSTANTS=,~UNSYMM,!TYPE:MECHANICAL," &
          // "!HYBRIDFORMULATION"), &
       keyword_t("INITIAL CONDITIONS", in_model, "TYPE=,!USER"), &

@@ -6,7 +6,8 @@
 !> if it is held too long; else only where the step cannot be cut any more. Of constraints that say
 !> nearly the same one acts until the other is needed too. Where Newton's method does not converge,
 !> what pulls is let go before the step is cut; in statics, where no set stands, the step is tried
-!> with sharp convex corners before. Linear constraints that are not eliminated act always. Source: docs/theory.md, section 6.
+!> with sharp convex corners before. Linear constraints that are not eliminated act always. Source:
+!> docs/theory.md, section 6.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
@@ -15,7 +16,8 @@ module emcon_active_set
    use emcon_holding, only : holding_complete, holding_find_free, holding_forget, holding_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
-   use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, newton_t
+   use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, &
+      newton_t
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
@@ -116,7 +118,8 @@ contains
    end subroutine active_set_overclosure
 
    !> Solve the step from `state`; `motion%du` is the first guess and the result.
-   subroutine active_set_solve(self, system, scene, newton, correction, motion, state, status, error)
+   subroutine active_set_solve(self, system, scene, newton, correction, motion, state, status, &
+      error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
@@ -170,8 +173,8 @@ contains
       end do
    end subroutine active_set_solve
 
-   !> Begin the step again with convex corners that are not rounded: in statics, where a node that is
-   !> pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.
+   !> Begin the step again with convex corners that are not rounded: in statics, where a node that
+   !> is pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.
    subroutine begin_sharp(self, system, newton, motion, state, is_done)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -335,8 +338,8 @@ contains
    end subroutine active_set_select
 
    !> The next set, from the gaps and multipliers of the converged one. Of the conditions gap >= 0,
-   !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does not
-   !> is taken in where gap < 0.
+   !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does
+   !> not is taken in where gap < 0.
    subroutine update(self, system, motion, state, has_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -410,8 +413,9 @@ contains
          .not. (self%only_adds .or. self%set%lam(k) >= -noise)
    end function is_let_go
 
-   !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact that
-   !> was left out and closes all the same does not follow from others: it had lost its surface.
+   !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact
+   !> that was left out and closes all the same does not follow from others: it had lost its
+   !> surface.
    pure subroutine look_at_open(self, contact, i, id, was_active, closes, status)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
@@ -432,21 +436,23 @@ contains
             return
          else if (gap%is_arriving .and. self%has_inertia .and. self%may_cut) then
             status = step_too_far
-         else if (was_active .or. .not. gap%gap0 - allowed(0) < -contact%deepest_start*gap%size) then
+         else if (was_active .or. .not. gap%gap0 - allowed(0) &
+            < -contact%deepest_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -gap_noise*gap%size
          end if
       end associate
    end subroutine look_at_open
 
-   !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one; in
-   !> the smallest it begins at once, if it is deep.
+   !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one;
+   !> in the smallest it begins at once, if it is deep.
    pure logical function may_arrive(gap)
       type(gap_state_t), intent(in) :: gap
 
       may_arrive = gap%was_open .and. .not. gap%gap1 >= -deepest_arrival*gap%size
    end function may_arrive
 
-   !> Would the `i`-th constraint of `contact` begin to act with a stencil chosen for another motion?
+   !> Would the `i`-th constraint of `contact` begin to act with a stencil chosen for another
+   !> motion?
    pure logical function begins_unseen(self, contact, i)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact

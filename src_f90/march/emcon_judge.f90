@@ -2,9 +2,8 @@
 !>
 !> All pieces that contact pairs name are looked at both ways: nodes of either against the outline
 !> of the other, and what lies of edges between their crossings with the other, also of a piece with
-!> itself; at the end of the step and, where it moves by much, on the straight way there. While boxes
-!> are apart nothing is done.
-!> Source: docs/theory.md, section 4.11.
+!> itself; at the end of the step and, where it moves by much, on the straight way there. While
+!> boxes are apart nothing is done. Source: docs/theory.md, section 4.11.
 module emcon_judge
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp
@@ -261,9 +260,10 @@ contains
       end associate
    end subroutine try_node
 
-   !> Is a part of edge `e`, between its crossings with `other`, inside? Looked at is its middle, and
-   !> of a piece in itself the node where it ends: the nearest edge is looked for along the outline
-   !> from the crossings, past what lies behind the piece's own surface. Neighbours do not cross.
+   !> Is a part of edge `e`, between its crossings with `other`, inside? Looked at is its middle,
+   !> and of a piece in itself the node where it ends: the nearest edge is looked for along the
+   !> outline from the crossings, past what lies behind the piece's own surface. Neighbours do not
+   !> cross.
    pure subroutine try_edge(self, x, e, other, is_own, reach, overlap)
       type(judge_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)

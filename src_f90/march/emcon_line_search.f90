@@ -52,7 +52,8 @@ contains
       call choose(self)
    end subroutine line_search_take
 
-   !> The next place, in the middle: across a corner the work is a step, on which a secant is slower.
+   !> The next place, in the middle: across a corner the work is a step, on which a secant is
+   !> slower.
    pure subroutine choose(self)
       type(line_search_t), intent(inout) :: self
       real(wp) :: from

@@ -67,7 +67,7 @@ module emcon_newton
       real(wp), allocatable :: history(:)        !! relative residuals of the last solve
       real(wp), allocatable :: residual(:), scale(:), correction(:)   !! (n_unknown)
       real(wp), allocatable :: dlam(:)
-      real(wp), allocatable :: way(:)            !! (n_unknown) the correction that is searched along
+      real(wp), allocatable :: way(:)            !! (n_unknown) the correction to search along
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
       !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
@@ -261,8 +261,8 @@ contains
    end subroutine judge
 
    !> Half of what was taken of the last correction if the residual, the last in the history, is no
-   !> smaller than one of the two before it, else twice as much. The first guess may happen to have a
-   !> small one.
+   !> smaller than one of the two before it, else twice as much. The first guess may happen to have
+   !> a small one.
    pure subroutine choose_damping(self)
       type(newton_t), intent(inout) :: self
 

@@ -15,8 +15,9 @@ module emcon_overclosure
 
 contains
 
-   !> Warn of pairs whose overclosure `overclosure` is not much more than edges dip into arcs, unless
-   !> nodes meet nodes: there the gaps of all are the same. Gaps at the start have been measured.
+   !> Warn of pairs whose overclosure `overclosure` is not much more than edges dip into arcs,
+   !> unless nodes meet nodes: there the gaps of all are the same. Gaps at the start have been
+   !> measured.
    subroutine overclosure_check(system, scene, overclosure, warnings)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene

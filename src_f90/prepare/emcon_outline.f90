@@ -102,7 +102,9 @@ contains
       integer, allocatable, intent(out) :: number(:)   !! (n_piece) as in `piece`, ascending
       integer :: s, i
 
-      self%pair = reshape([scene%pair%slave, scene%pair%master], [2, size(scene%pair)], order=[2, 1])
+      associate (pair => scene%pair)
+         self%pair = reshape([pair%slave, pair%master], [2, size(pair)], order=[2, 1])
+      end associate
       allocate(self%on(size(scene%surface)), number(0))
       do s = 1, size(scene%surface)
          allocate(self%on(s)%piece(0))
@@ -169,7 +171,8 @@ contains
             do f = 1, kind%n_face
                edge(:, n + f) = scene%element_node(kind%face_node(:, f), e)
             end do
-            thickness(n + 1:n + kind%n_face) = minval(lengths(scene, edge(:, n + 1:n + kind%n_face)))
+            thickness(n + 1:n + kind%n_face) = &
+               minval(lengths(scene, edge(:, n + 1:n + kind%n_face)))
             n = n + kind%n_face
          end associate
       end do

@@ -76,8 +76,8 @@ contains
                scene%pair(k)%is_exchanged)) // ") on " // &
                scene%surface(scene%pair(k)%master)%name // ", " // how)
          end do
-         if (system%n_pair < size(system%contact)) call add("contact: guards hold nodes that the " // &
-            "pairs do not, deeper than " // to_text(guard_slack) // " of an edge")
+         if (system%n_pair < size(system%contact)) call add("contact: guards hold nodes that " // &
+            "the pairs do not, deeper than " // to_text(guard_slack) // " of an edge")
          do k = 1, size(scene%step)
             call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
                ", h = " // to_text(scene%step(k)%h) // &

@@ -17,7 +17,7 @@ module emcon_couplings
       integer, allocatable :: node(:)                !! entries; the first is the slave node
       real(wp), allocatable :: weight(:)             !! [L]; the weights of a row sum up to 0
       real(wp), allocatable :: size(:)               !! (n) int psi_k, > 0 [L]
-      integer, allocatable :: covered(:, :)          !! (2, any) master edges under slave ones, whole
+      integer, allocatable :: covered(:, :)          !! (2, any) master edges all under slave ones
       integer, allocatable :: buried(:)              !! master nodes with the slave on both sides
       !> (3, any) ends of the slave: the node, first and last node of the master edge under it
       integer, allocatable :: ending(:, :)

@@ -225,8 +225,8 @@ contains
       end do
    end subroutine reference_gradient
 
-   !> Forces of a motion; with `slot`, also adds the tangent to the matrix entries `value` (slot > 0)
-   !> and `side` (slot < 0). What displacements are rounded by, forces are too.
+   !> Forces of a motion; with `slot`, also adds the tangent to the matrix entries `value` (slot >
+   !> 0) and `side` (slot < 0). What displacements are rounded by, forces are too.
    subroutine solid_respond(self, motion, nlgeom, response, slot, value, side)
       type(solid_t), intent(in) :: self
       type(motion_t), intent(in) :: motion
@@ -246,7 +246,8 @@ contains
       response%rounding = 0.0_wp
       response%inverted_element = 0
       if (self%has_given) then
-         call solid_evaluate_given(self, motion%from, motion%by, nlgeom, with_tangent, response%given)
+         call solid_evaluate_given(self, motion%from, motion%by, nlgeom, with_tangent, &
+            response%given)
          response%inverted_element = response%given%inverted_element
          if (response%inverted_element > 0) return
       end if

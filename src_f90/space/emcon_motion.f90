@@ -1,9 +1,9 @@
 !> A motion over one step, and where in it forces are evaluated.
 !>
 !> A scheme decides where. Forces are discrete gradients over a span of the step, from `from` by
-!> `by`: over the whole of it, or over nothing at its end, where a discrete gradient is the gradient.
-!> Who takes a motion needs not know which: a derivative over the span times `weight` is that by the
-!> end of the step. Source: docs/theory.md, section 2.
+!> `by`: over the whole of it, or over nothing at its end, where a discrete gradient is the
+!> gradient. Who takes a motion needs not know which: a derivative over the span times `weight` is
+!> that by the end of the step. Source: docs/theory.md, section 2.
 module emcon_motion
    use emcon_kinds, only : wp
    implicit none

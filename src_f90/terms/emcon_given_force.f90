@@ -43,8 +43,8 @@ module emcon_given_force
          !> (2, n_node) sums of |contributions| to `force`; left at 0: not known
          real(wp), intent(inout), contiguous :: magnitude(:, :)
          real(wp), intent(out) :: energy                              !! E(u0 + du) [M L^2/T^2]
-         !> Derivative of `force` by u0 + du, in the slots of `pattern`; 0 on entry. Where du = 0, half
-         !> of the second derivatives of E
+         !> Derivative of `force` by u0 + du, in the slots of `pattern`; 0 on entry. Where du = 0,
+         !> half of the second derivatives of E
          real(dp), intent(inout), contiguous :: tangent(:)
          integer, intent(out) :: status                               !! one of the `given_` codes
       end subroutine respond_interface

@@ -457,8 +457,8 @@ contains
             call check_near(error, s%f1 - s%f0, expected, 4.0_wp*eps, 4.0_wp, "values")
             call check_near(error, s%c, slopes_of(expect, which, x0 + dx), 40.0_wp*eps, 1.0_wp, &
                "gradient")
-            call check_second(error, which, x0, dx, trim(name(which)) // ", " // to_text(at(i)) // " to " &
-               // to_text(at(j)))
+            call check_second(error, which, x0, dx, trim(name(which)) // ", " // to_text(at(i)) &
+               // " to " // to_text(at(j)))
             image = operate(which, [-x0(1), x0(2:)], [-dx(1), dx(2:)])
             call check_near(error, [s%f1 - image%f1, s%df - image%df, s%g(1) + image%g(1)], &
                [at(j), dx(1), 1.0_wp], 4.0_wp*eps, 4.0_wp, "a, from both parts")

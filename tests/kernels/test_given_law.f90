@@ -183,8 +183,10 @@ contains
       call shake(du, 0.1_wp)
       call shake(way, 1.0_wp)
       if (law /= law_linear) du = 0.0_wp
-      call solid_respond(given%march%system%solid, motion_of(pose_t(), scene%x, u0, du), .true., one)
-      call solid_respond(own%march%system%solid, motion_of(pose_t(), scene%x, u0, du), .true., other)
+      call solid_respond(given%march%system%solid, motion_of(pose_t(), scene%x, u0, du), .true., &
+         one)
+      call solid_respond(own%march%system%solid, motion_of(pose_t(), scene%x, u0, du), .true., &
+         other)
       call check_near(error, one%force, other%force, 64.0_wp*eps, young, "force")
       call check_near(error, one%energy, other%energy, 64.0_wp*eps, young, "energy")
       call check_near(error, one%rounding, other%rounding, 16.0_wp*eps, young, "rounding")

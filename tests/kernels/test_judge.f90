@@ -224,9 +224,9 @@ contains
       call check_equal(error, overlap%node, block_node(strip, 8, 1), "node")
    end subroutine test_self_past
 
-   !> Two blocks side by side, the second a sixteenth lower and a little inside the first: an overlap
-   !> by the tops, but not if a tie holds them, which lets its ends slip by its error. What goes into
-   !> the other piece elsewhere is seen.
+   !> Two blocks side by side, the second a sixteenth lower and a little inside the first: an
+   !> overlap by the tops, but not if a tie holds them, which lets its ends slip by its error. What
+   !> goes into the other piece elsewhere is seen.
    subroutine test_joint(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -250,7 +250,8 @@ contains
       call judged(scene, overlap, 11, [-0.25_wp, -0.0625_wp])
       call check_equal(error, overlap%node, 0, "tied")
       call judged(scene, overlap, 14, [-1.5_wp, -0.125_wp])
-      call check_near(error, overlap%depth, 0.125_wp, 8.0_wp*eps, 1.0_wp, "a corner that is folded over")
+      call check_near(error, overlap%depth, 0.125_wp, 8.0_wp*eps, 1.0_wp, &
+         "a corner that is folded over")
       call check_equal(error, overlap%node, 14, "node")
    end subroutine test_joint
 

@@ -398,7 +398,8 @@ contains
       do i = 1, n_law
          n = n_constant(law_rows(i))
          if (first(i) + n /= first(i + 1)) error stop "test_law: constants do not fit the rows"
-         call law_create(law_rows(i)%code, constants(first(i):first(i + 1) - 1), created%law, raised)
+         call law_create(law_rows(i)%code, constants(first(i):first(i + 1) - 1), created%law, &
+            raised)
          call check_near(error, created%law%shear, mu, tol, mu, name(i))
          call law_create(law_rows(i)%code, spread(1.0_wp, 1, n + 1), created%law, raised)
          call check_error(error, raised, err_input, "too many or too few", name(i))

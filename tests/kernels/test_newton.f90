@@ -285,7 +285,8 @@ contains
       call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_converged, "status")
-      call check_true(error, all(trial%motion%du(2, 3:) < -0.5_wp .and. trial%motion%du(2, 3:) > -1.0_wp), &
+      call check_true(error, &
+         all(trial%motion%du(2, 3:) < -0.5_wp .and. trial%motion%du(2, 3:) > -1.0_wp), &
          "pressed flat, not through")
       call check_near(error, trial%system%response%force(2, 3:), [load%value, load%value], &
          1.0e4_wp*epsilon(1.0_wp), young, "internal forces balance the loads")

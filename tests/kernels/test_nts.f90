@@ -108,8 +108,8 @@ contains
       end do
    end subroutine test_corners
 
-   !> A square right on its twin goes in by a tenth and aside by as much. Statics evaluate gaps there
-   !> with no motion left: the corner, which the side does not bear, is still held by the top.
+   !> A square right on its twin goes in by a tenth and aside by as much. Statics evaluate gaps
+   !> there with no motion left: the corner, which the side does not bear, is still held by the top.
    subroutine test_faces_stay(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: way(2) = [-0.1_wp, -0.1_wp]

@@ -111,10 +111,10 @@ def outcomes(program, decks):
     program = pathlib.Path(program).resolve()
     store = STORE / f"of-{digest(program.read_bytes())}.json"
     known = json.loads(store.read_text()) if store.exists() else {}
-    todo = [deck for deck in decks if key(deck) not in known]
+    new = [deck for deck in decks if key(deck) not in known]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        found = pool.map(lambda deck: outcome(program, deck, options_of(deck)), todo)
-        known.update(zip(map(key, todo), found, strict=True))
+        found = pool.map(lambda deck: outcome(program, deck, options_of(deck)), new)
+        known.update(zip(map(key, new), found, strict=True))
     STORE.mkdir(parents=True, exist_ok=True)
     store.write_text(json.dumps(known))
     return {deck: known[key(deck)] for deck in decks}

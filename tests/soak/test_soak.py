@@ -1,6 +1,8 @@
-"""A few cases of each fuzzer; `make soak` runs more."""
+"""A few cases of each fuzzer, `make soak` runs more; the comparison of two programs."""
 
 import pytest
+import same_bits
+from scene_tools import DECKS, PROGRAM
 from soak import FUZZERS, soak
 
 CASES = {"decks": 25, "restart": 12, "calls": 4, "kill": 1}
@@ -9,3 +11,15 @@ CASES = {"decks": 25, "restart": 12, "calls": 4, "kill": 1}
 @pytest.mark.parametrize("name", FUZZERS)
 def test_a_few_cases(name, tmp_path):
     assert soak(name, 1, tmp_path, cases=CASES[name]) == CASES[name]
+
+
+def test_bits_of_two_programs(tmp_path, capsys, monkeypatch):
+    """A program has the bits of itself, and not those of one that takes another step."""
+    monkeypatch.setattr(same_bits, "STORE", tmp_path)
+    other = tmp_path / "other"
+    other.write_text(f'#!/bin/sh\nexec "{PROGRAM}" "$@" --set=h=0.02\n')
+    other.chmod(0o755)
+    deck = [DECKS / "two_blocks_static.inp", DECKS / "bouncing_bar.inp"]
+    assert same_bits.compare(PROGRAM, PROGRAM, deck) == 0
+    assert same_bits.compare(PROGRAM, other, deck[1:]) == 1
+    assert "bouncing_bar.inp: .csv, .h5, .json, .vtkhdf" in capsys.readouterr().out
