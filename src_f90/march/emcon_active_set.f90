@@ -52,6 +52,9 @@ module emcon_active_set
       type(constraint_set_t) :: set
       logical, allocatable :: is_active(:)       !! (n_constraint)
       real(wp), allocatable :: lam(:)            !! (n_constraint) multipliers to start from
+      !> (n_constraint) what acted at the end of the step before, with which multipliers
+      logical, allocatable :: was_active(:)
+      real(wp), allocatable :: lam0(:)
       logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
       integer :: n_tried = 0
       integer :: n_newton = 0                    !! iterations over all sets of the last step
@@ -117,25 +120,20 @@ contains
       end do
    end subroutine active_set_overclosure
 
-   !> Solve the step from `state`; `motion%du` is the first guess and the result.
-   subroutine active_set_solve(self, system, scene, newton, correction, motion, state, status, &
-      error)
+   !> Solve the step that has begun; `motion%du` is the first guess and the result.
+   subroutine active_set_solve(self, system, scene, newton, correction, motion, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
       type(correction_t), intent(inout) :: correction
-      type(motion_t), intent(inout) :: motion    !! from `state`
-      type(state_t), intent(in) :: state
+      type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: is_done, is_held
 
       self%first = motion%du
       self%driven = newton%driven
-      call stopwatch_start(system%contact_clock)
-      call active_set_begin(self, system, motion, state)
-      call stopwatch_stop(system%contact_clock)
       do
          call stopwatch_start(system%contact_clock)
          if (self%holding%is_needed) call hold(self, system, scene, newton%driven, motion)
@@ -154,33 +152,32 @@ contains
             cycle
          end if
          if (status == newton_diverged) then
-            call let_go_pulling(self, state%lam, motion%du, is_done)
-            if (is_done) call begin_sharp(self, system, newton, motion, state, is_done)
+            call let_go_pulling(self, motion%du, is_done)
+            if (is_done) call begin_sharp(self, system, newton, motion, is_done)
             if (is_done) return
             cycle
          end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
          if (status /= newton_converged .or. size(system%contact) == 0) return
          call stopwatch_start(system%contact_clock)
-         call active_set_advance(self, system, motion, state, is_done, status)
+         call active_set_advance(self, system, motion, is_done, status)
          if (is_done .and. status == step_done .and. self%holding%is_needed) then
             call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
             if (.not. is_held) status = step_not_held
          end if
          call stopwatch_stop(system%contact_clock)
-         if (status == step_cycling) call begin_sharp(self, system, newton, motion, state, is_done)
+         if (status == step_cycling) call begin_sharp(self, system, newton, motion, is_done)
          if (is_done) return
       end do
    end subroutine active_set_solve
 
    !> Begin the step again with convex corners that are not rounded: in statics, where a node that
    !> is pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.
-   subroutine begin_sharp(self, system, newton, motion, state, is_done)
+   subroutine begin_sharp(self, system, newton, motion, is_done)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
-      type(state_t), intent(in) :: state
       logical, intent(out) :: is_done
       integer :: pair, n_newton
 
@@ -199,7 +196,7 @@ contains
       do pair = 1, size(system%contact)
          system%contact(pair)%contact%is_sharp = system%contact(pair)%contact%may_sharpen
       end do
-      call begin_sets(self, system, motion, state)
+      call begin_sets(self, system, motion)
       self%n_newton = n_newton
    end subroutine begin_sharp
 
@@ -229,22 +226,25 @@ contains
       type(state_t), intent(in) :: state
       integer :: pair
 
+      call stopwatch_start(system%contact_clock)
+      self%was_active = state%is_active
+      self%lam0 = state%lam
       do pair = 1, size(system%contact)
          system%contact(pair)%contact%is_sharp = .false.
       end do
-      call begin_sets(self, system, motion, state)
+      call begin_sets(self, system, motion)
+      call stopwatch_stop(system%contact_clock)
    end subroutine active_set_begin
 
    !> Stencils and the first set, as the step began.
-   subroutine begin_sets(self, system, motion, state)
+   subroutine begin_sets(self, system, motion)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      type(state_t), intent(in) :: state
 
-      call begin_contact(self, system, motion, state)
+      call begin_contact(self, system, motion)
       call holding_forget(self%holding)
-      self%lam = state%lam
+      self%lam = self%lam0
       self%n_newton = 0
       self%n_tried = 0
       self%n_stale = 0
@@ -257,16 +257,15 @@ contains
 
    !> The next set from the motion and the multipliers that solve the step with the present one;
    !> `is_done` if that one stands, or if `status` tells of a failure.
-   subroutine active_set_advance(self, system, motion, state, is_done, status)
+   subroutine active_set_advance(self, system, motion, is_done, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      type(state_t), intent(in) :: state
       logical, intent(out) :: is_done            !! else solve the step again with the next set
       integer, intent(out) :: status                     !! one of the `step_` codes
       logical :: has_changed
 
-      call update(self, system, motion, state, has_changed, status)
+      call update(self, system, motion, has_changed, status)
       if (self%is_stale .and. self%n_stale < most_stale) then
          self%n_stale = self%n_stale + 1
          self%n_tried = 0
@@ -283,11 +282,10 @@ contains
 
    !> Choose stencils; start from the constraints that acted before and still can, also where the
    !> step is expected to end.
-   subroutine begin_contact(self, system, motion, state)
+   subroutine begin_contact(self, system, motion)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      type(state_t), intent(in) :: state
       integer :: pair
 
       self%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%is_reduced
@@ -297,8 +295,8 @@ contains
                last => system%first_constraint(pair + 1))
             call contact%begin_step(motion%x, motion%u0, motion%du)
             call contact%measure(motion%x, motion%u0, system%zero)
-            self%is_active(first:last) = state%is_active(first:last) .and. contact%state%is_near &
-               .and. contact%state%is_over
+            self%is_active(first:last) = self%was_active(first:last) &
+               .and. contact%state%is_near .and. contact%state%is_over
             if (.not. any(self%is_active(first:last))) cycle
             call contact%measure(motion%x, motion%u0, motion%du)
             self%is_active(first:last) = self%is_active(first:last) &
@@ -340,11 +338,10 @@ contains
    !> The next set, from the gaps and multipliers of the converged one. Of the conditions gap >= 0,
    !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does
    !> not is taken in where gap < 0.
-   subroutine update(self, system, motion, state, has_changed, status)
+   subroutine update(self, system, motion, has_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      type(state_t), intent(in) :: state
       logical, intent(out) :: has_changed
       integer, intent(out) :: status             !! one of the `step_` codes
       logical :: changes
@@ -363,11 +360,11 @@ contains
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then
                   k = k + 1
-                  call look_at_active(self, contact%state(i), k, state%is_active(id), status)
+                  call look_at_active(self, contact%state(i), k, self%was_active(id), status)
                   changes = is_let_go(self, system, contact, i, k)
                   if (changes .and. self%holding%is_needed) self%holding%has_pulled(id) = .true.
                else
-                  call look_at_open(self, contact, i, id, state%is_active(id), changes, status)
+                  call look_at_open(self, contact, i, id, changes, status)
                   ! What the pairs take in may hold the bodies away from their guards.
                   if (contact%slack > 0.0_wp .and. has_changed) changes = .false.
                   if (changes .and. begins_unseen(self, contact, i)) status = step_too_far
@@ -416,11 +413,10 @@ contains
    !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact
    !> that was left out and closes all the same does not follow from others: it had lost its
    !> surface.
-   pure subroutine look_at_open(self, contact, i, id, was_active, closes, status)
+   pure subroutine look_at_open(self, contact, i, id, closes, status)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i, id
-      logical, intent(in) :: was_active          !! in the step before
       logical, intent(out) :: closes
       integer, intent(inout) :: status
       real(wp) :: allowed(0:1)
@@ -436,7 +432,7 @@ contains
             return
          else if (gap%is_arriving .and. self%has_inertia .and. self%may_cut) then
             status = step_too_far
-         else if (was_active .or. .not. gap%gap0 - allowed(0) &
+         else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%deepest_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -gap_noise*gap%size
          end if
@@ -465,11 +461,10 @@ contains
    end function begins_unseen
 
    !> Newton's method has not converged: let go of the contacts that pull in its last iterate, each
-   !> once in a step, and start again with the multipliers `lam` from where it started. `is_done` if
+   !> once in a step, and start again with the multipliers and from where it started. `is_done` if
    !> there are none.
-   pure subroutine let_go_pulling(self, lam, du, is_done)
+   pure subroutine let_go_pulling(self, du, is_done)
       type(active_set_t), intent(inout) :: self
-      real(wp), intent(in) :: lam(:)             !! (n_constraint)
       real(wp), intent(inout), contiguous :: du(:, :)
       logical, intent(out) :: is_done
       integer :: k
@@ -485,7 +480,7 @@ contains
          end associate
       end do
       if (is_done) return
-      self%lam = lam
+      self%lam = self%lam0
       self%n_tried = 0
       du = self%before
    end subroutine let_go_pulling

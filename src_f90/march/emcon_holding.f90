@@ -106,7 +106,7 @@ contains
       type(look_t) :: look
       type(free_t), allocatable :: free(:)
       logical :: has_changed
-      integer :: i, round
+      integer :: i, round, n_active
 
       self%is_loose = .false.
       if (allocated(self%text)) deallocate(self%text)
@@ -126,9 +126,11 @@ contains
             has_changed = .true.
             exit
          end do
+         n_active = count(is_active)
          do i = 1, size(free)
-            if (.not. has_changed) call take_nearest(self, system, scene, motion, &
-               look%bodies, free(i), is_active, has_changed)
+            if (has_changed) exit
+            call take_nearest(self, system, scene, motion, look%bodies, free(i), is_active)
+            has_changed = count(is_active) > n_active
          end do
          if (.not. has_changed) exit
       end do
@@ -279,7 +281,7 @@ contains
 
    !> Along motions that no load works on take in the contacts that touch already; where no load
    !> acts on the bodies at all, those with the smallest gap. What has pulled is not asked again.
-   subroutine take_nearest(self, system, scene, motion, bodies, free, is_active, has_changed)
+   subroutine take_nearest(self, system, scene, motion, bodies, free, is_active)
       type(holding_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
@@ -287,7 +289,6 @@ contains
       type(rigid_bodies_t), intent(in) :: bodies
       type(free_t), intent(in) :: free
       logical, intent(inout) :: is_active(:)
-      logical, intent(inout) :: has_changed
       type(constraint_set_t) :: set
       logical :: is_next(size(is_active))
 
@@ -297,7 +298,6 @@ contains
       if (free%is_loaded) call gaps_keep_closed(set, is_next)
       if (.not. any(is_next)) return
       call note_brought(self, system, scene, bodies, free, set, is_next)
-      has_changed = .true.
       is_active = is_active .or. is_next
    end subroutine take_nearest
 

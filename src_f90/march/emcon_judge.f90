@@ -40,6 +40,15 @@ module emcon_judge
       real(wp) :: longest = 0.0_wp                               !! edge [L]
    end type extent_t
 
+   !> Where an edge crosses others, in order: at parts `share` of it, from 0 before the first to 1
+   !> after the last.
+   type :: crossings_t
+      integer :: n = 0
+      real(wp) :: share(0:most_crossings + 1) = 0.0_wp
+      logical :: goes_in(most_crossings) = .false.
+      integer :: edge(most_crossings) = 0        !! that is crossed
+   end type crossings_t
+
    type :: judge_t
       type(outline_t) :: outline
       type(extent_t), allocatable :: extent(:)   !! (n_piece) of the step
@@ -272,16 +281,15 @@ contains
       logical, intent(in) :: is_own              !! edges of the same piece
       real(wp), intent(in) :: reach              !! [L]
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: share(0:most_crossings + 1)
-      logical :: goes_in(most_crossings)
-      integer :: crossed(most_crossings), k, n, n_around
+      type(crossings_t) :: crossings
+      integer :: k, n_around
 
-      call find_crossings(self, x, e, other, n, share, goes_in, crossed)
-      if (n == 0) return
-      if (is_own) call find_around(self, e, crossed(:n), reach, n_around)
-      do k = 0, n
+      call find_crossings(self, x, e, other, crossings)
+      if (crossings%n == 0) return
+      if (is_own) call find_around(self, e, crossings%edge(:crossings%n), reach, n_around)
+      do k = 0, crossings%n
          if (.not. is_inside(k)) cycle
-         associate (middle => 0.5_wp*(share(k) + share(k + 1)))
+         associate (middle => 0.5_wp*(crossings%share(k) + crossings%share(k + 1)))
             if (.not. is_own) then
                call try_place(self, x, e, middle, other, overlap)
                cycle
@@ -289,7 +297,7 @@ contains
             associate (around => self%around(:n_around))
                call try_place(self, x, e, middle, around, overlap)
                if (k == 0) call try_place(self, x, e, 0.0_wp, around, overlap)
-               if (k == n) call try_place(self, x, e, 1.0_wp, around, overlap)
+               if (k == crossings%n) call try_place(self, x, e, 1.0_wp, around, overlap)
             end associate
          end associate
       end do
@@ -301,8 +309,8 @@ contains
          integer, intent(in) :: k
 
          is_inside = .false.
-         if (k > 0) is_inside = goes_in(k)
-         if (k < n) is_inside = is_inside .or. .not. goes_in(k + 1)
+         if (k > 0) is_inside = crossings%goes_in(k)
+         if (k < crossings%n) is_inside = is_inside .or. .not. crossings%goes_in(k + 1)
       end function is_inside
 
    end subroutine try_edge
@@ -333,22 +341,17 @@ contains
       end do
    end subroutine find_around
 
-   !> Where edge `e` crosses `other` edges, in order, from 0 before the first to 1 after the last.
-   pure subroutine find_crossings(self, x, e, other, n, share, goes_in, crossed)
+   !> Where edge `e` crosses `other` edges.
+   pure subroutine find_crossings(self, x, e, other, crossings)
       type(judge_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
-      integer, intent(out) :: n
-      real(wp), intent(out) :: share(0:)
-      logical, intent(out) :: goes_in(:)
-      integer, intent(out) :: crossed(:)
+      type(crossings_t), intent(out) :: crossings
       real(wp) :: new
       logical :: crosses, enters
       integer :: k, i
 
-      n = 0
-      share(0) = 0.0_wp
       do k = 1, size(other)
          if (are_neighbours(self, e, other(k))) cycle
          associate (a => self%outline%edge(:, e), b => self%outline%edge(:, other(k)))
@@ -356,17 +359,20 @@ contains
                between(x, self%u, a(1), b(1)), between(x, self%u, a(1), b(2))], [2, 2]), &
                crosses, new, enters)
          end associate
-         if (.not. crosses .or. n == size(goes_in)) cycle
-         i = count(share(1:n) <= new)
-         share(i + 2:n + 1) = share(i + 1:n)
-         goes_in(i + 2:n + 1) = goes_in(i + 1:n)
-         share(i + 1) = new
-         goes_in(i + 1) = enters
-         crossed(i + 2:n + 1) = crossed(i + 1:n)
-         crossed(i + 1) = other(k)
-         n = n + 1
+         if (.not. crosses .or. crossings%n == most_crossings) cycle
+         associate (n => crossings%n, share => crossings%share, goes_in => crossings%goes_in, &
+               edge => crossings%edge)
+            i = count(share(1:n) <= new)
+            share(i + 2:n + 1) = share(i + 1:n)
+            goes_in(i + 2:n + 1) = goes_in(i + 1:n)
+            edge(i + 2:n + 1) = edge(i + 1:n)
+            share(i + 1) = new
+            goes_in(i + 1) = enters
+            edge(i + 1) = other(k)
+            n = n + 1
+         end associate
       end do
-      share(n + 1) = 1.0_wp
+      crossings%share(crossings%n + 1) = 1.0_wp
    end subroutine find_crossings
 
    !> Do edges `e` and `f` meet in a node, at a joint, or where a tied piece ends on one of them?

@@ -4,8 +4,7 @@ module emcon_march_parts
       step_overlaps, step_refused, step_singular, step_stands_off, step_too_far
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_motion, only : instant_t
-   use emcon_march_step, only : cycling_text, increment_t, march_step, march_t
+   use emcon_march_step, only : cycling_text, increment_t, march_step, march_t, part_t
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_text, only : note_add, notes_append, notes_t, to_text
@@ -24,9 +23,8 @@ contains
       real(wp), intent(in) :: t0                     !! [T]
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
-      type(instant_t) :: start
+      type(part_t) :: part
       character(len=:), allocatable :: reason
-      real(wp) :: h
       integer :: level, place, status
 
       call notes_append(increment%warnings, self%warnings)
@@ -34,10 +32,11 @@ contains
       level = 0
       place = 0
       do while (place < 2**self%n_level)
-         h = scale(increment%h, -level)
-         start%step_time = t0 + scale(real(place, wp), -self%n_level)*increment%h
-         start%total_time = self%state%start_time + start%step_time
-         call march_step(self, scene, start, h, level < self%n_level, increment, status, error)
+         part%h = scale(increment%h, -level)
+         part%start%step_time = t0 + scale(real(place, wp), -self%n_level)*increment%h
+         part%start%total_time = self%state%start_time + part%start%step_time
+         part%may_cut = level < self%n_level
+         call march_step(self, scene, part, increment, status, error)
          if (allocated(error)) return
          if (status == step_done) then
             place = place + 2**(self%n_level - level)
@@ -48,15 +47,16 @@ contains
          call reason_text(self, scene, status, reason)
          if (.not. is_hopeless(self, status)) then
             call note_add(increment%notes, "increment cut at time " // &
-               to_text(start%total_time, 9) // ", h = " // to_text(h) // ": " // reason)
+               to_text(part%start%total_time, 9) // ", h = " // to_text(part%h) // ": " // &
+               reason)
             increment%n_cut = increment%n_cut + 1
             level = level + 1
             if (level <= self%n_level) cycle
-            reason = "with h = " // to_text(h) // ", the smallest allowed, " // reason
+            reason = "with h = " // to_text(part%h) // ", the smallest allowed, " // reason
          end if
          call failure_text(self, scene, reason)
          call raise(error, err_analysis, "the analysis stops at time " // &
-            to_text(start%total_time, 9) // ": " // reason)
+            to_text(part%start%total_time, 9) // ": " // reason)
          return
       end do
    end subroutine march_in_parts

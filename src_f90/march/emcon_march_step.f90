@@ -2,8 +2,8 @@
 !>
 !> `march_t` holds all that a march through time needs; how it cuts and counts: emcon_march.
 module emcon_march_step
-   use emcon_active_set, only : active_set_solve, active_set_t, step_done, step_overlaps, &
-      step_refused
+   use emcon_active_set, only : active_set_begin, active_set_solve, active_set_t, step_done, &
+      step_overlaps, step_refused
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason, correction_t
@@ -29,7 +29,7 @@ module emcon_march_step
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, march_step, march_guess, follow_links, cycling_text
+   public :: march_t, increment_t, part_t, march_step, march_guess, follow_links, cycling_text
 
    !> New overlap beyond this, by the edge, cuts an increment, down to this level of its halvings.
    real(wp), parameter :: deepest_new = 1.2_wp*guard_slack
@@ -54,6 +54,13 @@ module emcon_march_step
       type(notes_t) :: notes                     !! for the log
       type(notes_t) :: warnings                  !! for the log, the user and the verdict
    end type increment_t
+
+   !> The part of an increment that is one step.
+   type :: part_t
+      type(instant_t) :: start
+      real(wp) :: h = 0.0_wp                     !! > 0 [T]
+      logical :: may_cut = .false.               !! smaller ones are possible
+   end type part_t
 
    type :: march_t
       type(system_t) :: system
@@ -81,34 +88,33 @@ module emcon_march_step
 
 contains
 
-   !> One step of size `h`; if it succeeds the state and the works are moved on.
-   subroutine march_step(self, scene, start, h, may_cut, increment, status, error)
+   !> One step; if it succeeds the state and the works are moved on.
+   subroutine march_step(self, scene, part, increment, status, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      type(instant_t), intent(in) :: start
-      real(wp), intent(in) :: h                  !! > 0 [T]
-      logical, intent(in) :: may_cut             !! a smaller step is possible
+      type(part_t), intent(in) :: part
       type(increment_t), intent(inout) :: increment
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
       integer :: attempt
 
-      self%active%may_cut = may_cut
+      self%active%may_cut = part%may_cut
       self%active%gap_tolerance = 0.0_wp
-      if (may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
-      self%active%left = [overclosure_left(scene, self%state, start%step_time), &
-         overclosure_left(scene, self%state, start%step_time + h)]
+      if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
+      self%active%left = [overclosure_left(scene, self%state, part%start%step_time), &
+         overclosure_left(scene, self%state, part%start%step_time + part%h)]
       do attempt = 1, 2
-         call march_guess(self, scene, start, h, is_at_rest=attempt == 2)
+         call march_guess(self, scene, part%start, part%h, is_at_rest=attempt == 2)
+         call active_set_begin(self%active, self%system, self%motion, self%state)
          call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
-            self%motion, self%state, status, error)
+            self%motion, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
-      call judge(self, scene, h, may_cut, increment, status)
+      call judge(self, scene, part, increment, status)
       if (status /= step_done) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
       if (any(self%active%is_dropped)) then
@@ -116,7 +122,7 @@ contains
          call note_add(increment%notes, "contact is left out, as it follows from that of other " &
             // "nodes or has lost its surface, at slave nodes " // text)
       end if
-      call commit(self, scene, h, increment, error)
+      call commit(self, scene, part%h, increment, error)
    end subroutine march_step
 
    !> The part of the overclosure at the start of the step that is left at `step_time`.
@@ -136,11 +142,10 @@ contains
    end function overclosure_left
 
    !> Let the judge look at the solved step: cut it, or keep what was found.
-   subroutine judge(self, scene, h, may_cut, increment, status)
+   subroutine judge(self, scene, part, increment, status)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: h
-      logical, intent(in) :: may_cut
+      type(part_t), intent(in) :: part
       type(increment_t), intent(inout) :: increment
       integer, intent(inout) :: status
       type(overlap_t) :: overlap
@@ -148,7 +153,7 @@ contains
       call stopwatch_start(self%judge_clock)
       call judge_step(self%judge, scene%x, self%state%u, self%motion%du, overlap)
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
-      if (may_cut .and. h > scale(increment%h, -judge_levels)) then
+      if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then
          if (goes_in(self, scene, overlap)) status = step_overlaps
       end if
       call stopwatch_stop(self%judge_clock)

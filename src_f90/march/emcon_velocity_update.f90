@@ -57,7 +57,7 @@ contains
       real(wp), intent(out) :: restored          !! >= 0 [M L^2/T^2]
       logical, intent(out) :: has_root           !! .false.: `v` is left as it is
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: lost, noise, a, b, root
+      real(wp) :: lost, noise, a, b
       integer :: k
 
       restored = 0.0_wp
@@ -83,16 +83,10 @@ contains
       b = dot_product(self%push, self%jump)
       has_root = a > 0.0_wp
       if (.not. has_root) return
-      root = sqrt(b*b + 2.0_wp*a*lost)
-      if (b > 0.0_wp) then
-         root = 2.0_wp*lost/(b + root)
-      else
-         root = (root - b)/a
-      end if
       if (keeps_links(system)) then
-         call add_to_dofs(system%linked, self%jump, root, v)
+         call add_to_dofs(system%linked, self%jump, jump_size(a, b, lost), v)
       else
-         call add_to_dofs(system%numbering, self%jump, root, v)
+         call add_to_dofs(system%numbering, self%jump, jump_size(a, b, lost), v)
       end if
       restored = lost
 
@@ -110,6 +104,20 @@ contains
       end subroutine pick
 
    end subroutine velocity_update_apply
+
+   !> The root s > 0 of s b + s^2 a/2 = lost.
+   pure real(wp) function jump_size(a, b, lost) result(root)
+      real(wp), intent(in) :: a                  !! > 0
+      real(wp), intent(in) :: b
+      real(wp), intent(in) :: lost               !! > 0
+
+      root = sqrt(b*b + 2.0_wp*a*lost)
+      if (b > 0.0_wp) then
+         root = 2.0_wp*lost/(b + root)
+      else
+         root = (root - b)/a
+      end if
+   end function jump_size
 
    !> Are linear constraints not eliminated in the numbering? A jump has to keep them all the same.
    pure logical function keeps_links(system)

@@ -335,7 +335,7 @@ contains
       else
          call constraints_force(self%active%set, 1, force, self%system%magnitude)
       end if
-      call active_set_advance(self%active, self%system, self%motion, self%state, is_done, status)
+      call active_set_advance(self%active, self%system, self%motion, is_done, status)
       active = self%active%is_active
    end subroutine interface_update_active
 
