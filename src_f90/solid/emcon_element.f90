@@ -6,11 +6,11 @@
 !> from positions: a rigid offset of the scene costs no digits.
 module emcon_element
    use emcon_kinds, only : wp
-   use emcon_law, only : law_response_plane, law_response_t, law_t
+   use emcon_law, only : law_response_t
    implicit none
    private
-   public :: element_geometry_t, element_response_t, element_respond, element_strain
-   public :: element_point_strain, element_respond_known
+   public :: element_geometry_t, element_motion_t, element_response_t, point_motion_t
+   public :: element_point, element_clear, element_add_point, point_is_regular, point_strain
 
    integer, parameter :: max_node = 4, max_gp = 4
 
@@ -21,6 +21,22 @@ module emcon_element
       real(wp) :: gradient(2, max_node, max_gp) = 0.0_wp   !! of the shape functions by X [1/L]
       real(wp) :: weight(max_gp) = 0.0_wp                  !! reference volume of the point [L^3]
    end type element_geometry_t
+
+   !> Motion of the nodes of an element, from `from` by `by`.
+   type :: element_motion_t
+      logical :: nlgeom = .true.                           !! .false.: small strains
+      real(wp) :: from(2, max_node) = 0.0_wp               !! displacement at the start [L]
+      real(wp) :: by(2, max_node) = 0.0_wp                 !! displacement over the span [L]
+   end type element_motion_t
+
+   !> Motion of one quadrature point; without NLGEOM deformation gradients are the identity.
+   type :: point_motion_t
+      real(wp) :: strain(3) = 0.0_wp                       !! at the start: E11, E22, 2 E12
+      real(wp) :: dstrain(3) = 0.0_wp                      !! its increment E1 - E0
+      real(wp) :: f_mid(2, 2) = 0.0_wp                     !! of the mid-configuration
+      real(wp) :: f_end(2, 2) = 0.0_wp                     !! of the end
+      real(wp) :: geometric = 0.0_wp                       !! df_mid/df_end: 1/2 or 0
+   end type point_motion_t
 
    type :: element_response_t
       real(wp) :: energy = 0.0_wp                          !! strain energy at the end
@@ -33,86 +49,38 @@ module emcon_element
 
 contains
 
-   !> The element moves from `u0` to `u0 + du`.
-   pure subroutine element_respond(geometry, law, u0, du, nlgeom, with_tangent, response)
-      type(element_geometry_t), intent(in) :: geometry
-      class(law_t), intent(in) :: law
-      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)   !! [L]
-      logical, intent(in) :: nlgeom              !! .false.: small strains
-      logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(element_response_t), intent(inout) :: response
-      type(law_response_t) :: state
-      real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2), strain(3), dstrain(3)
-      integer :: k
-
-      call clear(response, with_tangent)
-      do k = 1, geometry%n_gp
-         call displacement_gradient(geometry, k, u0, grad0)
-         call displacement_gradient(geometry, k, du, dgrad)
-         call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
-         response%is_inverted = .not. is_regular(law%has_volume, strain + dstrain, f_end)
-         if (response%is_inverted) return
-         call law_response_plane(law, strain, dstrain, state)
-         call add_point(geometry, k, f_mid, f_end, nlgeom, with_tangent, state, response)
-      end do
-   end subroutine element_respond
-
-   !> Strain and its increment at point `k` of an element that moves from `u0` to `u0 + du`.
-   pure subroutine element_point_strain(geometry, k, u0, du, nlgeom, strain, dstrain, is_inverted)
+   !> The motion of quadrature point `k`.
+   pure subroutine element_point(geometry, k, motion, point)
       type(element_geometry_t), intent(in) :: geometry
       integer, intent(in) :: k                   !! 1 to n_gp
-      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)   !! [L]
-      logical, intent(in) :: nlgeom              !! .false.: small strains
-      real(wp), intent(out) :: strain(3), dstrain(3)       !! E11, E22, 2 E12
-      logical, intent(out) :: is_inverted                  !! at the end
-      real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2)
+      type(element_motion_t), intent(in) :: motion
+      type(point_motion_t), intent(out) :: point
+      real(wp) :: grad0(2, 2), dgrad(2, 2)
 
-      call displacement_gradient(geometry, k, u0, grad0)
-      call displacement_gradient(geometry, k, du, dgrad)
-      call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
-      is_inverted = .not. is_regular(.false., strain + dstrain, f_end)
-   end subroutine element_point_strain
+      call displacement_gradient(geometry, k, motion%from, grad0)
+      call displacement_gradient(geometry, k, motion%by, dgrad)
+      call point_strain(grad0, dgrad, motion%nlgeom, point)
+   end subroutine element_point
 
-   !> As `element_respond`, with the response of the law at all points known.
-   pure subroutine element_respond_known(geometry, state, u0, du, nlgeom, with_tangent, response)
-      type(element_geometry_t), intent(in) :: geometry
-      type(law_response_t), intent(in) :: state(:)         !! (n_gp)
-      real(wp), intent(in) :: u0(2, max_node), du(2, max_node)   !! [L]
-      logical, intent(in) :: nlgeom              !! .false.: small strains
-      logical, intent(in) :: with_tangent        !! else no tangent is computed
+   !> Nothing, before points are added.
+   pure subroutine element_clear(response, with_tangent)
       type(element_response_t), intent(inout) :: response
-      type(law_response_t) :: weighted
-      real(wp) :: grad0(2, 2), dgrad(2, 2), f_mid(2, 2), f_end(2, 2), strain(3), dstrain(3)
-      integer :: k
-
-      call clear(response, with_tangent)
-      do k = 1, geometry%n_gp
-         call displacement_gradient(geometry, k, u0, grad0)
-         call displacement_gradient(geometry, k, du, dgrad)
-         call element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
-         weighted = state(k)
-         call add_point(geometry, k, f_mid, f_end, nlgeom, with_tangent, weighted, response)
-      end do
-   end subroutine element_respond_known
-
-   pure subroutine clear(response, with_tangent)
-      type(element_response_t), intent(inout) :: response
-      logical, intent(in) :: with_tangent
+      logical, intent(in) :: with_tangent        !! else the tangent stays as it is
 
       response%energy = 0.0_wp
       response%force = 0.0_wp
       response%magnitude = 0.0_wp
       if (with_tangent) response%tangent = 0.0_wp
       response%is_inverted = .false.
-   end subroutine clear
+   end subroutine element_clear
 
    !> Add what point `k` gives; `state` leaves with the weight of the point.
-   pure subroutine add_point(geometry, k, f_mid, f_end, nlgeom, with_tangent, state, response)
+   pure subroutine element_add_point(geometry, k, point, state, with_tangent, response)
       type(element_geometry_t), intent(in) :: geometry
-      integer, intent(in) :: k
-      real(wp), intent(in) :: f_mid(2, 2), f_end(2, 2)
-      logical, intent(in) :: nlgeom, with_tangent
-      type(law_response_t), intent(inout) :: state
+      integer, intent(in) :: k                   !! 1 to n_gp
+      type(point_motion_t), intent(in) :: point
+      type(law_response_t), intent(inout) :: state       !! what the law answers to `point`
+      logical, intent(in) :: with_tangent        !! else no tangent is added
       type(element_response_t), intent(inout) :: response
       real(wp) :: nominal(2, 2), part(2)
       integer :: n, i
@@ -120,8 +88,8 @@ contains
       n = geometry%n_node
       response%energy = response%energy + geometry%weight(k)*state%energy
       state%stress = geometry%weight(k)*state%stress
-      nominal(:, 1) = f_mid(:, 1)*state%stress(1) + f_mid(:, 2)*state%stress(3)
-      nominal(:, 2) = f_mid(:, 1)*state%stress(3) + f_mid(:, 2)*state%stress(2)
+      nominal(:, 1) = point%f_mid(:, 1)*state%stress(1) + point%f_mid(:, 2)*state%stress(3)
+      nominal(:, 2) = point%f_mid(:, 1)*state%stress(3) + point%f_mid(:, 2)*state%stress(2)
       do i = 1, n
          part = nominal(:, 1)*geometry%gradient(1, i, k) &
             + nominal(:, 2)*geometry%gradient(2, i, k)
@@ -130,27 +98,30 @@ contains
       end do
       if (with_tangent) then
          state%tangent = geometry%weight(k)*state%tangent
-         call add_tangent(n, geometry%gradient(:, :, k), f_mid, f_end, state, &
-            merge(0.5_wp, 0.0_wp, nlgeom), response%tangent)
+         call add_tangent(n, geometry%gradient(:, :, k), point, state, response%tangent)
       end if
-   end subroutine add_point
+   end subroutine element_add_point
 
-   !> Is the end state one that the law can answer to? Newton's method tries all kinds of things.
-   pure logical function is_regular(has_volume, strain, f)
+   !> Is the end of the motion one that the law can answer to? Newton's method tries all kinds of
+   !> things.
+   pure logical function point_is_regular(point, has_volume) result(is_regular)
+      type(point_motion_t), intent(in) :: point
       logical, intent(in) :: has_volume                    !! as in law_t
-      real(wp), intent(in) :: strain(3), f(2, 2)
       real(wp), parameter :: largest = huge(1.0_wp)**0.2_wp   ! its powers in energies are finite
       real(wp), parameter :: noise = 64.0_wp*epsilon(1.0_wp)
-      real(wp) :: volume, terms
+      real(wp) :: strain(3), volume, terms
 
-      is_regular = maxval(abs(f)) < largest .and. maxval(abs(strain)) < largest
-      if (.not. is_regular) return
-      is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp
+      strain = point%strain + point%dstrain
+      associate (f => point%f_end)
+         is_regular = maxval(abs(f)) < largest .and. maxval(abs(strain)) < largest
+         if (.not. is_regular) return
+         is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp
+      end associate
       if (.not. (is_regular .and. has_volume)) return
       terms = (1.0_wp + 2.0_wp*abs(strain(1)))*(1.0_wp + 2.0_wp*abs(strain(2))) + strain(3)**2
       volume = (1.0_wp + 2.0_wp*strain(1))*(1.0_wp + 2.0_wp*strain(2)) - strain(3)**2
       is_regular = volume > noise*terms          ! det C, where it is more than round-off
-   end function is_regular
+   end function point_is_regular
 
    !> grad(a, b) = d u_a / d X_b at quadrature point `k`.
    pure subroutine displacement_gradient(geometry, k, u, grad)
@@ -167,46 +138,47 @@ contains
       end do
    end subroutine displacement_gradient
 
-   !> Strain (E11, E22, 2 E12) at the start, its increment E1 - E0 to relative accuracy, and the
-   !> deformation gradients of the mid and the end configuration (identity without `nlgeom`):
-   !> docs/theory.md, eq. (6).
-   pure subroutine element_strain(grad0, dgrad, nlgeom, strain, dstrain, f_mid, f_end)
+   !> Strain and deformation gradients from those of the displacement at the start, `grad0`, and
+   !> of its increment; the strain's increment to relative accuracy: docs/theory.md, eq. (6).
+   pure subroutine point_strain(grad0, dgrad, nlgeom, point)
       real(wp), intent(in) :: grad0(2, 2), dgrad(2, 2)   !! (component, by X)
       logical, intent(in) :: nlgeom              !! .false.: small strains
-      real(wp), intent(out) :: strain(3), dstrain(3)   !! E11, E22, 2 E12
-      real(wp), intent(out) :: f_mid(2, 2), f_end(2, 2)   !! (component, by X)
+      type(point_motion_t), intent(out) :: point
 
-      strain = [grad0(1, 1), grad0(2, 2), grad0(1, 2) + grad0(2, 1)]
-      f_mid = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
-      f_end = f_mid
+      point%strain = [grad0(1, 1), grad0(2, 2), grad0(1, 2) + grad0(2, 1)]
+      point%f_mid = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+      point%f_end = point%f_mid
       if (nlgeom) then
-         strain = strain + [0.5_wp*dot_product(grad0(:, 1), grad0(:, 1)), &
+         point%strain = point%strain + [0.5_wp*dot_product(grad0(:, 1), grad0(:, 1)), &
             0.5_wp*dot_product(grad0(:, 2), grad0(:, 2)), dot_product(grad0(:, 1), grad0(:, 2))]
-         f_mid = f_mid + (grad0 + 0.5_wp*dgrad)
-         f_end = f_end + (grad0 + dgrad)
+         point%f_mid = point%f_mid + (grad0 + 0.5_wp*dgrad)
+         point%f_end = point%f_end + (grad0 + dgrad)
+         point%geometric = 0.5_wp
       end if
-      dstrain = [dot_product(f_mid(:, 1), dgrad(:, 1)), dot_product(f_mid(:, 2), dgrad(:, 2)), &
-         dot_product(f_mid(:, 1), dgrad(:, 2)) + dot_product(f_mid(:, 2), dgrad(:, 1))]
-   end subroutine element_strain
+      associate (f => point%f_mid)
+         point%dstrain = [dot_product(f(:, 1), dgrad(:, 1)), dot_product(f(:, 2), dgrad(:, 2)), &
+            dot_product(f(:, 1), dgrad(:, 2)) + dot_product(f(:, 2), dgrad(:, 1))]
+      end associate
+   end subroutine point_strain
 
-   !> Add B(mid)^T D B(end) + factor (grad N_i . S grad N_j) I; stress and tangent are weighted:
+   !> Add B(mid)^T D B(end) + geometric (grad N_i . S grad N_j) I; stress and tangent are weighted:
    !> docs/theory.md, eq. (11).
-   pure subroutine add_tangent(n, gradient, f_mid, f_end, state, factor, tangent)
+   pure subroutine add_tangent(n, gradient, point, state, tangent)
       integer, intent(in) :: n
-      real(wp), intent(in) :: gradient(2, max_node), f_mid(2, 2), f_end(2, 2)
+      real(wp), intent(in) :: gradient(2, max_node)
+      type(point_motion_t), intent(in) :: point
       type(law_response_t), intent(in) :: state
-      real(wp), intent(in) :: factor
       real(wp), intent(inout) :: tangent(2*max_node, 2*max_node)
       real(wp) :: b_mid(3, 2*max_node), b_end(3), db(3), stress_gradient(2), geometric
       integer :: i, j, a
 
       do i = 1, n
-         call strain_operator(gradient(:, i), f_mid, 1, b_mid(:, 2*i - 1))
-         call strain_operator(gradient(:, i), f_mid, 2, b_mid(:, 2*i))
+         call strain_operator(gradient(:, i), point%f_mid, 1, b_mid(:, 2*i - 1))
+         call strain_operator(gradient(:, i), point%f_mid, 2, b_mid(:, 2*i))
       end do
       do j = 1, n
          do a = 1, 2
-            call strain_operator(gradient(:, j), f_end, a, b_end)
+            call strain_operator(gradient(:, j), point%f_end, a, b_end)
             db = state%tangent(:, 1)*b_end(1) + state%tangent(:, 2)*b_end(2) &
                + state%tangent(:, 3)*b_end(3)
             do i = 1, 2*n
@@ -214,7 +186,7 @@ contains
                   + (b_mid(1, i)*db(1) + b_mid(2, i)*db(2) + b_mid(3, i)*db(3))
             end do
          end do
-         stress_gradient = factor*[ &
+         stress_gradient = point%geometric*[ &
             state%stress(1)*gradient(1, j) + state%stress(3)*gradient(2, j), &
             state%stress(3)*gradient(1, j) + state%stress(2)*gradient(2, j)]
          do i = 1, n

@@ -1,7 +1,7 @@
 !> All elements of a scene: reference geometry, laws, mass; forces and tangents over a step.
 module emcon_solid
-   use emcon_element, only : element_geometry_t, element_point_strain, element_respond, &
-      element_respond_known, element_response_t
+   use emcon_element, only : element_add_point, element_clear, element_geometry_t, &
+      element_motion_t, element_point, element_response_t, point_is_regular, point_motion_t
    use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : err_input, error_t, raise
    use emcon_given_law, only : given_law_t, given_law_take, given_points_make_room, &
@@ -17,7 +17,7 @@ module emcon_solid
    implicit none
    private
    public :: solid_t, solid_init, solid_respond, solid_response_t, solid_tangent_times
-   public :: solid_evaluate_given, obstacle_text
+   public :: solid_element_respond, solid_evaluate_given, obstacle_text
 
    type :: solid_t
       integer :: n_element = 0
@@ -235,7 +235,8 @@ contains
       integer, intent(in), contiguous, optional :: slot(:)       !! element matrices by columns
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! both with `slot`
       type(element_response_t) :: part
-      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes), largest
+      type(element_motion_t) :: local
+      real(wp) :: largest
       logical :: with_tangent
       integer :: e, i, n, node, first
 
@@ -251,18 +252,17 @@ contains
          response%inverted_element = response%given%inverted_element
          if (response%inverted_element > 0) return
       end if
-      local0 = 0.0_wp
-      dlocal = 0.0_wp
+      local%nlgeom = nlgeom
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
-         call gather(self%node(:n, e), motion%from, motion%by, local0, dlocal)
-         call respond_element(self, e, response%given, local0, dlocal, nlgeom, with_tangent, part)
+         call gather(self%node(:n, e), motion%from, motion%by, local)
+         call solid_element_respond(self, e, local, response%given, with_tangent, part)
          if (part%is_inverted) then
             response%inverted_element = e
             return
          end if
          response%energy(e) = part%energy
-         largest = max(maxval(abs(local0(:, :n) + dlocal(:, :n))), &
+         largest = max(maxval(abs(local%from(:, :n) + local%by(:, :n))), &
             maxval(motion%computed(:, self%node(:n, e))))
          do i = 1, n
             node = self%node(i, e)
@@ -277,29 +277,33 @@ contains
       end do
    end subroutine solid_respond
 
-   !> Response of element `e`, by its law or from what the given laws have answered.
-   pure subroutine respond_element(self, e, given, local0, dlocal, nlgeom, with_tangent, part)
+   !> Response of element `e` to a motion, which is that of `given` too.
+   pure subroutine solid_element_respond(self, e, motion, given, with_tangent, part)
       type(solid_t), intent(in) :: self
-      integer, intent(in) :: e
+      integer, intent(in) :: e                   !! 1 to n_element
+      type(element_motion_t), intent(in) :: motion
       type(given_response_t), intent(in) :: given
-      real(wp), intent(in) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
-      logical, intent(in) :: nlgeom, with_tangent
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(element_response_t), intent(inout) :: part
-      type(law_response_t) :: state(max_element_nodes)
+      type(point_motion_t) :: point
+      type(law_response_t) :: state
       integer :: k
 
-      associate (geometry => self%geometry(e), law => self%law_of(e), first => self%first_point(e))
-         if (first == 0) then
-            call element_respond(geometry, self%law(law)%law, local0, dlocal, nlgeom, &
-               with_tangent, part)
+      call element_clear(part, with_tangent)
+      do k = 1, self%geometry(e)%n_gp
+         call element_point(self%geometry(e), k, motion, point)
+         if (self%first_point(e) > 0) then
+            state = given_state(given%points(self%law_of(e)), self%first_point(e) - 1 + k)
          else
-            do k = 1, geometry%n_gp
-               state(k) = given_state(given%points(law), first - 1 + k)
-            end do
-            call element_respond_known(geometry, state, local0, dlocal, nlgeom, with_tangent, part)
+            associate (law => self%law(self%law_of(e))%law)
+               part%is_inverted = .not. point_is_regular(point, law%has_volume)
+               if (part%is_inverted) return
+               call law_response_plane(law, point%strain, point%dstrain, state)
+            end associate
          end if
-      end associate
-   end subroutine respond_element
+         call element_add_point(self%geometry(e), k, point, state, with_tangent, part)
+      end do
+   end subroutine solid_element_respond
 
    !> Let the given laws answer to the step, each in one call for all its points.
    subroutine solid_evaluate_given(self, u0, du, nlgeom, with_tangent, given)
@@ -333,8 +337,8 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
       type(given_response_t), intent(inout) :: given
-      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
-      logical :: is_inverted
+      type(element_motion_t) :: local
+      type(point_motion_t) :: point
       integer :: e, i, k
 
       if (.not. allocated(given%points)) allocate(given%points(size(self%given)))
@@ -342,18 +346,18 @@ contains
          call given_points_make_room(given%points(k), self%n_point(k))
       end do
       given%inverted_element = 0
-      local0 = 0.0_wp
-      dlocal = 0.0_wp
+      local%nlgeom = nlgeom
       do e = 1, self%n_element
          if (self%first_point(e) == 0) cycle
-         call gather(self%node(:self%geometry(e)%n_node, e), u0, du, local0, dlocal)
+         call gather(self%node(:self%geometry(e)%n_node, e), u0, du, local)
          do k = 1, self%geometry(e)%n_gp
             i = self%first_point(e) - 1 + k
+            call element_point(self%geometry(e), k, local, point)
             associate (points => given%points(self%law_of(e)))
-               call element_point_strain(self%geometry(e), k, local0, dlocal, nlgeom, &
-                  points%strain(:, i), points%dstrain(:, i), is_inverted)
+               points%strain(:, i) = point%strain
+               points%dstrain(:, i) = point%dstrain
             end associate
-            if (is_inverted) then
+            if (.not. point_is_regular(point, .false.)) then
                given%inverted_element = e
                return
             end if
@@ -383,15 +387,15 @@ contains
 
    !> Displacements of the nodes of an element relative to its first node, which does not round them
    !> with the distance that a body has flown.
-   pure subroutine gather(node, u0, du, local0, dlocal)
+   pure subroutine gather(node, u0, du, local)
       integer, intent(in) :: node(:)
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      real(wp), intent(inout) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      type(element_motion_t), intent(inout) :: local
       integer :: i
 
       do i = 1, size(node)
-         local0(:, i) = u0(:, node(i)) - u0(:, node(1))
-         dlocal(:, i) = du(:, node(i)) - du(:, node(1))
+         local%from(:, i) = u0(:, node(i)) - u0(:, node(1))
+         local%by(:, i) = du(:, node(i)) - du(:, node(1))
       end do
    end subroutine gather
 
@@ -404,7 +408,7 @@ contains
       real(wp), intent(in), contiguous :: direction(:, :)                       !! (2, n_node)
       real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
       type(element_response_t) :: part
-      real(wp) :: local0(2, max_element_nodes), dlocal(2, max_element_nodes)
+      type(element_motion_t) :: local
       type(given_response_t) :: given
       real(wp) :: image(2*max_element_nodes)
       integer :: e, i, n, node
@@ -412,13 +416,12 @@ contains
       if (self%has_given) call solid_evaluate_given(self, motion%from, motion%by, nlgeom, &
          .true., given)
       if (given%inverted_element > 0) return
-      local0 = 0.0_wp
-      dlocal = 0.0_wp
+      local%nlgeom = nlgeom
       do e = 1, self%n_element
          n = self%geometry(e)%n_node
          if (.not. any(abs(direction(:, self%node(:n, e))) > 0.0_wp)) cycle
-         call gather(self%node(:n, e), motion%from, motion%by, local0, dlocal)
-         call respond_element(self, e, given, local0, dlocal, nlgeom, .true., part)
+         call gather(self%node(:n, e), motion%from, motion%by, local)
+         call solid_element_respond(self, e, local, given, .true., part)
          if (part%is_inverted) return
          image = 0.0_wp
          do i = 1, n

@@ -6,7 +6,7 @@
 !> not answer, the stress is not a number.
 module emcon_stress
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
-   use emcon_element, only : element_strain
+   use emcon_element, only : element_motion_t, element_point, point_motion_t
    use emcon_element_kinds, only : max_element_nodes
    use emcon_given_law, only : given_response_t, given_state
    use emcon_kinds, only : wp
@@ -26,16 +26,19 @@ contains
       logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
       type(given_response_t) :: given
+      type(element_motion_t) :: motion
       integer :: count_at(solid%n_node), e, i, k, node
       real(wp) :: at_gp(6), weight(max_element_nodes, max_element_nodes), strain(3)
 
       call respond_at(solid, u, nlgeom, given)
+      motion%nlgeom = nlgeom
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
+         call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
          weight = extrapolation(solid%kind(e), solid%geometry(e)%n_gp)
          do k = 1, solid%geometry(e)%n_gp
-            call point_state(solid, e, k, u, nlgeom, given, at_gp, strain)
+            call point_state(solid, e, k, motion, given, at_gp, strain)
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
                stress(:, node) = stress(:, node) + weight(k, i)*at_gp
@@ -80,35 +83,43 @@ contains
       end do
    end function extrapolation
 
+   !> No motion from displacements `u`.
+   pure subroutine place(node, u, motion)
+      integer, intent(in) :: node(:)
+      real(wp), intent(in), contiguous :: u(:, :)
+      type(element_motion_t), intent(inout) :: motion
+      integer :: i
+
+      do i = 1, size(node)
+         motion%from(:, i) = u(:, node(i))
+      end do
+   end subroutine place
+
    !> Stress (6) and strain (E11, E22, 2 E12) at quadrature point `k` of element `e`.
-   pure subroutine point_state(solid, e, k, u, nlgeom, given, stress, strain)
+   pure subroutine point_state(solid, e, k, motion, given, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e, k
-      real(wp), intent(in) :: u(:, :)
-      logical, intent(in) :: nlgeom
+      type(element_motion_t), intent(in) :: motion       !! of no size
       type(given_response_t), intent(in) :: given
       real(wp), intent(out) :: stress(6), strain(3)
       type(law_response_t) :: state
-      real(wp) :: grad(2, 2), zero(2, 2), dstrain(3), f(2, 2), f_end(2, 2), s(2, 2), det
-      integer :: i
+      type(point_motion_t) :: point
+      real(wp) :: s(2, 2), det
 
-      grad = 0.0_wp
-      zero = 0.0_wp
-      do i = 1, solid%geometry(e)%n_node
-         grad(:, 1) = grad(:, 1) + u(:, solid%node(i, e))*solid%geometry(e)%gradient(1, i, k)
-         grad(:, 2) = grad(:, 2) + u(:, solid%node(i, e))*solid%geometry(e)%gradient(2, i, k)
-      end do
-      call element_strain(grad, zero, nlgeom, strain, dstrain, f, f_end)
+      call element_point(solid%geometry(e), k, motion, point)
+      strain = point%strain
       if (solid%first_point(e) == 0) then
-         call law_response_plane(solid%law(solid%law_of(e))%law, strain, dstrain, state)
+         call law_response_plane(solid%law(solid%law_of(e))%law, strain, point%dstrain, state)
       else if (given%inverted_element == 0) then
          state = given_state(given%points(solid%law_of(e)), solid%first_point(e) - 1 + k)
       else
          state%stress = ieee_value(strain, ieee_quiet_nan)
       end if
       s = reshape([state%stress(1), state%stress(3), state%stress(3), state%stress(2)], [2, 2])
-      det = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1)
-      s = matmul(matmul(f, s), transpose(f))/det
+      associate (f => point%f_end)
+         det = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1)
+         s = matmul(matmul(f, s), transpose(f))/det
+      end associate
       stress = [s(1, 1), s(2, 2), state%stress_33/det, s(1, 2), 0.0_wp, 0.0_wp]
    end subroutine point_state
 
@@ -121,16 +132,19 @@ contains
       real(wp), intent(out) :: strain(:, :)      !! (3, n_element) E11, E22, 2 E12
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
       type(given_response_t) :: given
+      type(element_motion_t) :: motion
       real(wp) :: stress_k(6), strain_k(3), weight
       integer :: e, k
 
       call respond_at(solid, u, nlgeom, given)
+      motion%nlgeom = nlgeom
       stress = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight(:solid%geometry(e)%n_gp))
+         call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
          do k = 1, solid%geometry(e)%n_gp
-            call point_state(solid, e, k, u, nlgeom, given, stress_k, strain_k)
+            call point_state(solid, e, k, motion, given, stress_k, strain_k)
             weight = solid%geometry(e)%weight(k)/volume(e)
             stress(:, e) = stress(:, e) + weight*stress_k
             strain(:, e) = strain(:, e) + weight*strain_k

@@ -1,14 +1,15 @@
 !> One element over one step: identity, momenta, tangent, rigid motions, patch, inversion.
 module test_element
    use check, only : check_near, check_true, test_case_t
-   use emcon_element, only : element_geometry_t, element_respond, element_response_t, &
-      element_strain
+   use emcon_element, only : element_geometry_t, element_motion_t, element_response_t, &
+      point_motion_t, point_strain
    use emcon_errors, only : error_t
+   use emcon_given_law, only : given_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid, only : solid_element_respond, solid_init, solid_t
    use emcon_text, only : to_text
    use small_scenes, only : block_t, make_block, shake, young
    implicit none
@@ -77,9 +78,13 @@ contains
       real(wp), intent(in) :: u0(2, 4), du(2, 4)
       logical, intent(in) :: with_tangent
       type(element_response_t), intent(inout) :: response
+      type(element_motion_t) :: motion
+      type(given_response_t) :: none
 
-      call element_respond(sample%solid%geometry(1), sample%solid%law(1)%law, u0, du, &
-         sample%nlgeom, with_tangent, response)
+      motion%nlgeom = sample%nlgeom
+      motion%from = u0
+      motion%by = du
+      call solid_element_respond(sample%solid, 1, motion, none, with_tangent, response)
    end subroutine respond
 
    !> A start up to 10 % off, and a motion of up to 15 % plus, with nlgeom, a turn of 0.7 rad.
@@ -287,8 +292,8 @@ contains
    !> E1 - E0 to relative accuracy where the difference of the strains has none.
    subroutine test_strain(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: grad0(2, 2), dgrad(2, 2), f(2, 2), strain(3), dstrain(3), f_mid(2, 2), f_end(2, 2)
-      real(wp) :: expected(2, 2)
+      real(wp) :: grad0(2, 2), dgrad(2, 2), f(2, 2), expected(2, 2)
+      type(point_motion_t) :: point
       integer :: k
 
       do k = 0, 900, 100
@@ -300,10 +305,11 @@ contains
          f(2, 2) = f(2, 2) + 1.0_wp
          expected = matmul(transpose(f), dgrad) + matmul(transpose(dgrad), f) &
             + matmul(transpose(dgrad), dgrad)
-         call element_strain(grad0, dgrad, .true., strain, dstrain, f_mid, f_end)
-         call check_near(error, dstrain, [0.5_wp*expected(1, 1), 0.5_wp*expected(2, 2), &
+         call point_strain(grad0, dgrad, .true., point)
+         call check_near(error, point%dstrain, [0.5_wp*expected(1, 1), 0.5_wp*expected(2, 2), &
             expected(1, 2)], 8.0_wp*eps, 4.0_wp*maxval(abs(dgrad)), "at 2^-" // to_text(k))
-         call check_near(error, f_end - f_mid, 0.5_wp*dgrad, 2.0_wp*eps, 1.0_wp, "F")
+         call check_near(error, point%f_end - point%f_mid, 0.5_wp*dgrad, 2.0_wp*eps, &
+            1.0_wp, "F")
       end do
    end subroutine test_strain
 

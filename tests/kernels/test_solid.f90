@@ -1,12 +1,13 @@
 !> All elements together: masses in closed form, assembly, bad geometry.
 module test_solid
    use check, only : check_equal, check_error, check_near, test_case_t
-   use emcon_element, only : element_respond, element_response_t
+   use emcon_element, only : element_motion_t, element_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_of, pose_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t
+   use emcon_solid, only : solid_element_respond, solid_init, solid_respond, solid_response_t, &
+      solid_t
    use small_scenes, only : add_block, block_t, make_block, shake, young
    implicit none
    private
@@ -95,6 +96,7 @@ contains
       type(solid_t) :: solid
       type(solid_response_t) :: response
       type(element_response_t) :: part
+      type(element_motion_t) :: motion
       real(wp), allocatable :: u0(:, :), du(:, :), force(:, :)
       integer :: e, n
 
@@ -111,8 +113,9 @@ contains
       do e = 1, solid%n_element
          n = solid%geometry(e)%n_node
          associate (node => solid%node(:n, e))
-            call element_respond(solid%geometry(e), solid%law(1)%law, local(u0(:, node)), &
-               local(du(:, node)), .true., .false., part)
+            motion%from = local(u0(:, node))
+            motion%by = local(du(:, node))
+            call solid_element_respond(solid, e, motion, response%given, .false., part)
             force(:, node) = force(:, node) + part%force(:, :n)
             call check_near(error, response%energy(e), part%energy, tol, young, "energy")
          end associate
