@@ -4,7 +4,7 @@
 !> right-hand side. A matrix that cannot be factorised is a result (`is_singular`), not an error.
 !> An object owns memory of a C library: never assign one to another, and `free` it at the end (at
 !> any time, also twice). There is no finaliser: gfortran 12 loses other components of an object
-!> that holds one.
+!> that holds one. Copies are made of an object that has analysed nothing: it owns no memory yet.
 module emcon_sparse_solver
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, err_internal, error_t, raise
@@ -39,6 +39,7 @@ module emcon_sparse_solver
 
    !> For arrays of solvers.
    type :: solver_box_t
+      character(len=:), allocatable :: name      !! what decks call it, where they can
       class(sparse_solver_t), allocatable :: solver
    end type solver_box_t
 

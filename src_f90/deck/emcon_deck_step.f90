@@ -22,7 +22,7 @@ module emcon_deck_step
    use emcon_options, only : option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
-   use emcon_solver_registry, only : solvers
+   use emcon_solver_registry, only : is_foreign_solver, solver_given, solver_names, solvers
    use emcon_steps, only : method_null_space, procedure_dynamic, &
       procedure_static, step_t
    use emcon_text, only : to_text
@@ -196,7 +196,7 @@ contains
       end if
       step%procedure = merge(procedure_static, procedure_dynamic, card%name == "STATIC")
       step%is_direct = has_option(card, "DIRECT")
-      call read_solver(reader, card, step%solver)
+      call read_solver(reader, card, step)
       value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
       call data_open(data, card)
       if (.not. next_line(reader, data)) return
@@ -215,23 +215,30 @@ contains
       if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
    end subroutine read_procedure
 
-   !> SOLVER=: one that is here; a name from another program asks for nothing else.
-   subroutine read_solver(reader, card, solver)
+   !> SOLVER=: one that is here, or one that a program has to give; a name from another program asks
+   !> for nothing else.
+   subroutine read_solver(reader, card, step)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      integer, intent(inout) :: solver           !! one of `solver_`
+      type(step_t), intent(inout) :: step
+      character(len=:), allocatable :: known
       integer :: i
 
       if (.not. has_option(card, "SOLVER")) return
       i = findloc(solvers%word, option_name(card, "SOLVER"), 1)
-      if (i == 0) then
+      if (i == 0 .and. is_foreign_solver(option_name(card, "SOLVER"))) then
+         call solver_names(known)
          call card_warning(reader, card, "SOLVER=" // option_name(card, "SOLVER") // &
-            " has no effect: solvers here are UMFPACK and MUMPS")
+            " has no effect: solvers here are " // known)
+      else if (i == 0) then
+         step%solver = solver_given
+         step%solver_name = option_name(card, "SOLVER")
+         step%solver_origin = card%origin
       else if (.not. solvers(i)%is_built) then
          call card_error(reader, card, "SOLVER=" // option_name(card, "SOLVER") // &
             ": this program was built without it; leave SOLVER out")
       else
-         solver = solvers(i)%code
+         step%solver = solvers(i)%code
       end if
    end subroutine read_solver
 

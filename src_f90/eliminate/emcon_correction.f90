@@ -34,6 +34,7 @@ module emcon_correction
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
+      class(sparse_solver_t), allocatable :: given             !! by a program, for that choice
       class(sparse_solver_t), allocatable :: solver            !! no active constraint
       class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
       logical, private :: is_definite = .false.  !! last factorisation: by that one
@@ -50,13 +51,16 @@ module emcon_correction
 contains
 
    !> Forget all layouts: the numbering has changed.
-   subroutine correction_reset(self, method, choice)
+   subroutine correction_reset(self, method, choice, given)
       type(correction_t), intent(inout) :: self
       integer, intent(in) :: method              !! one of `method_`
-      integer, intent(in) :: choice              !! one of `solver_`
+      integer, intent(in) :: choice              !! one of `solver_`, or above
+      class(sparse_solver_t), intent(in), optional :: given    !! as in `solver_create`
 
       self%method = method
       self%choice = choice
+      if (allocated(self%given)) deallocate(self%given)
+      if (present(given)) allocate(self%given, source=given)
       call make_solvers(self)
       if (allocated(self%row_start)) deallocate(self%row_start, self%column)
    end subroutine correction_reset
@@ -64,10 +68,10 @@ contains
    subroutine make_solvers(self)
       type(correction_t), intent(inout) :: self
 
-      call solver_create(self%choice, matrix_general, self%solver)
-      call solver_create(self%choice, matrix_definite, self%definite_solver)
-      call solver_create(self%choice, matrix_general, self%null_space%solver)
-      call solver_create(self%choice, matrix_general, self%saddle_point%solver)
+      call solver_create(self%choice, matrix_general, self%solver, self%given)
+      call solver_create(self%choice, matrix_definite, self%definite_solver, self%given)
+      call solver_create(self%choice, matrix_general, self%null_space%solver, self%given)
+      call solver_create(self%choice, matrix_general, self%saddle_point%solver, self%given)
    end subroutine make_solvers
 
    !> Free what the solvers hold.

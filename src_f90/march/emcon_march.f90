@@ -5,7 +5,7 @@ module emcon_march
    use emcon_active_set, only : active_set_init, active_set_overclosure
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : err_analysis, err_input, err_interrupt, error_t, raise
-   use emcon_given, only : given_t
+   use emcon_given, only : given_copy_solvers, given_find_solver, given_t
    use emcon_holding, only : holding_begin, holding_t
    use emcon_judge, only : judge_init, judge_step, overlap_t
    use emcon_kinds, only : wp
@@ -21,6 +21,7 @@ module emcon_march
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
+   use emcon_solver_registry, only : solver_given
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_persistent, method_saddle_point, procedure_dynamic, &
       procedure_static, step_t
@@ -55,6 +56,7 @@ contains
 
       call system_init(self%system, scene, error, given)
       if (allocated(error)) return
+      call given_copy_solvers(given, self%solver)
       n = size(scene%x, 2)
       call motion_init(self%motion, scene%x)
       allocate(self%v1(2, n), source=0.0_wp)
@@ -209,9 +211,7 @@ contains
          call newton_init(self%newton, self%system%numbering%n_unknown, &
             self%system%solid%n_node, step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
-         call correction_reset(self%correction, merge(step%constraint_method, &
-            method_saddle_point, self%system%is_reduced), step%solver)
-         call velocity_update_reset(self%velocity_update, step%solver)
+         call choose_solver(self, step)
          self%active%puts_off = .true.
          self%active%holds_gap = step%initiation == initiation_persistent &
             .and. self%scheme%has_inertia
@@ -247,6 +247,23 @@ contains
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
       self%revision = self%revision + 1
    end subroutine prepare
+
+   !> What solves the systems of the step: a solver of EMCON, or one that was given.
+   subroutine choose_solver(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      integer :: i, method
+
+      method = merge(step%constraint_method, method_saddle_point, self%system%is_reduced)
+      if (step%solver /= solver_given) then
+         call correction_reset(self%correction, method, step%solver)
+         call velocity_update_reset(self%velocity_update, step%solver)
+      else
+         i = given_find_solver(self%solver, step%solver_name)
+         call correction_reset(self%correction, method, solver_given + i, self%solver(i)%solver)
+         call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
+      end if
+   end subroutine choose_solver
 
    !> Grid increments in the step, and by how much they may grow and shrink.
    subroutine count_grid(self, step)

@@ -20,6 +20,7 @@ module emcon_march_step
    use emcon_pair_record, only : pair_record_measure
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_t
+   use emcon_sparse_solver, only : solver_box_t
    use emcon_stand_off, only : stand_off_add, stand_off_t
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_velocity_update
@@ -71,6 +72,7 @@ module emcon_march_step
       type(active_set_t) :: active
       type(correction_t) :: correction
       type(velocity_update_t) :: velocity_update
+      type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(judge_t) :: judge
       type(stopwatch_t) :: judge_clock

@@ -25,6 +25,7 @@ module emcon_velocity_update
    type :: velocity_update_t
       logical :: is_ready = .false.              !! mass factorised for the present numbering
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
+      class(sparse_solver_t), allocatable :: given   !! by a program, for that choice
       class(sparse_solver_t), allocatable :: mass
       real(wp), allocatable :: push(:), jump(:)  !! (n_unknown)
    end type velocity_update_t
@@ -32,11 +33,14 @@ module emcon_velocity_update
 contains
 
    !> The numbering has changed.
-   subroutine velocity_update_reset(self, choice)
+   subroutine velocity_update_reset(self, choice, given)
       type(velocity_update_t), intent(inout) :: self
-      integer, intent(in) :: choice              !! one of `solver_`
+      integer, intent(in) :: choice              !! one of `solver_`, or above
+      class(sparse_solver_t), intent(in), optional :: given    !! as in `solver_create`
 
       self%choice = choice
+      if (allocated(self%given)) deallocate(self%given)
+      if (present(given)) allocate(self%given, source=given)
       self%is_ready = .false.
    end subroutine velocity_update_reset
 
@@ -152,7 +156,7 @@ contains
       type(csr_t) :: mass, links, reduced
       integer :: n
 
-      call solver_create(self%choice, matrix_definite, self%mass)
+      call solver_create(self%choice, matrix_definite, self%mass, self%given)
       n = system%numbering%n_unknown
       if (keeps_links(system)) then
          n = system%linked%n_unknown

@@ -9,7 +9,9 @@ module emcon_run_log
    use emcon_log, only : log_line, log_t
    use emcon_march, only : increment_t
    use emcon_scene, only : scene_t
+   use emcon_solver_registry, only : solver_given, solvers
    use emcon_stepper, only : stepper_t
+   use emcon_steps, only : step_t
    use emcon_text, only : notes_t, string_t, to_text
    use emcon_version, only : version
    implicit none
@@ -81,7 +83,8 @@ contains
          do k = 1, size(scene%step)
             call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
                ", h = " // to_text(scene%step(k)%h) // &
-               merge(", NLGEOM", "        ", scene%step(k)%nlgeom))
+               trim(merge(", NLGEOM", "        ", scene%step(k)%nlgeom)) // &
+               ", solver " // solver_text(scene%step(k)))
             do i = 1, size(scene%pair)
                if (.not. has_changed(scene, i, k)) cycle
                call formulation_text(scene%pair(i)%formulation, scene%step(k)%contact, how)
@@ -105,6 +108,28 @@ contains
       end subroutine add
 
    end function model_lines
+
+   !> What factorises the matrices of a step.
+   pure function solver_text(step) result(text)
+      type(step_t), intent(in) :: step
+      character(len=solver_length(step)) :: text
+
+      if (step%solver == solver_given) then
+         text = step%solver_name
+      else
+         text = solvers(findloc(solvers%code, step%solver, 1))%text
+      end if
+   end function solver_text
+
+   pure integer function solver_length(step)
+      type(step_t), intent(in) :: step
+
+      if (step%solver == solver_given) then
+         solver_length = len(step%solver_name)
+      else
+         solver_length = len_trim(solvers(findloc(solvers%code, step%solver, 1))%text)
+      end if
+   end function solver_length
 
    !> Is a pair computed otherwise in step `k` than in the step before?
    pure logical function has_changed(scene, pair, k)

@@ -56,6 +56,8 @@ module emcon_steps
       real(wp) :: h_max = 0.0_wp                     !! 0: not given
       integer :: constraint_method = method_null_space
       integer :: solver = solver_default             !! one of `solver_`
+      character(len=:), allocatable :: solver_name   !! of `solver_given`, upper case, no blanks
+      type(origin_t) :: solver_origin
       integer :: initiation = initiation_persistent
       real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
       type(contact_options_t) :: contact

@@ -1,4 +1,5 @@
-!> What a program gives to a model between reading its deck and building it: laws, forces, mass.
+!> What a program gives to a model between reading its deck and building it: laws, forces, mass,
+!> solvers.
 !>
 !> Copies are kept, also for a restart file that is loaded afterwards. Nodes that stand in no
 !> element are part of the model where they are given something. Gravity acts on the mass of
@@ -6,7 +7,8 @@
 module emcon_stepper_given
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given, only : given_add_force, given_add_law
+   use emcon_given, only : given_add_force, given_add_law, given_add_solver, given_copy_solvers, &
+      given_find_solver
    use emcon_given_check, only : given_check_force, given_check_mass
    use emcon_given_force, only : given_force_t
    use emcon_law, only : law_t
@@ -14,11 +16,14 @@ module emcon_stepper_given
    use emcon_node_potential, only : node_potential_init, node_potential_t
    use emcon_point_function, only : point_function_t
    use emcon_scene, only : where_text
+   use emcon_solver_registry, only : is_foreign_solver, solver_names, solvers
+   use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : to_upper
    implicit none
    private
-   public :: stepper_give_law, stepper_give_potential, stepper_give_force, stepper_give_mass
+   public :: stepper_give_law, stepper_give_potential, stepper_give_force, stepper_give_mass, &
+      stepper_give_solver
 
    !> Give the law of a *USER MATERIAL: its strain energy at points, or a type that extends `law_t`.
    interface stepper_give_law
@@ -122,13 +127,39 @@ contains
       if (.not. allocated(error)) self%given%mass = mass
    end subroutine stepper_give_mass
 
+   !> Give a direct solver, which steps with SOLVER=`name` factorise their matrices by.
+   subroutine stepper_give_solver(self, name, solver, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name           !! small or capital letters, without blanks
+      class(sparse_solver_t), intent(in) :: solver   !! it has analysed nothing yet
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+      type(solver_box_t), allocatable :: present(:)
+      character(len=:), allocatable :: word, known
+
+      word = to_upper(trim(adjustl(name)))
+      call check_stage(self, error)
+      if (allocated(error)) return
+      call given_copy_solvers(self%given, present)
+      if (any(solvers%word == word)) then
+         call solver_names(known)
+         call raise(error, err_input, "a solver cannot be given as " // word // &
+            ": EMCON has its own " // known)
+      else if (is_foreign_solver(word) .or. index(word, " ") > 0) then
+         call raise(error, err_input, "a solver cannot be given as " // word // &
+            ": the name has to be one without blanks that no other program has for its own")
+      else if (given_find_solver(present, word) > 0) then
+         call raise(error, err_input, "the solver " // word // " is given already")
+      end if
+      if (.not. allocated(error)) call given_add_solver(self%given, word, solver)
+   end subroutine stepper_give_solver
+
    !> The deck is read, the model is not built.
    subroutine check_stage(self, error)
       type(stepper_t), intent(in) :: self
       type(error_t), allocatable, intent(out) :: error
 
       if (allocated(self%march%scheme)) then
-         call raise(error, err_input, "laws, forces and mass are given before the model is built")
+         call raise(error, err_input, "what a model is given has to come before it is built")
       else if (.not. self%is_read) then
          call raise(error, err_input, "there is no scene to give anything to: no deck was read, " &
             // "or reading it failed")

@@ -5,15 +5,19 @@ module emcon_given
    use emcon_given_law, only : given_law_t
    use emcon_law, only : law_t
    use emcon_point_function, only : point_function_t
+   use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    implicit none
    private
-   public :: given_t, given_add_force, given_add_law, given_copy_forces, given_count
+   public :: given_t, given_add_force, given_add_law, given_add_solver, given_copy_forces, &
+      given_copy_solvers, given_count, given_find_solver
 
-   !> Laws by the names of materials, forces between nodes, and mass beside that of elements.
+   !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
+   !> by what decks call them.
    type :: given_t
       type(given_law_t), allocatable :: law(:)
       type(given_force_box_t), allocatable :: force(:)
       type(csr_t) :: mass                        !! (n_node x n_node) [M]; without rows: none
+      type(solver_box_t), allocatable :: solver(:)
    end type given_t
 
 contains
@@ -66,6 +70,53 @@ contains
       if (present(law)) allocate(longer(n + 1)%law, source=law)
       call move_alloc(longer, self%law)
    end subroutine given_add_law
+
+   !> Append a copy of a solver that has not been used.
+   subroutine given_add_solver(self, name, solver)
+      type(given_t), intent(inout) :: self
+      character(len=*), intent(in) :: name       !! upper case, without blanks
+      class(sparse_solver_t), intent(in) :: solver   !! it has analysed nothing yet
+      type(solver_box_t), allocatable :: longer(:)
+      integer :: i, n
+
+      n = 0
+      if (allocated(self%solver)) n = size(self%solver)
+      allocate(longer(n + 1))
+      do i = 1, n
+         longer(i)%name = self%solver(i)%name
+         call move_alloc(self%solver(i)%solver, longer(i)%solver)
+      end do
+      longer(n + 1)%name = name
+      allocate(longer(n + 1)%solver, source=solver)
+      call move_alloc(longer, self%solver)
+   end subroutine given_add_solver
+
+   !> Place of the solver `name` in a list; 0: it is not there.
+   pure integer function given_find_solver(solver, name) result(i)
+      type(solver_box_t), intent(in) :: solver(:)   !! each with its name
+      character(len=*), intent(in) :: name       !! upper case, without blanks
+
+      do i = size(solver), 1, -1
+         if (solver(i)%name == name) return
+      end do
+   end function given_find_solver
+
+   !> The solvers of `self`, independent of it; none: of no size.
+   subroutine given_copy_solvers(self, copy)
+      type(given_t), intent(in), optional :: self
+      type(solver_box_t), allocatable, intent(out) :: copy(:)   !! each with its name
+      integer :: i, n
+
+      n = 0
+      if (present(self)) then
+         if (allocated(self%solver)) n = size(self%solver)
+      end if
+      allocate(copy(n))
+      do i = 1, n
+         copy(i)%name = self%solver(i)%name
+         allocate(copy(i)%solver, source=self%solver(i)%solver)
+      end do
+   end subroutine given_copy_solvers
 
    !> Forces and mass of `self`, independent of it.
    subroutine given_copy_forces(self, copy)

@@ -3,10 +3,12 @@ module emcon_given_check
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given, only : given_count, given_t
+   use emcon_given, only : given_copy_solvers, given_count, given_find_solver, given_t
    use emcon_given_force, only : given_force_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t, where_text
+   use emcon_solver_registry, only : solver_given, solver_names
+   use emcon_sparse_solver, only : solver_box_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -149,13 +151,16 @@ contains
       end do
    end subroutine check_pattern
 
-   !> There is something to compute, and each node that the deck says is given has forces or mass.
+   !> There is something to compute, each node that the deck says is given has forces or mass, and
+   !> solvers that it names are there.
    subroutine given_check_scene(given, scene, error)
       type(given_t), intent(in) :: given
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       integer :: i, n
 
+      call check_solvers(given, scene, error)
+      if (allocated(error)) return
       if (all(given_count(given) == 0)) then
          if (allocated(scene%given_node)) then
             call raise(error, err_input, where_text(scene, scene%given_origin) // ": error: " // &
@@ -192,6 +197,29 @@ contains
       end function has_force
 
    end subroutine given_check_scene
+
+   !> Each solver that a step names and that is not of EMCON was given.
+   subroutine check_solvers(given, scene, error)
+      type(given_t), intent(in) :: given
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(solver_box_t), allocatable :: solver(:)
+      character(len=:), allocatable :: known
+      integer :: i
+
+      call given_copy_solvers(given, solver)
+      do i = 1, size(scene%step)
+         associate (step => scene%step(i))
+            if (step%solver /= solver_given) cycle
+            if (given_find_solver(solver, step%solver_name) > 0) cycle
+            call solver_names(known)
+            call raise(error, err_input, where_text(scene, step%solver_origin) // ": error: " // &
+               "SOLVER=" // step%solver_name // ": no program has given this solver, see " // &
+               "docs/embedding.md; those of EMCON are " // known)
+            return
+         end associate
+      end do
+   end subroutine check_solvers
 
    pure logical function has_row(matrix, i)
       type(csr_t), intent(in) :: matrix

@@ -98,7 +98,8 @@ def outcome(program, deck, options):
         result = {"exit code": str(done.returncode), "messages": digest(said.encode())}
         for path in sorted(pathlib.Path(folder).iterdir()):
             if path.suffix in READ:
-                result[path.suffix] = digest(READ[path.suffix](path))
+                held = READ[path.suffix](path).replace(folder.encode(), b"")
+                result[path.suffix] = digest(held)
     return result
 
 
