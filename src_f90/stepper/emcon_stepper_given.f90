@@ -159,7 +159,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       if (allocated(self%march%scheme)) then
-         call raise(error, err_input, "laws, forces, mass and solvers are given before the model is built")
+         call raise(error, err_input, "laws, forces, mass and solvers are given before the model " &
+            // "is built")
       else if (.not. self%is_read) then
          call raise(error, err_input, "there is no scene to give anything to: no deck was read, " &
             // "or reading it failed")
