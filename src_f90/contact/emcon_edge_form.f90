@@ -10,7 +10,7 @@ module emcon_edge_form
       moment_gap_xi, n_moment
    implicit none
    private
-   public :: edge_form_t, form_begin, form_share, form_constraint
+   public :: edge_form_t, weighted_gap_t, form_begin, form_share, form_constraint
 
    !> Covered but for round-off: the dual basis needs no care.
    real(wp), parameter :: whole = 256.0_wp*epsilon(1.0_wp)
@@ -24,6 +24,15 @@ module emcon_edge_form
       integer, allocatable :: node(:)            !! (>= n_node)
       type(wide_t) :: moment(n_moment)           !! over the coordinates of the nodes
    end type edge_form_t
+
+   !> Which weighted gap a constraint holds: that of one slave node.
+   type :: weighted_gap_t
+      integer :: node = 0                        !! of the scene
+      integer :: edge(2) = 0                     !! that ends there, that begins there; 0: none
+      logical :: is_dual = .true.                !! else the standard basis
+      real(wp) :: target = 0.0_wp                !! mean gap to hold [L]
+      real(wp) :: scale = 1.0_wp                 !! > 0 [L^2]
+   end type weighted_gap_t
 
 contains
 
@@ -79,29 +88,29 @@ contains
 
    end subroutine form_share
 
-   !> The constraint (Phi - target W)/scale of a slave node, from the edges that end there and begin
-   !> there, numbers `e` in `form`; one of them may be absent, 0. Source: docs/theory.md, eq. (15).
-   pure subroutine form_constraint(form, e, node, is_dual, target, scale, work, item)
+   !> The constraint (Phi - target W)/scale of a slave node: docs/theory.md, eq. (15).
+   pure subroutine form_constraint(form, gap, work, item)
       type(edge_form_t), intent(in) :: form(:)   !! (n_edge) of the slave side
-      integer, intent(in) :: e(2)                !! that ends at the node, that begins there
-      integer, intent(in) :: node                !! of the scene
-      logical, intent(in) :: is_dual             !! else the standard basis
-      real(wp), intent(in) :: target             !! mean gap to hold [L]
-      real(wp), intent(in) :: scale              !! > 0 [L^2]
+      type(weighted_gap_t), intent(in) :: gap
       type(wide_t), intent(inout) :: work(3)     !! work space
       type(condition_t), intent(inout) :: item
-      integer :: list(1 + sum(form(pack(e, e > 0))%n_node)), n, k, i
+      integer :: list(1 + sum(form(pack(gap%edge, gap%edge > 0))%n_node)), n, k, i
       integer :: place(size(list))
 
-      list(1) = node
+      list(1) = gap%node
       n = 1
       do k = 1, 2
-         if (e(k) > 0) call append(form(e(k))%node(:form(e(k))%n_slave), list, n)
+         if (gap%edge(k) == 0) cycle
+         associate (edge => form(gap%edge(k)))
+            call append(edge%node(:edge%n_slave), list, n)
+         end associate
       end do
       item%n_slave = n
       do k = 1, 2
-         if (e(k) > 0) call append(form(e(k))%node(form(e(k))%n_slave + 1:form(e(k))%n_node), &
-            list, n)
+         if (gap%edge(k) == 0) cycle
+         associate (edge => form(gap%edge(k)))
+            call append(edge%node(edge%n_slave + 1:edge%n_node), list, n)
+         end associate
       end do
       call condition_resize(item, n)
       item%node(:n) = list(:n)
@@ -112,13 +121,13 @@ contains
       item%c = 0.0_wp
       item%h = 0.0_wp
       do k = 1, 2
-         if (e(k) == 0) cycle
-         associate (edge => form(e(k)))
-            call weighted(edge, 3 - k, is_dual, target, work(1), work(2), work(3))
+         if (gap%edge(k) == 0) cycle
+         associate (edge => form(gap%edge(k)))
+            call weighted(edge, 3 - k, gap%is_dual, gap%target, work(1), work(2), work(3))
             do i = 1, edge%n_node
                place(i) = findloc(list(:n), edge%node(i), 1)
             end do
-            call add(work(1), place(:edge%n_node), 1.0_wp/scale, item)
+            call add(work(1), place(:edge%n_node), 1.0_wp/gap%scale, item)
          end associate
       end do
    end subroutine form_constraint

@@ -42,8 +42,9 @@ module emcon_mortar
       real(wp), allocatable :: point(:), weight(:)    !! quadrature on 0..1
       integer, allocatable :: start(:)                !! (n_edge + 1) pairs of each slave edge
       type(pair_stencil_t), allocatable :: pair(:)    !! (>= number of pairs)
-      integer, allocatable :: seen(:, :, :)           !! (2, n_point, n_edge) pair at a Gauss point,
-                                                      !! and the one beside it at a master node; 0
+      integer, allocatable :: seen(:, :, :)           !! (2, n_point, n_edge) which pair of the edge
+                                                      !! is at a Gauss point, and which beside it
+                                                      !! at a master node; 0: none
    contains
       procedure :: configure => mortar_configure
       procedure :: begin_step => mortar_begin_step
@@ -104,8 +105,8 @@ contains
       do e = 1, self%slave%n_edge
          self%start(e) = n + 1
          call choose_pairs(self, e, x, u0, du, n)
-         if (self%options%integration == integration_elements) call pairs_seen(self%pair, &
-            self%master, self%start(e), n, self%point, x, u0, du, self%seen(:, :, e))
+         if (self%options%integration == integration_elements) call pairs_seen( &
+            self%pair(self%start(e):n), self%master, self%point, x, u0, du, self%seen(:, :, e))
       end do
       self%start(e) = n + 1
    end subroutine mortar_begin_step
@@ -212,7 +213,9 @@ contains
       integer, intent(in) :: i, e, k
 
       share = 0.0_wp
-      if (any(self%seen(:, i, e) == k)) share = self%weight(i)/count(self%seen(:, i, e) > 0)
+      associate (seen => self%seen(:, i, e))
+         if (any(seen == k - self%start(e) + 1)) share = self%weight(i)/count(seen > 0)
+      end associate
    end function share
 
    pure subroutine mortar_form_edge(self, e, x, u0, du)

@@ -166,17 +166,16 @@ contains
       end do
    end subroutine pairs_drop_far
 
-   !> The pair, of those from `first` to `last`, that each point of a slave edge looks at, at the
+   !> The pair, of those of one slave edge, that each point of a slave edge looks at, at the
    !> start of the step or else at its expected end; 0: none. A point that looks between the nodes
    !> of a joint of the master sees one of the edges there, one that looks at a master node the
    !> edges on both sides of it: which of them comes first must not matter.
-   pure subroutine pairs_seen(list, master, first, last, point, x, u0, du, seen)
-      type(pair_stencil_t), intent(in) :: list(:)   !! (>= last)
+   pure subroutine pairs_seen(pair, master, point, x, u0, du, seen)
+      type(pair_stencil_t), intent(in) :: pair(:)   !! (>= 0) of the edge
       type(chain_t), intent(in) :: master
-      integer, intent(in) :: first, last         !! indices into `list`; last < first: none
       real(wp), intent(in) :: point(:)           !! (n_point) on 0..1
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      integer, intent(out) :: seen(:, :)         !! (2, n_point) pair, and the one beside it or 0
+      integer, intent(out) :: seen(:, :)         !! (2, n_point) index, and the one beside it or 0
       type(frame_t) :: frame
       real(wp) :: local(2, n_place), dlocal(2, n_place), beyond(2)
       integer :: pass, k
@@ -187,14 +186,14 @@ contains
          is_open = seen(1, :) == 0
          if (.not. any(is_open)) exit
          beyond = 0.0_wp
-         do k = first, last
+         do k = 1, size(pair)
             if (pass > 1) then
-               beyond = joint_width(master, list(k)%edge, x, u0)
+               beyond = joint_width(master, pair(k)%edge, x, u0)
                if (.not. any(beyond > 0.0_wp)) cycle
             end if
-            call stencil_gather(list(k), x, u0, du, local, dlocal)
-            call frame_init(frame, list(k), local + mod(pass, 2)*dlocal)
-            call see_pair(frame, list(k), k, beyond, point, is_open, seen)
+            call stencil_gather(pair(k), x, u0, du, local, dlocal)
+            call frame_init(frame, pair(k), local + mod(pass, 2)*dlocal)
+            call see_pair(frame, pair(k), k, beyond, point, is_open, seen)
          end do
          where (seen(1, :) == 0) seen(2, :) = 0
       end do

@@ -206,7 +206,8 @@ contains
       if (self%edge(i) == 0) return
       if (self%smoothing == smoothing_hermite) then
          call smooth_stencil(self%smooth(i), self%master, self%is_corner, self%node(i), &
-            self%edge(i), self%rounding, x, u0)
+            self%edge(i), x, u0)
+         self%smooth(i)%curve%rounding = self%rounding*self%master%length(self%edge(i))
       else
          call take_sector(self, i, x, u0)
       end if

@@ -129,13 +129,13 @@ contains
 
    !> The smoothed surface around `edge`, over two edges on either side of it, for a step from
    !> `u0`. It ends where an edge of a surface in contact with itself begins at the slave node.
-   pure subroutine smooth_stencil(self, master, is_corner, slave, edge, rounding, x, u0)
+   !> Corners are not rounded: `curve%rounding` is left to the caller.
+   pure subroutine smooth_stencil(self, master, is_corner, slave, edge, x, u0)
       type(smooth_stencil_t), intent(out) :: self
       type(chain_t), intent(in) :: master
       logical, intent(in) :: is_corner(:)        !! (n_edge) at the first node of each
       integer, intent(in) :: slave               !! node of the scene
       integer, intent(in) :: edge                !! of `master`, the nearest
-      real(wp), intent(in) :: rounding           !! of corners, as a fraction of the edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (2, n_node) [L]
       real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
       integer :: near(5), k, number
@@ -149,7 +149,6 @@ contains
       self%node(:3) = [slave, master%edge(:, edge)]
       self%n = 3
       self%curve%node(3:4) = [2, 3]
-      self%curve%rounding = rounding*master%length(edge)
       do k = 1, 5
          if (near(k) == 0) cycle
          self%curve%length(k) = master%length(near(k))

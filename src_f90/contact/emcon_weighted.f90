@@ -8,7 +8,7 @@ module emcon_weighted
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, deepest_arrival
    use emcon_dgrad_wide, only : wide_t
-   use emcon_edge_form, only : edge_form_t, form_constraint, form_share
+   use emcon_edge_form, only : edge_form_t, form_constraint, form_share, weighted_gap_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_pair_t
    use emcon_joints, only : chain_join
@@ -176,8 +176,8 @@ contains
                self%is_formed(e) = .true.
             end associate
          end do
-         call form_constraint(self%form, self%node_edge(:, i), self%node(i), self%is_dual, &
-            target(n), self%scale(i), self%work, item(n))
+         call form_constraint(self%form, weighted_gap_t(self%node(i), self%node_edge(:, i), &
+            self%is_dual, target(n), self%scale(i)), self%work, item(n))
          item(n)%size = self%state(i)%size
       end do
    end subroutine weighted_evaluate

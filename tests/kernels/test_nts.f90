@@ -486,7 +486,7 @@ contains
       call nts_init(nts, scene, pair, error)
       if (allocated(error)) return
       is_corner = .false.
-      call smooth_stencil(stencil, nts%master, is_corner, 1, 3, 0.0_wp, scene%x, scene%u0)
+      call smooth_stencil(stencil, nts%master, is_corner, 1, 3, scene%x, scene%u0)
       call check_equal(error, stencil%node(:stencil%n), [1, 3, 4, 2, 8, 7], "nodes")
       call check_equal(error, stencil%curve%node, [0, 4, 2, 3, 5, 6], "nodes along the surface")
    end subroutine test_own_node
