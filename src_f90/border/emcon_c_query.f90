@@ -119,7 +119,7 @@ contains
       if (emcon_residual /= err_none) return
       if (c_associated(nodal)) call check_count("n_node", n_node, n_nodes(model), error)
       if (c_associated(unknown)) call check_count("n_unknown", n_unknown, &
-         model%stepper%march%system%numbering%n_unknown, error)
+         model%stepper%march%system%space%numbering%n_unknown, error)
       if (.not. allocated(error)) call query_residual(model%query, with_contact /= 0, at_node, &
          of_unknown, error)
       if (.not. allocated(error)) call put_field(at_node, nodal)

@@ -37,8 +37,8 @@ contains
       associate (system => model%stepper%march%system)
          to%n_contact = system%n_constraint - system%linear%n
          to%n_pair = system%n_pair
-         to%n_body = system%n_body
-         to%n_unknown = system%numbering%n_unknown
+         to%n_body = system%space%n_body
+         to%n_unknown = system%space%numbering%n_unknown
          to%n_constraint = system%n_constraint
          to%i_step = model%stepper%march%state%i_step
          to%n_load = size(model%stepper%scene%step(to%i_step)%load)
@@ -292,7 +292,7 @@ contains
 
       call find_built(handle, model, emcon_get_momenta)
       if (emcon_get_momenta /= err_none) return
-      call check_count("n_body", n_body, model%stepper%march%system%n_body, error)
+      call check_count("n_body", n_body, model%stepper%march%system%space%n_body, error)
       if (.not. allocated(error)) call query_momenta(model%query, model%stepper, of_body, error)
       if (.not. allocated(error)) call put_field(of_body, momenta)
       call handle_pass(model, error, emcon_get_momenta)

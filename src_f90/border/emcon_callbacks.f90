@@ -8,7 +8,7 @@ module emcon_callbacks
       c_int, c_loc, c_null_funptr, c_null_ptr, c_ptr
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given_force, only : given_force_t
+   use emcon_given_force, only : force_response_t, given_force_t
    use emcon_kinds, only : dp, wp
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_stepper, only : stepper_t
@@ -156,15 +156,11 @@ contains
    end subroutine point_callback_evaluate
 
    !> As `given_force_t` has it.
-   subroutine force_callback_respond(self, u0, du, wants_tangent, force, magnitude, energy, &
-      tangent, status)
+   subroutine force_callback_respond(self, u0, du, wants_tangent, response)
       class(force_callback_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       logical, intent(in) :: wants_tangent
-      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
-      real(wp), intent(out) :: energy
-      real(dp), intent(inout), contiguous :: tangent(:)
-      integer, intent(out) :: status
+      type(force_response_t), intent(inout) :: response
       procedure(force_interface), pointer :: function
       real(c_double), allocatable, target :: start(:, :), motion(:, :), f(:, :), size_of(:, :), k(:)
       real(c_double) :: last
@@ -176,17 +172,17 @@ contains
       f = 0.0_c_double
       size_of = 0.0_c_double
       last = ieee_value(0.0_c_double, ieee_quiet_nan)   ! to see that it was set
-      allocate(k(merge(size(tangent), 0, wants_tangent)), source=0.0_c_double)
+      allocate(k(merge(size(response%tangent), 0, wants_tangent)), source=0.0_c_double)
       slope = c_null_ptr
       if (wants_tangent) slope = c_loc(k)
       call c_f_procpointer(self%function, function)
-      status = status_of(function(self%user, int(size(u0, 2), c_int), c_loc(start), &
+      response%status = status_of(function(self%user, int(size(u0, 2), c_int), c_loc(start), &
          c_loc(motion), merge(1_c_int, 0_c_int, wants_tangent), c_loc(f), c_loc(size_of), last, &
          slope))
-      force = real(f, wp)
-      magnitude = real(size_of, wp)
-      energy = real(last, wp)
-      if (wants_tangent) tangent = real(k, dp)
+      response%force = real(f, wp)
+      response%magnitude = real(size_of, wp)
+      response%energy = real(last, wp)
+      if (wants_tangent) response%tangent = real(k, dp)
    end subroutine force_callback_respond
 
    pure integer function status_of(code)

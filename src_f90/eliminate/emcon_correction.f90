@@ -103,16 +103,16 @@ contains
          if (.not. has_pattern(self, set)) then
             call take_pattern(self, system, set)
             if (self%method == method_null_space) call null_space_init(null_space, set, &
-               self%merged, system%numbering, error)
+               self%merged, system%space%numbering, error)
             if (allocated(error)) return
          else if (self%method == method_null_space) then
-            call null_space_update(null_space, set, system%numbering)
+            call null_space_update(null_space, set, system%space%numbering)
          end if
          self%uses_null_space = self%method == method_null_space
          if (self%uses_null_space) then
             self%uses_null_space = null_space%obstacle == obstacle_none
          else
-            call independent_rows_find(null_space%rows, set, system%numbering)
+            call independent_rows_find(null_space%rows, set, system%space%numbering)
          end if
          self%n_redundant = null_space%rows%n_redundant
          if (self%n_redundant > 0) then
@@ -170,7 +170,7 @@ contains
       do k = 1, size(self%slot)
          self%merged%value(self%slot(k)) = system%matrix%value(k)
       end do
-      call constraints_add_curvature(set, system%numbering, self%merged)
+      call constraints_add_curvature(set, system%space%numbering, self%merged)
       call stopwatch_stop(self%clock)
       self%is_reduced = self%method == method_null_space
       self%obstacle = obstacle_none
@@ -208,7 +208,7 @@ contains
       is_singular = .not. self%is_definite
       if (self%is_definite) return
       ! Minimum degree fills matrices of tied pieces by a quarter more than the pieces need.
-      self%solver%seeks_less_fill = system%numbering%n_dependent > 0
+      self%solver%seeks_less_fill = system%space%numbering%n_dependent > 0
       call self%solver%analyse(system%matrix, error)
       if (.not. allocated(error)) call self%solver%factorise(system%matrix%value, error)
       is_singular = self%solver%is_singular
@@ -223,7 +223,7 @@ contains
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
 
       if (set%n == 0 .or. .not. self%uses_null_space) return
-      call null_space_multipliers(self%null_space, set, system%numbering, residual, set%lam)
+      call null_space_multipliers(self%null_space, set, system%space%numbering, residual, set%lam)
    end subroutine correction_multipliers
 
    !> CPU time spent on constraints so far, over what the system without them would take [s].

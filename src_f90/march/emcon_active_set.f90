@@ -15,7 +15,7 @@ module emcon_active_set
    use emcon_errors, only : error_t
    use emcon_holding, only : holding_complete, holding_find_free, holding_forget, holding_t
    use emcon_kinds, only : wp
-   use emcon_motion, only : motion_t
+   use emcon_motion, only : at_rest, motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, &
       newton_t
    use emcon_scene, only : scene_t
@@ -111,8 +111,8 @@ contains
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
             contact%reach = 0.0_wp
-            call contact%begin_step(x, u, system%zero)
-            call contact%measure(x, u, system%zero)
+            call contact%begin_step(x, u, at_rest(u))
+            call contact%measure(x, u, at_rest(u))
             where (contact%state%is_near .and. contact%state%is_over)
                self%overclosure(first:last) = min(0.0_wp, contact%state%gap0)
             end where
@@ -288,13 +288,13 @@ contains
       type(motion_t), intent(in) :: motion
       integer :: pair
 
-      self%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%is_reduced
+      self%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%space%is_reduced
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
             call contact%begin_step(motion%x, motion%u0, motion%du)
-            call contact%measure(motion%x, motion%u0, system%zero)
+            call contact%measure(motion%x, motion%u0, at_rest(motion%u0))
             self%is_active(first:last) = self%was_active(first:last) &
                .and. contact%state%is_near .and. contact%state%is_over
             if (.not. any(self%is_active(first:last))) cycle
@@ -403,7 +403,7 @@ contains
       integer, intent(in) :: i, k
       real(wp) :: noise
 
-      noise = force_noise*sum(system%magnitude(:, contact%node(i)))
+      noise = force_noise*sum(system%response%magnitude(:, contact%node(i)))
       if (.not. self%has_inertia) noise = noise + force_noise &
          *sum(system%response%rounding(:, contact%node(i)))
       is_let_go = contact%state(i)%is_leaving .or. &

@@ -12,14 +12,13 @@ module emcon_holding
    use emcon_holding_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, gaps_nearest, &
       gaps_next_to_close, gaps_that_can_act, in_the_way
    use emcon_kinds, only : dp, wp
-   use emcon_loads, only : loads_add
    use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs
    use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t, rigid_field, rigid_force
    use emcon_rigid_motion, only : describe_motion
    use emcon_rigid_rows, only : rigid_rows_append, rigid_rows_find, rigid_rows_t
    use emcon_scene, only : scene_t
-   use emcon_system, only : system_stiffen, system_t
+   use emcon_system, only : system_loads, system_stiffen, system_t
    implicit none
    private
    public :: holding_t, holding_begin, holding_forget, holding_complete, holding_find_free
@@ -76,7 +75,7 @@ contains
          self%stabilizes = step%stabilizes
          call rigid_rows_find(system, step%prescribed, self%supports)
       end associate
-      allocate(self%is_loose(system%n_body), source=.false.)
+      allocate(self%is_loose(system%space%n_body), source=.false.)
       allocate(self%has_pulled(system%n_constraint), source=.false.)
       allocate(self%brought(system%n_constraint), source=0.0_wp)
       if (size(system%contact) == 0) return
@@ -110,7 +109,7 @@ contains
 
       self%is_loose = .false.
       if (allocated(self%text)) deallocate(self%text)
-      do round = 1, 6*system%n_body + size(is_active)
+      do round = 1, 6*system%space%n_body + size(is_active)
          call motion_place(motion)
          call gaps_measure(system, motion)
          call look_at_contacts(self, system, scene, motion, is_active, look)
@@ -135,7 +134,7 @@ contains
          if (.not. has_changed) exit
       end do
       do i = 1, size(free)
-         self%is_loose(pack(free(i)%member, free(i)%member <= system%n_body)) = .true.
+         self%is_loose(pack(free(i)%member, free(i)%member <= system%space%n_body)) = .true.
       end do
       call system_stiffen(system, self%is_loose)
    end subroutine holding_complete
@@ -190,7 +189,7 @@ contains
       type(look_t), intent(out) :: look
 
       look%rows = self%supports
-      if (system%nlgeom) then
+      if (scene%step(system%i_step)%nlgeom) then
          call rigid_bodies_find(system, scene, scene%x + u, look%rows, .false., .true., look%bodies)
       else
          call rigid_bodies_find(system, scene, scene%x, look%rows, .false., .true., look%bodies)
@@ -328,10 +327,10 @@ contains
       type(rigid_bodies_t), intent(in) :: bodies
       type(free_t), intent(inout) :: free
       real(dp) :: total(3*size(free%member)), along(size(free%z, 2)), magnitude
+      real(wp) :: force(size(motion%x, 1), size(motion%x, 2))
 
-      system%f_work = 0.0_wp
-      call loads_add(system%loads, system%solid, motion, system%f_work)
-      call rigid_force(bodies, free%member, system%f_work, total, magnitude)
+      call system_loads(system, motion, force)
+      call rigid_force(bodies, free%member, force, total, magnitude)
       along = matmul(total, free%z)
       free%is_loaded = magnitude > 0.0_dp
       if (norm2(along) <= max(real(self%tolerance, dp), free%noise)*magnitude) along = 0.0_dp
@@ -344,15 +343,15 @@ contains
       real(wp), intent(in) :: way(:, :)                  !! (2, n_node)
       real(wp), intent(in) :: time
       real(wp), intent(inout), contiguous :: du(:, :)
-      real(wp) :: vector(system%numbering%n_unknown)
+      real(wp) :: vector(system%space%numbering%n_unknown)
       integer :: k
 
       do k = 1, size(vector)
-         associate (dof => system%numbering%dof(k))
+         associate (dof => system%space%numbering%dof(k))
             vector(k) = way(2 - mod(dof, 2), (dof + 1)/2)
          end associate
       end do
-      call add_to_dofs(system%numbering, vector, time, du)
+      call add_to_dofs(system%space%numbering, vector, time, du)
    end subroutine move
 
 end module emcon_holding

@@ -27,20 +27,21 @@ contains
    !> Energies and momenta of `state`; the works stand.
    subroutine ledger_measure(self, system, x, state)
       type(ledger_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
+      type(system_t), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(state_t), intent(in) :: state
+      real(wp) :: momentum(size(x, 1), size(x, 2))   ! of each node
       integer :: i
 
-      call mass_times(system, state%v, system%f_work)
-      self%kinetic = 0.5_wp*sum(state%v*system%f_work)
+      call mass_times(system, state%v, momentum)
+      self%kinetic = 0.5_wp*sum(state%v*momentum)
       self%strain = sum(state%energy)
       self%potential = state%potential
       self%total = self%kinetic + self%strain + self%potential - self%external_work
-      self%momentum = sum(system%f_work, dim=2)
+      self%momentum = sum(momentum, dim=2)
       self%angular = 0.0_wp
       do i = 1, size(x, 2)
-         self%angular = self%angular + moment(x(:, i), state%u(:, i), system%f_work(:, i))
+         self%angular = self%angular + moment(x(:, i), state%u(:, i), momentum(:, i))
       end do
    end subroutine ledger_measure
 
@@ -52,18 +53,20 @@ contains
 
    !> Linear and angular momentum of each body: rows px, py, lz.
    subroutine body_momenta(system, x, state, momenta)
-      type(system_t), intent(inout) :: system
+      type(system_t), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(state_t), intent(in) :: state
       real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
+      real(wp) :: momentum(size(x, 1), size(x, 2))   ! of each node
       integer :: i
 
-      call mass_times(system, state%v, system%f_work)
+      call mass_times(system, state%v, momentum)
       momenta = 0.0_wp
       do i = 1, size(x, 2)
-         if (system%body(i) == 0) cycle
-         momenta(:, system%body(i)) = momenta(:, system%body(i)) + [system%f_work(:, i), &
-            moment(x(:, i), state%u(:, i), system%f_work(:, i))]
+         if (system%space%body(i) == 0) cycle
+         associate (to => momenta(:, system%space%body(i)))
+            to = to + [momentum(:, i), moment(x(:, i), state%u(:, i), momentum(:, i))]
+         end associate
       end do
    end subroutine body_momenta
 

@@ -12,7 +12,7 @@ module emcon_march
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_parts, only : march_in_parts
    use emcon_march_step, only : increment_t, march_t
-   use emcon_motion, only : motion_init, motion_of, pose_t
+   use emcon_motion, only : at_rest, motion_init, motion_of, pose_t
    use emcon_newton, only : interrupt_interface, newton_init
    use emcon_numbering, only : spread_dependent
    use emcon_overclosure, only : overclosure_check
@@ -27,6 +27,7 @@ module emcon_march
       procedure_static, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_init, &
       system_respond
+   use emcon_term, only : role_internal
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
    use emcon_velocity_update, only : velocity_update_free, velocity_update_reset
@@ -67,7 +68,7 @@ contains
          allocate(state%internal(2, n), source=0.0_wp)
          allocate(state%is_active(self%system%n_constraint), source=.false.)
          allocate(state%lam(self%system%n_constraint), source=0.0_wp)
-         allocate(state%energy(self%system%solid%n_element), source=0.0_wp)
+         allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)
       call active_set_init(self%active, self%system)
@@ -151,7 +152,7 @@ contains
 
          largest = maxval(abs(field))
          self%motion%du = field
-         call spread_dependent(self%system%linked, field)
+         call spread_dependent(self%system%space%linked, field)
          change = maxval(abs(field - self%motion%du), 1)
          i = maxloc(change, 1)
          if (change(i) > deck_rounding*largest) call note_add(self%system%notes, "the " // name // &
@@ -208,8 +209,8 @@ contains
             allocate(scheme_static_t :: self%scheme)
             self%scheme%has_inertia = .false.
          end if
-         call newton_init(self%newton, self%system%numbering%n_unknown, &
-            self%system%solid%n_node, step%newton_tolerance, step%newton_maximum)
+         call newton_init(self%newton, self%system%space%numbering%n_unknown, &
+            size(scene%x, 2), step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
          self%active%puts_off = .true.
@@ -230,19 +231,19 @@ contains
             step%resolves_overclosure)
          self%meant_overlap = 0.0_wp
          if (step%resolves_overclosure) then
-            call judge_step(self%judge, scene%x, state%u_start, self%system%zero, overlap)
+            call judge_step(self%judge, scene%x, state%u_start, at_rest(state%u), overlap)
             self%meant_overlap = overlap%depth
             call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
          end if
          call count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = grid_time(self, step, state%n_grid)
          call system_respond(self%system, motion_of(pose_t(is_end=.true.), scene%x, state%u, &
-            self%system%zero), .false.)
+            at_rest(state%u)), .false.)
          call system_check_response(self%system, "at the start of the step", error)
          if (allocated(error)) return
-         state%internal = self%system%response%force
+         state%internal = self%system%response%part(role_internal)%force
          state%energy = self%system%response%energy
-         state%potential = self%system%potential
+         state%potential = self%system%response%potential
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
       self%revision = self%revision + 1
@@ -254,7 +255,7 @@ contains
       type(step_t), intent(in) :: step
       integer :: i, method
 
-      method = merge(step%constraint_method, method_saddle_point, self%system%is_reduced)
+      method = merge(step%constraint_method, method_saddle_point, self%system%space%is_reduced)
       if (step%solver /= solver_given) then
          call correction_reset(self%correction, method, step%solver)
          call velocity_update_reset(self%velocity_update, step%solver)

@@ -7,6 +7,7 @@ module emcon_march_parts
    use emcon_march_step, only : cycling_text, increment_t, march_step, march_t, part_t
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : scene_t
+   use emcon_system, only : system_may_hold
    use emcon_text, only : note_add, notes_append, notes_t, to_text
    implicit none
    private
@@ -80,7 +81,7 @@ contains
 
       select case (status)
       case (step_refused)
-         text = self%system%refusal
+         text = self%system%response%refusal
       case (step_diverged)
          text = "Newton's method does not converge (relative residual " // &
             to_text(self%newton%history(max(1, self%newton%n_history))) // " after " // &
@@ -113,13 +114,15 @@ contains
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(inout) :: text
       character(len=:), allocatable :: motion
+      logical :: may_hold(size(scene%x, 2))
 
       if (.not. self%scheme%has_inertia .and. .not. allocated(self%active%holding%text)) then
          call free_motion_text(self%system, scene, &
             scene%step(self%state%i_step)%prescribed, motion, with_contact=.true.)
          if (len(motion) == 0) return
          text = text // "; without contact "
-         if (self%system%given%is_any) text = text // "and given forces "
+         call system_may_hold(self%system, may_hold)
+         if (any(may_hold)) text = text // "and given forces "
          text = text // motion
       end if
    end subroutine failure_text

@@ -14,7 +14,7 @@ module emcon_march_step
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_loads, only : prescribed_motion
-   use emcon_motion, only : instant_t, motion_t
+   use emcon_motion, only : at_rest, instant_t, motion_t
    use emcon_newton, only : interrupt_interface, newton_t
    use emcon_numbering, only : gather_dependent, spread_dependent
    use emcon_pair_record, only : pair_record_measure
@@ -25,6 +25,7 @@ module emcon_march_step
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_velocity_update
    use emcon_system, only : system_t
+   use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_t
@@ -184,7 +185,7 @@ contains
          end associate
       end do
       if (.not. goes_in) return
-      call judge_step(self%judge, scene%x, self%state%u, self%system%zero, before)
+      call judge_step(self%judge, scene%x, self%state%u, at_rest(self%motion%du), before)
       goes_in = overlap%depth > before%depth + 0.1_wp*deepest_new
    end function goes_in
 
@@ -255,7 +256,7 @@ contains
       self%motion%offset = 0.0_wp
       self%motion%du = 0.0_wp
       if (self%scheme%has_inertia .and. .not. is_at_rest) self%motion%du = h*self%state%v
-      where (.not. self%system%is_alive) self%motion%du = 0.0_wp
+      where (.not. self%system%space%is_alive) self%motion%du = 0.0_wp
       self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%i_step))
          do k = 1, size(step%prescribed)
@@ -283,7 +284,7 @@ contains
       type(system_t), intent(in) :: system
       real(wp), intent(inout), contiguous :: field(:, :)     !! (2, n_node)
 
-      if (system%linear%n > 0) call spread_dependent(system%linked, field)
+      if (system%linear%n > 0) call spread_dependent(system%space%linked, field)
    end subroutine follow_links
 
    !> Take over the solved step: works, velocities, contact and reaction forces.
@@ -296,20 +297,20 @@ contains
       integer :: i, a, k
 
       associate (state => self%state, system => self%system, set => self%active%set)
-         system%residual = system%residual - self%newton%contact
-         call gather_dependent(system%numbering, system%residual)
+         system%response%residual = system%response%residual - self%newton%contact
+         call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
          do i = 1, size(state%v, 2)
             do a = 1, 2
-               if (system%numbering%unknown(a, i) > 0) then
+               if (system%space%numbering%unknown(a, i) > 0) then
                   self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), &
                      self%motion%du(a, i))
-                  system%residual(a, i) = 0.0_wp
+                  system%response%residual(a, i) = 0.0_wp
                end if
             end do
          end do
          call follow_links(system, self%v1)
-         state%reaction = system%residual
+         state%reaction = system%response%residual
          if (set%n_linear > 0) call constraints_force(set, set%n_linear + 1, self%newton%contact)
          call book_work(self)
          if (scene%step(state%i_step)%initiation == initiation_velocity_update &
@@ -320,9 +321,9 @@ contains
          state%contact = self%newton%contact
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
             merge(0.5_wp, 0.0_wp, self%scheme%has_inertia))
-         state%internal = system%response%force
+         state%internal = system%response%part(role_internal)%force
          state%energy = system%response%energy
-         state%potential = system%potential
+         state%potential = system%response%potential
          if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             trim(correction_reason(self%correction)) // ": solved as a saddle point")
          call stand_off_add(increment%stand_off, system, set, h)
@@ -378,9 +379,9 @@ contains
          call tell_stabilized(self%active%holding, increment)
          do i = 1, size(self%motion%du, 2)
             do a = 1, 2
-               if (system%numbering%unknown(a, i) == 0) cycle
+               if (system%space%numbering%unknown(a, i) == 0) cycle
                self%ledger%stabilization = self%ledger%stabilization &
-                  - system%residual(a, i)*self%motion%du(a, i)
+                  - system%response%residual(a, i)*self%motion%du(a, i)
             end do
          end do
       end associate
@@ -408,19 +409,20 @@ contains
       real(wp) :: contact_work
       integer :: k
 
-      associate (state => self%state, system => self%system, set => self%active%set, &
-            motion => self%motion)
+      associate (state => self%state, part => self%system%response%part, &
+            set => self%active%set, motion => self%motion)
          contact_work = 0.0_wp
          if (self%scheme%has_inertia) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
             end do
-            self%ledger%external_work = self%ledger%external_work + sum(system%external*motion%du) &
-               + sum(state%reaction*motion%du) + sum(system%inertia*motion%offset)
+            self%ledger%external_work = self%ledger%external_work &
+               + sum(part(role_external)%force*motion%du) + sum(state%reaction*motion%du) &
+               + sum(part(role_inertia)%force*motion%offset)
          else
             contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*motion%du)
             self%ledger%external_work = self%ledger%external_work - contact_work &
-               + 0.5_wp*sum((state%internal + system%response%force)*motion%du)
+               + 0.5_wp*sum((state%internal + part(role_internal)%force)*motion%du)
          end if
          self%ledger%contact_work = self%ledger%contact_work + contact_work
       end associate

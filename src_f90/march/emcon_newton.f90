@@ -15,13 +15,14 @@ module emcon_newton
    use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
    use emcon_system, only : system_respond, system_tangent_times, system_t
+   use emcon_term, only : role_external, role_inertia
    use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
    public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant
 
-   !> How a solve ended. Refused: there are no forces at the displacements, see `system%refusal`;
+   !> How a solve ended. Refused: there are no forces at the displacements, see `system%response%refusal`;
    !> redundant: some constraints depend on others, see `correction%redundant`.
    integer, parameter :: newton_converged = 0, newton_refused = 1, newton_diverged = 2, &
       newton_singular = 3, newton_redundant = 4
@@ -69,6 +70,7 @@ module emcon_newton
       real(wp), allocatable :: dlam(:)
       real(wp), allocatable :: way(:)            !! (n_unknown) the correction to search along
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
+      real(wp), allocatable :: left(:, :)        !! (2, n_node) the residual with them
       !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
@@ -98,7 +100,8 @@ contains
       self%maximum = maximum
       allocate(self%residual(n_unknown), self%scale(n_unknown), self%correction(n_unknown), &
          self%way(n_unknown))
-      allocate(self%contact(2, n_node), self%driven(2, n_node), source=0.0_wp)
+      allocate(self%contact(2, n_node), self%driven(2, n_node), self%left(2, n_node), &
+         source=0.0_wp)
       allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
    end subroutine newton_init
 
@@ -179,7 +182,7 @@ contains
       goes_on = self%line%is_on
       if (.not. goes_on) return
       self%correction = self%line%step*self%way
-      call add_to_dofs(system%numbering, self%correction, 1.0_wp, motion%du)
+      call add_to_dofs(system%space%numbering, self%correction, 1.0_wp, motion%du)
       set%lam = set%lam + self%line%step*self%dlam
    end subroutine search
 
@@ -306,7 +309,7 @@ contains
          self%dlam = self%damping*self%dlam
          self%work = dot_product(self%correction, self%residual)
       end if
-      call add_to_dofs(system%numbering, self%correction, 1.0_wp, du)
+      call add_to_dofs(system%space%numbering, self%correction, 1.0_wp, du)
       set%lam = set%lam + self%dlam
    end subroutine correct
 
@@ -323,7 +326,7 @@ contains
       integer :: k
 
       call system_tangent_times(system, motion, self%driven, self%contact)
-      call pick_unknowns(system%numbering, self%contact, self%scale)
+      call pick_unknowns(system%space%numbering, self%contact, self%scale)
       self%residual = self%residual + self%scale
       do k = 1, set%n
          set%defect(k) = set%defect(k) + condition_rate(set%item(k), self%driven)
@@ -350,20 +353,20 @@ contains
       do i = 0, most_halvings
          call motion_place(motion)
          call system_respond(system, motion, with_tangent=.not. self%is_polish)
-         if (allocated(system%failure)) allocate(error, source=system%failure)
+         if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(error)) return
-         if (.not. allocated(system%refusal)) exit
+         if (.not. allocated(system%response%refusal)) exit
          if (i == most_halvings .or. self%n_solve == 0) return
          self%correction = 0.5_wp*self%correction
          self%work = 0.5_wp*self%work
          self%line%is_on = .false.
-         call add_to_dofs(system%numbering, self%correction, -1.0_wp, motion%du)
+         call add_to_dofs(system%space%numbering, self%correction, -1.0_wp, motion%du)
       end do
       status = newton_converged
       if (set%n > 0) then
          call stopwatch_start(system%contact_clock)
          call constraints_evaluate(set, system, motion)
-         call constraints_rows(set, system%numbering)
+         call constraints_rows(set, system%space%numbering)
          call stopwatch_stop(system%contact_clock)
       end if
       call correction_lay_out(correction, system, set, error)
@@ -380,20 +383,20 @@ contains
       logical, intent(out) :: is_rounding        !! nothing but round-off is left
       integer :: k
 
-      call pick_unknowns(system%numbering, system%residual, self%residual)
+      call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
       call correction_multipliers(correction, system, set, self%residual)
-      call constraints_force(set, 1, self%contact, system%magnitude)
+      call constraints_force(set, 1, self%contact, system%response%magnitude)
       if (set%n > 0) then
-         system%f_work = system%residual - self%contact
-         call pick_unknowns(system%numbering, system%f_work, self%residual)
+         self%left = system%response%residual - self%contact
+         call pick_unknowns(system%space%numbering, self%left, self%residual)
       end if
-      call pick_magnitudes(system%numbering, system%magnitude, self%scale)
+      call pick_magnitudes(system%space%numbering, system%response%magnitude, self%scale)
       norm = relative_size(self%residual, self%scale)
       defect = 0.0_wp
       do k = 1, set%n
          defect = max(defect, abs(set%defect(k))/set%item(k)%size)
       end do
-      call pick_magnitudes(system%numbering, system%response%rounding, self%scale)
+      call pick_magnitudes(system%space%numbering, system%response%rounding, self%scale)
       is_rounding = relative_size(self%residual, self%scale) <= floor .and. defect <= floor
       ! A body that moves as a rigid one has no forces to compare its round-off with.
       self%is_idle = is_rounding .and. .not. has_load(system)
@@ -404,7 +407,10 @@ contains
    pure logical function has_load(system)
       type(system_t), intent(in) :: system
 
-      has_load = any(abs(system%external) > 0.0_wp) .or. any(abs(system%inertia) > 0.0_wp)
+      associate (part => system%response%part)
+         has_load = any(abs(part(role_external)%force) > 0.0_wp) &
+            .or. any(abs(part(role_inertia)%force) > 0.0_wp)
+      end associate
    end function has_load
 
    !> |v| / |scale|, 0 where v vanishes, huge where it is not finite; without overflow on the way.

@@ -42,7 +42,7 @@ contains
    !> a step back for discrete gradients, at the end (0) in statics.
    subroutine pair_record_measure(self, system, set, x, u, du, lag)
       type(pair_record_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
+      type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (2, n_node)
       real(wp), intent(in) :: lag                !! 0 or 1/2
@@ -101,14 +101,15 @@ contains
    !> Forces of contact `k` on its slave nodes.
    subroutine measure_nodes(self, system, k, item, lam)
       type(pair_record_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
+      type(system_t), intent(in) :: system
       integer, intent(in) :: k
       type(condition_t), intent(in) :: item(:)
       real(wp), intent(in) :: lam(:)
+      real(wp) :: force(size(self%force, 1), size(system%space%body))
       integer :: j, i, first
 
       first = system%first_constraint(k)
-      associate (force => system%f_work, node => system%contact(k)%contact%node, &
+      associate (node => system%contact(k)%contact%node, &
             twin => system%contact(k)%contact%twin)
          do i = 1, size(node)
             force(:, node(i)) = 0.0_wp

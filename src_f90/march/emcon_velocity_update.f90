@@ -8,11 +8,12 @@ module emcon_velocity_update
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_numbering, only : add_to_dofs, numbering_matrix, pick_unknowns
    use emcon_solver_registry, only : solver_create, solver_default
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    use emcon_system, only : mass_times, system_t
+   use emcon_term_registry, only : terms_mass_values
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    implicit none
    private
@@ -61,7 +62,7 @@ contains
       real(wp), intent(out) :: restored          !! >= 0 [M L^2/T^2]
       logical, intent(out) :: has_root           !! .false.: `v` is left as it is
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: lost, noise, a, b
+      real(wp) :: force(size(v, 1), size(v, 2)), lost, noise, a, b
       integer :: k
 
       restored = 0.0_wp
@@ -73,24 +74,24 @@ contains
          noise = noise + gap_noise*abs(set%lam(k))*set%item(k)%size
       end do
       if (lost <= noise) return
-      call push_forces(set, system%f_work)
+      call push_forces(set, force)
       if (.not. self%is_ready) call factorise_mass(self, system, error)
       if (allocated(error)) return
       has_root = .not. self%mass%is_singular
       if (.not. has_root) return
-      call pick(system%f_work)
+      call pick(force)
       call self%mass%solve(self%push, self%jump, error)
       if (allocated(error)) return
       a = dot_product(self%push, self%jump)
-      call mass_times(system, v, system%f_work)
-      call pick(system%f_work)
+      call mass_times(system, v, force)
+      call pick(force)
       b = dot_product(self%push, self%jump)
       has_root = a > 0.0_wp
       if (.not. has_root) return
       if (keeps_links(system)) then
-         call add_to_dofs(system%linked, self%jump, jump_size(a, b, lost), v)
+         call add_to_dofs(system%space%linked, self%jump, jump_size(a, b, lost), v)
       else
-         call add_to_dofs(system%numbering, self%jump, jump_size(a, b, lost), v)
+         call add_to_dofs(system%space%numbering, self%jump, jump_size(a, b, lost), v)
       end if
       restored = lost
 
@@ -101,9 +102,9 @@ contains
          real(wp), intent(in), contiguous :: field(:, :)     !! (2, n_node)
 
          if (keeps_links(system)) then
-            call pick_unknowns(system%linked, field, self%push)
+            call pick_unknowns(system%space%linked, field, self%push)
          else
-            call pick_unknowns(system%numbering, field, self%push)
+            call pick_unknowns(system%space%numbering, field, self%push)
          end if
       end subroutine pick
 
@@ -127,7 +128,7 @@ contains
    pure logical function keeps_links(system)
       type(system_t), intent(in) :: system
 
-      keeps_links = system%linear%n > 0 .and. .not. system%is_reduced
+      keeps_links = system%linear%n > 0 .and. .not. system%space%is_reduced
    end function keeps_links
 
    !> Sum of w_k grad gap_k at the end of the step.
@@ -154,15 +155,17 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(triple_product_t) :: product
       type(csr_t) :: mass, links, reduced
+      real(dp), allocatable :: value(:)
       integer :: n
 
       call solver_create(self%choice, matrix_definite, self%mass, self%given)
-      n = system%numbering%n_unknown
+      n = system%space%numbering%n_unknown
+      call terms_mass_values(system%term, value)
       if (keeps_links(system)) then
-         n = system%linked%n_unknown
+         n = system%space%linked%n_unknown
          mass = system%matrix
-         mass%value = system%mass_value
-         call numbering_matrix(system%linked, system%numbering%dof, links)
+         mass%value = value
+         call numbering_matrix(system%space%linked, system%space%numbering%dof, links)
          call triple_product_init(product, links, mass, links, reduced, error)
          if (allocated(error)) return
          call triple_product_update(product, links, mass, links, reduced)
@@ -170,7 +173,7 @@ contains
          if (.not. allocated(error)) call self%mass%factorise(reduced%value, error)
       else
          call self%mass%analyse(system%matrix, error)
-         if (.not. allocated(error)) call self%mass%factorise(system%mass_value, error)
+         if (.not. allocated(error)) call self%mass%factorise(value, error)
       end if
       if (allocated(self%push)) deallocate(self%push, self%jump)
       allocate(self%push(n), self%jump(n))

@@ -127,7 +127,7 @@ contains
       type(overlap_t), intent(in) :: overlap
       character(len=:), allocatable, intent(out) :: text
 
-      associate (label => scene%node_label, body => march%system%body, &
+      associate (label => scene%node_label, body => march%system%space%body, &
             edge => overlap%edge)
          text = "node " // to_text(label(overlap%node)) // " of body " // &
             to_text(body(overlap%node)) // " behind the edge from node " // &

@@ -8,7 +8,7 @@ module emcon_rigid_bodies
    use emcon_rigid_rows, only : rigid_rows_t
    use emcon_scene, only : scene_t
    use emcon_surface_edges, only : surface_edges
-   use emcon_system, only : system_t
+   use emcon_system, only : system_may_hold, system_t
    implicit none
    private
    public :: rigid_bodies_t, rigid_bodies_find, rigid_body_free, rigid_motions_at
@@ -38,17 +38,18 @@ contains
       type(rigid_rows_t), intent(in) :: rows
       logical, intent(in) :: contact_holds, given_holds
       type(rigid_bodies_t), intent(out) :: bodies
-      logical :: is_in_row(2, size(scene%x, 2)), touches(system%n_body)
+      logical :: is_in_row(2, size(scene%x, 2)), touches(system%space%n_body)
+      logical :: may_hold(size(scene%x, 2))
       integer :: i, k, b
 
       is_in_row = .false.
       do k = 1, size(rows%dof)
          is_in_row(2 - mod(rows%dof(k), 2), (rows%dof(k) + 1)/2) = .true.
       end do
-      allocate(bodies%of_node, source=system%body)
+      allocate(bodies%of_node, source=system%space%body)
       allocate(bodies%x, source=x)
-      bodies%n_mesh = system%n_body
-      bodies%n = system%n_body
+      bodies%n_mesh = system%space%n_body
+      bodies%n = system%space%n_body
       do i = 1, size(bodies%of_node)
          if (bodies%of_node(i) > 0 .or. .not. any(is_in_row(:, i))) cycle
          bodies%n = bodies%n + 1
@@ -60,8 +61,9 @@ contains
             call mark_contact_bodies(system, scene, k, touches)
          end do
       end if
-      if (given_holds .and. system%given%is_any) then
-         touches(pack(system%body, system%given%has_force)) = .true.
+      if (given_holds) then
+         call system_may_hold(system, may_hold)
+         touches(pack(system%space%body, may_hold)) = .true.
       end if
       allocate(bodies%is_free(3, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh
@@ -93,7 +95,7 @@ contains
                node = edge(1, :)
             end if
          end associate
-         touches(pack(system%body(node), system%body(node) > 0)) = .true.
+         touches(pack(system%space%body(node), system%space%body(node) > 0)) = .true.
       end do
    end subroutine mark_contact_bodies
 

@@ -126,7 +126,7 @@ contains
          if (bodies%of_node(i) > 0) label(bodies%of_node(i)) = scene%node_label(i)
       end do
       do i = size(scene%element_label), 1, -1
-         associate (b => system%body(system%solid%node(1, i)))
+         associate (b => system%space%body(scene%element_node(1, i)))
             label(b) = scene%element_label(i)
             has_element(b) = .true.
          end associate

@@ -29,7 +29,7 @@ contains
       if (system%linear%n == 0) return
       call find_crosspoints(scene, node, place, n_place)
       call elimination_text(system, text)
-      call note_add(notes, to_text(system%n_body) // " subdomains, " // &
+      call note_add(notes, to_text(system%space%n_body) // " subdomains, " // &
          to_text(size(scene%tie)) // " ties, " // to_text(n_place) // " crosspoints, " // &
          to_text(size(scene%equation)) // " equations; " // text)
       if (size(scene%tie) > 0) call add_subdomains(scene, system, notes)
@@ -48,8 +48,8 @@ contains
       type(system_t), intent(in) :: system
       character(len=:), allocatable, intent(out) :: text
 
-      associate (numbering => system%numbering)
-         if (system%is_reduced) then
+      associate (numbering => system%space%numbering)
+         if (system%space%is_reduced) then
             text = to_text(numbering%n_unknown + numbering%n_dependent) // &
                " unknowns before, " // to_text(numbering%n_unknown) // " after elimination"
          else
@@ -64,21 +64,21 @@ contains
       type(scene_t), intent(in) :: scene
       type(system_t), intent(in) :: system
       type(notes_t), intent(inout) :: notes
-      integer :: n_node(system%n_body), n_element(system%n_body), first(system%n_body)
+      integer :: n_node(system%space%n_body), n_element(system%space%n_body), first(system%space%n_body)
       character(len=:), allocatable :: text
       integer :: i, b
 
       n_node = 0
       n_element = 0
-      do i = 1, size(system%body)
-         if (system%body(i) > 0) n_node(system%body(i)) = n_node(system%body(i)) + 1
+      do i = 1, size(system%space%body)
+         if (system%space%body(i) > 0) n_node(system%space%body(i)) = n_node(system%space%body(i)) + 1
       end do
       do i = size(scene%element_kind), 1, -1
-         b = system%body(scene%element_node(1, i))
+         b = system%space%body(scene%element_node(1, i))
          n_element(b) = n_element(b) + 1
          first(b) = scene%element_label(i)
       end do
-      do b = 1, min(system%n_body, most_subdomains)
+      do b = 1, min(system%space%n_body, most_subdomains)
          text = "subdomain " // to_text(b) // ": "
          if (n_element(b) > 0) text = text // to_text(n_element(b)) // " elements from " // &
             to_text(first(b)) // " on, "

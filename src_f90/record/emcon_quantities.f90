@@ -1,8 +1,10 @@
 !> The output quantities by their deck names, as arrays: one function per kind of place.
 module emcon_quantities
    use emcon_kinds, only : dp, wp
+   use emcon_solid, only : solid_t
    use emcon_stepper, only : contact_gaps, stepper_t
    use emcon_stress, only : element_means, nodal_stress, von_mises
+   use emcon_term_registry, only : terms_solid
    use emcon_vtkhdf, only : field_t
    implicit none
    private
@@ -77,13 +79,15 @@ contains
 
    !> U, V, RF: (2, n_node); S: Cauchy stress and von Mises stress (7, n_node).
    function node_quantity(stepper, variable) result(values)
-      type(stepper_t), intent(in) :: stepper
+      type(stepper_t), intent(in), target :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
       real(wp), allocatable :: stress(:, :)
       integer :: i
+      type(solid_t), pointer :: solid
 
-      associate (state => stepper%march%state, system => stepper%march%system)
+      solid => terms_solid(stepper%march%system%term)
+      associate (state => stepper%march%state)
          select case (variable)
          case ("U")
             values = real(state%u, dp)
@@ -93,7 +97,7 @@ contains
             values = real(state%reaction, dp)
          case default
             allocate(stress(6, size(state%u, 2)), values(7, size(state%u, 2)))
-            call nodal_stress(system%solid, state%u, system%nlgeom, stress)
+            call nodal_stress(solid, state%u, is_large(stepper), stress)
             values(:6, :) = real(stress, dp)
             do i = 1, size(values, 2)
                values(7, i) = real(von_mises(stress(:, i)), dp)
@@ -105,14 +109,16 @@ contains
    !> Means and sums over elements: S (6), E (3), ENER and ELSE strain energy, ELKE kinetic energy,
    !> EVOL reference volume (1); second index the element.
    function element_quantity(stepper, variable) result(values)
-      type(stepper_t), intent(in) :: stepper
+      type(stepper_t), intent(in), target :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
       real(wp), allocatable :: stress(:, :), strain(:, :), volume(:)
       integer :: n
+      type(solid_t), pointer :: solid
 
-      associate (state => stepper%march%state, system => stepper%march%system)
-         n = system%solid%n_element
+      solid => terms_solid(stepper%march%system%term)
+      associate (state => stepper%march%state)
+         n = size(stepper%scene%element_kind)
          select case (variable)
          case ("ENER", "ELSE")
             values = reshape(real(state%energy, dp), [1, n])
@@ -120,7 +126,7 @@ contains
             values = reshape(real(kinetic_energies(stepper), dp), [1, n])
          case default
             allocate(stress(6, n), strain(3, n), volume(n))
-            call element_means(system%solid, state%u, system%nlgeom, stress, strain, volume)
+            call element_means(solid, state%u, is_large(stepper), stress, strain, volume)
             if (variable == "S") then
                values = real(stress, dp)
             else if (variable == "E") then
@@ -132,13 +138,22 @@ contains
       end associate
    end function element_quantity
 
+   !> Does the step take displacements as large?
+   pure logical function is_large(stepper)
+      type(stepper_t), intent(in) :: stepper
+
+      is_large = stepper%scene%step(stepper%march%state%i_step)%nlgeom
+   end function is_large
+
    !> Kinetic energy of each element.
    function kinetic_energies(stepper) result(energy)
-      type(stepper_t), intent(in) :: stepper
+      type(stepper_t), intent(in), target :: stepper
       real(wp), allocatable :: energy(:)
+      type(solid_t), pointer :: solid
       integer :: e, i, j
 
-      associate (solid => stepper%march%system%solid, v => stepper%march%state%v)
+      solid => terms_solid(stepper%march%system%term)
+      associate (v => stepper%march%state%v)
          allocate(energy(solid%n_element), source=0.0_wp)
          do e = 1, solid%n_element
             do j = 1, solid%geometry(e)%n_node

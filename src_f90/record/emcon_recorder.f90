@@ -2,6 +2,7 @@
 !>
 !> Turns states of the stepper into the plain arrays that results/ writes.
 module emcon_recorder
+   use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_history, only : column_t, history_append, history_close, history_create, &
       history_publish, history_put_run, history_resume, history_set_append, history_set_define, &
@@ -15,6 +16,7 @@ module emcon_recorder
    use emcon_run_mark, only : run_mark
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
+   use emcon_term_registry, only : terms_mass
    use emcon_text, only : string_t
    use emcon_version, only : version
    use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
@@ -174,7 +176,7 @@ contains
       call print_series_define(self%series, self%history, stepper, error)
       if (allocated(error)) return
       call history_set_define(self%history, "BODIES", "MOMENTUM", &
-         [(k, k = 1, stepper%march%system%n_body)], 3, self%momentum_set, error)
+         [(k, k = 1, stepper%march%system%space%n_body)], 3, self%momentum_set, error)
    end subroutine define_sets
 
    !> The masses of the bodies, once.
@@ -182,17 +184,19 @@ contains
       type(recorder_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
       type(error_t), allocatable, intent(out) :: error
-      real(dp) :: mass(1, stepper%march%system%n_body)
+      real(dp) :: mass(1, stepper%march%system%space%n_body)
+      type(csr_t) :: between
       integer :: i, k, i_set
 
       mass = 0.0_dp
       associate (system => stepper%march%system)
-         do i = 1, system%mass%n_row
-            do k = system%mass%row_start(i) + 1, system%mass%row_start(i + 1)
-               mass(1, system%body(i)) = mass(1, system%body(i)) + system%mass%value(k)
+         call terms_mass(system%term, between)
+         do i = 1, between%n_row
+            do k = between%row_start(i) + 1, between%row_start(i + 1)
+               mass(1, system%space%body(i)) = mass(1, system%space%body(i)) + between%value(k)
             end do
          end do
-         call history_set_define(self%history, "BODIES", "MASS", [(k, k = 1, system%n_body)], 1, &
+         call history_set_define(self%history, "BODIES", "MASS", [(k, k = 1, system%space%n_body)], 1, &
             i_set, error)
       end associate
       if (allocated(error)) return
@@ -206,7 +210,7 @@ contains
       type(increment_t), intent(in) :: increment
       real(dp), intent(in) :: cpu                !! seconds of CPU time so far
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: momenta(3, stepper%march%system%n_body)
+      real(wp) :: momenta(3, stepper%march%system%space%n_body)
 
       associate (state => stepper%march%state, ledger => stepper%march%ledger)
          call history_append(self%history, [real(dp) :: real(state%increment, dp), &

@@ -60,8 +60,8 @@ contains
       associate (scene => stepper%scene, system => stepper%march%system)
          if (len_trim(scene%heading) > 0) call add(trim(scene%heading))
          call add(to_text(size(scene%x, 2)) // " nodes, " // &
-            to_text(system%numbering%n_unknown) // " unknowns in step 1, " // &
-            to_text(system%n_body) // " bodies")
+            to_text(system%space%numbering%n_unknown) // " unknowns in step 1, " // &
+            to_text(system%space%n_body) // " bodies")
          do k = 1, size(element_kinds)
             if (any(scene%element_kind == k)) call add(to_text(count(scene%element_kind == k)) // &
                " elements " // trim(element_kinds(k)%name))

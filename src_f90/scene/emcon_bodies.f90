@@ -3,7 +3,7 @@ module emcon_bodies
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: bodies_find, bodies_find_tied
+   public :: bodies_find, bodies_find_lists, bodies_find_tied
 
 contains
 
@@ -40,25 +40,39 @@ contains
       call bodies_find(connected(:, :n), size(scene%x, 2), body, n_body)
    end subroutine bodies_find_tied
 
-   !> Number the connected parts in the order of their first node.
+   !> Number the parts that elements hold together, in the order of their first node.
    pure subroutine bodies_find(element_node, n_node, body, n_body)
       integer, intent(in) :: element_node(:, :)          !! (nodes, n_element), 0: no node
       integer, intent(in) :: n_node
       integer, allocatable, intent(out) :: body(:)       !! (n_node), 0: no element
       integer, intent(out) :: n_body
-      integer :: parent(n_node), e, i, root, other
+      integer :: e
+
+      associate (n => size(element_node, 1))
+         call bodies_find_lists([(1 + n*e, e = 0, size(element_node, 2))], &
+            reshape(element_node, [size(element_node)]), n_node, body, n_body)
+      end associate
+   end subroutine bodies_find
+
+   !> The same for lists of nodes, each of which hangs together.
+   pure subroutine bodies_find_lists(start, node, n_node, body, n_body)
+      integer, intent(in) :: start(:)                    !! (lists + 1) into `node`; last: size + 1
+      integer, intent(in) :: node(:)                     !! 0: no node
+      integer, intent(in) :: n_node
+      integer, allocatable, intent(out) :: body(:)       !! (n_node), 0: in no list
+      integer, intent(out) :: n_body
+      integer :: parent(n_node), k, i, root, other
 
       parent = 0
-      do e = 1, size(element_node, 2)
-         do i = 1, size(element_node, 1)
-            if (element_node(i, e) > 0) parent(element_node(i, e)) = element_node(i, e)
-         end do
+      do i = 1, size(node)
+         if (node(i) > 0) parent(node(i)) = node(i)
       end do
-      do e = 1, size(element_node, 2)
-         root = find_root(parent, element_node(1, e))
-         do i = 2, size(element_node, 1)
-            if (element_node(i, e) == 0) cycle
-            other = find_root(parent, element_node(i, e))
+      do k = 1, size(start) - 1
+         root = 0
+         do i = start(k), start(k + 1) - 1
+            if (node(i) == 0) cycle
+            other = find_root(parent, node(i))
+            if (root == 0) root = other
             parent(max(root, other)) = min(root, other)
             root = min(root, other)
          end do
@@ -76,7 +90,7 @@ contains
          end if
          parent(i) = root
       end do
-   end subroutine bodies_find
+   end subroutine bodies_find_lists
 
    pure integer function find_root(parent, i)
       integer, intent(in) :: parent(:), i

@@ -1,4 +1,4 @@
-!> All elements of a scene: reference geometry, laws, mass; forces and tangents over a step.
+!> All elements of a scene: reference geometry, laws, mass; what one of them responds.
 module emcon_solid
    use emcon_element, only : element_add_point, element_clear, element_geometry_t, &
       element_motion_t, element_point, element_response_t, point_is_regular, point_motion_t
@@ -9,15 +9,13 @@ module emcon_solid
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create, law_given
-   use emcon_motion, only : motion_t
-   use emcon_point_function, only : point_failed, point_gradient, point_ok
+   use emcon_point_function, only : point_gradient, point_ok
    use emcon_scene, only : scene_t
    use emcon_shape, only : shape_create, shape_t
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: solid_t, solid_init, solid_respond, solid_response_t, solid_tangent_times
-   public :: solid_element_respond, solid_evaluate_given, obstacle_text
+   public :: solid_t, solid_init, solid_element_respond, solid_evaluate_given, solid_gather
 
    type :: solid_t
       integer :: n_element = 0
@@ -39,16 +37,6 @@ module emcon_solid
       !> (4, n_element) force that a displacement of one causes before anything cancels [M/T^2]
       real(wp), allocatable :: stiffness(:, :)
    end type solid_t
-
-   !> What all elements give over one step; sized by the caller.
-   type :: solid_response_t
-      real(wp), allocatable :: force(:, :)               !! (2, n_node)
-      real(wp), allocatable :: magnitude(:, :)           !! (2, n_node) sum of |contributions|
-      real(wp), allocatable :: rounding(:, :)            !! (2, n_node) times epsilon: round-off
-      real(wp), allocatable :: energy(:)                 !! (n_element) at the end of the step
-      integer :: inverted_element = 0                    !! first one with det F <= 0, or 0
-      type(given_response_t) :: given                    !! of given laws: may tell more of that
-   end type solid_response_t
 
 contains
 
@@ -225,58 +213,6 @@ contains
       end do
    end subroutine reference_gradient
 
-   !> Forces of a motion; with `slot`, also adds the tangent to the matrix entries `value` (slot >
-   !> 0) and `side` (slot < 0). What displacements are rounded by, forces are too.
-   subroutine solid_respond(self, motion, nlgeom, response, slot, value, side)
-      type(solid_t), intent(in) :: self
-      type(motion_t), intent(in) :: motion
-      logical, intent(in) :: nlgeom              !! .false.: small strains
-      type(solid_response_t), intent(inout) :: response
-      integer, intent(in), contiguous, optional :: slot(:)       !! element matrices by columns
-      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! both with `slot`
-      type(element_response_t) :: part
-      type(element_motion_t) :: local
-      real(wp) :: largest
-      logical :: with_tangent
-      integer :: e, i, n, node, first
-
-      with_tangent = present(slot)
-      first = 1
-      response%force = 0.0_wp
-      response%magnitude = 0.0_wp
-      response%rounding = 0.0_wp
-      response%inverted_element = 0
-      if (self%has_given) then
-         call solid_evaluate_given(self, motion%from, motion%by, nlgeom, with_tangent, &
-            response%given)
-         response%inverted_element = response%given%inverted_element
-         if (response%inverted_element > 0) return
-      end if
-      local%nlgeom = nlgeom
-      do e = 1, self%n_element
-         n = self%geometry(e)%n_node
-         call gather(self%node(:n, e), motion%from, motion%by, local)
-         call solid_element_respond(self, e, local, response%given, with_tangent, part)
-         if (part%is_inverted) then
-            response%inverted_element = e
-            return
-         end if
-         response%energy(e) = part%energy
-         largest = max(maxval(abs(local%from(:, :n) + local%by(:, :n))), &
-            maxval(motion%computed(:, self%node(:n, e))))
-         do i = 1, n
-            node = self%node(i, e)
-            response%force(:, node) = response%force(:, node) + part%force(:, i)
-            response%magnitude(:, node) = response%magnitude(:, node) + part%magnitude(:, i)
-            response%rounding(:, node) = response%rounding(:, node) + largest*self%stiffness(i, e)
-         end do
-         if (with_tangent) then
-            call scatter(2*n, part%tangent, motion%weight, slot(first:), value, side)
-            first = first + 4*n*n
-         end if
-      end do
-   end subroutine solid_respond
-
    !> Response of element `e` to a motion, which is that of `given` too.
    pure subroutine solid_element_respond(self, e, motion, given, with_tangent, part)
       type(solid_t), intent(in) :: self
@@ -349,7 +285,7 @@ contains
       local%nlgeom = nlgeom
       do e = 1, self%n_element
          if (self%first_point(e) == 0) cycle
-         call gather(self%node(:self%geometry(e)%n_node, e), u0, du, local)
+         call solid_gather(self%node(:self%geometry(e)%n_node, e), u0, du, local)
          do k = 1, self%geometry(e)%n_gp
             i = self%first_point(e) - 1 + k
             call element_point(self%geometry(e), k, local, point)
@@ -365,95 +301,18 @@ contains
       end do
    end subroutine gather_strains
 
-   !> Why `response` is none: an element is inverted, `by` what, or a given law does not answer.
-   subroutine obstacle_text(self, response, by, text)
-      type(solid_t), intent(in) :: self
-      type(solid_response_t), intent(in) :: response
-      character(len=*), intent(in) :: by         !! ends "... is inverted"
-      character(len=:), allocatable, intent(out) :: text   !! names the element
-
-      if (response%given%material == 0) then
-         text = "element " // to_text(self%label(max(1, response%inverted_element))) // &
-            " is inverted" // by
-         return
-      end if
-      text = "the law given for material " // self%material(response%given%material)%text
-      if (response%given%status == point_failed) then
-         text = text // " has failed"
-      else
-         text = text // " has no finite value at a strain that is met"
-      end if
-   end subroutine obstacle_text
-
    !> Displacements of the nodes of an element relative to its first node, which does not round them
    !> with the distance that a body has flown.
-   pure subroutine gather(node, u0, du, local)
-      integer, intent(in) :: node(:)
+   pure subroutine solid_gather(node, u0, du, local)
+      integer, intent(in) :: node(:)                             !! of the element
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      type(element_motion_t), intent(inout) :: local
+      type(element_motion_t), intent(inout) :: local             !! `from`, `by` are set
       integer :: i
 
       do i = 1, size(node)
          local%from(:, i) = u0(:, node(i)) - u0(:, node(1))
          local%by(:, i) = du(:, node(i)) - du(:, node(1))
       end do
-   end subroutine gather
-
-   !> Add the tangent of a motion times `direction` to `product`. Elements that `direction` does not
-   !> touch are passed over.
-   subroutine solid_tangent_times(self, motion, nlgeom, direction, product)
-      type(solid_t), intent(in) :: self
-      type(motion_t), intent(in) :: motion
-      logical, intent(in) :: nlgeom              !! .false.: small strains
-      real(wp), intent(in), contiguous :: direction(:, :)                       !! (2, n_node)
-      real(wp), intent(inout), contiguous :: product(:, :)                      !! (2, n_node)
-      type(element_response_t) :: part
-      type(element_motion_t) :: local
-      type(given_response_t) :: given
-      real(wp) :: image(2*max_element_nodes)
-      integer :: e, i, n, node
-
-      if (self%has_given) call solid_evaluate_given(self, motion%from, motion%by, nlgeom, &
-         .true., given)
-      if (given%inverted_element > 0) return
-      local%nlgeom = nlgeom
-      do e = 1, self%n_element
-         n = self%geometry(e)%n_node
-         if (.not. any(abs(direction(:, self%node(:n, e))) > 0.0_wp)) cycle
-         call gather(self%node(:n, e), motion%from, motion%by, local)
-         call solid_element_respond(self, e, local, given, .true., part)
-         if (part%is_inverted) return
-         image = 0.0_wp
-         do i = 1, n
-            node = self%node(i, e)
-            image(:2*n) = image(:2*n) + part%tangent(:2*n, 2*i - 1)*direction(1, node) &
-               + part%tangent(:2*n, 2*i)*direction(2, node)
-         end do
-         do i = 1, n
-            node = self%node(i, e)
-            product(:, node) = product(:, node) + motion%weight*image(2*i - 1:2*i)
-         end do
-      end do
-   end subroutine solid_tangent_times
-
-   !> Add a square element matrix of `n` unknowns to its places; `slot` runs down the columns.
-   pure subroutine scatter(n, tangent, factor, slot, value, side)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: tangent(2*max_element_nodes, 2*max_element_nodes), factor
-      integer, intent(in) :: slot(:)
-      real(dp), intent(inout) :: value(:), side(:)
-      integer :: i, j, k
-
-      do j = 1, n
-         do i = 1, n
-            k = slot(i + n*(j - 1))
-            if (k > 0) then
-               value(k) = value(k) + real(factor*tangent(i, j), dp)
-            else if (k < 0) then
-               side(-k) = side(-k) + real(factor*tangent(i, j), dp)
-            end if
-         end do
-      end do
-   end subroutine scatter
+   end subroutine solid_gather
 
 end module emcon_solid

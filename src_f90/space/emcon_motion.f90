@@ -8,7 +8,7 @@ module emcon_motion
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: instant_t, pose_t, motion_t, motion_init, motion_place, motion_of
+   public :: instant_t, pose_t, motion_t, motion_init, motion_place, motion_of, at_rest
 
    !> A moment of a step, as amplitudes see it.
    type :: instant_t
@@ -96,5 +96,13 @@ contains
       if (present(v0)) motion%v0 = v0
       call motion_place(motion)
    end function motion_of
+
+   !> No displacement over a step of nodes at `x`.
+   pure function at_rest(x) result(du)
+      real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node), for its shape
+      real(wp) :: du(size(x, 1), size(x, 2))
+
+      du = 0.0_wp
+   end function at_rest
 
 end module emcon_motion

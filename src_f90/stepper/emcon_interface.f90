@@ -27,6 +27,7 @@ module emcon_interface
    use emcon_numbering, only : gather_dependent, numbering_init, numbering_matrix, numbering_t, &
       spread_dependent, unresolved_t
    use emcon_scene, only : scene_t
+   use emcon_space, only : space_t
    use emcon_sort, only : find_sorted
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_admissible, initiation_persistent, prescribed_t
@@ -250,7 +251,7 @@ contains
       allocate(is_alive(2, self%n_node), source=.true.)
       call linear_rows_init(linear, self%scene)
       call numbering_init(self%linked, is_alive, self%scene%step(1)%prescribed, linear, unresolved)
-      call numbering_init(self%system%numbering, is_alive, nothing)
+      call numbering_init(self%system%space%numbering, is_alive, nothing)
       self%n_unknown = self%linked%n_unknown
       do t = 1, size(self%scene%tie)
          n = count(linear%tie(unresolved%row) == t)
@@ -267,7 +268,7 @@ contains
       integer :: i
 
       associate (system => self%system, scene => self%scene)
-         system = system_t(numbering=self%system%numbering)
+         system = system_t(space=space_t(numbering=self%system%space%numbering))
          allocate(system%linear%is_used(0))
          allocate(system%contact(size(scene%pair)))
          allocate(system%first_constraint(size(scene%pair) + 1), source=0)
@@ -281,7 +282,7 @@ contains
             end associate
             system%first_constraint(i + 1) = system%n_constraint
          end do
-         allocate(system%zero(2, self%n_node), system%magnitude(2, self%n_node), source=0.0_wp)
+         allocate(system%response%magnitude(2, self%n_node), source=0.0_wp)
          call motion_init(self%motion, scene%x)
          self%n_constraint = system%n_constraint
       end associate

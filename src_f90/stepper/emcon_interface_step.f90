@@ -212,7 +212,7 @@ contains
       call take_motion(self, u0, du)
       associate (set => self%active%set)
          call constraints_evaluate(set, self%system, self%motion)
-         call constraints_rows(set, self%system%numbering)
+         call constraints_rows(set, self%system%space%numbering)
          values%n = set%n
          values%id = set%id
          values%target = set%target
@@ -329,11 +329,11 @@ contains
       self%active%lam(self%active%set%id) = lam
       call take_motion(self, u0, du)
       self%state%u = u0
-      self%system%magnitude = 0.0_wp
+      self%system%response%magnitude = 0.0_wp
       if (present(magnitude)) then
-         self%system%magnitude = magnitude
+         self%system%response%magnitude = magnitude
       else
-         call constraints_force(self%active%set, 1, force, self%system%magnitude)
+         call constraints_force(self%active%set, 1, force, self%system%response%magnitude)
       end if
       call active_set_advance(self%active, self%system, self%motion, is_done, status)
       active = self%active%is_active

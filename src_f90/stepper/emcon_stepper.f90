@@ -12,6 +12,7 @@ module emcon_stepper
    use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : at_rest
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_resume, march_t
@@ -210,8 +211,8 @@ contains
          do pair = 1, size(system%contact)
             associate (contact => system%contact(pair)%contact)
                contact%reach = 0.0_wp      ! which gaps are measured must not depend on the past
-               call contact%begin_step(self%scene%x, u, system%zero)
-               call contact%measure(self%scene%x, u, system%zero)
+               call contact%begin_step(self%scene%x, u, at_rest(u))
+               call contact%measure(self%scene%x, u, at_rest(u))
                do i = 1, contact%n_constraint
                   id = system%first_constraint(pair) + i
                   state = contact%state(i)

@@ -16,6 +16,7 @@ module emcon_stepper_conditions
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
    use emcon_steps, only : load_gravity, load_point, prescribed_t, procedure_static, step_t
+   use emcon_system, only : system_renew
    use emcon_text, only : to_text
    implicit none
    private
@@ -80,9 +81,9 @@ contains
                load%value_start = run_start(present_value, value, part)
             end if
             load%value = value
-            self%march%system%loads%load(i) = load
          end associate
       end associate
+      call system_renew(self%march%system, self%scene)
    end subroutine stepper_set_load
 
    !> Give the boundary condition on degree of freedom `dof` of node `label` the value `value`.

@@ -226,7 +226,7 @@ contains
             self%has_null_space = .true.
             return
          end if
-         call null_space_matrices(null_space, set, system%numbering)
+         call null_space_matrices(null_space, set, system%space%numbering)
          select case (null_space%obstacle)
          case (obstacle_none)
             call csr_product(links, null_space%p, p)
@@ -259,9 +259,9 @@ contains
       end if
       if (allocated(error) .or. self%march%active%set%n == 0) return
       associate (set => self%march%active%set, system => self%march%system)
-         allocate(residual(system%numbering%n_unknown), active(set%n))
-         call pick_unknowns(system%numbering, system%residual, residual)
-         call null_space_multipliers(self%null_space, set, system%numbering, residual, active)
+         allocate(residual(system%space%numbering%n_unknown), active(set%n))
+         call pick_unknowns(system%space%numbering, system%response%residual, residual)
+         call null_space_multipliers(self%null_space, set, system%space%numbering, residual, active)
          lam(set%id) = active
       end associate
    end subroutine query_multipliers
@@ -282,7 +282,7 @@ contains
       type(csr_t), intent(out) :: links
       integer :: d
 
-      call numbering_matrix(system%numbering, [(d, d = 1, 2*size(system%body))], links)
+      call numbering_matrix(system%space%numbering, [(d, d = 1, 2*size(system%space%body))], links)
    end subroutine links_of
 
 end module emcon_stepper_constraints

@@ -9,12 +9,13 @@ module emcon_stepper_free
    use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
       march_set_time
    use emcon_march_step, only : follow_links
-   use emcon_motion, only : motion_of, pose_t
+   use emcon_motion, only : at_rest, motion_of, pose_t
    use emcon_pair_record, only : pair_record_init
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
    use emcon_steps, only : procedure_static
    use emcon_system, only : system_check_response, system_respond
+   use emcon_term, only : role_internal
    use emcon_text, only : to_text
    use emcon_verdict, only : verdict_move, verdict_t, verdict_update
    implicit none
@@ -224,12 +225,12 @@ contains
 
       associate (system => self%march%system)
          call system_respond(system, motion_of(pose_t(is_end=.true.), self%scene%x, next%u, &
-            system%zero), .false.)
+            at_rest(next%u)), .false.)
          call system_check_response(system, "u", error)
          if (allocated(error)) return
-         next%internal = system%response%force
+         next%internal = system%response%part(role_internal)%force
          next%energy = system%response%energy
-         next%potential = system%potential
+         next%potential = system%response%potential
          next%contact = 0.0_wp
          next%reaction = 0.0_wp
          call pair_record_init(next%pairs, system)

@@ -12,14 +12,15 @@ module emcon_stepper_query
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_ledger, only : body_momenta
-   use emcon_motion, only : instant_t, motion_place
+   use emcon_motion, only : at_rest, instant_t, motion_place
    use emcon_march, only : march_free, march_init, march_resume, march_t
    use emcon_march_step, only : follow_links, march_guess
    use emcon_null_space, only : null_space_free, null_space_t
    use emcon_numbering, only : pick_unknowns
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
-   use emcon_system, only : system_check_response, system_respond
+   use emcon_system, only : system_check_response, system_renew, system_respond
+   use emcon_term_registry, only : terms_mass
    use emcon_text, only : to_text
    implicit none
    private
@@ -66,7 +67,7 @@ contains
       if (self%revision < 0) then
          call march_init(self%march, stepper%scene, error, stepper%given)
          if (allocated(error)) return
-         allocate(self%contact, source=self%march%system%zero)
+         allocate(self%contact, source=at_rest(stepper%scene%x))
          self%revision = 0
       end if
       self%march%state = stepper%march%state
@@ -77,7 +78,7 @@ contains
          self%march%state = stepper%march%state
          self%revision = stepper%march%revision
       end if
-      self%march%system%loads%load = stepper%march%system%loads%load
+      call system_renew(self%march%system, stepper%scene)
    end subroutine query_sync
 
    !> Forget the last evaluation if the unknowns of the model have been numbered anew since.
@@ -175,9 +176,9 @@ contains
          call begin_contact(self)
          call active_set_select(march%active, system, march%motion)
          call constraints_evaluate(march%active%set, system, march%motion)
-         call constraints_rows(march%active%set, system%numbering)
+         call constraints_rows(march%active%set, system%space%numbering)
          call constraints_force(march%active%set, 1, self%contact)
-         is_finite = all(ieee_is_finite(system%residual))
+         is_finite = all(ieee_is_finite(system%response%residual))
          if (with_tangent) is_finite = is_finite .and. all(ieee_is_finite(system%matrix%value))
          if (.not. is_finite) call raise(error, err_analysis, "the step of the size " // &
             to_text(h) // " to u1 has a residual or a tangent that is not finite")
@@ -248,7 +249,7 @@ contains
 
       associate (march => self%march, system => self%march%system, state => self%march%state, &
             active => self%march%active)
-         active%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%is_reduced
+         active%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%space%is_reduced
          do pair = 1, size(system%contact)
             associate (contact => system%contact(pair)%contact, &
                   first => system%first_constraint(pair) + 1, &
@@ -285,10 +286,10 @@ contains
 
       call check_evaluated(self, error)
       if (allocated(error)) return
-      allocate(nodal, source=self%march%system%residual)
+      allocate(nodal, source=self%march%system%response%residual)
       if (with_contact) nodal = nodal - self%contact
-      allocate(unknown(self%march%system%numbering%n_unknown))
-      call pick_unknowns(self%march%system%numbering, nodal, unknown)
+      allocate(unknown(self%march%system%space%numbering%n_unknown))
+      call pick_unknowns(self%march%system%space%numbering, nodal, unknown)
    end subroutine query_residual
 
    !> Derivative of the residual on the unknowns by the unknowns at the end of the step, for given
@@ -315,7 +316,7 @@ contains
          do k = 1, size(slot)
             matrix%value(slot(k)) = system%matrix%value(k)
          end do
-         call constraints_add_curvature(set, system%numbering, matrix)
+         call constraints_add_curvature(set, system%space%numbering, matrix)
       end associate
    end subroutine query_tangent
 
@@ -326,7 +327,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call stepper_check_open(stepper, error)
-      if (.not. allocated(error)) unknown = stepper%march%system%numbering%unknown
+      if (.not. allocated(error)) unknown = stepper%march%system%space%numbering%unknown
    end subroutine query_unknowns
 
    !> The consistent mass between nodes, the same in both directions [M].
@@ -336,7 +337,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call stepper_check_open(stepper, error)
-      if (.not. allocated(error)) matrix = stepper%march%system%mass
+      if (.not. allocated(error)) call terms_mass(stepper%march%system%term, matrix)
    end subroutine query_mass
 
    !> Linear momenta and angular momentum about the origin of each body in the present state.
@@ -348,7 +349,7 @@ contains
 
       call query_sync(self, stepper, error)
       if (allocated(error)) return
-      allocate(momenta(3, self%march%system%n_body))
+      allocate(momenta(3, self%march%system%space%n_body))
       call body_momenta(self%march%system, stepper%scene%x, self%march%state, momenta)
    end subroutine query_momenta
 

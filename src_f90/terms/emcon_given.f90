@@ -8,8 +8,8 @@ module emcon_given
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    implicit none
    private
-   public :: given_t, given_add_force, given_add_law, given_add_solver, given_copy_forces, &
-      given_copy_solvers, given_count, given_find_solver
+   public :: given_t, given_add_force, given_add_law, given_add_solver, given_copy_solvers, &
+      given_count, given_find_solver
 
    !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
    !> by what decks call them.
@@ -117,20 +117,5 @@ contains
          allocate(copy(i)%solver, source=self%solver(i)%solver)
       end do
    end subroutine given_copy_solvers
-
-   !> Forces and mass of `self`, independent of it.
-   subroutine given_copy_forces(self, copy)
-      type(given_t), intent(in) :: self
-      type(given_t), intent(out) :: copy
-      integer :: i, n
-
-      n = 0
-      if (allocated(self%force)) n = size(self%force)
-      allocate(copy%force(n))
-      do i = 1, n
-         allocate(copy%force(i)%force, source=self%force(i)%force)
-      end do
-      copy%mass = self%mass
-   end subroutine given_copy_forces
 
 end module emcon_given

@@ -10,10 +10,22 @@ module emcon_given_force
       given_outside => point_outside
    implicit none
    private
-   public :: given_force_t, given_force_box_t
+   public :: given_force_t, given_force_box_t, force_response_t
    !> How a response ended. Outside: there is none at these displacements, as for an inverted
    !> element; the step is cut. Failed: there is no use in going on.
    public :: given_ok, given_outside, given_failed
+
+   !> What a given force is over a motion.
+   type :: force_response_t
+      real(wp), allocatable :: force(:, :)       !! (2, n_node) [M L/T^2]
+      !> (2, n_node) sums of |contributions| to `force`; left at 0: not known
+      real(wp), allocatable :: magnitude(:, :)
+      real(wp) :: energy = 0.0_wp                !! E(u0 + du) [M L^2/T^2]
+      !> Derivative of `force` by u0 + du, in the slots of `pattern`. Where du = 0, half of the
+      !> second derivatives of E
+      real(dp), allocatable :: tangent(:)
+      integer :: status = given_ok               !! one of the `given_` codes
+   end type force_response_t
 
    type, abstract :: given_force_t
       character(len=:), allocatable :: name      !! for messages
@@ -33,20 +45,12 @@ module emcon_given_force
    abstract interface
       !> Forces of a motion from `u0` to `u0 + du`: a discrete gradient of the energy E, with
       !> force.du = E(u0 + du) - E(u0); where du = 0, the gradient of E.
-      subroutine respond_interface(self, u0, du, wants_tangent, force, magnitude, energy, &
-         tangent, status)
-         import :: given_force_t, dp, wp
+      subroutine respond_interface(self, u0, du, wants_tangent, response)
+         import :: force_response_t, given_force_t, wp
          class(given_force_t), intent(inout) :: self
-         real(wp), intent(in), contiguous :: u0(:, :), du(:, :)       !! (2, n_node) [L]
-         logical, intent(in) :: wants_tangent                         !! else leave `tangent` alone
-         real(wp), intent(inout), contiguous :: force(:, :)           !! (2, n_node) 0 on entry
-         !> (2, n_node) sums of |contributions| to `force`; left at 0: not known
-         real(wp), intent(inout), contiguous :: magnitude(:, :)
-         real(wp), intent(out) :: energy                              !! E(u0 + du) [M L^2/T^2]
-         !> Derivative of `force` by u0 + du, in the slots of `pattern`; 0 on entry. Where du = 0,
-         !> half of the second derivatives of E
-         real(dp), intent(inout), contiguous :: tangent(:)
-         integer, intent(out) :: status                               !! one of the `given_` codes
+         real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+         logical, intent(in) :: wants_tangent                     !! else leave `tangent` alone
+         type(force_response_t), intent(inout) :: response        !! sized, 0 on entry
       end subroutine respond_interface
    end interface
 

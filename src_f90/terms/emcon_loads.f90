@@ -5,52 +5,75 @@ module emcon_loads
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : instant_t, motion_t
-   use emcon_numbering, only : numbering_t
-   use emcon_reduction, only : freedom_numbers, reduction_slot, reduction_t
+   use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
+   use emcon_space, only : space_t
    use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t, &
       procedure_static, step_t
+   use emcon_term, only : response_t, role_external, term_t
    implicit none
    private
-   public :: loads_t, loads_init, loads_add, prescribed_motion
+   public :: loads_t, loads_init, prescribed_motion
 
-   type :: loads_t
-      integer :: n = 0
+   !> Point loads, pressures and gravity of a step.
+   type, extends(term_t) :: loads_t
       type(load_t), allocatable :: load(:)
-      type(amplitude_t), allocatable :: amplitude(:)     !! of the scene
-      integer, allocatable :: edge(:, :)         !! (2, n) nodes of a loaded edge, else 0
-      integer, allocatable :: slot(:, :)         !! (16, n) entries of the pressure stiffness
-      logical :: has_pressure = .false.
-      logical :: is_ramped = .false.             !! static: without amplitude, linear over the step
-      logical :: nlgeom = .false.
-      real(wp) :: duration = 1.0_wp
+      type(amplitude_t), allocatable, private :: amplitude(:)   !! of the scene
+      integer, allocatable, private :: edge(:, :)   !! (2, n) nodes of a loaded edge, else 0
+      integer, allocatable, private :: slot(:, :)   !! (16, n) entries of the pressure stiffness
+      logical, private :: is_ramped = .false.    !! static: without amplitude, linear over the step
+      logical, private :: nlgeom = .false.
+      real(wp), private :: duration = 1.0_wp     !! [T]
+      integer, allocatable, private :: node(:, :)        !! (max_element_nodes, n_element)
+      real(wp), allocatable, private :: volume_mass(:, :)   !! int rho N_i, like `node` [M]
+      real(wp), allocatable, private :: thickness(:)     !! (n_element) [L]
+      real(wp), allocatable, private :: force(:, :)      !! (2, n_node) [M L/T^2]
+   contains
+      procedure :: begin_step
+      procedure :: renew
+      procedure :: respond
+      procedure :: is_symmetric
    end type loads_t
 
 contains
 
-   !> The loads of `step`; `matrix` is the pattern that pressure stiffness goes into.
-   subroutine loads_init(self, scene, step, numbering, matrix, reduction)
+   !> Loads on the elements of `solid` and their nodes; there are none before the first step.
+   pure subroutine loads_init(self, scene, solid)
       type(loads_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
-      type(step_t), intent(in) :: step
-      type(numbering_t), intent(in) :: numbering
+      type(solid_t), intent(in) :: solid
+
+      self%role = role_external
+      self%amplitude = scene%amplitude
+      self%node = solid%node
+      self%volume_mass = solid%volume_mass
+      self%thickness = solid%thickness
+      allocate(self%load(0))
+      allocate(self%force, mold=scene%x)
+   end subroutine loads_init
+
+   !> The loads of step `i_step`, and the places of the pressure stiffness in the matrix.
+   subroutine begin_step(self, scene, i_step, space, matrix, slot)
+      class(loads_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! from 1
+      type(space_t), intent(in) :: space
       type(csr_t), intent(in) :: matrix
-      type(reduction_t), intent(in) :: reduction
+      integer, intent(in) :: slot(:)             !! empty: what meets here meets in elements
       integer, allocatable :: number(:)
       integer :: i, e, dofs(4), j, k
 
-      self%load = step%load
-      self%amplitude = scene%amplitude
-      self%n = size(step%load)
-      self%has_pressure = any(step%load%kind == load_pressure)
-      self%is_ramped = step%procedure == procedure_static
-      self%nlgeom = step%nlgeom
-      self%duration = step%duration
-      allocate(self%edge(2, self%n), source=0)
-      allocate(self%slot(16, self%n), source=0)
-      allocate(number, source=freedom_numbers(numbering))
-      do i = 1, self%n
+      call self%renew(scene, i_step)
+      associate (step => scene%step(i_step))
+         self%is_ramped = step%procedure == procedure_static
+         self%nlgeom = step%nlgeom
+         self%duration = step%duration
+      end associate
+      if (allocated(self%edge)) deallocate(self%edge, self%slot)
+      allocate(self%edge(2, size(self%load)), self%slot(16, size(self%load)), source=0)
+      allocate(number, source=freedom_numbers(space%numbering))
+      do i = 1, size(self%load)
          if (self%load(i)%kind /= load_pressure) cycle
          e = self%load(i)%target
          self%edge(:, i) = scene%element_node( &
@@ -59,15 +82,25 @@ contains
             2*self%edge(2, i)])
          do k = 1, 4
             do j = 1, 4
-               self%slot(j + 4*(k - 1), i) = reduction_slot(reduction, matrix, dofs(j), dofs(k))
+               self%slot(j + 4*(k - 1), i) = reduction_slot(space%reduction, matrix, dofs(j), &
+                  dofs(k))
             end do
          end do
       end do
-   end subroutine loads_init
+   end subroutine begin_step
+
+   !> Take the loads of step `i_step` as they are.
+   subroutine renew(self, scene, i_step)
+      class(loads_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! from 1
+
+      self%load = scene%step(i_step)%load
+   end subroutine renew
 
    !> Present size of load `i`.
    pure real(wp) function load_value(self, i, instant)
-      type(loads_t), intent(in) :: self
+      class(loads_t), intent(in) :: self
       integer, intent(in) :: i
       type(instant_t), intent(in) :: instant
       real(wp) :: factor, rate
@@ -96,39 +129,51 @@ contains
       call find_amplitude_value(amplitude, time, value, rate)
    end subroutine amplitude_at
 
-   !> Add the loads of a motion, which act on it where it is placed, to `force`; with `value` and
-   !> `side`, also subtract their derivatives by the end of the step from the matrix.
-   pure subroutine loads_add(self, solid, motion, force, value, side)
-      type(loads_t), intent(in) :: self
-      type(solid_t), intent(in) :: solid
-      type(motion_t), intent(in) :: motion
-      real(wp), intent(inout), contiguous :: force(:, :)   !! (2, n_node) [M L/T^2]
+   !> The loads of a motion, which act on it where it is placed.
+   subroutine respond(self, motion, response, value, side)
+      class(loads_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion                     !! placed
+      type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       real(wp) :: p
       integer :: i, j, node
 
-      do i = 1, self%n
+      self%force = 0.0_wp
+      do i = 1, size(self%load)
          associate (load => self%load(i))
             p = load_value(self, i, motion%pose%load_instant)
             select case (load%kind)
             case (load_point)
-               force(load%place, load%target) = force(load%place, load%target) + p
+               self%force(load%place, load%target) = self%force(load%place, load%target) + p
             case (load_gravity)
-               do j = 1, element_kinds(solid%kind(load%target))%n_node
-                  node = solid%node(j, load%target)
-                  force(:, node) = force(:, node) &
-                     + p*solid%volume_mass(j, load%target)*load%direction(:2)
+               do j = 1, size(self%node, 1)
+                  node = self%node(j, load%target)
+                  if (node == 0) cycle
+                  self%force(:, node) = self%force(:, node) &
+                     + p*self%volume_mass(j, load%target)*load%direction(:2)
                end do
             case (load_pressure)
-               p = p*solid%thickness(load%target)
-               call add_pressure(self%edge(:, i), p, motion%x, motion%at, self%nlgeom, force)
+               p = p*self%thickness(load%target)
+               call add_pressure(self%edge(:, i), p, motion%x, motion%at, self%nlgeom, self%force)
                if (present(value) .and. self%nlgeom) then
                   call add_pressure_stiffness(p*motion%load_weight, self%slot(:, i), value, side)
                end if
             end select
          end associate
       end do
-   end subroutine loads_add
+      associate (total => response%part(self%role))
+         total%force = total%force + self%force
+         total%magnitude = total%magnitude + abs(self%force)
+      end associate
+   end subroutine respond
+
+   !> It is, unless a pressure follows the surface.
+   pure logical function is_symmetric(self, motion)
+      class(loads_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+
+      is_symmetric = .not. (self%nlgeom .and. any(self%load%kind == load_pressure))
+   end function is_symmetric
 
    !> Pressure on the edge a-b: half of -p n |b - a| on either node, n outwards.
    pure subroutine add_pressure(edge, p, x, u, nlgeom, force)

@@ -5,7 +5,7 @@
 module emcon_node_potential
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given_force, only : given_failed, given_force_t, given_ok
+   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok
    use emcon_kinds, only : dp, wp
    use emcon_point_function, only : point_function_t, point_gradient, point_response_t
    use emcon_text, only : to_text
@@ -100,14 +100,11 @@ contains
    end subroutine place
 
    !> As `given_force_t` has it.
-   subroutine respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, status)
+   subroutine respond(self, u0, du, wants_tangent, response)
       class(node_potential_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
       logical, intent(in) :: wants_tangent       !! else no tangent is computed
-      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)  !! (2, n_node) 0 on entry
-      real(wp), intent(out) :: energy            !! at the end [M L^2/T^2]
-      real(dp), intent(inout), contiguous :: tangent(:)   !! slots of `pattern`
-      integer, intent(out) :: status             !! one of the `given_` codes
+      type(force_response_t), intent(inout) :: response   !! sized, 0 on entry
       integer :: i, n
 
       n = size(self%node)
@@ -115,16 +112,16 @@ contains
          self%z(:, i) = self%x(:, i) + u0(:, self%node(i))
          self%dz(:, i) = du(:, self%node(i))
       end do
-      energy = 0.0_wp
-      call point_gradient(self%potential, self%z, self%dz, wants_tangent, self%response, status)
-      if (status == given_failed) self%reason = "its function failed"
-      if (status /= given_ok) return
-      energy = sum(self%response%energy(:n))
+      call point_gradient(self%potential, self%z, self%dz, wants_tangent, self%response, &
+         response%status)
+      if (response%status == given_failed) self%reason = "its function failed"
+      if (response%status /= given_ok) return
+      response%energy = sum(self%response%energy(:n))
       do i = 1, n
-         force(:, self%node(i)) = self%response%gradient(:, i)
-         magnitude(:, self%node(i)) = abs(self%response%gradient(:, i))
+         response%force(:, self%node(i)) = self%response%gradient(:, i)
+         response%magnitude(:, self%node(i)) = abs(self%response%gradient(:, i))
       end do
-      if (wants_tangent) call put_tangent(self, tangent)
+      if (wants_tangent) call put_tangent(self, response%tangent)
    end subroutine respond
 
    !> The tangents into the rows of the nodes.

@@ -3,8 +3,8 @@
 !> Triangles that the library does not know stand on a bed of springs, and a block of the library's
 !> elements, of a law that is given too, falls on them. The host gives mass, forces and tangent.
 module triangle_host
-   use emcon_api, only : csr_from_elements, csr_t, dp, error_t, given_force_t, given_ok, &
-      given_outside, point_function_t, point_ok, point_outside, wp
+   use emcon_api, only : csr_from_elements, csr_t, dp, error_t, force_response_t, given_force_t, &
+      given_ok, given_outside, point_function_t, point_ok, point_outside, wp
    implicit none
    private
    public :: triangles_t, springs_t, foam_t, triangles_init, density
@@ -115,21 +115,17 @@ contains
 
    !> The stress of the mean of the strains, on the displacements in the middle: forces . du is the
    !> change of the energy exactly.
-   subroutine respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, status)
+   subroutine respond(self, u0, du, wants_tangent, response)
       class(triangles_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       logical, intent(in) :: wants_tangent
-      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
-      real(wp), intent(out) :: energy
-      real(dp), intent(inout), contiguous :: tangent(:)
-      integer, intent(out) :: status
+      type(force_response_t), intent(inout) :: response
       real(wp), parameter :: law(3, 3) = reshape([modulus + 2.0_wp*shear, modulus, 0.0_wp, &
          modulus, modulus + 2.0_wp*shear, 0.0_wp, 0.0_wp, 0.0_wp, shear], [3, 3])
       real(wp) :: gradient(2, 3), area, f0(2, 2), f1(2, 2), e0(3), e1(3), stress(3), rows(3, 6)
       integer :: t
 
-      energy = 0.0_wp
-      status = given_outside
+      response%status = given_outside
       do t = 1, size(self%node, 2)
          associate (node => self%node(:, t))
             call shape_of(self, t, gradient, area)
@@ -138,14 +134,15 @@ contains
             if (.not. f1(1, 1)*f1(2, 2) - f1(1, 2)*f1(2, 1) > 0.0_wp) return
             stress = matmul(law, 0.5_wp*(e0 + e1))
             rows = strain_rows(gradient, 0.5_wp*(f0 + f1))
-            energy = energy + 0.5_wp*area*dot_product(e1, matmul(law, e1))
-            force(:, node) = force(:, node) + reshape(area*matmul(stress, rows), [2, 3])
-            magnitude(:, node) = magnitude(:, node) &
+            response%energy = response%energy + 0.5_wp*area*dot_product(e1, matmul(law, e1))
+            response%force(:, node) = response%force(:, node) &
+               + reshape(area*matmul(stress, rows), [2, 3])
+            response%magnitude(:, node) = response%magnitude(:, node) &
                + reshape(area*matmul(abs(stress), abs(rows)), [2, 3])
             if (wants_tangent) call add_tangent()
          end associate
       end do
-      status = given_ok
+      response%status = given_ok
 
    contains
 
@@ -168,7 +165,7 @@ contains
          associate (slot => reshape(self%slot(36*(t - 1) + 1:36*t), [6, 6]))
             do b = 1, 6
                do a = 1, 6
-                  tangent(slot(a, b)) = tangent(slot(a, b)) + real(k(a, b), dp)
+                  response%tangent(slot(a, b)) = response%tangent(slot(a, b)) + real(k(a, b), dp)
                end do
             end do
          end associate

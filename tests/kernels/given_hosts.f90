@@ -2,24 +2,25 @@
 module given_hosts
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_csr, only : csr_find, csr_from_elements
-   use emcon_element_lists, only : element_lists
    use emcon_errors, only : error_t
-   use emcon_given_force, only : given_failed, given_force_t, given_ok, given_outside
+   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok, &
+      given_outside
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t, pose_t
    use emcon_point_function, only : point_function_t, point_ok
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_init, solid_respond, solid_response_t, solid_t
+   use emcon_solid_term, only : solid_term_init, solid_term_t
+   use emcon_space, only : lists_begin, lists_t, space_t
+   use emcon_term, only : response_begin, response_init, response_t, role_internal
    implicit none
    private
    public :: solid_host_t, chain_host_t, well_t, solid_host_init, chain_host_init
 
    !> The elements of a scene as those of a host code.
    type, extends(given_force_t) :: solid_host_t
-      type(solid_t) :: solid
-      type(solid_response_t) :: response
+      type(solid_term_t) :: solid
+      type(response_t) :: response
       logical :: tells_magnitude = .true.
-      integer, allocatable :: slot(:)
    contains
       procedure :: respond => solid_host_respond
    end type solid_host_t
@@ -52,44 +53,45 @@ contains
       type(solid_host_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: start(:), list(:)
+      type(lists_t) :: lists
+      type(space_t) :: space
+      integer, allocatable :: slot(:)
       integer :: n
 
       self%name = "SOLID"
-      call solid_init(self%solid, scene, error)
+      call solid_term_init(self%solid, scene, error)
       if (allocated(error)) return
       n = size(scene%x, 2)
-      call element_lists(self%solid, 2, start, list)
-      call csr_from_elements(self%pattern, 2*n, start, list, self%slot, error)
-      allocate(self%response%force(2, n), self%response%magnitude(2, n), source=0.0_wp)
-      allocate(self%response%rounding(2, n), source=0.0_wp)
-      allocate(self%response%energy(self%solid%n_element), source=0.0_wp)
+      call lists_begin(lists, 2)
+      call self%solid%lay_out(lists)
+      call csr_from_elements(self%pattern, 2*n, lists%start, lists%freedom, slot, error)
+      if (allocated(error)) return
+      call self%solid%begin_step(scene, 1, space, self%pattern, slot)
+      call response_init(self%response, 2, n, size(scene%element_kind))
    end subroutine solid_host_init
 
-   subroutine solid_host_respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, &
-      status)
+   subroutine solid_host_respond(self, u0, du, wants_tangent, response)
       class(solid_host_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       logical, intent(in) :: wants_tangent
-      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
-      real(wp), intent(out) :: energy
-      real(dp), intent(inout), contiguous :: tangent(:)
-      integer, intent(out) :: status
+      type(force_response_t), intent(inout) :: response
       type(motion_t) :: motion
       real(dp) :: side(0)
 
-      energy = 0.0_wp
       motion = motion_of(pose_t(), 0.0_wp*u0, u0, du)
+      call response_begin(self%response)
       if (wants_tangent) then
-         call solid_respond(self%solid, motion, .true., self%response, self%slot, tangent, side)
+         call self%solid%respond(motion, self%response, response%tangent, side)
       else
-         call solid_respond(self%solid, motion, .true., self%response)
+         call self%solid%respond(motion, self%response)
       end if
-      status = merge(given_outside, given_ok, self%response%inverted_element > 0)
-      if (status /= given_ok) return
-      force = self%response%force
-      if (self%tells_magnitude) magnitude = self%response%magnitude
-      energy = sum(self%response%energy)
+      if (allocated(self%response%refusal)) response%status = given_outside
+      if (response%status /= given_ok) return
+      associate (total => self%response%part(role_internal))
+         response%force = total%force
+         if (self%tells_magnitude) response%magnitude = total%magnitude
+      end associate
+      response%energy = sum(self%response%energy)
    end subroutine solid_host_respond
 
    !> Springs between the nodes `node` of `n_node` in turn.
@@ -107,24 +109,19 @@ contains
          [(2*node(i:i + 1) - 1, i = 1, n)], slot, error)
    end subroutine chain_host_init
 
-   subroutine chain_respond(self, u0, du, wants_tangent, force, magnitude, energy, tangent, &
-      status)
+   subroutine chain_respond(self, u0, du, wants_tangent, response)
       class(chain_host_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       logical, intent(in) :: wants_tangent
-      real(wp), intent(inout), contiguous :: force(:, :), magnitude(:, :)
-      real(wp), intent(out) :: energy
-      real(dp), intent(inout), contiguous :: tangent(:)
-      integer, intent(out) :: status
+      type(force_response_t), intent(inout) :: response
       real(wp) :: e0, e1, f, slope
       integer :: i, a, b
 
-      energy = 0.0_wp
-      status = given_ok
+      response%status = given_ok
       self%n_call = self%n_call + 1
       if (self%n_call >= self%ends_at) then
-         if (self%gives_nan) force = ieee_value(1.0_wp, ieee_quiet_nan)
-         if (.not. self%gives_nan) status = self%status_then
+         if (self%gives_nan) response%force = ieee_value(1.0_wp, ieee_quiet_nan)
+         if (.not. self%gives_nan) response%status = self%status_then
          self%reason = "out of springs"
          return
       end if
@@ -133,13 +130,14 @@ contains
          b = self%node(i + 1)
          e0 = u0(1, b) - u0(1, a)
          e1 = e0 + (du(1, b) - du(1, a))
-         if (abs(e1) > self%longest) status = given_outside
+         if (abs(e1) > self%longest) response%status = given_outside
          f = (0.5_wp*self%k + 0.25_wp*self%c*(e0**2 + e1**2))*(e0 + e1)
          slope = 0.5_wp*self%k + 0.25_wp*self%c*((e0**2 + e1**2) + (e0 + e1)*2.0_wp*e1)
-         energy = energy + 0.5_wp*self%k*e1**2 + 0.25_wp*self%c*e1**4
-         force(1, b) = force(1, b) + f
-         force(1, a) = force(1, a) - f
-         if (self%tells_magnitude) magnitude(1, [a, b]) = magnitude(1, [a, b]) + abs(f)
+         response%energy = response%energy + 0.5_wp*self%k*e1**2 + 0.25_wp*self%c*e1**4
+         response%force(1, b) = response%force(1, b) + f
+         response%force(1, a) = response%force(1, a) - f
+         if (self%tells_magnitude) response%magnitude(1, [a, b]) = &
+            response%magnitude(1, [a, b]) + abs(f)
          if (.not. wants_tangent) cycle
          call add(a, a, slope)
          call add(b, b, slope)
@@ -155,7 +153,7 @@ contains
          integer :: k
 
          k = csr_find(self%pattern, 2*i - 1, 2*j - 1)
-         tangent(k) = tangent(k) + real(value, dp)
+         response%tangent(k) = response%tangent(k) + real(value, dp)
       end subroutine add
 
    end subroutine chain_respond

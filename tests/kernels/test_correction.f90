@@ -40,7 +40,7 @@ contains
       real(wp) :: dlam(problem%set%n)
 
       is_singular = .true.
-      system%numbering = problem%numbering
+      system%space%numbering = problem%numbering
       system%matrix = problem%base
       allocate(dq, source=problem%residual)
       call make_rows(problem)
@@ -158,7 +158,7 @@ contains
       call make_chain([1, 2, 3, 4], [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp, 4, 0, problem)
       call make_rows(problem)
       problem%set%n = 0
-      system%numbering = problem%numbering
+      system%space%numbering = problem%numbering
       system%matrix = problem%matrix
       system%is_symmetric = .true.
       allocate(dq, image, source=problem%residual)

@@ -172,7 +172,7 @@ contains
          200.0_wp*32.0_wp*eps, 1.0_wp, "momentum")
       call check_near(error, stepper%march%state%u(2, 3), 10.0_wp, 200.0_wp*8.0_wp*eps, 10.0_wp, &
          "flies along y")
-      call check_equal(error, stepper%march%system%n_body, 1, "bodies")
+      call check_equal(error, stepper%march%system%space%n_body, 1, "bodies")
       call stepper_close(stepper)
    end subroutine test_chain
 
@@ -241,7 +241,7 @@ contains
       if (.not. allocated(error)) call stepper_build(stepper, error)
       if (.not. allocated(error)) call run_conserving(stepper, 1.0_wp, error)
       if (allocated(error)) return
-      call check_equal(error, stepper%march%system%n_body, 2, "bodies")
+      call check_equal(error, stepper%march%system%space%n_body, 2, "bodies")
       call check_near(error, stepper%march%state%u(1, 3), stepper%march%state%u(1, 4), 0.0_wp, &
          1.0_wp, "tied ends")
       call check_true(error, abs(stepper%march%state%u(1, 1)) > 0.1_wp, "the first chain moves")

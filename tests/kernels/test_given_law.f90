@@ -383,8 +383,8 @@ contains
       if (allocated(error)) return
       call solid_respond(given%march%system%solid, motion_of(pose_t(), scene%x, &
          given%march%state%u, u1), .true., given%march%system%response)
-      call check_near(error, query%march%system%response%force, &
-         given%march%system%response%force, 64.0_wp*eps, young, "force")
+      call check_near(error, query%march%system%response%part(role_internal)%force, &
+         given%march%system%response%part(role_internal)%force, 64.0_wp*eps, young, "force")
       call query_free(query)
       call stepper_close(given)
    end subroutine test_query

@@ -170,18 +170,18 @@ contains
       call shake(u, 0.2_wp)
       up = 0.0_wp
       call loads_add(system%loads, system%solid, motion_of(pose_t(), scene%x, u, 0.0_wp*u), up, &
-         system%matrix%value, system%reduction%side%value)
-      n = system%numbering%n_unknown
+         system%matrix%value, system%space%reduction%side%value)
+      n = system%space%numbering%n_unknown
       do j = 1, n
-         u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) = &
-            u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) + 1.0_wp
+         u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) = &
+            u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) + 1.0_wp
          call forces(system, scene, instant_t(), u, up)
-         u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) = &
-            u(2 - mod(system%numbering%dof(j), 2), (system%numbering%dof(j) + 1)/2) - 1.0_wp
+         u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) = &
+            u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) - 1.0_wp
          call forces(system, scene, instant_t(), u, down)
          do i = 1, n
-            slope = up(2 - mod(system%numbering%dof(i), 2), (system%numbering%dof(i) + 1)/2) &
-               - down(2 - mod(system%numbering%dof(i), 2), (system%numbering%dof(i) + 1)/2)
+            slope = up(2 - mod(system%space%numbering%dof(i), 2), (system%space%numbering%dof(i) + 1)/2) &
+               - down(2 - mod(system%space%numbering%dof(i), 2), (system%space%numbering%dof(i) + 1)/2)
             slot = csr_find(system%matrix, i, j)
             actual = 0.0_wp
             if (slot > 0) actual = real(system%matrix%value(slot), wp)

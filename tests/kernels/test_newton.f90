@@ -60,7 +60,7 @@ contains
       if (allocated(error)) return
       call system_begin_step(trial%system, scene, 1, error)
       if (allocated(error)) return
-      call newton_init(trial%newton, trial%system%numbering%n_unknown, size(scene%x, 2), &
+      call newton_init(trial%newton, trial%system%space%numbering%n_unknown, size(scene%x, 2), &
          1.0e3_wp*epsilon(1.0_wp), maximum)
       call correction_reset(trial%correction, method, solver_default)
       call constraints_select(trial%set, none)
@@ -177,7 +177,7 @@ contains
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_converged, "status")
       call check_equal(error, trial%newton%n_solve, 0, "linear systems")
-      call check_true(error, maxval(abs(trial%system%residual)) > 0.0_wp, "reactions are there")
+      call check_true(error, maxval(abs(trial%system%response%residual)) > 0.0_wp, "reactions are there")
       call correction_free(trial%correction)
    end subroutine test_no_unknowns
 
@@ -288,7 +288,7 @@ contains
       call check_true(error, &
          all(trial%motion%du(2, 3:) < -0.5_wp .and. trial%motion%du(2, 3:) > -1.0_wp), &
          "pressed flat, not through")
-      call check_near(error, trial%system%response%force(2, 3:), [load%value, load%value], &
+      call check_near(error, trial%system%response%part(role_internal)%force(2, 3:), [load%value, load%value], &
          1.0e4_wp*epsilon(1.0_wp), young, "internal forces balance the loads")
       call correction_free(trial%correction)
    end subroutine test_damping

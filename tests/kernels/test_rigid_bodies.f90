@@ -86,7 +86,7 @@ contains
 
          row = 0.0_wp
          do s = 1, size(dof)
-            associate (x => scene%x(:, (dof(s) + 1)/2), b => system%body((dof(s) + 1)/2))
+            associate (x => scene%x(:, (dof(s) + 1)/2), b => system%space%body((dof(s) + 1)/2))
                j = 3*b - 1 - mod(dof(s), 2)
                row(j) = row(j) + weight(s)
                row(3*b) = row(3*b) + weight(s)*merge(-x(2), x(1), mod(dof(s), 2) == 1)

@@ -352,7 +352,7 @@ contains
       call shake(v, 1.0_wp)
       call stepper_set_state(stepper, error, u=u, v=v)
       if (allocated(error)) return
-      associate (state => stepper%march%state, numbering => stepper%march%system%linked)
+      associate (state => stepper%march%state, numbering => stepper%march%system%space%linked)
          call check_true(error, numbering%n_dependent > 0 .and. any(abs(state%u - u) > 0.0_wp), &
             "some nodes follow")
          call spread_dependent(numbering, u)

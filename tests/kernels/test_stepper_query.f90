@@ -171,8 +171,8 @@ contains
          call check_near(error, unknown, 0.0_wp*unknown, 1.0e3_wp*eps, 1.0_wp/drop_h + young, &
             "residual of scene " // to_text(k))
          call check_near(error, nodal - nodal*merge(1.0_wp, 0.0_wp, &
-            stepper%march%system%numbering%unknown > 0), after%state%reaction*merge(0.0_wp, &
-            1.0_wp, stepper%march%system%numbering%unknown > 0), 1.0e3_wp*eps, &
+            stepper%march%system%space%numbering%unknown > 0), after%state%reaction*merge(0.0_wp, &
+            1.0_wp, stepper%march%system%space%numbering%unknown > 0), 1.0e3_wp*eps, &
             1.0_wp/drop_h + young, "reactions")
          if (.not. allocated(error) .or. k > 1) call query_null_space(query, p, d, error)
          if (allocated(error)) return

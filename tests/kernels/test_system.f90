@@ -92,8 +92,8 @@ contains
       integer :: j
 
       allocate(u0, v0, du, source=scene%x)
-      allocate(up(system%numbering%n_unknown), down(system%numbering%n_unknown))
-      allocate(way(system%numbering%n_unknown))
+      allocate(up(system%space%numbering%n_unknown), down(system%space%numbering%n_unknown))
+      allocate(way(system%space%numbering%n_unknown))
       allocate(matrix(size(way), size(way)))
       call shake(u0, 0.1_wp)
       call shake(v0, 1.0_wp)
@@ -104,13 +104,13 @@ contains
       do j = 1, size(way)
          way = 0.0_wp
          way(j) = step
-         call add_to_dofs(system%numbering, way, 1.0_wp, du)
+         call add_to_dofs(system%space%numbering, way, 1.0_wp, du)
          call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .false.)
-         call pick_unknowns(system%numbering, system%residual, up)
-         call add_to_dofs(system%numbering, way, -2.0_wp, du)
+         call pick_unknowns(system%space%numbering, system%response%residual, up)
+         call add_to_dofs(system%space%numbering, way, -2.0_wp, du)
          call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .false.)
-         call pick_unknowns(system%numbering, system%residual, down)
-         call add_to_dofs(system%numbering, way, 1.0_wp, du)
+         call pick_unknowns(system%space%numbering, system%response%residual, down)
+         call add_to_dofs(system%space%numbering, way, 1.0_wp, du)
          call check_near(error, matrix(:, j), (up - down)/(2.0_wp*step), 300.0_wp*step**2, &
             young, "column " // to_text(j))
       end do
@@ -134,19 +134,19 @@ contains
       pose(1) = dynamic%pose(instant_t(), 0.25_wp)
       pose(2) = static%pose(instant_t(), 0.25_wp)
       allocate(u0, du, way, product, source=scene%x)
-      allocate(x(system%numbering%n_unknown), y(system%numbering%n_unknown))
-      allocate(z(system%numbering%n_unknown))
+      allocate(x(system%space%numbering%n_unknown), y(system%space%numbering%n_unknown))
+      allocate(z(system%space%numbering%n_unknown))
       do k = 1, 2
          call shake(u0, 0.1_wp)
          call shake(du, 0.1_wp)
          call random_number(x)
          way = 0.0_wp
-         call add_to_dofs(system%numbering, x, 1.0_wp, way)
+         call add_to_dofs(system%space%numbering, x, 1.0_wp, way)
          motion = motion_of(pose(k), scene%x, u0, du)
          call system_respond(system, motion, .true.)
          call csr_multiply(system%matrix, x, y)
          call system_tangent_times(system, motion, way, product)
-         call pick_unknowns(system%numbering, product, z)
+         call pick_unknowns(system%space%numbering, product, z)
          call check_near(error, z, y, tol, 10.0_wp*young, "product by pose " // to_text(k))
       end do
    end subroutine test_driven
@@ -173,9 +173,9 @@ contains
       call system_respond(system, motion, .false.)
       change = (scheme%velocity(h, v0, du + offset) - v0)/h
       call mass_times(system, change, expected)
-      call check_near(error, system%inertia, expected, tol, 20.0_wp, "inertia")
-      call check_near(error, system%residual, system%inertia + system%response%force &
-         - system%external, tol, young, "sum of the residual")
+      call check_near(error, system%response%part(role_inertia)%force, expected, tol, 20.0_wp, "inertia")
+      call check_near(error, system%response%residual, system%response%part(role_inertia)%force + system%response%part(role_internal)%force &
+         - system%response%part(role_external)%force, tol, young, "sum of the residual")
    end subroutine test_inertia
 
    !> Translation: total mass; turn: first and second moments, of a block of mass 2 and one of 1.

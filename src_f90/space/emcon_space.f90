@@ -1,0 +1,143 @@
+!> Which freedoms a model has, which of them are unknowns of a step, and how the matrix between
+!> these is laid out.
+module emcon_space
+   use emcon_bodies, only : bodies_find_lists
+   use emcon_couplings, only : equation_t
+   use emcon_csr, only : csr_from_elements, csr_t
+   use emcon_errors, only : error_t
+   use emcon_linear_rows, only : linear_rows_t
+   use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
+   use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
+   use emcon_steps, only : method_null_space, step_t
+   implicit none
+   private
+   public :: space_t, space_init, space_begin_step
+   public :: lists_t, lists_append, lists_begin
+
+   !> Freedoms that meet, list by list; freedom a of node i is n_dim*(i - 1) + a.
+   type :: lists_t
+      integer :: n_dim = 0
+      integer, allocatable :: start(:)           !! (lists + 1) into `freedom`; last: size + 1
+      integer, allocatable :: freedom(:)
+   end type lists_t
+
+   type :: space_t
+      integer :: n_body = 0
+      integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
+      logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term or an equation
+      type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
+      type(unresolved_t), allocatable :: unresolved(:)   !! those of them that follow from others
+      logical :: is_reduced = .true.             !! `numbering` is that one, else without them
+      type(numbering_t) :: numbering
+      type(reduction_t) :: reduction             !! brings dependent freedoms into the matrix
+   end type space_t
+
+contains
+
+   !> No lists yet, of freedoms of `n_dim` directions.
+   pure subroutine lists_begin(self, n_dim)
+      type(lists_t), intent(out) :: self
+      integer, intent(in) :: n_dim               !! > 0
+
+      self%n_dim = n_dim
+      allocate(self%start(1), source=1)
+      allocate(self%freedom(0))
+   end subroutine lists_begin
+
+   !> Append lists that stand one behind the other in `freedom`.
+   pure subroutine lists_append(self, length, freedom)
+      type(lists_t), intent(inout) :: self
+      integer, intent(in) :: length(:)           !! (lists) number of freedoms of each
+      integer, intent(in) :: freedom(:)          !! (sum of them)
+      integer, allocatable :: start(:)
+      integer :: k, n
+
+      n = size(self%start)
+      allocate(start(n + size(length)))
+      start(:n) = self%start
+      do k = 1, size(length)
+         start(n + k) = start(n + k - 1) + length(k)
+      end do
+      call move_alloc(start, self%start)
+      self%freedom = [self%freedom, freedom]
+   end subroutine lists_append
+
+   !> Bodies, and which freedoms are part of the model: those of `lists` and of equations.
+   pure subroutine space_init(self, n_node, lists, equation)
+      type(space_t), intent(out) :: self
+      integer, intent(in) :: n_node
+      type(lists_t), intent(in) :: lists         !! of all terms
+      type(equation_t), intent(in) :: equation(:)   !! (any) of the scene
+      logical, allocatable :: is_alive(:)
+      integer :: i
+
+      call bodies_find_lists(lists%start, (lists%freedom - 1)/lists%n_dim + 1, n_node, self%body, &
+         self%n_body)
+      allocate(is_alive(lists%n_dim*n_node), source=.false.)
+      is_alive(lists%freedom) = .true.
+      do i = 1, size(equation)
+         is_alive(lists%n_dim*(equation(i)%node - 1) + equation(i)%dof) = .true.
+      end do
+      self%is_alive = reshape(is_alive, [lists%n_dim, n_node])
+      allocate(self%unresolved(0))
+   end subroutine space_init
+
+   !> Number the unknowns of `step` and lay out the matrix between them. Linear constraints are
+   !> eliminated, less those that follow from others, unless the step asks for multipliers or their
+   !> rows are too long: `is_reduced` tells.
+   subroutine space_begin_step(self, step, linear, lists, matrix, slot, error)
+      type(space_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      type(linear_rows_t), intent(inout) :: linear
+      type(lists_t), intent(in) :: lists                 !! of all terms
+      type(csr_t), intent(out) :: matrix                 !! values are zero
+      integer, allocatable, intent(out) :: slot(:)       !! places of the lists in it
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_too_full
+
+      linear%is_used = .true.
+      if (linear%n > 0) then
+         call numbering_init(self%linked, self%is_alive, step%prescribed, linear, self%unresolved)
+         linear%is_used(self%unresolved%row) = .false.
+      end if
+      self%is_reduced = step%constraint_method == method_null_space
+      if (self%is_reduced .and. linear%n > 0) then
+         self%numbering = self%linked
+         call lay_out(self, lists, matrix, slot, is_too_full, error)
+         self%is_reduced = .not. is_too_full
+         if (allocated(error) .or. self%is_reduced) return
+      end if
+      call numbering_init(self%numbering, self%is_alive, step%prescribed)
+      call lay_out(self, lists, matrix, slot, is_too_full, error)
+   end subroutine space_begin_step
+
+   !> The matrix of `numbering`: each freedom meets those of its lists, and itself.
+   subroutine lay_out(self, lists, matrix, slot, is_too_full, error)
+      type(space_t), intent(inout) :: self
+      type(lists_t), intent(in) :: lists
+      type(csr_t), intent(out) :: matrix
+      integer, allocatable, intent(out) :: slot(:)
+      logical, intent(out) :: is_too_full
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: full
+      integer, allocatable :: number(:), bare(:)
+      logical :: is_bare(size(self%is_alive))
+      integer :: i
+
+      is_too_full = .false.
+      is_bare = reshape(self%is_alive, [size(is_bare)])
+      is_bare(lists%freedom) = .false.
+      bare = pack([(i, i = 1, size(is_bare))], is_bare)
+      allocate(number, source=freedom_numbers(self%numbering))
+      associate (numbering => self%numbering, n => size(lists%freedom), &
+            n_entry => sum((lists%start(2:) - lists%start(:size(lists%start) - 1))**2))
+         call csr_from_elements(full, numbering%n_unknown + numbering%n_dependent, &
+            [lists%start, [(n + 1 + i, i = 1, size(bare))]], number([lists%freedom, bare]), slot, &
+            error)
+         if (allocated(error)) return
+         slot = slot(:n_entry)
+      end associate
+      call reduction_init(self%reduction, self%numbering, full, matrix, slot, is_too_full)
+   end subroutine lay_out
+
+end module emcon_space

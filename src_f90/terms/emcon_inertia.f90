@@ -1,0 +1,188 @@
+!> Inertia s M (b du - w v0): the mass between nodes, the same in all directions, that of the
+!> elements and what is given.
+!>
+!> Source: docs/theory.md, eqs. (2) and (4).
+module emcon_inertia
+   use emcon_csr, only : csr_find, csr_from_elements, csr_t
+   use emcon_element_lists, only : element_lists
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_t
+   use emcon_reduction, only : freedom_numbers, reduction_add, reduction_slot, reduction_t
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
+   use emcon_space, only : lists_append, lists_t, space_t
+   use emcon_term, only : response_t, role_inertia, term_t
+   implicit none
+   private
+   public :: inertia_t, inertia_init, inertia_times
+
+   type, extends(term_t) :: inertia_t
+      type(csr_t) :: mass                        !! (n_node x n_node) [M]
+      real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
+      integer, allocatable, private :: pair(:, :)   !! (2, any) nodes between which mass is given
+      real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
+   contains
+      procedure :: lay_out
+      procedure :: begin_step
+      procedure :: respond
+      procedure :: tangent_times
+   end type inertia_t
+
+contains
+
+   !> The mass of `solid` and what is given beside it.
+   subroutine inertia_init(self, solid, n_dim, given, error)
+      type(inertia_t), intent(out) :: self
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: n_dim               !! > 0
+      type(csr_t), intent(in) :: given           !! (n_node x n_node) [M]; without rows: none
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: start(:), list(:), slot(:)
+      integer :: e, i, j, k, n
+
+      self%role = role_inertia
+      call list_pairs(given, self%pair)
+      call element_lists(solid, 1, start, list)
+      n = size(list)
+      list = [list, reshape(self%pair, [size(self%pair)])]
+      start = [start, [(n + 1 + 2*i, i = 1, size(self%pair, 2))]]
+      call csr_from_elements(self%mass, solid%n_node, start, list, slot, error)
+      if (allocated(error)) return
+      allocate(self%rate(n_dim, solid%n_node), self%product(n_dim, solid%n_node), source=0.0_wp)
+      k = 0
+      do e = 1, solid%n_element
+         n = start(e + 1) - start(e)
+         do j = 1, n
+            do i = 1, n
+               k = k + 1
+               self%mass%value(slot(k)) = self%mass%value(slot(k)) + real(solid%mass(i, j, e), dp)
+            end do
+         end do
+      end do
+      do i = 1, given%n_row
+         do k = given%row_start(i) + 1, given%row_start(i + 1)
+            associate (to => self%mass%value(csr_find(self%mass, i, given%column(k) + 1)))
+               to = to + given%value(k)
+            end associate
+         end do
+      end do
+   end subroutine inertia_init
+
+   !> The pairs of nodes between which there is mass.
+   pure subroutine list_pairs(mass, pair)
+      type(csr_t), intent(in) :: mass
+      integer, allocatable, intent(out) :: pair(:, :)        !! (2, n)
+      integer :: i, k
+
+      if (mass%n_row == 0) then
+         allocate(pair(2, 0))
+         return
+      end if
+      allocate(pair(2, size(mass%column)))
+      do i = 1, mass%n_row
+         do k = mass%row_start(i) + 1, mass%row_start(i + 1)
+            pair(:, k) = [i, mass%column(k) + 1]
+         end do
+      end do
+   end subroutine list_pairs
+
+   !> The freedoms that given mass connects; those of elements meet there.
+   pure subroutine lay_out(self, lists)
+      class(inertia_t), intent(in) :: self
+      type(lists_t), intent(inout) :: lists
+      integer :: freedom(2, lists%n_dim, size(self%pair, 2)), a
+
+      do a = 1, lists%n_dim
+         freedom(:, a, :) = lists%n_dim*(self%pair - 1) + a
+      end do
+      call lists_append(lists, spread(2, 1, size(freedom)/2), reshape(freedom, [size(freedom)]))
+   end subroutine lay_out
+
+   !> Put the mass into the pattern of the matrix.
+   subroutine begin_step(self, scene, i_step, space, matrix, slot)
+      class(inertia_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! from 1
+      type(space_t), intent(in) :: space
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: slot(:)             !! not used: mass is placed node by node
+      real(dp) :: side(size(space%reduction%side%value))
+      type(reduction_t) :: reduction
+      type(csr_t) :: placed
+      integer, allocatable :: number(:)
+      integer :: i, k, a, place, n_dim
+
+      allocate(number, source=freedom_numbers(space%numbering))
+      n_dim = size(space%is_alive, 1)
+      side = 0.0_dp
+      if (allocated(self%value)) deallocate(self%value)
+      allocate(self%value(size(matrix%column)), source=0.0_dp)
+      do i = 1, self%mass%n_row
+         do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
+            do a = 1, n_dim
+               place = reduction_slot(space%reduction, matrix, number(n_dim*(i - 1) + a), &
+                  number(n_dim*self%mass%column(k) + a))
+               if (place > 0) self%value(place) = self%value(place) + self%mass%value(k)
+               if (place < 0) side(-place) = side(-place) + self%mass%value(k)
+            end do
+         end do
+      end do
+      if (space%numbering%n_dependent == 0) return
+      placed = matrix
+      placed%value = self%value
+      reduction = space%reduction
+      reduction%side%value = side
+      call reduction_add(reduction, placed)
+      self%value = placed%value
+   end subroutine begin_step
+
+   !> s M (b du - w v0), and the sizes of what it consists of; nothing where s = 0.
+   subroutine respond(self, motion, response, value, side)
+      class(inertia_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion                     !! placed
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+
+      associate (pose => motion%pose, total => response%part(self%role))
+         if (.not. pose%mass_scale > 0.0_wp) return
+         if (present(value)) value = value + real(pose%mass_scale*pose%rate, dp)*self%value
+         self%rate = pose%rate*(motion%du + motion%offset) - pose%v_weight*motion%v0
+         call inertia_times(self, self%rate, self%product)
+         total%force = total%force + pose%mass_scale*self%product
+         self%rate = abs(pose%rate*(motion%du + motion%offset)) + abs(pose%v_weight*motion%v0)
+         call inertia_times(self, self%rate, self%product)
+         total%magnitude = total%magnitude + pose%mass_scale*self%product
+      end associate
+   end subroutine respond
+
+   !> Add s b M `direction` to `product`.
+   subroutine tangent_times(self, motion, direction, product)
+      class(inertia_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion                             !! placed
+      real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
+      real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
+
+      self%rate = (motion%pose%mass_scale*motion%pose%rate)*direction
+      call inertia_times(self, self%rate, self%product)
+      product = product + self%product
+   end subroutine tangent_times
+
+   !> M field, in all directions.
+   pure subroutine inertia_times(self, field, product)
+      class(inertia_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
+      real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
+      real(wp) :: total(size(field, 1))
+      integer :: i, k
+
+      do i = 1, self%mass%n_row
+         total = 0.0_wp
+         do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
+            total = total + real(self%mass%value(k), wp)*field(:, self%mass%column(k) + 1)
+         end do
+         product(:, i) = total
+      end do
+   end subroutine inertia_times
+
+end module emcon_inertia

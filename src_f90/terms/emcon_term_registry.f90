@@ -1,0 +1,127 @@
+!> The terms of a model: which kinds there are, and what some of them are asked for by name.
+module emcon_term_registry
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : error_t
+   use emcon_given, only : given_count, given_t
+   use emcon_given_check, only : given_check_mass
+   use emcon_given_term, only : given_term_init, given_term_t
+   use emcon_inertia, only : inertia_init, inertia_t, inertia_times
+   use emcon_kinds, only : dp, wp
+   use emcon_loads, only : loads_init, loads_t
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
+   use emcon_solid_term, only : solid_term_init, solid_term_t
+   use emcon_term, only : term_box_t
+   implicit none
+   private
+   public :: terms_create, terms_solid, terms_mass, terms_mass_times, terms_mass_values
+
+   !> Where the terms that every model has stand; what is given comes after them.
+   integer, parameter :: of_inertia = 1, of_solid = 2, of_loads = 3, n_own = 3
+
+contains
+
+   !> The terms of `scene`, and of what it is given.
+   subroutine terms_create(scene, term, error, given)
+      type(scene_t), intent(in) :: scene
+      type(term_box_t), allocatable, intent(out) :: term(:)
+      type(error_t), allocatable, intent(out) :: error
+      type(given_t), intent(in), optional :: given
+      integer :: n(2), i
+
+      n = 0
+      if (present(given)) n = given_count(given)
+      allocate(term(n_own + n(1)))
+      allocate(inertia_t :: term(of_inertia)%term)
+      allocate(solid_term_t :: term(of_solid)%term)
+      allocate(loads_t :: term(of_loads)%term)
+      call create_own(scene, term, error, given)
+      do i = 1, n(1)
+         if (allocated(error)) return
+         allocate(given_term_t :: term(n_own + i)%term)
+         select type (part => term(n_own + i)%term)
+         type is (given_term_t)
+            call given_term_init(part, given%force(i)%force, scene, error)
+         end select
+      end do
+   end subroutine terms_create
+
+   !> The elements, and the terms that stand on them.
+   subroutine create_own(scene, term, error, given)
+      type(scene_t), intent(in) :: scene
+      type(term_box_t), intent(inout), target :: term(:)
+      type(error_t), allocatable, intent(out) :: error
+      type(given_t), intent(in), optional :: given
+      type(csr_t) :: extra
+      type(solid_t), pointer :: solid
+
+      select type (part => term(of_solid)%term)
+      type is (solid_term_t)
+         if (present(given)) then
+            call solid_term_init(part, scene, error, given%law)
+            extra = given%mass
+         else
+            call solid_term_init(part, scene, error)
+         end if
+      end select
+      if (.not. allocated(error) .and. extra%n_row > 0) call given_check_mass(extra, scene, error)
+      if (allocated(error)) return
+      solid => terms_solid(term)
+      select type (part => term(of_inertia)%term)
+      type is (inertia_t)
+         call inertia_init(part, solid, size(scene%x, 1), extra, error)
+      end select
+      select type (part => term(of_loads)%term)
+      type is (loads_t)
+         call loads_init(part, scene, solid)
+      end select
+   end subroutine create_own
+
+   !> The elements, for what is derived from them.
+   function terms_solid(term) result(solid)
+      type(term_box_t), intent(in), target :: term(:)   !! of `terms_create`
+      type(solid_t), pointer :: solid
+
+      nullify(solid)
+      select type (part => term(of_solid)%term)
+      type is (solid_term_t)
+         solid => part%solid
+      end select
+   end function terms_solid
+
+   !> The mass between nodes, the same in all directions.
+   pure subroutine terms_mass(term, mass)
+      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+      type(csr_t), intent(out) :: mass           !! (n_node x n_node) [M]
+
+      select type (part => term(of_inertia)%term)
+      type is (inertia_t)
+         mass = part%mass
+      end select
+   end subroutine terms_mass
+
+   !> The mass between unknowns of the step, in the pattern of the matrix.
+   pure subroutine terms_mass_values(term, value)
+      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+      real(dp), allocatable, intent(out) :: value(:)   !! (entries of the matrix) [M]
+
+      select type (part => term(of_inertia)%term)
+      type is (inertia_t)
+         value = part%value
+      end select
+   end subroutine terms_mass_values
+
+   !> M field, in all directions.
+   pure subroutine terms_mass_times(term, field, product)
+      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+      real(wp), intent(in), contiguous :: field(:, :)      !! (n_dim, n_node)
+      real(wp), intent(out), contiguous :: product(:, :)   !! (n_dim, n_node)
+
+      product = 0.0_wp
+      select type (part => term(of_inertia)%term)
+      type is (inertia_t)
+         call inertia_times(part, field, product)
+      end select
+   end subroutine terms_mass_times
+
+end module emcon_term_registry
