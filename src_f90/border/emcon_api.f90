@@ -49,7 +49,8 @@ module emcon_api
    use emcon_deck_source, only : passage_t
    use emcon_errors, only : err_analysis, err_file, err_input, err_internal, err_interrupt, &
       err_none, error_t
-   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok, given_outside
+   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok, &
+      given_outside
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
       formulation_segment, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none

@@ -22,7 +22,8 @@ module emcon_newton
    public :: newton_t, newton_init, newton_solve, interrupt_interface
    public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant
 
-   !> How a solve ended. Refused: there are no forces at the displacements, see `system%response%refusal`;
+   !> How a solve ended. Refused: there are no forces at the displacements, see `refusal` of
+   !> the response;
    !> redundant: some constraints depend on others, see `correction%redundant`.
    integer, parameter :: newton_converged = 0, newton_refused = 1, newton_diverged = 2, &
       newton_singular = 3, newton_redundant = 4

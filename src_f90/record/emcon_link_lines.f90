@@ -64,14 +64,15 @@ contains
       type(scene_t), intent(in) :: scene
       type(system_t), intent(in) :: system
       type(notes_t), intent(inout) :: notes
-      integer :: n_node(system%space%n_body), n_element(system%space%n_body), first(system%space%n_body)
+      integer, dimension(system%space%n_body) :: n_node, n_element, first
       character(len=:), allocatable :: text
       integer :: i, b
 
       n_node = 0
       n_element = 0
       do i = 1, size(system%space%body)
-         if (system%space%body(i) > 0) n_node(system%space%body(i)) = n_node(system%space%body(i)) + 1
+         b = system%space%body(i)
+         if (b > 0) n_node(b) = n_node(b) + 1
       end do
       do i = size(scene%element_kind), 1, -1
          b = system%space%body(scene%element_node(1, i))

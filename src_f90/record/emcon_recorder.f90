@@ -196,7 +196,7 @@ contains
                mass(1, system%space%body(i)) = mass(1, system%space%body(i)) + between%value(k)
             end do
          end do
-         call history_set_define(self%history, "BODIES", "MASS", [(k, k = 1, system%space%n_body)], 1, &
+         call history_set_define(self%history, "BODIES", "MASS", [(k, k = 1, size(mass, 2))], 1, &
             i_set, error)
       end associate
       if (allocated(error)) return

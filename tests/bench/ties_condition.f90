@@ -67,7 +67,7 @@ contains
       integer :: n, k
 
       associate (march => stepper%march, set => stepper%march%active%set)
-         n = march%system%numbering%n_unknown
+         n = march%system%space%numbering%n_unknown
          if (set%n == 0) then
             a = dense(march%system%matrix)
             call print_line("null space", a, [(1.0_dp, k = 1, n)], 1.0_dp)

@@ -8,10 +8,10 @@
 program ties_elimination
    use, intrinsic :: iso_fortran_env, only : error_unit, output_unit
    use emcon_csr, only : csr_from_elements, csr_t
-   use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp
    use emcon_reduction, only : freedom_numbers, reduction_add, reduction_init, reduction_t
+   use emcon_space, only : lists_begin, lists_t
    use emcon_stepper, only : stepper_close, stepper_open, stepper_t
    use emcon_system, only : system_t
    use emcon_text, only : string_t
@@ -66,8 +66,8 @@ contains
       call by_elimination(system, direct, begin_direct, add(1), eliminate(1))
       call by_product(system, product, begin_product, add(2), eliminate(2))
       if (allocated(error)) return
-      write(output_unit, "(a, i0, a, i0, a, i0)") "unknowns ", system%numbering%n_unknown, &
-         ", dependent ", system%numbering%n_dependent, ", entries ", size(direct%column)
+      write(output_unit, "(a, i0, a, i0, a, i0)") "unknowns ", system%space%numbering%n_unknown, &
+         ", dependent ", system%space%numbering%n_dependent, ", entries ", size(direct%column)
       write(output_unit, "(a20, 4a18)") "", "once [ms]", "elements [ms]", "T [ms]", "each time [ms]"
       write(output_unit, "(a20, 4f18.2)") "while assembling", 1.0e3_dp*[begin_direct, add(1), &
          eliminate(1), add(1) + eliminate(1)]
@@ -94,7 +94,7 @@ contains
 
       call full_pattern(system, full, slot)
       since = cpu_seconds()
-      call reduction_init(reduction, system%numbering, full, matrix, slot, is_too_full)
+      call reduction_init(reduction, system%space%numbering, full, matrix, slot, is_too_full)
       begin = cpu_seconds() - since
       add = huge(add)
       eliminate = huge(eliminate)
@@ -122,7 +122,7 @@ contains
 
       call full_pattern(system, full, slot)
       since = cpu_seconds()
-      call terms_of_all(system%reduction, t)
+      call terms_of_all(system%space%reduction, t)
       call triple_product_init(product, t, full, t, matrix, error)
       if (allocated(error)) return
       begin = cpu_seconds() - since
@@ -144,26 +144,19 @@ contains
       type(system_t), intent(in) :: system
       type(csr_t), intent(out) :: full
       integer, allocatable, intent(out) :: slot(:)
-      integer, allocatable :: number(:), start(:), list(:)
-      integer :: e, i, a, k
+      type(lists_t) :: lists
+      integer, allocatable :: number(:)
+      integer :: k
 
-      allocate(number, source=freedom_numbers(system%numbering))
-      associate (solid => system%solid)
-         allocate(start(solid%n_element + 1), list(2*max_element_nodes*solid%n_element))
-         k = 0
-         do e = 1, solid%n_element
-            start(e) = k + 1
-            do i = 1, element_kinds(solid%kind(e))%n_node
-               do a = 1, 2
-                  k = k + 1
-                  list(k) = number(2*(solid%node(i, e) - 1) + a)
-               end do
-            end do
-         end do
-         start(solid%n_element + 1) = k + 1
+      allocate(number, source=freedom_numbers(system%space%numbering))
+      call lists_begin(lists, size(system%space%is_alive, 1))
+      do k = 1, size(system%term)
+         call system%term(k)%term%lay_out(lists)
+      end do
+      associate (numbering => system%space%numbering)
+         call csr_from_elements(full, numbering%n_unknown + numbering%n_dependent, lists%start, &
+            number(lists%freedom), slot, error)
       end associate
-      call csr_from_elements(full, system%numbering%n_unknown + system%numbering%n_dependent, &
-         start, list(:k), slot, error)
    end subroutine full_pattern
 
    !> T for all freedoms: unknowns are themselves.

@@ -11,6 +11,7 @@ module given_scenes
    use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
    use emcon_surface_edges, only : surface_edges
    use emcon_system, only : system_init, system_t
+   use emcon_term_registry, only : terms_mass
    use emcon_text, only : to_text
    use given_hosts, only : solid_host_init, solid_host_t
    use small_scenes, only : add_step, scene_begin
@@ -62,6 +63,7 @@ contains
       type(scene_t) :: part
       type(solid_host_t) :: host
       type(system_t) :: system
+      type(csr_t) :: mass
 
       own%scene = scene
       own%is_read = .true.
@@ -78,7 +80,8 @@ contains
       call keep_elements(hosted%scene, is_kept)
       hosted%is_read = .true.
       call stepper_give_force(hosted, host, error)
-      if (.not. allocated(error)) call stepper_give_mass(hosted, system%mass, error)
+      if (.not. allocated(error)) call terms_mass(system%term, mass)
+      if (.not. allocated(error)) call stepper_give_mass(hosted, mass, error)
       if (.not. allocated(error)) call stepper_build(hosted, error)
    end subroutine open_both
 

@@ -5,11 +5,12 @@ module test_loads
    use emcon_csr, only : csr_find
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_loads, only : loads_add, prescribed_motion
+   use emcon_loads, only : prescribed_motion
    use emcon_motion, only : instant_t, motion_of, pose_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
-   use emcon_system, only : system_begin_step, system_init, system_t
+   use emcon_system, only : system_begin_step, system_init, system_loads, system_t
+   use emcon_term, only : response_begin, role_external
    use small_scenes, only : add_load, add_step, add_surface, block_t, bottom, clamp, left, &
       make_block, right, shake, top
    implicit none
@@ -67,15 +68,14 @@ contains
 
    !> Forces of the loads at `instant` and x + u.
    subroutine forces(system, scene, instant, u, force)
-      type(system_t), intent(in) :: system
+      type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(instant_t), intent(in) :: instant
       real(wp), intent(in), contiguous :: u(:, :)
       real(wp), intent(out), contiguous :: force(:, :)
 
-      force = 0.0_wp
-      call loads_add(system%loads, system%solid, motion_of(pose_t(is_end=.true., &
-         load_instant=instant), scene%x, u, 0.0_wp*u), force)
+      call system_loads(system, motion_of(pose_t(is_end=.true., load_instant=instant), scene%x, u, &
+         0.0_wp*u), force)
    end subroutine forces
 
    !> -p n L t, half on either node, on the deformed edge.
@@ -155,7 +155,7 @@ contains
       type(block_t) :: block
       type(system_t) :: system
       real(wp) :: u(2, 9), up(2, 9), down(2, 9), slope, actual
-      integer :: i, j, slot, n
+      integer :: i, j, k, slot
 
       call make_block(scene, "CPE4", [2, 2], block)
       call add_step(scene, .false., 1.0_wp, 1)
@@ -168,26 +168,28 @@ contains
       if (allocated(error)) return
       system%matrix%value = 0.0_dp
       call shake(u, 0.2_wp)
-      up = 0.0_wp
-      call loads_add(system%loads, system%solid, motion_of(pose_t(), scene%x, u, 0.0_wp*u), up, &
-         system%matrix%value, system%space%reduction%side%value)
-      n = system%space%numbering%n_unknown
-      do j = 1, n
-         u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) = &
-            u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) + 1.0_wp
-         call forces(system, scene, instant_t(), u, up)
-         u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) = &
-            u(2 - mod(system%space%numbering%dof(j), 2), (system%space%numbering%dof(j) + 1)/2) - 1.0_wp
-         call forces(system, scene, instant_t(), u, down)
-         do i = 1, n
-            slope = up(2 - mod(system%space%numbering%dof(i), 2), (system%space%numbering%dof(i) + 1)/2) &
-               - down(2 - mod(system%space%numbering%dof(i), 2), (system%space%numbering%dof(i) + 1)/2)
-            slot = csr_find(system%matrix, i, j)
-            actual = 0.0_wp
-            if (slot > 0) actual = real(system%matrix%value(slot), wp)
-            call check_near(error, actual, -0.5_wp*slope, tol_dp, 3.0_wp, "stiffness")
-         end do
+      call response_begin(system%response)
+      do k = 1, size(system%term)
+         if (system%term(k)%term%role == role_external) call system%term(k)%term%respond( &
+            motion_of(pose_t(), scene%x, u, 0.0_wp*u), system%response, system%matrix%value, &
+            system%space%reduction%side%value)
       end do
+      associate (dof => system%space%numbering%dof)
+         do j = 1, size(dof)
+            u(2 - mod(dof(j), 2), (dof(j) + 1)/2) = u(2 - mod(dof(j), 2), (dof(j) + 1)/2) + 1.0_wp
+            call forces(system, scene, instant_t(), u, up)
+            u(2 - mod(dof(j), 2), (dof(j) + 1)/2) = u(2 - mod(dof(j), 2), (dof(j) + 1)/2) - 1.0_wp
+            call forces(system, scene, instant_t(), u, down)
+            do i = 1, size(dof)
+               slope = up(2 - mod(dof(i), 2), (dof(i) + 1)/2) &
+                  - down(2 - mod(dof(i), 2), (dof(i) + 1)/2)
+               slot = csr_find(system%matrix, i, j)
+               actual = 0.0_wp
+               if (slot > 0) actual = real(system%matrix%value(slot), wp)
+               call check_near(error, actual, -0.5_wp*slope, tol_dp, 3.0_wp, "stiffness")
+            end do
+         end do
+      end associate
    end subroutine test_stiffness
 
    subroutine test_gravity(error)

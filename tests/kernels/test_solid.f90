@@ -1,13 +1,15 @@
 !> All elements together: masses in closed form, assembly, bad geometry.
 module test_solid
-   use check, only : check_equal, check_error, check_near, test_case_t
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_element, only : element_motion_t, element_response_t
+   use emcon_given_law, only : given_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_of, pose_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_element_respond, solid_init, solid_respond, solid_response_t, &
-      solid_t
+   use emcon_solid, only : solid_element_respond, solid_init, solid_t
+   use emcon_solid_term, only : solid_term_init, solid_term_t
+   use emcon_term, only : response_begin, response_init, response_t, role_internal
    use small_scenes, only : add_block, block_t, make_block, shake, young
    implicit none
    private
@@ -93,45 +95,48 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(block_t) :: block
-      type(solid_t) :: solid
-      type(solid_response_t) :: response
+      type(solid_term_t) :: term
+      type(response_t) :: response
       type(element_response_t) :: part
       type(element_motion_t) :: motion
+      type(given_response_t) :: nothing
       real(wp), allocatable :: u0(:, :), du(:, :), force(:, :)
       integer :: e, n
 
       call make_block(scene, "CPE4", [2, 2], block)
       call add_block(scene, "CPE3", [2, 1], [5.0_wp, 1.0_wp], [2.0_wp, 1.0_wp], block)
-      call solid_init(solid, scene, error)
+      call make_term(scene, term, response, error)
       if (allocated(error)) return
       allocate(u0, du, force, source=scene%x)
       call shake(u0, 0.1_wp)
       call shake(du, 0.1_wp)
-      call make_response(solid, response)
-      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du), .true., response)
+      call term%respond(motion_of(pose_t(), scene%x, u0, du), response)
       force = 0.0_wp
-      do e = 1, solid%n_element
-         n = solid%geometry(e)%n_node
-         associate (node => solid%node(:n, e))
-            motion%from = local(u0(:, node))
-            motion%by = local(du(:, node))
-            call solid_element_respond(solid, e, motion, response%given, .false., part)
-            force(:, node) = force(:, node) + part%force(:, :n)
-            call check_near(error, response%energy(e), part%energy, tol, young, "energy")
-         end associate
-      end do
-      call check_near(error, response%force, force, tol, young, "forces")
+      associate (solid => term%solid)
+         do e = 1, solid%n_element
+            n = solid%geometry(e)%n_node
+            associate (node => solid%node(:n, e))
+               motion%from = local(u0(:, node))
+               motion%by = local(du(:, node))
+               call solid_element_respond(solid, e, motion, nothing, .false., part)
+               force(:, node) = force(:, node) + part%force(:, :n)
+               call check_near(error, response%energy(e), part%energy, tol, young, "energy")
+            end associate
+         end do
+      end associate
+      call check_near(error, response%part(role_internal)%force, force, tol, young, "forces")
    end subroutine test_sums
 
-   pure subroutine make_response(solid, response)
-      type(solid_t), intent(in) :: solid
-      type(solid_response_t), intent(out) :: response
-      real(wp) :: zero(2, solid%n_node)
+   !> The elements of `scene` as a term, and room for its response.
+   subroutine make_term(scene, term, response, error)
+      type(scene_t), intent(in) :: scene
+      type(solid_term_t), intent(out) :: term
+      type(response_t), intent(out) :: response
+      type(error_t), allocatable, intent(out) :: error
 
-      zero = 0.0_wp
-      allocate(response%force, response%magnitude, response%rounding, source=zero)
-      allocate(response%energy(solid%n_element), source=0.0_wp)
-   end subroutine make_response
+      call solid_term_init(term, scene, error)
+      call response_init(response, 2, size(scene%x, 2), size(scene%element_kind))
+   end subroutine make_term
 
    pure function local(field) result(four)
       real(wp), intent(in) :: field(:, :)
@@ -147,24 +152,24 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(block_t) :: block
-      type(solid_t) :: solid
-      type(solid_response_t) :: response
+      type(solid_term_t) :: term
+      type(response_t) :: response
       real(wp), allocatable :: u0(:, :), du(:, :), move(:, :)
 
       call make_block(scene, "CPE4", [2, 2], block)
       allocate(u0, du, move, source=scene%x)
       call shake(move, 0.25_wp)
       scene%x = scene%x + move
-      call solid_init(solid, scene, error)
+      call make_term(scene, term, response, error)
       if (allocated(error)) return
-      call make_response(solid, response)
       u0 = 1.0e8_wp
       du = 0.0_wp
       du(1, :) = -3.0e7_wp
-      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du), .true., response)
+      call term%respond(motion_of(pose_t(), scene%x, u0, du), response)
       call check_near(error, response%energy, 0.0_wp*response%energy, (4.0e8_wp*eps)**2, young, &
          "energy")
-      call check_near(error, abs(response%force)/response%rounding, 0.0_wp*u0, 4.0_wp*eps, 1.0_wp, &
+      call check_near(error, abs(response%part(role_internal)%force)/response%rounding, &
+         0.0_wp*u0, 4.0_wp*eps, 1.0_wp, &
          "forces over their round-off")
    end subroutine test_translation
 
@@ -172,20 +177,22 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(block_t) :: block
-      type(solid_t) :: solid
-      type(solid_response_t) :: response
+      type(solid_term_t) :: term
+      type(response_t) :: response
       real(wp), allocatable :: u0(:, :), du(:, :)
 
       call make_block(scene, "CPE4", [3, 1], block)
-      call solid_init(solid, scene, error)
+      call make_term(scene, term, response, error)
       if (allocated(error)) return
       allocate(u0, du, source=0.0_wp*scene%x)
-      call make_response(solid, response)
       du(1, [4, 8]) = -1.5_wp                    ! the right side of element 3
-      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, du), .true., response)
-      call check_equal(error, response%inverted_element, 3, "inverted element")
-      call solid_respond(solid, motion_of(pose_t(), scene%x, u0, 0.5_wp*du), .true., response)
-      call check_equal(error, response%inverted_element, 0, "inverted element at half of it")
+      call term%respond(motion_of(pose_t(), scene%x, u0, du), response)
+      call check_true(error, allocated(response%refusal), "refused")
+      if (allocated(response%refusal)) call check_equal(error, response%refusal, &
+         "element 3 is inverted", "refusal")
+      call response_begin(response)
+      call term%respond(motion_of(pose_t(), scene%x, u0, 0.5_wp*du), response)
+      call check_true(error, .not. allocated(response%refusal), "half of it is not")
    end subroutine test_inverted
 
    subroutine test_clockwise(error)

@@ -10,8 +10,9 @@ module test_system
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
    use emcon_steps, only : load_pressure, load_t
-   use emcon_system, only : mass_times, system_begin_step, system_init, system_respond, &
-      system_t, system_tangent_times
+   use emcon_system, only : mass_times, system_begin_step, system_init, system_renew, &
+      system_respond, system_t, system_tangent_times
+   use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, shake, young
    use sparse_samples, only : dense_of
@@ -130,7 +131,8 @@ contains
 
       call make_system(scene, system, .false., error)
       if (allocated(error)) return
-      system%loads%n = 0
+      scene%step(1)%load = scene%step(1)%load(:0)
+      call system_renew(system, scene)
       pose(1) = dynamic%pose(instant_t(), 0.25_wp)
       pose(2) = static%pose(instant_t(), 0.25_wp)
       allocate(u0, du, way, product, source=scene%x)
@@ -173,9 +175,11 @@ contains
       call system_respond(system, motion, .false.)
       change = (scheme%velocity(h, v0, du + offset) - v0)/h
       call mass_times(system, change, expected)
-      call check_near(error, system%response%part(role_inertia)%force, expected, tol, 20.0_wp, "inertia")
-      call check_near(error, system%response%residual, system%response%part(role_inertia)%force + system%response%part(role_internal)%force &
-         - system%response%part(role_external)%force, tol, young, "sum of the residual")
+      associate (part => system%response%part)
+         call check_near(error, part(role_inertia)%force, expected, tol, 20.0_wp, "inertia")
+         call check_near(error, system%response%residual, part(role_inertia)%force &
+            + part(role_internal)%force - part(role_external)%force, tol, young, "residual")
+      end associate
    end subroutine test_inertia
 
    !> Translation: total mass; turn: first and second moments, of a block of mass 2 and one of 1.
