@@ -42,16 +42,9 @@ from .arguments import flag_array, number, real_array
 from .csr import Csr
 from .errors import _KINDS, InputError
 from .memory import copied, csr, made, matrix, structure, structures, text, whole
+from .options import host_choices
 
 __all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome"]
-
-_FORMULATIONS = {"node to segment": _core.EMCON_NODE_TO_SEGMENT, "segment": _core.EMCON_SEGMENT,
-                 "mortar": _core.EMCON_MORTAR}
-_INTEGRATIONS = {"segments": _core.EMCON_SEGMENTS, "elements": _core.EMCON_ELEMENTS}
-_MULTIPLIERS = {"standard": _core.EMCON_STANDARD, "dual": _core.EMCON_DUAL}
-_NORMALS = {"edge": _core.EMCON_EDGE_NORMAL, "nodal": _core.EMCON_NODAL_NORMAL}
-_SMOOTHINGS = {"none": _core.EMCON_UNSMOOTHED, "hermite": _core.EMCON_HERMITE}
-_INITIATIONS = {"persistent": _core.EMCON_PERSISTENT, "admissible": _core.EMCON_ADMISSIBLE}
 
 _Args = ParamSpec("_Args")
 _R = TypeVar("_R")
@@ -239,16 +232,15 @@ class Interface:
         `smoothing` of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to
         180 degrees, are corners. Rigid obstacles are masters of held nodes.
         """
-        choice = [_choice("integration", integration, _INTEGRATIONS),
+        choice = [_choice("integration", integration),
                   0 if n_point is None else _number("n_point", n_point, 1, 10),
-                  _choice("multiplier", multiplier, _MULTIPLIERS),
-                  _choice("normal", normal, _NORMALS),
-                  _choice("smoothing", smoothing, _SMOOTHINGS)]
+                  _choice("multiplier", multiplier), _choice("normal", normal),
+                  _choice("smoothing", smoothing)]
         # 0 stands for the default in the library; the least angle above makes corners as well.
         angles = [number(normal_angle, "normal_angle") or np.nextafter(0.0, 1.0),
                   number(smoothing_angle, "smoothing_angle") or np.nextafter(0.0, 1.0)]
         sides = self._surfaces(slave, master)
-        kind = _choice("formulation", formulation, _FORMULATIONS)
+        kind = _choice("formulation", formulation)
         options = made("emcon_pair_options", *choice, *angles)
         self._call(_core.emcon_interface_add_pair, *sides, kind, options)
 
@@ -263,7 +255,7 @@ class Interface:
         if tolerance is not None and reach < 0:
             raise InputError(f"tolerance is {tolerance}, which is negative")
         sides = self._surfaces(slave, master)
-        kind = _choice("multiplier", multiplier, _MULTIPLIERS)
+        kind = _choice("multiplier", multiplier)
         self._call(_core.emcon_interface_add_tie, *sides, kind, reach)
         self._n_tie += 1
         return self._n_tie - 1
@@ -284,7 +276,7 @@ class Interface:
         edge, 0 for any. `is_last_try`: the host cannot try the step in smaller parts. `is_end`:
         statics, gradients at the end of the step and closed gaps; set it before `prepare`, too.
         """
-        kind = _choice("initiation", initiation, _INITIATIONS)
+        kind = _choice("initiation", initiation)
         settings = made("emcon_interface_settings", kind, number(gap_tolerance, "gap_tolerance"),
                         bool(is_last_try), bool(is_end))
         self._call(_core.emcon_interface_set, settings)
@@ -546,7 +538,8 @@ def _number(name: str, value: int, least: int, most: int) -> int:
     return found
 
 
-def _choice(name: str, value: str, choices: dict[str, int]) -> int:
+def _choice(name: str, value: str) -> int:
+    choices = host_choices(name)
     if not isinstance(value, str) or value.lower() not in choices:
         raise InputError(f"{name} is {value!r}, not one of {', '.join(map(repr, choices))}")
     return choices[value.lower()]

@@ -8,33 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
+from .options import LAWS
 
-#: Room for the texts of a law.
-_N_TEXT = 1024
-
-
-@dataclass(frozen=True)
-class Law:
-    """A row of the library's table of laws: what decks call it, and its constants."""
-
-    code: int
-    keyword: str
-    variant: str
-    constants: tuple[str, ...]
-
-
-def _laws() -> dict[str, Law]:
-    laws = {}
-    status, code, text = _core.emcon_get_law(0, _N_TEXT)
-    while status == 0:
-        name, keyword, variant, constants = text.tobytes().split(b"\0")[0].decode().split("\n")
-        laws[name] = Law(code, keyword, variant, tuple(constants.split()))
-        status, code, text = _core.emcon_get_law(len(laws), _N_TEXT)
-    return laws
-
-
-#: Constitutive laws by name.
-LAWS = _laws()
+__all__ = ["LAWS", "Gap", "LawResponse", "law_response", "nts_gap"]
 
 
 @dataclass(frozen=True)

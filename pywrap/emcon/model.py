@@ -32,6 +32,8 @@ from .errors import InputError
 from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_function,
                     check_solid, count_nodes)
 from .given_matrices import give_masses, given_mass
+from .mesh.checks import KINDS
+from .options import LAWS, words
 from .steps import Step
 
 if TYPE_CHECKING:
@@ -39,8 +41,6 @@ if TYPE_CHECKING:
     from .mesh import Mesh
     from .stepper import Stepper
 
-#: Nodes of an element, by kind.
-_CORNERS = {"CPE3": 3, "CPE4": 4}
 _LARGEST_TEXT = 2**31 - 1
 #: The interaction of pairs that name none.
 _FRICTIONLESS = "FRICTIONLESS CONTACT"
@@ -119,11 +119,12 @@ class Model(Cards):
             raise InputError("element_labels have the kinds of elements: "
                              f"{', '.join(map(repr, kinds))}")
         for kind, corners in kinds.items():
-            if kind and kind not in _CORNERS:
-                raise InputError(f"{kind!r} is no kind of element; known are CPE3, CPE4")
+            if kind and kind not in KINDS:
+                raise InputError(f"{kind!r} is no kind of element; known are "
+                                 f"{', '.join(words('element'))}")
             array = array_of(corners, "elements")
-            if kind and array.ndim == 2 and array.shape[1] != _CORNERS[kind]:
-                raise InputError(f"elements of {kind} have {_CORNERS[kind]} nodes, not "
+            if kind and array.ndim == 2 and array.shape[1] != KINDS[kind]:
+                raise InputError(f"elements of {kind} have {KINDS[kind]} nodes, not "
                                  f"{array.shape[1]}")
             model.add_elements(array, labels=labels[kind])
         return model
@@ -268,23 +269,13 @@ class Model(Cards):
     # --- materials -------------------------------------------------------------------------
 
     def material(self, name: str, *, density: Number | None = None,
-                 elastic: Sequence[Number] | None = None,
-                 neo_hooke: Sequence[Number] | None = None,
-                 coupled_neo_hooke: Sequence[Number] | None = None,
-                 mooney_rivlin: Sequence[Number] | None = None,
-                 yeoh: Sequence[Number] | None = None,
-                 ogden: Sequence[Number] | None = None,
-                 user: Sequence[Number] | None = None,
-                 law: PointFunction | None = None) -> Model:
+                 user: Sequence[Number] | None = None, law: PointFunction | None = None,
+                 **constants: Sequence[Number] | None) -> Model:
         """`*MATERIAL` with one law; stresses in [M/(L T^2)].
 
         density             [M/L^3]; required in dynamic steps and for gravity
-        elastic             (E, nu): St. Venant-Kirchhoff under NLGEOM, linear without
-        neo_hooke           (C10, D1): C10 (J^(-2/3) tr C - 3) + (J - 1)^2/D1
-        coupled_neo_hooke   (E, nu): mu/2 (tr C - 3) - mu ln J + lambda/2 ln^2 J
-        mooney_rivlin       (C10, C01, D1)
-        yeoh                (C10, C20, C30, D1, D2, D3)
-        ogden               (mu1, alpha1, .., muN, alphaN, D1, .., DN), N = 1 to 3
+        constants           those of a law of the library, `elastic=(E, nu)`, by the name of the law:
+                            `emcon.options.LAWS` and docs/deck.md list them
         law                 a function of strains (n, 3), E11, E22, 2 E12 of Green and Lagrange (the
                             small ones without NLGEOM), that returns energies per reference volume
                             (n,), stresses (n, 3) and tangents (n, 3, 3), the first and second
@@ -294,29 +285,21 @@ class Model(Cards):
         """
         if law is not None and user is None:
             user = ()
-        kinds = {"ELASTIC": elastic, "HYPERELASTIC, NEO HOOKE": neo_hooke,
-                 "HYPERELASTIC, COUPLED NEO HOOKE": coupled_neo_hooke, "USER MATERIAL": user,
-                 "HYPERELASTIC, MOONEY-RIVLIN": mooney_rivlin, "HYPERELASTIC, YEOH": yeoh,
-                 "HYPERELASTIC, OGDEN": ogden}
-        chosen = [(kind, values) for kind, values in kinds.items() if values is not None]
-        if len(chosen) != 1:
-            raise InputError(f"material {name} has one law, not {len(chosen)}")
-        kind, values = chosen[0]
-        constants = list(values)
-        known = {"HYPERELASTIC, MOONEY-RIVLIN": (3,), "HYPERELASTIC, YEOH": (6,),
-                 "HYPERELASTIC, OGDEN": (3, 6, 9)}.get(kind, (2,))
-        if kind != "USER MATERIAL" and len(constants) not in known:
-            raise InputError(f"material {name}: {kind} has {' or '.join(map(str, known))} "
-                             f"constants, not {len(constants)}")
-        options: dict[str, object] = {}
-        if kind == "ELASTIC":
-            options = {"TYPE": "ISO"}
-        elif kind == "USER MATERIAL":
-            options = {"CONSTANTS": len(constants)}
-        elif kind == "HYPERELASTIC, OGDEN":
-            options = {"N": len(constants)//3}
+        given = {key: values for key, values in {**constants, "user": user}.items()
+                 if values is not None}
+        known = {row.argument for row in LAWS.values()}
+        unknown = sorted(set(given) - known - {"user"})
+        if unknown:
+            raise InputError(f"material {name}: there is no law {unknown[0]!r}; known are "
+                             f"{', '.join(sorted(known))}")
+        if len(given) != 1:
+            raise InputError(f"material {name} has one law, not {len(given)}")
+        ((chosen, values),) = given.items()
+        numbers = list(values)
+        kind, options = _law_card(name, chosen, len(numbers))
+        rows = [numbers[k:k + 8] for k in range(0, len(numbers), 8)]
         text = card("MATERIAL", {"NAME": name})
-        text += card(kind, options, [constants[k:k + 8] for k in range(0, len(constants), 8)])
+        text += card(kind, options, rows)
         if law is not None:
             self.give_law(name, law)
         self._add(text if density is None else text + card("DENSITY", rows=[(density,)]))
@@ -545,6 +528,18 @@ class Model(Cards):
             first = step._blocks[0]
             blocks += [*step._blocks, Block("*END STEP\n", first.file, first.line)]
         return blocks
+
+
+def _law_card(material: str, argument: str, n: int) -> tuple[str, dict[str, object]]:
+    """The card of a law with `n` constants, and its parameters."""
+    if argument == "user":
+        return "USER MATERIAL", {"CONSTANTS": n}
+    rows = {len(row.constants): row for row in LAWS.values() if row.argument == argument}
+    if n not in rows:
+        raise InputError(f"material {material}: {argument} has {' or '.join(map(str, rows))} "
+                         f"constants, not {n}")
+    row = rows[n]
+    return row.card, {"TYPE": "ISO"} if row.keyword == "ELASTIC" else {"N": row.order}
 
 
 def _parameter(name: str, value: object) -> str:

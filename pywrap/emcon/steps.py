@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .cards import Cards, Dof, Number, Where, card, entry
 from .errors import InputError
+from .options import words
 
 if TYPE_CHECKING:
     from .model import Model
@@ -29,8 +30,9 @@ class Step(Cards):
     def __init__(self, model: Model, step: dict[str, object], procedure: str,
                  options: dict[str, object], times: Sequence[Number | None]) -> None:
         super().__init__(model._nodes, model._elements)
-        if procedure not in ("STATIC", "DYNAMIC"):
-            raise InputError(f"procedures are STATIC and DYNAMIC, not {procedure!r}")
+        if procedure not in words("procedure"):
+            raise InputError(f"procedures are {' and '.join(words('procedure'))}, not "
+                             f"{procedure!r}")
         entries = ", ".join("" if time is None else entry(time, f"*{procedure}") for time in times)
         self._add(card("STEP", step) + card(procedure, options, data=entries.rstrip(", ") + "\n"))
 

@@ -377,12 +377,20 @@ int emcon_curvature_times(emcon_model *model, int n, const double *factor /* n *
                           const double *direction /* n_node x 2 */,
                           double *product /* n_node x 2 */);
 
-/* ---- single kernels, for tests and for trying things out ------------------------------------- */
+/* ---- tables: what decks may say -------------------------------------------------------------- */
+
+/* Value number `i`, from 0, of all options of decks that are one of a few words: its code, whether
+ * it is taken where a deck says nothing, and in `text` the option, the word in decks, the name in
+ * these headers and what the log says, with line ends between these four; the last two may be
+ * empty. EMCON_ERROR_INPUT behind the last value, and if there is too little room, or NULL. */
+int emcon_get_option(int i, int *code, int *is_default, int n_text, char *text /* n_text */);
 
 /* Law number `i`, from 0: its code, and in `text` its name, its keyword and parameter in decks, and
  * the names of its constants between blanks, with line ends between these four.
  * EMCON_ERROR_INPUT behind the last law, and if there is too little room, or NULL. */
 int emcon_get_law(int i, int *code, int n_text, char *text /* n_text */);
+
+/* ---- single kernels, for tests and for trying things out ------------------------------------- */
 
 /* The law of this code, with its n constants, for a strain 11, 22, 2*12 that goes from `strain` by `dstrain`:
  * the energy at the end, the algorithmic stress S with S . dstrain = change of energy, and its

@@ -1,41 +1,18 @@
 !> The C interface: single kernels. What each function does is said in emcon.h.
 module emcon_c_kernels
-   use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, c_int, c_ptr
-   use emcon_c_border, only : c_string, put_field, put_number, put_values
+   use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_ptr
+   use emcon_c_border, only : put_field, put_values
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : err_input, err_none, error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
-   use emcon_law_registry, only : law_create, law_rows, n_constant
+   use emcon_law_registry, only : law_create
    use emcon_nts_gap, only : nts_gap
    implicit none
    private
-   public :: emcon_get_law, emcon_law_response, emcon_node_gap
+   public :: emcon_law_response, emcon_node_gap
 
 contains
-
-   integer(c_int) function emcon_get_law(i, code, n_text, text) result(ierr) bind(c)
-      integer(c_int), value :: i, n_text
-      type(c_ptr), value :: code, text
-      character(kind=c_char), pointer :: to(:)
-      character(len=:), allocatable :: said
-      integer :: k
-
-      ierr = err_input
-      if (i < 0 .or. i >= size(law_rows) .or. .not. c_associated(text)) return
-      associate (row => law_rows(i + 1))
-         said = trim(row%name) // new_line("a") // trim(row%keyword) // new_line("a") // &
-            trim(row%variant) // new_line("a")
-         do k = 1, n_constant(row)
-            said = said // " " // trim(row%constant(k))
-         end do
-         if (n_text <= len(said)) return
-         call c_f_pointer(text, to, [len(said) + 1])
-         to = c_string(said)
-         call put_number(row%code, code)
-      end associate
-      ierr = err_none
-   end function emcon_get_law
 
    integer(c_int) function emcon_law_response(law, n, constant, strain, dstrain, energy, stress, &
       tangent) result(ierr) bind(c)

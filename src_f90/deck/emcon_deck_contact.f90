@@ -10,7 +10,7 @@ module emcon_deck_contact
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
       formulation_segment
    use emcon_kinds, only : wp
-   use emcon_options, only : option_code, option_words
+   use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : read_real, to_text
@@ -132,7 +132,7 @@ contains
       integer, intent(out) :: formulation
       character(len=:), allocatable :: known
 
-      formulation = formulation_nts
+      formulation = option_default("formulation")
       if (option_name(card, "TYPE") == "") return
       formulation = option_code("formulation", option_name(card, "TYPE"))
       if (formulation > 0) return

@@ -1,14 +1,15 @@
 !> Settings of contact in a step: how it begins, what overlaps at the start, what nothing holds.
 module emcon_deck_contact_settings
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
+   use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_name, &
       option_real, reader_t, refuse_option
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_steps, only : initiation_admissible, initiation_persistent, &
-      initiation_velocity_update, procedure_dynamic, step_t
+   use emcon_options, only : option_default
+   use emcon_steps, only : initiation_persistent, procedure_dynamic, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -22,16 +23,8 @@ contains
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
 
-      select case (option_name(card, "TYPE"))
-      case ("", "PERSISTENT")
-         step%initiation = initiation_persistent
-      case ("ADMISSIBLE")
-         step%initiation = initiation_admissible
-      case ("VELOCITYUPDATE")
-         step%initiation = initiation_velocity_update
-      case default
-         call refuse_option(reader, card, "TYPE", "PERSISTENT, ADMISSIBLE, VELOCITY UPDATE", "")
-      end select
+      if (option_name(card, "TYPE") == "") step%initiation = option_default("initiation")
+      call choose_option(reader, card, "TYPE", "initiation", step%initiation)
       call option_real(reader, card, "GAP TOLERANCE", step%gap_tolerance)
       if (has_option(card, "GAPTOLERANCE") .and. step%initiation /= initiation_persistent) &
          call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")

@@ -19,12 +19,11 @@ module emcon_deck_step
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_options, only : option_words
+   use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_solver_registry, only : is_foreign_solver, solver_given, solver_names, solvers
-   use emcon_steps, only : method_null_space, procedure_dynamic, &
-      procedure_static, step_t
+   use emcon_steps, only : procedure_dynamic, procedure_static, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -194,7 +193,7 @@ contains
          call card_error(reader, card, "the step has a procedure already")
          return
       end if
-      step%procedure = merge(procedure_static, procedure_dynamic, card%name == "STATIC")
+      step%procedure = option_code("procedure", card%name)
       step%is_direct = has_option(card, "DIRECT")
       call read_solver(reader, card, step)
       value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
@@ -271,7 +270,7 @@ contains
 
       select case (option_name(card, "TYPE"))
       case ("")
-         step%constraint_method = method_null_space
+         step%constraint_method = option_default("method")
       case ("PENALTY", "AUGMENTEDLAGRANGE")
          call option_words("method", known)
          call refuse_option(reader, card, "TYPE", known, "not in this version")

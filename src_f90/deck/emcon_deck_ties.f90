@@ -2,11 +2,11 @@
 module emcon_deck_ties
    use emcon_couplings, only : tie_t
    use emcon_deck_fields, only : data_error, data_open, data_t, next_line
+   use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, line_origin, need_name, option_name, &
       option_real, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : quoted
-   use emcon_interactions, only : multiplier_dual, multiplier_standard
    use emcon_scene, only : scene_t, where_text
    implicit none
    private
@@ -47,14 +47,7 @@ contains
 
       call need_name(reader, card, "NAME", tie%name)
       call option_real(reader, card, "POSITION TOLERANCE", tie%tolerance)
-      select case (option_name(card, "MULTIPLIER"))
-      case ("", "DUAL")
-         tie%multiplier = multiplier_dual
-      case ("STANDARD")
-         tie%multiplier = multiplier_standard
-      case default
-         call refuse_option(reader, card, "MULTIPLIER", "DUAL, STANDARD", "")
-      end select
+      call choose_option(reader, card, "MULTIPLIER", "tie multiplier", tie%multiplier)
       select case (option_name(card, "ADJUST"))
       case ("", "YES")
          continue

@@ -25,7 +25,7 @@ module emcon_law_registry
 
    !> One law, at one order if it has several: what chooses it, and its constants in deck order.
    type :: law_row_t
-      character(len=18) :: name                  !! in texts and in Python
+      character(len=18) :: name                  !! in texts; in capitals what decks may write
       character(len=12) :: keyword
       character(len=16) :: variant               !! parameter without blanks; empty: none
       integer :: order                           !! N=; 0: has none
@@ -40,7 +40,7 @@ module emcon_law_registry
          "C10", "D1", "", "", "", "", "", "", ""]), &
       law_row_t("coupled neo hooke", "HYPERELASTIC", "COUPLEDNEOHOOKE", 0, &
          law_coupled_neo_hooke, [character(len=6) :: "E", "nu", "", "", "", "", "", "", ""]), &
-      law_row_t("mooney rivlin", "HYPERELASTIC", "MOONEY-RIVLIN", 0, law_mooney_rivlin, &
+      law_row_t("mooney-rivlin", "HYPERELASTIC", "MOONEY-RIVLIN", 0, law_mooney_rivlin, &
          [character(len=6) :: "C10", "C01", "D1", "", "", "", "", "", ""]), &
       law_row_t("yeoh", "HYPERELASTIC", "YEOH", 0, law_yeoh, [character(len=6) :: &
          "C10", "C20", "C30", "D1", "D2", "D3", "", "", ""]), &

@@ -3,13 +3,14 @@ module emcon_run_log
    use emcon_element_kinds, only : element_kinds
    use emcon_guards, only : guard_slack
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_segment, &
-      integration_elements, multiplier_dual, normal_nodal, smoothing_hermite
+      normal_nodal, smoothing_none
    use emcon_kinds, only : wp
    use emcon_link_lines, only : add_link_lines
    use emcon_log, only : log_line, log_t
    use emcon_march, only : increment_t
+   use emcon_options, only : option_text
    use emcon_scene, only : scene_t
-   use emcon_solver_registry, only : solver_given, solvers
+   use emcon_solver_registry, only : solver_given
    use emcon_stepper, only : stepper_t
    use emcon_steps, only : step_t
    use emcon_text, only : notes_t, string_t, to_text
@@ -81,10 +82,11 @@ contains
          if (system%n_pair < size(system%contact)) call add("contact: guards hold nodes that " // &
             "the pairs do not, deeper than " // to_text(guard_slack) // " of an edge")
          do k = 1, size(scene%step)
+            call solver_text(scene%step(k), how)
             call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
                ", h = " // to_text(scene%step(k)%h) // &
                trim(merge(", NLGEOM", "        ", scene%step(k)%nlgeom)) // &
-               ", solver " // solver_text(scene%step(k)))
+               ", solver " // how)
             do i = 1, size(scene%pair)
                if (.not. has_changed(scene, i, k)) cycle
                call formulation_text(scene%pair(i)%formulation, scene%step(k)%contact, how)
@@ -110,26 +112,16 @@ contains
    end function model_lines
 
    !> What factorises the matrices of a step.
-   pure function solver_text(step) result(text)
+   pure subroutine solver_text(step, text)
       type(step_t), intent(in) :: step
-      character(len=solver_length(step)) :: text
+      character(len=:), allocatable, intent(out) :: text
 
       if (step%solver == solver_given) then
          text = step%solver_name
       else
-         text = solvers(findloc(solvers%code, step%solver, 1))%text
+         call option_text("solver", step%solver, text)
       end if
-   end function solver_text
-
-   pure integer function solver_length(step)
-      type(step_t), intent(in) :: step
-
-      if (step%solver == solver_given) then
-         solver_length = len(step%solver_name)
-      else
-         solver_length = len_trim(solvers(findloc(solvers%code, step%solver, 1))%text)
-      end if
-   end function solver_length
+   end subroutine solver_text
 
    !> Is a pair computed otherwise in step `k` than in the step before?
    pure logical function has_changed(scene, pair, k)
@@ -151,52 +143,33 @@ contains
       integer, intent(in) :: formulation         !! one of the `formulation_` codes
       type(contact_options_t), intent(in) :: options
       character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable :: integration, multiplier, normal
 
-      call multiplier_text(options, multiplier)
-      select case (formulation)
-      case (formulation_mortar)
-         call integration_text(options, integration)
-         call normal_text(options, normal)
-         text = "mortar, " // integration // ", " // multiplier // ", " // normal
-      case (formulation_segment)
-         text = "gaps of nodes integrated over slave edges, " // multiplier
-      case default
-         text = "node to segment"
-      end select
-      if (options%smoothing == smoothing_hermite) then
-         text = text // ", smoothed master surface"
+      call option_text("formulation", formulation, text)
+      if (formulation == formulation_mortar) then
+         call add_option(text, "integration", options%integration)
+         if (options%n_point > 0) text = text // " with " // to_text(options%n_point) // " points"
+      end if
+      if (any(formulation == [formulation_mortar, formulation_segment])) &
+         call add_option(text, "multiplier", options%multiplier)
+      if (formulation == formulation_mortar) then
+         call add_option(text, "normal", options%normal)
+         if (options%normal == normal_nodal) call add_corner(text, options%normal_angle)
+      end if
+      if (options%smoothing /= smoothing_none) then
+         call add_option(text, "smoothing", options%smoothing)
          call add_corner(text, options%smoothing_angle)
       end if
    end subroutine formulation_text
 
-   pure subroutine integration_text(options, text)
-      type(contact_options_t), intent(in) :: options
-      character(len=:), allocatable, intent(out) :: text
+   pure subroutine add_option(text, kind, code)
+      character(len=:), allocatable, intent(inout) :: text
+      character(len=*), intent(in) :: kind
+      integer, intent(in) :: code
+      character(len=:), allocatable :: more
 
-      text = "segments"
-      if (options%integration == integration_elements) text = "element-wise integration"
-      if (options%n_point > 0) text = text // " with " // to_text(options%n_point) // " points"
-   end subroutine integration_text
-
-   pure subroutine multiplier_text(options, text)
-      type(contact_options_t), intent(in) :: options
-      character(len=:), allocatable, intent(out) :: text
-
-      text = "standard multipliers"
-      if (options%multiplier == multiplier_dual) text = "dual multipliers"
-   end subroutine multiplier_text
-
-   pure subroutine normal_text(options, text)
-      type(contact_options_t), intent(in) :: options
-      character(len=:), allocatable, intent(out) :: text
-
-      text = "normals of edges"
-      if (options%normal == normal_nodal) then
-         text = "normals of nodes"
-         call add_corner(text, options%normal_angle)
-      end if
-   end subroutine normal_text
+      call option_text(kind, code, more)
+      text = text // ", " // more
+   end subroutine add_option
 
    !> Add the angle beyond which a kink is a corner.
    pure subroutine add_corner(text, angle)

@@ -1,68 +1,164 @@
-!> The options of contact and of how it is solved: each is one row, which decks and their messages
-!> are made from.
+!> The options of decks that are one of a few words: each value is one row, which decks and their
+!> messages, the log, the border, Python and the test of the documents are made from.
+!>
+!> Laws have more to say, in rows of their own: `emcon_law_registry`.
 module emcon_options
-   use emcon_interactions, only : formulation_mortar, formulation_nts, formulation_segment, &
-      integration_elements, integration_segments, multiplier_dual, multiplier_standard, &
-      normal_edge, normal_nodal, smoothing_hermite, smoothing_none
-   use emcon_steps, only : method_null_space, method_saddle_point
+   use emcon_couplings, only : tie_t
+   use emcon_element_kinds, only : element_kinds
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+      formulation_nts, formulation_segment, integration_elements, integration_segments, &
+      multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
+      smoothing_none
+   use emcon_solver_registry, only : solvers
+   use emcon_steps, only : initiation_admissible, initiation_persistent, &
+      initiation_velocity_update, method_null_space, method_saddle_point, procedure_dynamic, &
+      procedure_static, step_t
    implicit none
    private
-   public :: option_row_t, option_rows, option_code, option_words
+   public :: option_row_t, n_option_row, option_row, option_code, option_default, option_words, &
+      option_text
 
    !> One value that an option may have.
    type :: option_row_t
-      character(len=12) :: kind                  !! the option
+      character(len=14) :: kind                  !! the option
       integer :: code
       character(len=16) :: word                  !! in decks
+      character(len=24) :: c_name                !! in the headers; empty: it is not there
+      character(len=44) :: text                  !! in the log; empty: nothing is said
       character(len=40) :: also                  !! other words of decks, ",A,B,", without blanks
    end type option_row_t
 
-   type(option_row_t), parameter :: option_rows(*) = [ &
-      option_row_t("formulation", formulation_nts, "NODE TO SURFACE", ""), &
-      option_row_t("formulation", formulation_segment, "SEGMENT", ""), &
-      option_row_t("formulation", formulation_mortar, "MORTAR", &
+   !> Those that no other table has.
+   type(option_row_t), parameter :: own(*) = [ &
+      option_row_t("formulation", formulation_nts, "NODE TO SURFACE", "EMCON_NODE_TO_SEGMENT", &
+         "node to segment", ""), &
+      option_row_t("formulation", formulation_segment, "SEGMENT", "EMCON_SEGMENT", &
+         "gaps of nodes integrated over slave edges", ""), &
+      option_row_t("formulation", formulation_mortar, "MORTAR", "EMCON_MORTAR", "mortar", &
          ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,"), &
-      option_row_t("integration", integration_segments, "SEGMENTS", ""), &
-      option_row_t("integration", integration_elements, "ELEMENTS", ""), &
-      option_row_t("multiplier", multiplier_standard, "STANDARD", ""), &
-      option_row_t("multiplier", multiplier_dual, "DUAL", ""), &
-      option_row_t("normal", normal_edge, "EDGE", ""), &
-      option_row_t("normal", normal_nodal, "NODAL", ""), &
-      option_row_t("smoothing", smoothing_none, "NONE", ""), &
-      option_row_t("smoothing", smoothing_hermite, "HERMITE", ""), &
-      option_row_t("method", method_null_space, "NULL SPACE", ""), &
-      option_row_t("method", method_saddle_point, "SADDLE POINT", "")]
+      option_row_t("integration", integration_segments, "SEGMENTS", "EMCON_SEGMENTS", &
+         "segments", ""), &
+      option_row_t("integration", integration_elements, "ELEMENTS", "EMCON_ELEMENTS", &
+         "element-wise integration", ""), &
+      option_row_t("multiplier", multiplier_standard, "STANDARD", "EMCON_STANDARD", &
+         "standard multipliers", ""), &
+      option_row_t("multiplier", multiplier_dual, "DUAL", "EMCON_DUAL", "dual multipliers", ""), &
+      option_row_t("tie multiplier", multiplier_standard, "STANDARD", "EMCON_STANDARD", &
+         "standard multipliers", ""), &
+      option_row_t("tie multiplier", multiplier_dual, "DUAL", "EMCON_DUAL", "dual multipliers", &
+         ""), &
+      option_row_t("normal", normal_edge, "EDGE", "EMCON_EDGE_NORMAL", "normals of edges", ""), &
+      option_row_t("normal", normal_nodal, "NODAL", "EMCON_NODAL_NORMAL", "normals of nodes", ""), &
+      option_row_t("smoothing", smoothing_none, "NONE", "EMCON_UNSMOOTHED", "", ""), &
+      option_row_t("smoothing", smoothing_hermite, "HERMITE", "EMCON_HERMITE", &
+         "smoothed master surface", ""), &
+      option_row_t("initiation", initiation_persistent, "PERSISTENT", "EMCON_PERSISTENT", "", ""), &
+      option_row_t("initiation", initiation_admissible, "ADMISSIBLE", "EMCON_ADMISSIBLE", "", ""), &
+      option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", "", ""), &
+      option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
+      option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
+      option_row_t("procedure", procedure_static, "STATIC", "", "", ""), &
+      option_row_t("procedure", procedure_dynamic, "DYNAMIC", "", "", "")]
+
+   integer, parameter :: n_option_row = size(own) + size(solvers) + size(element_kinds)
 
 contains
+
+   !> One of the rows of all options; those of an option follow each other.
+   pure type(option_row_t) function option_row(i) result(row)
+      integer, intent(in) :: i                   !! 1..n_option_row
+      integer :: k
+
+      k = i - size(own)
+      if (k <= 0) then
+         row = own(i)
+      else if (k <= size(solvers)) then
+         row = option_row_t("solver", solvers(k)%code, solvers(k)%word, "", solvers(k)%text, "")
+      else
+         k = k - size(solvers)
+         row = option_row_t("element", k, element_kinds(k)%name, "", "", "")
+      end if
+   end function option_row
 
    !> Code of the `word` of a deck; 0: there is none.
    pure integer function option_code(kind, word) result(code)
       character(len=*), intent(in) :: kind
       character(len=*), intent(in) :: word       !! upper case, without blanks
+      type(option_row_t) :: row
       integer :: i
 
       code = 0
       if (word == "") return
-      do i = 1, size(option_rows)
-         if (option_rows(i)%kind /= kind) cycle
-         if (without_blanks(option_rows(i)%word) == word &
-            .or. index(option_rows(i)%also, "," // word // ",") > 0) code = option_rows(i)%code
+      do i = 1, n_option_row
+         row = option_row(i)
+         if (row%kind /= kind) cycle
+         if (without_blanks(row%word) == word .or. index(row%also, "," // word // ",") > 0) &
+            code = row%code
       end do
    end function option_code
+
+   !> Code of an option that a deck does not speak of; < 0: it has to.
+   pure integer function option_default(kind) result(code)
+      character(len=*), intent(in) :: kind
+      type(contact_options_t) :: contact
+      type(contact_pair_t) :: pair
+      type(step_t) :: step
+      type(tie_t) :: tie
+
+      select case (kind)
+      case ("formulation")
+         code = pair%formulation
+      case ("integration")
+         code = contact%integration
+      case ("multiplier")
+         code = contact%multiplier
+      case ("tie multiplier")
+         code = tie%multiplier
+      case ("normal")
+         code = contact%normal
+      case ("smoothing")
+         code = contact%smoothing
+      case ("initiation")
+         code = step%initiation
+      case ("method")
+         code = step%constraint_method
+      case ("solver")
+         code = step%solver
+      case default
+         code = -1
+      end select
+   end function option_default
 
    !> The words that decks are told: "A, B".
    pure subroutine option_words(kind, list)
       character(len=*), intent(in) :: kind
       character(len=:), allocatable, intent(out) :: list
+      type(option_row_t) :: row
       integer :: i
 
       list = ""
-      do i = 1, size(option_rows)
-         if (option_rows(i)%kind /= kind) cycle
+      do i = 1, n_option_row
+         row = option_row(i)
+         if (row%kind /= kind) cycle
          if (list /= "") list = list // ", "
-         list = list // trim(option_rows(i)%word)
+         list = list // trim(row%word)
       end do
    end subroutine option_words
+
+   !> What the log says of a value; "" where it says nothing.
+   pure subroutine option_text(kind, code, text)
+      character(len=*), intent(in) :: kind
+      integer, intent(in) :: code
+      character(len=:), allocatable, intent(out) :: text
+      type(option_row_t) :: row
+      integer :: i
+
+      text = ""
+      do i = 1, n_option_row
+         row = option_row(i)
+         if (row%kind == kind .and. row%code == code) text = trim(row%text)
+      end do
+   end subroutine option_text
 
    !> The text with its blanks moved to its end.
    pure function without_blanks(text) result(squeezed)

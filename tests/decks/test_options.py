@@ -1,46 +1,118 @@
-"""docs/deck.md names every row of the tables of options and laws."""
+"""The tables of options and laws: documents, decks, headers and Python say what their rows say."""
 
 import pathlib
 import re
 
 import pytest
+from emcon import _core
+from emcon.options import LAWS, OPTIONS, host_choices
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-OPTION = re.compile(r'option_row_t\("(\w+)", \w+, "([A-Z ]+)"')
-LAW = re.compile(r'law_row_t\("[\w ]+", "(\w+)", "([\w-]*)", \d+, \w+, \[[^"]+([^]]+)\]')
-
-
-def read(path):
-    """A source with continued lines joined."""
-    return re.sub(r"&\s*\n\s*", "", (ROOT / path).read_text())
+DECK = (ROOT / "docs/deck.md").read_text()
+HEADERS = [ROOT / "src_f90/border" / name for name in ("emcon.h", "emcon_interface.h")]
+#: Options without a default: decks have to say which.
+NEEDED = {"procedure", "element"}
+#: The cards that choose.
+CARD = {
+    "formulation": "*CONTACT PAIR",
+    "integration": "*MORTAR",
+    "multiplier": "*MORTAR",
+    "tie multiplier": "*TIE",
+    "normal": "*MORTAR",
+    "smoothing": "*SURFACE SMOOTHING",
+    "initiation": "*CONTACT INITIATION",
+    "method": "*CONSTRAINT METHOD",
+    "solver": "*STATIC",
+}
 
 
 def missing(doc):
-    """Words of rows that the text does not have between backquotes, alone or after NAME=."""
+    """What the text does not have between backquotes, alone, after NAME= or behind an asterisk."""
     doc = re.sub(r"```.*?```", "", doc, flags=re.S)
     code = set(re.findall(r"`([^`]+)`", doc))
-    words = {word for text in code for word in re.split(r"=|, (?=[A-Z])", text)}
-    source = read("src_f90/scene/emcon_options.f90")
-    rows = OPTION.findall(source)
-    assert len(rows) == source.count("option_row_t(")
-    yield from (word for _, word in rows if word not in words)
-    source = read("src_f90/laws/emcon_law_registry.f90")
-    laws = LAW.findall(source)
-    assert len(laws) == source.count("law_row_t(")
-    for keyword, variant, constants in laws:
-        names = [name for name in re.findall(r'"(\w*)"', constants) if name]
-        squeezed = {text.replace(" ", "") for text in code}
-        if f"*{keyword}{',' * bool(variant)}{variant}" not in squeezed:
-            yield f"{keyword} {variant}"
-        if not (", ".join(names) in doc or "mu1" in names):
-            yield ", ".join(names)
+    words = {word.removeprefix("*") for text in code for word in re.split(r"=|, (?=[A-Z])", text)}
+    yield from (row.word for rows in OPTIONS.values() for row in rows if row.word not in words)
+    squeezed = {text.replace(" ", "") for text in code}
+    for law in LAWS.values():
+        if f"*{law.keyword}{',' * bool(law.variant)}{law.variant}" not in squeezed:
+            yield law.name
+        if not (", ".join(law.constants) in doc or "mu1" in law.constants):
+            yield ", ".join(law.constants)
+
+
+def wrong_defaults(doc):
+    """Options whose default the table of cards does not tell: as `WORD` (default), or in a column."""
+    for option, card in CARD.items():
+        word = next(row.word for row in OPTIONS[option] if row.is_default)
+        line = next(line for line in doc.splitlines() if line.startswith(f"| `{card}` |"))
+        last = line.strip(" |").split("|")[-1]
+        if f"{word}` (default)" not in line and f"`{word}`" not in last:
+            yield option
 
 
 def test_the_reference_names_every_row():
-    assert list(missing((ROOT / "docs/deck.md").read_text())) == []
+    assert list(missing(DECK)) == []
 
 
-@pytest.mark.parametrize("word", ["SADDLE POINT", "YEOH", "C10, C01, D1", "HERMITE"])
+def test_the_reference_tells_every_default():
+    assert set(CARD) | NEEDED == set(OPTIONS)
+    assert list(wrong_defaults(DECK)) == []
+
+
+@pytest.mark.parametrize("word", ["SADDLE POINT", "YEOH", "C10, C01, D1", "HERMITE", "CPE3"])
 def test_a_row_that_is_not_named_is_found(word):
-    doc = (ROOT / "docs/deck.md").read_text()
-    assert len(list(missing(doc.replace(word, "?")))) >= 1
+    assert len(list(missing(DECK.replace(word, "?")))) >= 1
+
+
+@pytest.mark.parametrize(("option", "right", "wrong"), [
+    ("formulation", "SURFACE` (default)", "SURFACE`"),
+    ("normal", "`DUAL`, `NODAL`", "`DUAL`, `EDGE`"),
+])
+def test_a_wrong_default_is_found(option, right, wrong):
+    assert list(wrong_defaults(DECK.replace(right, wrong))) == [option]
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_values_of_an_option(option):
+    """Each has a word and a code of its own; one is the default, where there is one."""
+    rows = OPTIONS[option]
+    assert len({row.word for row in rows}) == len({row.code for row in rows}) == len(rows)
+    assert sum(row.is_default for row in rows) == (option not in NEEDED)
+
+
+def test_enumerations_of_the_headers():
+    """Each name of an option in the headers is that of a row, with its code, and the other way."""
+    rows = {(row.c_name, row.code) for rows in OPTIONS.values() for row in rows if row.c_name}
+    assert all(getattr(_core, name) == code for name, code in rows)
+    text = HEADERS[1].read_text()
+    found = re.findall(r"^enum \{(.*)\};\s+/\* (\w+) \*/$", text, re.M)
+    assert {option for _, option in found} == {option for option in OPTIONS
+                                               if option != "tie multiplier"
+                                               and any(row.c_name for row in OPTIONS[option])}
+    for body, option in found:
+        pairs = re.findall(r"(\w+) = (\d+)", body)
+        assert pairs == [(row.c_name, str(row.code)) for row in OPTIONS[option] if row.c_name]
+
+
+def test_words_of_hosts():
+    assert host_choices("formulation") == {"node to surface": 1, "segment": 2, "mortar": 3,
+                                           "node to segment": 1}
+    assert "velocity update" not in host_choices("initiation")
+
+
+def test_names_of_laws():
+    """In capitals the name is the parameter that chooses the law."""
+    for law in LAWS.values():
+        assert law.variant in ("", law.family.upper().replace(" ", ""))
+    assert {law.argument for law in LAWS.values()} == {
+        "elastic", "neo_hooke", "coupled_neo_hooke", "mooney_rivlin", "yeoh", "ogden"}
+
+
+def test_words_have_no_second_list():
+    """Where one of several words is read it is by the table: no reader lists them again."""
+    words = [row.word.replace(" ", "") for option in ("multiplier", "smoothing", "initiation")
+             for row in OPTIONS[option] if row.word != "NONE"]
+    cases = [line for path in (ROOT / "src_f90").glob("*/*.f90")
+             for line in path.read_text().splitlines() if "case (" in line]
+    assert len(cases) > 200
+    assert [line for line in cases for word in words if f'"{word}"' in line] == []

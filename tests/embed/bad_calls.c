@@ -82,6 +82,7 @@ static void without_model(void)
    TELL(emcon_constraints(m, 1, x, x, 0, &report));
    TELL(emcon_curvature_times(m, 1, x, 1, x, x));
    TELL(emcon_get_law(0, i, 0, NULL));
+   TELL(emcon_get_option(0, i, NULL, 0, NULL));
    TELL(emcon_law_response(1, 0, NULL, NULL, NULL, x, NULL, NULL));
    TELL(emcon_node_gap(NULL, NULL, 0, 0, 0, NULL, NULL, NULL, NULL));
 }

@@ -122,6 +122,16 @@ static void kernels(void)
    REFUSED(emcon_get_law(1000, &law, n_text, text));
    REFUSED(emcon_get_law(-1, &law, n_text, text));
    free(text);
+   const char *nts = "formulation\nNODE TO SURFACE\nEMCON_NODE_TO_SEGMENT\nnode to segment";
+   const int n_nts = (int)strlen(nts) + 1;
+   text = malloc((size_t)n_nts);
+   int code = 0, is_default = 0;
+   WORKS(emcon_get_option(0, &code, &is_default, n_nts, text));
+   need(strcmp(text, nts) == 0 && code == 1 && is_default == 1, "the first option");
+   REFUSED(emcon_get_option(0, &code, &is_default, n_nts - 1, text));
+   REFUSED(emcon_get_option(1000, &code, &is_default, n_nts, text));
+   REFUSED(emcon_get_option(-1, &code, &is_default, n_nts, text));
+   free(text);
    WORKS(emcon_law_response(law, 2, constant, none, strain, &energy, stress, tangent));
    need(energy == 1 && stress[0] == 1 && tangent[0] == 1 && tangent[1] == 0, "law");
    REFUSED(emcon_law_response(99, 2, constant, none, strain, &energy, stress, tangent));

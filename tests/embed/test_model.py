@@ -20,11 +20,11 @@ from emcon import _core, errors  # noqa: E402
 from emcon.deck_text import number, table  # noqa: E402
 from emcon.mesh import block, read  # noqa: E402
 from emcon.model import Model  # noqa: E402
+from emcon.options import LAWS  # noqa: E402
 from emcon.stepper import AnalysisError, InputError, Stepper  # noqa: E402
 
 RING = ROOT/"input_decks"/"ring.inp"
 KEYWORDS = ROOT/"src_f90"/"deck"/"emcon_deck_keywords.f90"
-LAWS = ROOT/"src_f90"/"laws"/"emcon_law_registry.f90"
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
@@ -302,10 +302,9 @@ def test_all_keywords_of_the_reader_have_a_method() -> None:
     missing = {name: options - written.get(name, set()) for name, options in known.items()
                if name not in written or not options <= written[name]}
     assert not missing
-    laws = re.findall(r'law_row_t\("[\w ]+", *"(\w+)", *"([\w-]*)"', LAWS.read_text())
-    assert len(laws) >= 8
-    assert all(law in written and (not variant or variant in written[law])
-               for law, variant in laws)
+    assert len(LAWS) >= 8
+    assert all(law.keyword in written and (not law.variant or law.variant in written[law.keyword])
+               for law in LAWS.values())
 
 
 @pytest.mark.parametrize("path", sorted((ROOT/"input_decks").glob("*.inp"))

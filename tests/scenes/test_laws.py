@@ -6,7 +6,7 @@ from scene_tools import DECKS, Deck, run_deck
 
 LAWS = {
     "neo hooke": ["*HYPERELASTIC, NEO HOOKE", "50., 0.004"],
-    "mooney rivlin": ["*HYPERELASTIC, MOONEY-RIVLIN", "40., 10., 0.004"],
+    "mooney-rivlin": ["*HYPERELASTIC, MOONEY-RIVLIN", "40., 10., 0.004"],
     "yeoh": ["*HYPERELASTIC, YEOH", "50., -2., 1., 0.004, 0.1, 0.1"],
     "ogden 1": ["*HYPERELASTIC, OGDEN", "100., 2., 0.004"],
     "ogden 3": ["*HYPERELASTIC, OGDEN, N=3", "75., 1.3, 12.5, 4., 12.5, -2., 0.004, 0.1", "0.1"],

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import Array, MeshError
+from .checks import KINDS, Array, MeshError
 from .mesh import Mesh
 
 _Index = NDArray[np.int64]
@@ -186,7 +186,7 @@ def _assemble(nodes: Array, quads: _Index, name: str, kind: str,
         mesh = Mesh(nodes, {kind: halves})
         faces = {side: tuple(holder[rows, face - 1].T) for side, (rows, face, _) in sides.items()}
     else:
-        raise MeshError(f"{kind!r} is no kind of element; known are CPE3, CPE4")
+        raise MeshError(f"{kind!r} is no kind of element; known are {', '.join(KINDS)}")
     mesh.add_node_set(name, mesh.node_labels)
     mesh.add_element_set(name, mesh.element_labels[kind])
     for side, pair in faces.items():
