@@ -24,7 +24,7 @@ contains
    !> The terms of `scene`, and of what it is given.
    subroutine terms_create(scene, term, error, given)
       type(scene_t), intent(in) :: scene
-      type(term_box_t), allocatable, intent(out) :: term(:)
+      type(term_box_t), allocatable, intent(out) :: term(:)   !! (n_term)
       type(error_t), allocatable, intent(out) :: error
       type(given_t), intent(in), optional :: given
       integer :: n(2), i
