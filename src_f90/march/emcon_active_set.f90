@@ -11,7 +11,6 @@
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
-   use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
    use emcon_holding, only : holding_complete, holding_find_free, holding_forget, holding_t
    use emcon_kinds, only : wp
@@ -121,12 +120,11 @@ contains
    end subroutine active_set_overclosure
 
    !> Solve the step that has begun; `motion%du` is the first guess and the result.
-   subroutine active_set_solve(self, system, scene, newton, correction, motion, status, error)
+   subroutine active_set_solve(self, system, scene, newton, motion, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
-      type(correction_t), intent(inout) :: correction
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
@@ -142,13 +140,16 @@ contains
          status = step_not_held
          if (allocated(self%holding%text)) return
          self%before = motion%du
-         call newton_solve(newton, system, correction, self%set, motion, status, error)
+         call newton_solve(newton, system, self%set, motion, status, error)
          if (allocated(error)) return
          self%lam(self%set%id) = self%set%lam
          self%n_newton = self%n_newton + newton%n_iteration
          if (status == newton_redundant) then
-            call put_off(self, pack(correction%redundant, correction%is_near))
-            call active_set_drop(self, pack(correction%redundant, .not. correction%is_near))
+            associate (redundant => newton%correction%redundant, is_near => &
+                  newton%correction%is_near)
+               call put_off(self, pack(redundant, is_near))
+               call active_set_drop(self, pack(redundant, .not. is_near))
+            end associate
             cycle
          end if
          if (status == newton_diverged) then

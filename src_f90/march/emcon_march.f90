@@ -79,7 +79,7 @@ contains
    subroutine march_free(self)
       type(march_t), intent(inout) :: self
 
-      call correction_free(self%correction)
+      call correction_free(self%newton%correction)
       call velocity_update_free(self%velocity_update)
    end subroutine march_free
 
@@ -210,7 +210,7 @@ contains
             self%scheme%has_inertia = .false.
          end if
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
-            size(scene%x, 2), step%newton_tolerance, step%newton_maximum)
+            shape(scene%x), step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
          self%active%puts_off = .true.
@@ -257,11 +257,11 @@ contains
 
       method = merge(step%constraint_method, method_saddle_point, self%system%space%is_reduced)
       if (step%solver /= solver_given) then
-         call correction_reset(self%correction, method, step%solver)
+         call correction_reset(self%newton%correction, method, step%solver)
          call velocity_update_reset(self%velocity_update, step%solver)
       else
          i = given_find_solver(self%solver, step%solver_name)
-         call correction_reset(self%correction, method, solver_given + i, self%solver(i)%solver)
+         call correction_reset(self%newton%correction, method, solver_given + i, self%solver(i)%solver)
          call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
       end if
    end subroutine choose_solver

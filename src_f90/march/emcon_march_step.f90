@@ -6,7 +6,7 @@ module emcon_march_step
       step_overlaps, step_refused
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_constraints, only : constraint_place, constraints_force
-   use emcon_correction, only : correction_reason, correction_t
+   use emcon_correction, only : correction_reason
    use emcon_errors, only : error_t
    use emcon_guards, only : guard_slack
    use emcon_holding, only : holding_t
@@ -71,7 +71,6 @@ module emcon_march_step
       class(scheme_t), allocatable :: scheme
       type(newton_t) :: newton
       type(active_set_t) :: active
-      type(correction_t) :: correction
       type(velocity_update_t) :: velocity_update
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
@@ -110,7 +109,7 @@ contains
       do attempt = 1, 2
          call march_guess(self, scene, part%start, part%h, is_at_rest=attempt == 2)
          call active_set_begin(self%active, self%system, self%motion, self%state)
-         call active_set_solve(self%active, self%system, scene, self%newton, self%correction, &
+         call active_set_solve(self%active, self%system, scene, self%newton, &
             self%motion, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
@@ -324,8 +323,8 @@ contains
          state%internal = system%response%part(role_internal)%force
          state%energy = system%response%energy
          state%potential = system%response%potential
-         if (self%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
-            trim(correction_reason(self%correction)) // ": solved as a saddle point")
+         if (self%newton%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
+            trim(correction_reason(self%newton%correction)) // ": solved as a saddle point")
          call stand_off_add(increment%stand_off, system, set, h)
          increment%is_guarded = increment%is_guarded .or. &
             any(set%id > system%first_constraint(system%n_pair + 1))

@@ -67,14 +67,16 @@ module emcon_newton
       integer :: n_solve = 0                     !! linear systems solved in the last solve
       integer :: n_history = 0
       real(wp), allocatable :: history(:)        !! relative residuals of the last solve
-      real(wp), allocatable :: residual(:), scale(:), correction(:)   !! (n_unknown)
-      real(wp), allocatable :: dlam(:)
+      real(wp), allocatable :: residual(:), scale(:)   !! (n_unknown)
+      real(wp), allocatable :: dq(:)             !! (n_unknown) the last correction
+      real(wp), allocatable :: dlam(:)           !! (n) and that of the multipliers
       real(wp), allocatable :: way(:)            !! (n_unknown) the correction to search along
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
       real(wp), allocatable :: left(:, :)        !! (2, n_node) the residual with them
       !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
+      type(correction_t) :: correction           !! how linear systems are solved
       ! how the present solve goes:
       real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far
       real(wp) :: best = 0.0_wp
@@ -89,29 +91,34 @@ module emcon_newton
 
 contains
 
-   !> Set up for `n_unknown` unknowns.
-   subroutine newton_init(self, n_unknown, n_node, tolerance, maximum)
-      type(newton_t), intent(out) :: self
+   !> Set up for `n_unknown` unknowns; `correction` stays.
+   subroutine newton_init(self, n_unknown, extent, tolerance, maximum)
+      type(newton_t), intent(inout) :: self
       integer, intent(in) :: n_unknown           !! >= 0
-      integer, intent(in) :: n_node              !! of the scene
+      integer, intent(in) :: extent(2)           !! of a nodal field: n_dim, n_node
       real(wp), intent(in) :: tolerance          !! > 0, of the relative residual
       integer, intent(in) :: maximum             !! iterations at most
 
       self%tolerance = tolerance
       self%maximum = maximum
-      allocate(self%residual(n_unknown), self%scale(n_unknown), self%correction(n_unknown), &
+      self%is_idle = .false.
+      if (allocated(self%residual)) deallocate(self%residual, self%scale, self%dq, self%way, &
+         self%contact, self%left, self%driven, self%history)
+      allocate(self%residual(n_unknown), self%scale(n_unknown), self%dq(n_unknown), &
          self%way(n_unknown))
-      allocate(self%contact(2, n_node), self%driven(2, n_node), self%left(2, n_node), &
-         source=0.0_wp)
+      associate (n_dim => extent(1), n_node => extent(2))
+         allocate(self%contact(n_dim, n_node), self%left(n_dim, n_node), &
+            self%driven(n_dim, n_node), source=0.0_wp)
+      end associate
       allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
+      call begin(self, 0)
    end subroutine newton_init
 
    !> Solve for `motion%du`, whose prescribed entries stand; on entry a first guess. The multipliers
    !> of `set` start from what they are.
-   subroutine newton_solve(self, system, correction, set, motion, status, error)
+   subroutine newton_solve(self, system, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
@@ -126,16 +133,16 @@ contains
       do
          call check_interrupt(self, status, error)
          if (allocated(error)) return
-         call evaluate_damped(self, system, correction, set, motion, status, error)
+         call evaluate_damped(self, system, set, motion, status, error)
          if (.not. allocated(error) .and. status == newton_converged) call measure(self, system, &
-            correction, set, norm, defect, is_rounding)
-         if (correction%n_redundant > 0 .and. status == newton_converged) then
+            set, norm, defect, is_rounding)
+         if (self%correction%n_redundant > 0 .and. status == newton_converged) then
             status = newton_redundant
             if (is_driven) motion%du = motion%du + self%driven
          end if
          if (allocated(error) .or. status /= newton_converged) return
          if (is_driven) then
-            call start_driven(self, system, correction, set, motion, status, error)
+            call start_driven(self, system, set, motion, status, error)
             if (allocated(error) .or. status /= newton_converged) return
             is_driven = .false.
             cycle
@@ -150,10 +157,10 @@ contains
             status = newton_diverged
             return
          case (next_tangent)
-            call factorise(self, system, correction, set, status, error)
+            call factorise(self, system, set, status, error)
             if (allocated(error) .or. status /= newton_converged) return
          end select
-         call correct(self, system, correction, set, motion%du, error)
+         call correct(self, system, set, motion%du, error)
          if (allocated(error)) return
          if (motion%pose%is_end .and. is_too_far(self, motion%x)) then
             status = newton_singular
@@ -175,15 +182,15 @@ contains
       if (self%line%is_on) then
          call line_search_take(self%line, dot_product(self%way, self%residual))
       else
-         call line_search_begin(self%line, [self%work, dot_product(self%correction, &
+         call line_search_begin(self%line, [self%work, dot_product(self%dq, &
             self%residual)])
-         if (self%line%is_on) self%way = self%correction
+         if (self%line%is_on) self%way = self%dq
          self%work = 0.0_wp
       end if
       goes_on = self%line%is_on
       if (.not. goes_on) return
-      self%correction = self%line%step*self%way
-      call add_to_dofs(system%space%numbering, self%correction, 1.0_wp, motion%du)
+      self%dq = self%line%step*self%way
+      call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, motion%du)
       set%lam = set%lam + self%line%step*self%dlam
    end subroutine search
 
@@ -204,7 +211,7 @@ contains
       real(wp), intent(in) :: x(:, :)            !! (2, n_node) [L]
 
       is_too_far = .false.
-      if (size(self%correction) > 0) is_too_far = maxval(abs(self%correction)) &
+      if (size(self%dq) > 0) is_too_far = maxval(abs(self%dq)) &
          > farthest*norm2(maxval(x, 2) - minval(x, 2))
    end function is_too_far
 
@@ -279,47 +286,44 @@ contains
    end subroutine choose_damping
 
    !> Factorise for the present tangent.
-   subroutine factorise(self, system, correction, set, status, error)
+   subroutine factorise(self, system, set, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
-      type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(in) :: set
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       logical :: is_singular
 
-      call correction_factorise(correction, system, set, is_singular, error)
+      call correction_factorise(self%correction, system, set, is_singular, error)
       self%n_iteration = self%n_iteration + 1
       status = merge(newton_singular, newton_converged, is_singular)
    end subroutine factorise
 
    !> Correct `du` and the multipliers for the present residual.
-   subroutine correct(self, system, correction, set, du, error)
+   subroutine correct(self, system, set, du, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
-      type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(inout), contiguous :: du(:, :)
       type(error_t), allocatable, intent(out) :: error
 
-      call correction_solve(correction, set, self%residual, self%correction, self%dlam, error)
+      call correction_solve(self%correction, set, self%residual, self%dq, self%dlam, error)
       if (allocated(error)) return
       self%n_solve = self%n_solve + 1
       if (set%n > set%n_linear .and. .not. self%is_polish) then
-         self%correction = self%damping*self%correction
+         self%dq = self%damping*self%dq
          self%dlam = self%damping*self%dlam
-         self%work = dot_product(self%correction, self%residual)
+         self%work = dot_product(self%dq, self%residual)
       end if
-      call add_to_dofs(system%space%numbering, self%correction, 1.0_wp, du)
+      call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
       set%lam = set%lam + self%dlam
    end subroutine correct
 
    !> First correction: what the prescribed motion does by the tangent at its start. Elements at
    !> driven nodes would be squeezed if these moved alone.
-   subroutine start_driven(self, system, correction, set, motion, status, error)
+   subroutine start_driven(self, system, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status
@@ -332,18 +336,17 @@ contains
       do k = 1, set%n
          set%defect(k) = set%defect(k) + condition_rate(set%item(k), self%driven)
       end do
-      call factorise(self, system, correction, set, status, error)
+      call factorise(self, system, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return
-      call correct(self, system, correction, set, motion%du, error)
+      call correct(self, system, set, motion%du, error)
       self%work = 0.0_wp
       motion%du = motion%du + self%driven
    end subroutine start_driven
 
    !> Forces and constraints; the last correction is halved as long as there are none.
-   subroutine evaluate_damped(self, system, correction, set, motion, status, error)
+   subroutine evaluate_damped(self, system, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status
@@ -358,10 +361,10 @@ contains
          if (allocated(error)) return
          if (.not. allocated(system%response%refusal)) exit
          if (i == most_halvings .or. self%n_solve == 0) return
-         self%correction = 0.5_wp*self%correction
+         self%dq = 0.5_wp*self%dq
          self%work = 0.5_wp*self%work
          self%line%is_on = .false.
-         call add_to_dofs(system%space%numbering, self%correction, -1.0_wp, motion%du)
+         call add_to_dofs(system%space%numbering, self%dq, -1.0_wp, motion%du)
       end do
       status = newton_converged
       if (set%n > 0) then
@@ -370,22 +373,21 @@ contains
          call constraints_rows(set, system%space%numbering)
          call stopwatch_stop(system%contact_clock)
       end if
-      call correction_lay_out(correction, system, set, error)
+      call correction_lay_out(self%correction, system, set, error)
    end subroutine evaluate_damped
 
    !> Residual with contact forces, its size relative to its contributions, and the largest gap
    !> defect relative to the edge.
-   subroutine measure(self, system, correction, set, norm, defect, is_rounding)
+   subroutine measure(self, system, set, norm, defect, is_rounding)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(correction_t), intent(in) :: correction
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(out) :: norm, defect
       logical, intent(out) :: is_rounding        !! nothing but round-off is left
       integer :: k
 
       call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
-      call correction_multipliers(correction, system, set, self%residual)
+      call correction_multipliers(self%correction, system, set, self%residual)
       call constraints_force(set, 1, self%contact, system%response%magnitude)
       if (set%n > 0) then
          self%left = system%response%residual - self%contact

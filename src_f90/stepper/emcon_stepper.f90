@@ -229,7 +229,7 @@ contains
       type(stepper_t), intent(in) :: self
 
       stepper_contact_seconds = self%march%system%contact_clock%seconds &
-         + correction_seconds(self%march%correction)
+         + correction_seconds(self%march%newton%correction)
    end function stepper_contact_seconds
 
    !> Put all that the next increment depends on into `restart`.

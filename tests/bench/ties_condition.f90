@@ -71,16 +71,16 @@ contains
          if (set%n == 0) then
             a = dense(march%system%matrix)
             call print_line("null space", a, [(1.0_dp, k = 1, n)], 1.0_dp)
-         else if (march%correction%method == method_saddle_point) then
+         else if (march%newton%correction%method == method_saddle_point) then
             allocate(length(n + set%n), source=1.0_dp)
             do k = 1, set%n
                if (set%id(k) <= march%system%linear%n) length(n + k) = real(set%item(k)%size, dp)
             end do
-            a = dense(march%correction%saddle_point%full)
+            a = dense(march%newton%correction%saddle_point%full)
             a(n + 1:, :) = -a(n + 1:, :)
-            call print_line("saddle point", a, length, march%correction%saddle_point%scale, n)
+            call print_line("saddle point", a, length, march%newton%correction%saddle_point%scale, n)
          else
-            a = dense(march%correction%null_space%reduced)
+            a = dense(march%newton%correction%null_space%reduced)
             call print_line("null space", a, [(1.0_dp, k = 1, size(a, 1))], 1.0_dp)
          end if
       end associate

@@ -288,7 +288,7 @@ contains
       do k = 1, n_step/2
          do m = 1, 2
             scene%step(1)%constraint_method = merge(method_null_space, method_saddle_point, m == 1)
-            march(m)%correction%method = scene%step(1)%constraint_method
+            march(m)%newton%correction%method = scene%step(1)%constraint_method
             call march_increment(march(m), scene, increment, error)
             if (allocated(error)) return
          end do
@@ -297,8 +297,8 @@ contains
          call check_near(error, march(1)%state%lam, march(2)%state%lam, 1.0e6_wp*eps, &
             maxval(march(1)%state%lam) + 1.0_wp, "multipliers in increment " // to_text(k))
       end do
-      call check_true(error, march(1)%correction%uses_null_space &
-         .and. .not. march(2)%correction%uses_null_space, "each by its own method")
+      call check_true(error, march(1)%newton%correction%uses_null_space &
+         .and. .not. march(2)%newton%correction%uses_null_space, "each by its own method")
       call march_free(march(1))
       call march_free(march(2))
    end subroutine test_methods

@@ -25,7 +25,6 @@ module test_newton
    type :: trial_t
       type(system_t) :: system
       type(newton_t) :: newton
-      type(correction_t) :: correction
       type(constraint_set_t) :: set
       type(motion_t) :: motion
       integer :: status = 0
@@ -61,9 +60,9 @@ contains
       if (allocated(error)) return
       call system_begin_step(trial%system, scene, 1, error)
       if (allocated(error)) return
-      call newton_init(trial%newton, trial%system%space%numbering%n_unknown, size(scene%x, 2), &
+      call newton_init(trial%newton, trial%system%space%numbering%n_unknown, shape(scene%x), &
          1.0e3_wp*epsilon(1.0_wp), maximum)
-      call correction_reset(trial%correction, method, solver_default)
+      call correction_reset(trial%newton%correction, method, solver_default)
       call constraints_select(trial%set, none)
       call motion_init(trial%motion, scene%x)
       trial%motion%pose%is_end = .not. h > 0.0_wp
@@ -76,7 +75,7 @@ contains
       type(trial_t), intent(inout) :: trial
       type(error_t), allocatable, intent(out) :: error
 
-      call newton_solve(trial%newton, trial%system, trial%correction, trial%set, trial%motion, &
+      call newton_solve(trial%newton, trial%system, trial%set, trial%motion, &
          trial%status, error)
    end subroutine solve
 
@@ -131,7 +130,7 @@ contains
       call check_quadratic(error, trial, "large step")
       call check_true(error, trial%newton%n_iteration <= 8, &
          "iterations: " // to_text(trial%newton%n_iteration))
-      call correction_free(trial%correction)
+      call correction_free(trial%newton%correction)
    end subroutine test_order
 
    !> With three active constraints on a bent surface, by either method.
@@ -157,7 +156,7 @@ contains
          call check_quadratic(error, trial, "method " // to_text(method))
          call check_near(error, trial%set%defect, [0.0_wp, 0.0_wp, 0.0_wp], &
             16.0_wp*epsilon(1.0_wp), 1.0_wp, "gaps")
-         call correction_free(trial%correction)
+         call correction_free(trial%newton%correction)
          if (allocated(error)) return
       end do
    end subroutine test_order_in_contact
@@ -179,7 +178,7 @@ contains
       call check_equal(error, trial%status, newton_converged, "status")
       call check_equal(error, trial%newton%n_solve, 0, "linear systems")
       call check_true(error, maxval(abs(trial%system%response%residual)) > 0.0_wp, "reactions")
-      call correction_free(trial%correction)
+      call correction_free(trial%newton%correction)
    end subroutine test_no_unknowns
 
    subroutine test_rest(error)
@@ -195,7 +194,7 @@ contains
       call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, [trial%status, trial%newton%n_solve], [newton_converged, 0], "solves")
-      call correction_free(trial%correction)
+      call correction_free(trial%newton%correction)
    end subroutine test_rest
 
    subroutine test_diverged(error)
@@ -214,7 +213,7 @@ contains
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_diverged, "status")
       call check_equal(error, trial%newton%n_iteration, 2, "iterations")
-      call correction_free(trial%correction)
+      call correction_free(trial%newton%correction)
    end subroutine test_diverged
 
    !> Statics of a free block under a load.
@@ -240,7 +239,7 @@ contains
       call check_true(error, trial%status /= newton_converged, "no solution is claimed")
       call check_true(error, any(trial%status == [newton_singular, newton_diverged, &
          newton_refused]), "status")
-      call correction_free(trial%correction)
+      call correction_free(trial%newton%correction)
    end subroutine test_singular
 
    subroutine test_inverted(error)
@@ -259,7 +258,7 @@ contains
       call check_equal(error, trial%status, newton_refused, "status")
       if (allocated(trial%system%response%refusal)) call check_equal(error, &
          trial%system%response%refusal, "element 3 is inverted", "refusal")
-      call correction_free(trial%correction)
+      call correction_free(trial%newton%correction)
    end subroutine test_inverted
 
    !> Dead loads that by linear theory press the block to three times its height.
@@ -293,7 +292,7 @@ contains
       call check_near(error, trial%system%response%part(role_internal)%force(2, 3:), &
          [load%value, load%value], &
          1.0e4_wp*epsilon(1.0_wp), young, "internal forces balance the loads")
-      call correction_free(trial%correction)
+      call correction_free(trial%newton%correction)
    end subroutine test_damping
 
 end module test_newton
