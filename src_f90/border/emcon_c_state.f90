@@ -35,7 +35,7 @@ contains
       to%n_step = size(model%stepper%scene%step)
       if (.not. allocated(model%stepper%march%scheme)) return
       associate (system => model%stepper%march%system)
-         to%n_contact = system%n_constraint - system%linear%n
+         to%n_contact = system%n_constraint - system%first_constraint(1)
          to%n_pair = system%n_pair
          to%n_body = system%space%n_body
          to%n_unknown = system%space%numbering%n_unknown
@@ -210,7 +210,7 @@ contains
       call find_built(handle, model, emcon_get_contact)
       if (emcon_get_contact /= err_none) return
       associate (system => model%stepper%march%system, state => model%stepper%march%state)
-         before = system%linear%n
+         before = system%first_constraint(1)
          call check_count("n_contact", n_contact, system%n_constraint - before, error)
          call handle_pass(model, error, emcon_get_contact)
          if (allocated(error)) return
@@ -222,7 +222,7 @@ contains
                   last => system%first_constraint(i + 1) - before)
                of_node(first:last) = &
                   model%stepper%scene%node_label(system%contact(i)%contact%node)
-               of_pair(first:last) = abs(system%of_pair(i)) - 1
+               of_pair(first:last) = abs(system%contact(i)%of_pair) - 1
             end associate
          end do
          call put_numbers(of_node, label)
@@ -240,7 +240,7 @@ contains
       call find_built(handle, model, emcon_get_pressures)
       if (emcon_get_pressures /= err_none) return
       associate (system => model%stepper%march%system)
-         before = system%linear%n
+         before = system%first_constraint(1)
          call check_count("n_contact", n_contact, system%n_constraint - before, error)
       end associate
       if (.not. allocated(error)) then

@@ -35,7 +35,6 @@ module emcon_contact
    end type gap_state_t
 
    type, abstract, extends(constraint_t) :: contact_t
-      integer :: n_constraint = 0
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       logical :: may_sharpen = .false.                !! of polygons: convex corners are rounded
       logical :: is_sharp = .false.                   !! but not in this step
@@ -66,6 +65,7 @@ module emcon_contact
 
    !> For arrays of formulations of different types.
    type :: contact_box_t
+      integer :: of_pair = 0                          !! of the scene; < 0: its sides exchanged
       class(contact_t), allocatable :: contact
    end type contact_box_t
 

@@ -290,6 +290,7 @@ contains
       integer :: pair
 
       self%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%space%is_reduced
+      self%is_active(system%linear%n + 1:system%first_constraint(1)) = .true.
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
@@ -322,7 +323,7 @@ contains
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
          call constraint_place(system, self%set%id(k), pair, i)
-         self%set%is_kept(k) = .true.
+         self%set%is_kept(k) = self%set%id(k) <= system%linear%n
          if (pair == 0) cycle
          self%set%is_firm(k) = .not. self%puts_off .or. self%only_adds &
             .or. self%is_put_off(self%set%id(k))
@@ -351,7 +352,7 @@ contains
       status = step_done
       has_changed = .false.
       self%is_stale = .false.
-      k = count(self%is_active(:system%linear%n))
+      k = count(self%is_active(:system%first_constraint(1)))
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             ! The motion may be more than was expected.
@@ -472,7 +473,7 @@ contains
 
       is_done = .true.
       if (self%only_adds) return
-      do k = self%set%n_linear + 1, self%set%n
+      do k = self%set%n_held + 1, self%set%n
          associate (id => self%set%id(k))
             if (self%is_let_go(id) .or. .not. self%set%lam(k) < 0.0_wp) cycle
             self%is_let_go(id) = .true.

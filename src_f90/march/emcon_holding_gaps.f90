@@ -41,7 +41,7 @@ contains
       integer :: k, pair, i, id
 
       call constraints_select(set, pack([(k, k = 1, size(is_meant))], &
-         is_meant .and. [(k > system%linear%n, k = 1, size(is_meant))]))
+         is_meant .and. [(k > system%first_constraint(1), k = 1, size(is_meant))]))
       do k = 1, set%n
          id = set%id(k)
          call constraint_place(system, id, pair, i)

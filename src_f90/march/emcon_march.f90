@@ -261,7 +261,8 @@ contains
          call velocity_update_reset(self%velocity_update, step%solver)
       else
          i = given_find_solver(self%solver, step%solver_name)
-         call correction_reset(self%newton%correction, method, solver_given + i, self%solver(i)%solver)
+         call correction_reset(self%newton%correction, method, solver_given + i, &
+            self%solver(i)%solver)
          call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
       end if
    end subroutine choose_solver
@@ -353,7 +354,7 @@ contains
          state%increment = state%increment + 1
          state%step_time = grid_time(self, step, state%n_grid)
          state%time = state%start_time + state%step_time
-         increment%n_active = count(state%is_active(self%system%linear%n + 1:))
+         increment%n_active = count(state%is_active(self%system%first_constraint(1) + 1:))
          if (increment%n_cut > 0) then
             state%n_easy = 0
             state%grid_stride = max(1, state%grid_stride/2)
@@ -409,7 +410,8 @@ contains
       end if
       self%state%increment = self%state%increment + 1
       call march_set_time(self, scene, before%step_time + h)
-      increment%n_active = count(self%state%is_active(self%system%linear%n + 1:))
+      increment%n_active = count(self%state%is_active( &
+         self%system%first_constraint(1) + 1:))
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine march_free_increment
 

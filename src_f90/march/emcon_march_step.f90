@@ -310,7 +310,7 @@ contains
          end do
          call follow_links(system, self%v1)
          state%reaction = system%response%residual
-         if (set%n_linear > 0) call constraints_force(set, set%n_linear + 1, self%newton%contact)
+         if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
          call book_work(self)
          if (scene%step(state%i_step)%initiation == initiation_velocity_update &
             .and. self%scheme%has_inertia) call restore_energy(self, increment%notes, error)

@@ -95,7 +95,7 @@ contains
    subroutine newton_init(self, n_unknown, extent, tolerance, maximum)
       type(newton_t), intent(inout) :: self
       integer, intent(in) :: n_unknown           !! >= 0
-      integer, intent(in) :: extent(2)           !! of a nodal field: n_dim, n_node
+      integer, intent(in) :: extent(:)           !! of a nodal field: n_dim, n_node
       real(wp), intent(in) :: tolerance          !! > 0, of the relative residual
       integer, intent(in) :: maximum             !! iterations at most
 
@@ -106,10 +106,8 @@ contains
          self%contact, self%left, self%driven, self%history)
       allocate(self%residual(n_unknown), self%scale(n_unknown), self%dq(n_unknown), &
          self%way(n_unknown))
-      associate (n_dim => extent(1), n_node => extent(2))
-         allocate(self%contact(n_dim, n_node), self%left(n_dim, n_node), &
-            self%driven(n_dim, n_node), source=0.0_wp)
-      end associate
+      allocate(self%contact(extent(1), extent(2)), source=0.0_wp)
+      allocate(self%left, self%driven, source=self%contact)
       allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
       call begin(self, 0)
    end subroutine newton_init
@@ -178,7 +176,7 @@ contains
       logical, intent(out) :: goes_on            !! there is another place to look at
 
       goes_on = .false.
-      if (.not. motion%pose%is_end .or. set%n == set%n_linear) return
+      if (.not. motion%pose%is_end .or. set%n == set%n_held) return
       if (self%line%is_on) then
          call line_search_take(self%line, dot_product(self%way, self%residual))
       else

@@ -49,14 +49,14 @@ contains
       integer :: k, first, last
 
       self%total = pair_total_t()
-      last = set%n_linear
+      last = set%n_held
       do k = 1, size(system%contact)
          first = last + 1
          last = count(set%id <= system%first_constraint(k + 1))
-         associate (total => self%total(abs(system%of_pair(k))))
-            if (system%of_pair(k) < 0) call exchange_sides(total)
+         associate (total => self%total(abs(system%contact(k)%of_pair)))
+            if (system%contact(k)%of_pair < 0) call exchange_sides(total)
             call add_up(total, set%item(first:last), set%lam(first:last), x, u, du, lag)
-            if (system%of_pair(k) < 0) call exchange_sides(total)
+            if (system%contact(k)%of_pair < 0) call exchange_sides(total)
          end associate
          call measure_nodes(self, system, k, set%item(first:last), set%lam(first:last))
          call measure_areas(self, system, k, set%id(first:last), x, u)
@@ -142,7 +142,7 @@ contains
 
       associate (contact => system%contact(k)%contact, before => system%first_constraint(k))
          call contact%area(x, u, self%area(before + 1:before + contact%n_constraint), length)
-         associate (total => self%total(abs(system%of_pair(k))))
+         associate (total => self%total(abs(system%contact(k)%of_pair)))
             total%length = total%length + sum(length(id - before))
          end associate
       end associate

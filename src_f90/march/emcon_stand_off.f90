@@ -28,7 +28,7 @@ contains
       real(wp) :: force(set%n), total(2), gap
       integer :: k, first, pair, i
 
-      first = set%n_linear + 1
+      first = set%n_held + 1
       if (first > set%n) return
       do k = first, set%n
          associate (item => set%item(k))

@@ -69,7 +69,7 @@ contains
       has_root = .true.
       lost = 0.0_wp
       noise = 0.0_wp
-      do k = set%n_linear + 1, set%n
+      do k = set%n_held + 1, set%n
          lost = lost - set%lam(k)*set%item(k)%dgap
          noise = noise + gap_noise*abs(set%lam(k))*set%item(k)%size
       end do
@@ -139,7 +139,7 @@ contains
       integer :: k, i, node
 
       force = 0.0_wp
-      do k = set%n_linear + 1, set%n
+      do k = set%n_held + 1, set%n
          weight = max(0.0_wp, set%lam(k))*max(0.0_wp, set%item(k)%gap0)
          do i = 1, set%item(k)%n_node
             node = set%item(k)%node(i)

@@ -7,7 +7,7 @@ module emcon_constraint
    use emcon_motion, only : motion_t
    implicit none
    private
-   public :: condition_t, condition_force, condition_rate, constraint_t
+   public :: condition_t, condition_force, condition_rate, constraint_t, constraint_box_t
 
    !> One condition over a motion, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: condition_t
@@ -25,9 +25,17 @@ module emcon_constraint
    end type condition_t
 
    type, abstract :: constraint_t
+      character(len=:), allocatable :: name           !! for messages
+      integer :: n_constraint = 0                     !! number of conditions
    contains
+      procedure :: take_positions
       procedure(linearise_interface), deferred :: linearise
    end type constraint_t
+
+   !> For arrays of constraints of different types.
+   type :: constraint_box_t
+      class(constraint_t), allocatable :: constraint
+   end type constraint_box_t
 
    abstract interface
 
@@ -44,6 +52,13 @@ module emcon_constraint
    end interface
 
 contains
+
+   !> Told once, before the first step: the reference positions `x` of the nodes, which ties and
+   !> adjusted contact may have moved. To be overridden where they matter.
+   subroutine take_positions(self, x)
+      class(constraint_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)     !! (n_dim, n_node) [L]
+   end subroutine take_positions
 
    !> The force of the multiplier `lam` on node `i` of the condition: along the discrete gradient,
    !> as there is no friction.

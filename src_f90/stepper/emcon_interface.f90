@@ -270,7 +270,7 @@ contains
       associate (system => self%system, scene => self%scene)
          system = system_t(space=space_t(numbering=self%system%space%numbering))
          allocate(system%linear%is_used(0))
-         allocate(system%contact(size(scene%pair)))
+         allocate(system%contact(size(scene%pair)), system%held(0))
          allocate(system%first_constraint(size(scene%pair) + 1), source=0)
          do i = 1, size(scene%pair)
             call new_contact(scene, scene%pair(i), system%contact(i)%contact, error)

@@ -133,7 +133,7 @@ contains
       allocate(report%gap0(set%n), report%gap1(set%n), report%dgap(set%n), report%size(set%n))
       do k = 1, set%n
          call constraint_place(system, set%id(k), contact, i)
-         report%pair(k) = abs(system%of_pair(contact))
+         report%pair(k) = abs(system%contact(contact)%of_pair)
          report%node(k) = system%contact(contact)%contact%node(i)
          report%gap0(k) = set%item(k)%gap0
          report%gap1(k) = set%item(k)%gap1

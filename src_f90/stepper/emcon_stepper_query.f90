@@ -251,6 +251,7 @@ contains
             active => self%march%active)
          active%is_active(:system%linear%n) = system%linear%is_used &
             .and. .not. system%space%is_reduced
+         active%is_active(system%linear%n + 1:system%first_constraint(1)) = .true.
          do pair = 1, size(system%contact)
             associate (contact => system%contact(pair)%contact, &
                   first => system%first_constraint(pair) + 1, &

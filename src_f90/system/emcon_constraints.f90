@@ -21,6 +21,7 @@ module emcon_constraints
    type :: constraint_set_t
       integer :: n = 0
       integer :: n_linear = 0                    !! the first ones: linear, without curvature
+      integer :: n_held = 0                      !! these and the next ones always act
       integer, allocatable :: id(:)              !! (n) numbers over all pairs
       type(condition_t), allocatable :: item(:) !! (n) values and derivatives
       real(wp), allocatable :: target(:)         !! (n) mean gap to hold [L]
@@ -50,6 +51,7 @@ contains
 
       self%n = size(id)
       self%n_linear = 0
+      self%n_held = 0
       self%id = id
       if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, &
          self%is_firm, self%lam, self%defect)
@@ -59,12 +61,12 @@ contains
       self%is_firm = .true.
    end subroutine constraints_select
 
-   !> Pair and number within the pair of constraint `id`; pair 0: a linear one.
+   !> Pair and number within the pair of constraint `id`; pair 0: it is not one of contact.
    pure subroutine constraint_place(system, id, pair, i)
       type(system_t), intent(in) :: system
       integer, intent(in) :: id                  !! from 1
-      integer, intent(out) :: pair               !! 0: linear
-      integer, intent(out) :: i                  !! row, or number within the pair
+      integer, intent(out) :: pair               !! 0: it always holds
+      integer, intent(out) :: i                  !! `id`, or number within the pair
 
       pair = count(system%first_constraint < id)
       i = id
@@ -76,18 +78,19 @@ contains
       type(constraint_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      integer :: k, pair, number(self%n), last
+      integer :: k, last, before
 
       if (self%n == 0) return
-      do k = 1, self%n
-         call constraint_place(system, self%id(k), pair, number(k))
-      end do
       self%n_linear = count(self%id <= system%linear%n)
+      self%n_held = count(self%id <= system%first_constraint(1))
       last = 0
-      call linearise(system%linear, self%n_linear)
-      do pair = 1, size(system%contact)
-         call linearise(system%contact(pair)%contact, &
-            count(self%id <= system%first_constraint(pair + 1)))
+      before = 0
+      call linearise(system%linear, system%linear%n)
+      do k = 1, size(system%held)
+         call linearise(system%held(k)%constraint, system%held(k)%constraint%n_constraint)
+      end do
+      do k = 1, size(system%contact)
+         call linearise(system%contact(k)%contact, system%contact(k)%contact%n_constraint)
       end do
       do k = 1, self%n
          self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
@@ -95,13 +98,16 @@ contains
 
    contains
 
-      !> The conditions of `constraint`, which are those up to number `to`.
-      subroutine linearise(constraint, to)
+      !> The conditions of the next constraint, which has `n`.
+      subroutine linearise(constraint, n)
          class(constraint_t), intent(inout) :: constraint
-         integer, intent(in) :: to
+         integer, intent(in) :: n
+         integer :: to
 
-         if (to > last) call constraint%linearise(number(last + 1:to), motion, &
+         to = count(self%id <= before + n)
+         if (to > last) call constraint%linearise(self%id(last + 1:to) - before, motion, &
             self%target(last + 1:to), self%item(last + 1:to))
+         before = before + n
          last = to
       end subroutine linearise
 

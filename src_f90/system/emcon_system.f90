@@ -4,6 +4,7 @@
 !> a scheme asks for r = s M (b du - w v0) + f_int - f_ext and its tangent, docs/theory.md,
 !> eqs. (2) and (16), which are sums over the terms.
 module emcon_system
+   use emcon_constraint, only : constraint_box_t
    use emcon_contact, only : contact_box_t
    use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_find, csr_t
@@ -32,11 +33,12 @@ module emcon_system
    type :: system_t
       type(term_box_t), allocatable :: term(:)
       type(linear_rows_t) :: linear              !! rows of ties and equations
+      type(constraint_box_t), allocatable :: held(:)   !! that hold at the end of every step
       type(contact_box_t), allocatable :: contact(:)
-      integer, allocatable :: first_constraint(:)   !! (n_contact + 1) constraints before each
-      integer :: n_constraint = 0
       integer :: n_pair = 0                      !! of the scene; guards come after them
-      integer, allocatable :: of_pair(:)         !! (n_contact) < 0: with the pair's sides exchanged
+      !> Conditions are numbered: linear ones, those of `held`, those of `contact`
+      integer :: n_constraint = 0
+      integer, allocatable :: first_constraint(:)   !! (n_contact + 1) conditions before each
       integer :: i_step = 0                      !! step of the deck the rest belongs to
       type(space_t) :: space                     !! bodies, freedoms, unknowns
       type(csr_t) :: matrix                      !! tangent over the unknowns
@@ -60,6 +62,7 @@ contains
       call terms_create(scene, self%term, error, given)
       if (allocated(error)) return
       call linear_rows_init(self%linear, scene)
+      call init_held(self, scene, given)
       call init_contact(self, scene, error)
       if (allocated(error)) return
       call lay_out(self, scene, lists)
@@ -68,7 +71,27 @@ contains
          size(scene%element_kind))
    end subroutine system_init
 
-   !> The contact of pairs and guards, and the numbers of their constraints, after the linear ones.
+   !> Copies of the constraints that are given, placed; their numbers come after the linear ones.
+   subroutine init_held(self, scene, given)
+      type(system_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(given_t), intent(in), optional :: given
+      integer :: i, n
+
+      self%n_constraint = self%linear%n
+      n = 0
+      if (present(given)) then
+         if (allocated(given%constraint)) n = size(given%constraint)
+      end if
+      allocate(self%held(n))
+      do i = 1, n
+         allocate(self%held(i)%constraint, source=given%constraint(i)%constraint)
+         call self%held(i)%constraint%take_positions(scene%x)
+         self%n_constraint = self%n_constraint + self%held(i)%constraint%n_constraint
+      end do
+   end subroutine init_held
+
+   !> The contact of pairs and guards, and the numbers of their conditions, the last ones.
    subroutine init_contact(self, scene, error)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -77,16 +100,16 @@ contains
       integer :: i
 
       self%n_pair = size(scene%pair)
-      self%of_pair = [(i, i = 1, self%n_pair)]
       if (allocated(scene%guard)) then
          allocate(pair, source=[scene%pair, scene%guard])
-         self%of_pair = [self%of_pair, merge(-1, 1, scene%guard%is_reverse)*scene%guard%of_pair]
       else
          allocate(pair, source=scene%pair)
       end if
       allocate(self%contact(size(pair)))
-      allocate(self%first_constraint(size(pair) + 1), source=self%linear%n)
-      self%n_constraint = self%linear%n
+      allocate(self%first_constraint(size(pair) + 1), source=self%n_constraint)
+      self%contact(:self%n_pair)%of_pair = [(i, i = 1, self%n_pair)]
+      if (allocated(scene%guard)) self%contact(self%n_pair + 1:)%of_pair = &
+         merge(-1, 1, scene%guard%is_reverse)*scene%guard%of_pair
       do i = 1, size(pair)
          call new_contact(scene, pair(i), self%contact(i)%contact, error)
          if (allocated(error)) return

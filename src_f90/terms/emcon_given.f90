@@ -1,5 +1,6 @@
 !> What a model is given from outside between reading its deck and building it.
 module emcon_given
+   use emcon_constraint, only : constraint_box_t, constraint_t
    use emcon_csr, only : csr_t
    use emcon_given_force, only : given_force_box_t, given_force_t
    use emcon_given_law, only : given_law_t
@@ -8,16 +9,17 @@ module emcon_given
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    implicit none
    private
-   public :: given_t, given_add_force, given_add_law, given_add_solver, given_copy_solvers, &
-      given_count, given_find_solver
+   public :: given_t, given_add_constraint, given_add_force, given_add_law, given_add_solver, &
+      given_copy_solvers, given_count, given_find_solver
 
    !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
-   !> by what decks call them.
+   !> by what decks call them, constraints that always hold.
    type :: given_t
       type(given_law_t), allocatable :: law(:)
       type(given_force_box_t), allocatable :: force(:)
       type(csr_t) :: mass                        !! (n_node x n_node) [M]; without rows: none
       type(solver_box_t), allocatable :: solver(:)
+      type(constraint_box_t), allocatable :: constraint(:)
    end type given_t
 
 contains
@@ -38,6 +40,23 @@ contains
       allocate(longer(n + 1)%force, source=force)
       call move_alloc(longer, self%force)
    end subroutine given_add_force
+
+   !> Append a copy of `constraint`, whose conditions hold at the end of every step.
+   subroutine given_add_constraint(self, constraint)
+      type(given_t), intent(inout) :: self
+      class(constraint_t), intent(in) :: constraint
+      type(constraint_box_t), allocatable :: longer(:)
+      integer :: i, n
+
+      n = 0
+      if (allocated(self%constraint)) n = size(self%constraint)
+      allocate(longer(n + 1))
+      do i = 1, n
+         call move_alloc(self%constraint(i)%constraint, longer(i)%constraint)
+      end do
+      allocate(longer(n + 1)%constraint, source=constraint)
+      call move_alloc(longer, self%constraint)
+   end subroutine given_add_constraint
 
    !> Number of forces, and of masses.
    pure function given_count(self) result(n)
