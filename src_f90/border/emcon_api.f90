@@ -14,9 +14,10 @@
 !>    `stepper%diagnostic` holds all that is wrong with the deck. What a deck cannot say is given
 !>    between reading and building: by `stepper_give_law` and `stepper_give_potential` an energy at
 !>    points, a type that extends `point_function_t`, or a law of the invariants of strain, one
-!>    that extends `law_t` of `emcon_law`; by `stepper_give_force` and
-!>    `stepper_give_mass` the solid of a host code, a type that extends `given_force_t`; by
-!>    `stepper_give_solver` a direct solver, a type that extends `sparse_solver_t`.
+!>    that extends `law_t` of `emcon_law`; by `stepper_give_scheme` a scheme of time integration,
+!>    a type that extends `scheme_t`; by `stepper_give_force` and `stepper_give_mass` the solid of
+!>    a host code, a type that extends `given_force_t`; by `stepper_give_solver` a direct solver, a
+!>    type that extends `sparse_solver_t`.
 !> 2. `stepper_advance` until `stepper_is_done`: the grid of the deck. Or `stepper_step` with sizes
 !>    of the program's own, and `stepper_next_step` for the next step of the deck.
 !> 3. Between steps read `stepper%march%state` (`state_t`) and `stepper%march%ledger` (`ledger_t`),
@@ -69,9 +70,11 @@ module emcon_api
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
+   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_quantities, only : contact_field, contact_quantity, element_quantity, &
       node_quantity, pair_components, pair_quantity, quantity_components
    use emcon_restart, only : restart_read, restart_t, restart_write
+   use emcon_scheme, only : scheme_t
    use emcon_sparse_solver, only : matrix_definite, matrix_general, matrix_symmetric, &
       sparse_solver_t
    use emcon_state, only : state_t
@@ -85,7 +88,7 @@ module emcon_api
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
    use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_mass, &
-      stepper_give_potential, stepper_give_solver
+      stepper_give_potential, stepper_give_scheme, stepper_give_solver
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &

@@ -7,6 +7,7 @@ module emcon_contact
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
+   use emcon_pose, only : pose_is_equilibrium
    implicit none
    private
    public :: contact_t, contact_box_t, condition_resize, gap_state_t
@@ -126,7 +127,8 @@ contains
       self%rounding = merge(static_rounding, dynamic_rounding, meets_statics)
    end subroutine suit_steps
 
-   !> As `constraint_t` has it: second derivatives are by the end of the step.
+   !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
+   !> that end, and work over the whole step, wherever in it a scheme evaluates forces.
    pure subroutine linearise(self, wanted, motion, target, item)
       class(contact_t), intent(inout) :: self
       integer, intent(in) :: wanted(:)                !! (n) numbers of constraints, ascending
@@ -135,10 +137,14 @@ contains
       type(condition_t), intent(inout) :: item(:)     !! (n)
       integer :: k
 
-      call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
-      do k = 1, size(item)
-         item(k)%h = motion%weight*item(k)%h
-      end do
+      if (pose_is_equilibrium(motion%pose)) then
+         call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
+         do k = 1, size(item)
+            item(k)%h = motion%weight*item(k)%h
+         end do
+      else
+         call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, item)
+      end if
    end subroutine linearise
 
    !> Make room for `n` nodes and count them.

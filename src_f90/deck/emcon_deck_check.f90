@@ -6,7 +6,7 @@ module emcon_deck_check
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_gravity, load_point, procedure_dynamic
+   use emcon_steps, only : load_gravity, load_point
    implicit none
    private
    public :: check_materials, check_nodes
@@ -19,7 +19,7 @@ contains
       type(scene_t), intent(in) :: scene
       logical, allocatable :: is_used(:), is_bare(:), has_weight(:)
       integer :: i, k, material
-      logical :: is_dynamic
+      logical :: needs_mass
 
       if (reader%doubt_names .or. reader%doubt_elements) return
       is_bare = scene%element_section == 0
@@ -33,9 +33,9 @@ contains
       do i = 1, size(scene%section)
          if (scene%section(i)%material > 0) is_used(scene%section(i)%material) = .true.
       end do
-      is_dynamic = .false.
+      needs_mass = .false.
       do i = 1, size(scene%step)
-         is_dynamic = is_dynamic .or. scene%step(i)%procedure == procedure_dynamic
+         needs_mass = needs_mass .or. scene%step(i)%scheme%masses_resist
          do k = 1, size(scene%step(i)%load)
             if (scene%step(i)%load(k)%kind /= load_gravity) cycle
             material = scene%element_section(scene%step(i)%load(k)%target)
@@ -49,7 +49,7 @@ contains
             if (given%law == 0) call add_error(reader%log, given%origin, "material " &
                // given%name // " has no law: *ELASTIC, *HYPERELASTIC or *USER MATERIAL is missing")
             if (given%density > 0.0_wp .or. given%density < 0.0_wp) cycle
-            if (is_dynamic) then
+            if (needs_mass) then
                call add_error(reader%log, given%origin, "material " // given%name &
                   // " has no density: a dynamic step needs *DENSITY above 0")
             else if (has_weight(i)) then

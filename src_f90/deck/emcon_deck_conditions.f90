@@ -12,7 +12,7 @@ module emcon_deck_conditions
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_point, load_t, prescribed_t, procedure_static, step_t
+   use emcon_steps, only : load_point, load_t, prescribed_t, step_t
    implicit none
    private
    public :: conditions_t, conditions_init, conditions_carry, conditions_store
@@ -146,7 +146,7 @@ contains
       step%prescribed = pack(self%prescribed(:self%n_prescribed), &
          .not. self%prescribed_dropped(:self%n_prescribed))
       holds = .not. self%load_dropped(:self%n_load)
-      if (step%procedure == procedure_static) then
+      if (step%scheme%loads_ramp) then
          holds = holds .or. self%load(:self%n_load)%value_start /= 0.0_wp
       end if
       step%load = pack(self%load(:self%n_load), holds)

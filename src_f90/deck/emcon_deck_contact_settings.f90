@@ -9,7 +9,7 @@ module emcon_deck_contact_settings
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_options, only : option_default
-   use emcon_steps, only : initiation_persistent, procedure_dynamic, step_t
+   use emcon_steps, only : initiation_persistent, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -79,7 +79,7 @@ contains
 
       if (step%overclosure_amplitude > 0) call check_left(reader, reader%card(i_first), &
          amplitude(step%overclosure_amplitude), step%duration)
-      if (step%procedure /= procedure_dynamic) return
+      if (.not. step%scheme%masses_resist) return
       if (step%resolves_overclosure) call card_error(reader, reader%card(i_first), &
          "*CONTACT INTERFERENCE is for *STATIC steps: in dynamics pushing bodies apart would " &
          // "make energy")

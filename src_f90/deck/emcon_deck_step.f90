@@ -14,16 +14,17 @@ module emcon_deck_step
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_options, only : choose_option
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
-   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
-      option_name, option_real, reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
+      option_count, option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
+   use emcon_scheme_registry, only : scheme_given, scheme_row
    use emcon_solver_registry, only : is_foreign_solver, solver_given, solver_names, solvers
-   use emcon_steps, only : procedure_dynamic, procedure_static, step_t
+   use emcon_steps, only : step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -86,6 +87,7 @@ contains
       step%newton_tolerance = last%newton_tolerance
       step%newton_maximum = last%newton_maximum
       step%restart_frequency = last%restart_frequency
+      step%choice = last%choice
    end subroutine inherit
 
    !> Procedure and settings of the step whose first card is `i_first`.
@@ -121,15 +123,16 @@ contains
             case ("NEWTON")
                call read_newton(reader, card, step)
             case ("TIMEINTEGRATION")
-               call check_scheme(reader, card)
+               call read_scheme(reader, card, step)
             case ("RESTART")
                call read_restart(reader, card, step)
             end select
          end associate
       end do
+      if (step%scheme%card == step%choice%row%card) step%scheme = step%choice%row
       call read_step_card(reader, reader%card(i_first), step)
       call check_statics(reader, i_first, amplitude, step)
-      if (step%procedure /= 0 .or. reader%doubt_names) return
+      if (step%scheme%code /= 0 .or. reader%doubt_names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
          "the step has no procedure: *STATIC or *DYNAMIC")
    end subroutine read_settings
@@ -168,10 +171,10 @@ contains
       case ("")
          continue
       case ("RAMP")
-         if (step%procedure == procedure_dynamic) call refuse_option(reader, card, "AMPLITUDE", &
-            "STEP in a dynamic step", "give the loads an amplitude")
+         if (.not. step%scheme%loads_ramp .and. step%scheme%code /= 0) call refuse_option(reader, &
+            card, "AMPLITUDE", "STEP in a dynamic step", "give the loads an amplitude")
       case ("STEP")
-         if (step%procedure == procedure_static) call refuse_option(reader, card, "AMPLITUDE", &
+         if (step%scheme%loads_ramp) call refuse_option(reader, card, "AMPLITUDE", &
             "RAMP in a static step", "give the loads an amplitude")
       case default
          call refuse_option(reader, card, "AMPLITUDE", "RAMP, STEP", "")
@@ -189,11 +192,11 @@ contains
       character(len=17), parameter :: what(4) = [character(len=17) :: "increment", "duration", &
          "least increment", "largest increment"]
 
-      if (step%procedure /= 0) then
+      if (step%scheme%code /= 0) then
          call card_error(reader, card, "the step has a procedure already")
          return
       end if
-      step%procedure = option_code("procedure", card%name)
+      step%scheme = scheme_row(card%name, "")
       step%is_direct = has_option(card, "DIRECT")
       call read_solver(reader, card, step)
       value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
@@ -299,19 +302,32 @@ contains
       call option_count(reader, card, "MAXIMUM", 1, step%newton_maximum)
    end subroutine read_newton
 
-   subroutine check_scheme(reader, card)
+   !> *TIME INTEGRATION: the scheme of dynamic steps from this one on.
+   subroutine read_scheme(reader, card, step)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+      character(len=:), allocatable :: known
 
+      associate (choice => step%choice)
+         choice%origin = card%origin
+         choice%row = scheme_row("DYNAMIC", option_name(card, "SCHEME"))
+         if (choice%row%code == scheme_given) then
+            call need_name(reader, card, "NAME", choice%name)
+            return
+         end if
+         if (has_option(card, "NAME")) call card_error(reader, card, &
+            "NAME= is for SCHEME=USER, a scheme that a program gives")
+         if (choice%row%code /= 0) return
+      end associate
+      call option_words("scheme", known)
       select case (option_name(card, "SCHEME"))
-      case ("", "ENERGYMOMENTUM")
-         continue
       case ("MIDPOINT", "TRAPEZOIDAL", "GENERALIZEDALPHA", "CENTRALDIFFERENCE")
-         call refuse_option(reader, card, "SCHEME", "ENERGY MOMENTUM", "not in this version")
+         call refuse_option(reader, card, "SCHEME", known, "not in this version")
       case default
-         call refuse_option(reader, card, "SCHEME", "ENERGY MOMENTUM", "")
+         call refuse_option(reader, card, "SCHEME", known, "")
       end select
-   end subroutine check_scheme
+   end subroutine read_scheme
 
    subroutine read_restart(reader, card, step)
       type(reader_t), intent(inout) :: reader

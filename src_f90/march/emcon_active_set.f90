@@ -45,7 +45,7 @@ module emcon_active_set
 
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start
-      logical :: has_inertia = .true.            !! energy is to be kept
+      logical :: masses_resist = .true.          !! pushing bodies apart makes energy
       logical :: puts_off = .false.              !! what follows from others nearly waits
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
@@ -182,7 +182,7 @@ contains
       logical, intent(out) :: is_done
       integer :: pair, n_newton
 
-      is_done = self%has_inertia
+      is_done = self%masses_resist
       if (is_done) return
       is_done = .true.
       do pair = 1, size(system%contact)
@@ -330,7 +330,7 @@ contains
          associate (gap => system%contact(pair)%contact%state(i))
             self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k)) + gap%closed
             ! What is closed too far is never pushed out: that would make energy.
-            self%set%is_kept(k) = self%holds_gap .or. (self%has_inertia .and. &
+            self%set%is_kept(k) = self%holds_gap .or. (self%masses_resist .and. &
                gap%gap0 < self%set%target(k) - touch_tol*gap%size)
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate
@@ -406,7 +406,7 @@ contains
       real(wp) :: noise
 
       noise = force_noise*sum(system%response%magnitude(:, contact%node(i)))
-      if (.not. self%has_inertia) noise = noise + force_noise &
+      if (.not. self%masses_resist) noise = noise + force_noise &
          *sum(system%response%rounding(:, contact%node(i)))
       is_let_go = contact%state(i)%is_leaving .or. &
          .not. (self%only_adds .or. self%set%lam(k) >= -noise)
@@ -430,9 +430,9 @@ contains
          if (self%is_dropped(id)) then
             if (self%may_cut .and. gap%gap1 < min(gap%gap0, allowed(1)) - touch_tol*gap%size) &
                status = step_too_far
-         else if (gap%is_arriving .and. self%has_inertia .and. .not. may_arrive(gap)) then
+         else if (gap%is_arriving .and. self%masses_resist .and. .not. may_arrive(gap)) then
             return
-         else if (gap%is_arriving .and. self%has_inertia .and. self%may_cut) then
+         else if (gap%is_arriving .and. self%masses_resist .and. self%may_cut) then
             status = step_too_far
          else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%deepest_start*gap%size) then
@@ -458,7 +458,7 @@ contains
 
       associate (gap => contact%state(i))
          begins_unseen = .not. gap%is_covered .or. &
-            (self%has_inertia .and. gap%gap0 > contact%farthest_start)
+            (self%masses_resist .and. gap%gap0 > contact%farthest_start)
       end associate
    end function begins_unseen
 

@@ -6,25 +6,25 @@ module emcon_march
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : err_analysis, err_input, err_interrupt, error_t, raise
    use emcon_given, only : given_copy_solvers, given_find_solver, given_t
+   use emcon_given_scheme, only : given_scheme_find
    use emcon_holding, only : holding_begin, holding_t
    use emcon_judge, only : judge_init, judge_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_parts, only : march_in_parts
    use emcon_march_step, only : increment_t, march_t
-   use emcon_motion, only : at_rest, motion_init, motion_of, pose_t
+   use emcon_motion, only : at_rest, motion_init, motion_of
    use emcon_newton, only : interrupt_interface, newton_init
    use emcon_numbering, only : spread_dependent
    use emcon_overclosure, only : overclosure_check
    use emcon_pair_record, only : pair_record_init
+   use emcon_pose, only : pose_at_end
    use emcon_rigid_motion, only : free_motion_text
-   use emcon_scene, only : scene_t
-   use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
-   use emcon_scheme_static, only : scheme_static_t
+   use emcon_scene, only : scene_t, where_text
+   use emcon_scheme_registry, only : scheme_create, scheme_given
    use emcon_solver_registry, only : solver_given
    use emcon_state, only : state_t
-   use emcon_steps, only : initiation_persistent, method_saddle_point, procedure_dynamic, &
-      procedure_static, step_t
+   use emcon_steps, only : initiation_persistent, method_saddle_point, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_init, &
       system_respond
    use emcon_term, only : role_internal
@@ -55,7 +55,8 @@ contains
       type(given_t), intent(in), optional :: given
       integer :: n
 
-      call system_init(self%system, scene, error, given)
+      call check_schemes(self, scene, error)
+      if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
       call given_copy_solvers(given, self%solver)
       n = size(scene%x, 2)
@@ -74,6 +75,25 @@ contains
       call active_set_init(self%active, self%system)
       call judge_init(self%judge, scene)
    end subroutine march_init
+
+   !> Each scheme that the deck calls by name was given.
+   subroutine check_schemes(self, scene, error)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 1, size(scene%step)
+         associate (choice => scene%step(i)%choice)
+            if (scene%step(i)%scheme%code /= scheme_given) cycle
+            if (given_scheme_find(self%given_scheme, choice%name) > 0) cycle
+            call raise(error, err_input, where_text(scene, choice%origin) // ": error: *TIME " // &
+               "INTEGRATION: the scheme " // choice%name // " was not given; it comes from a " // &
+               "program that calls the library, see docs/embedding.md")
+            return
+         end associate
+      end do
+   end subroutine check_schemes
 
    !> Free what the solvers hold; the rest goes with the object.
    subroutine march_free(self)
@@ -106,7 +126,7 @@ contains
       self%state%n_easy = 0
       self%state%n_before = self%state%increment
       self%state%start_time = self%state%time
-      if (scene%step(i_step)%procedure == procedure_static) self%state%v = 0.0_wp
+      if (.not. scene%step(i_step)%scheme%masses_resist) self%state%v = 0.0_wp
       call system_begin_step(self%system, scene, i_step, error)
       if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
          self%system%notes, error)
@@ -118,7 +138,7 @@ contains
       call prepare(self, scene, error)
    end subroutine march_begin_step
 
-   !> In statics no body may be free to move.
+   !> Where masses do not resist no body may be free to move.
    subroutine check_held(self, scene, error)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
@@ -126,7 +146,7 @@ contains
       character(len=:), allocatable :: text
 
       associate (step => scene%step(self%state%i_step))
-         if (step%procedure /= procedure_static) return
+         if (step%scheme%masses_resist) return
          call free_motion_text(self%system, scene, step%prescribed, text)
          if (len(text) > 0) call raise(error, err_analysis, "the static problem is singular: " &
             // text)
@@ -202,28 +222,22 @@ contains
       integer :: i
 
       associate (step => scene%step(self%state%i_step), state => self%state)
-         if (allocated(self%scheme)) deallocate(self%scheme)
-         if (step%procedure == procedure_dynamic) then
-            allocate(scheme_energy_momentum_t :: self%scheme)
-         else
-            allocate(scheme_static_t :: self%scheme)
-            self%scheme%has_inertia = .false.
-         end if
+         call choose_scheme(self, step)
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
             shape(scene%x), step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
          self%active%puts_off = .true.
          self%active%holds_gap = step%initiation == initiation_persistent &
-            .and. self%scheme%has_inertia
-         self%active%has_inertia = self%scheme%has_inertia
+            .and. step%scheme%masses_resist
+         self%active%masses_resist = step%scheme%masses_resist
          self%active%gap_tolerance = step%gap_tolerance
          self%active%holding = holding_t()
-         if (.not. self%scheme%has_inertia) call holding_begin(self%active%holding, self%system, &
+         if (.not. step%scheme%masses_resist) call holding_begin(self%active%holding, self%system, &
             scene, state%u)
          do i = 1, size(self%system%contact)
             associate (contact => self%system%contact(i)%contact)
-               call contact%suit_steps(any(scene%step%procedure == procedure_static))
+               call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
                call contact%configure(scene%x, step%contact)
             end associate
          end do
@@ -237,7 +251,7 @@ contains
          end if
          call count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = grid_time(self, step, state%n_grid)
-         call system_respond(self%system, motion_of(pose_t(is_end=.true.), scene%x, state%u, &
+         call system_respond(self%system, motion_of(pose_at_end, scene%x, state%u, &
             at_rest(state%u)), .false.)
          call system_check_response(self%system, "at the start of the step", error)
          if (allocated(error)) return
@@ -267,6 +281,20 @@ contains
       end if
    end subroutine choose_solver
 
+   !> The scheme of a step: of its row, or one that was given.
+   subroutine choose_scheme(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      integer :: k
+
+      if (step%scheme%code /= scheme_given) then
+         call scheme_create(step%scheme, self%scheme)
+         return
+      end if
+      k = given_scheme_find(self%given_scheme, step%choice%name)
+      call scheme_create(step%scheme, self%scheme, self%given_scheme(k)%scheme)
+   end subroutine choose_scheme
+
    !> Grid increments in the step, and by how much they may grow and shrink.
    subroutine count_grid(self, step)
       type(march_t), intent(inout) :: self
@@ -279,7 +307,7 @@ contains
       self%n_grid = max(1, self%n_grid)
       h_max = step%h_max
       if (.not. h_max > 0.0_wp) then
-         h_max = merge(step%duration, step%h, step%procedure == procedure_static)
+         h_max = merge(step%h, step%duration, step%scheme%masses_resist)
       end if
       self%most_stride = 1
       if (.not. step%is_direct) then

@@ -116,7 +116,7 @@ contains
       character(len=:), allocatable :: motion
       logical :: may_hold(size(scene%x, 2))
 
-      if (.not. self%scheme%has_inertia .and. .not. allocated(self%active%holding%text)) then
+      if (.not. self%scheme%row%masses_resist .and. .not. allocated(self%active%holding%text)) then
          call free_motion_text(self%system, scene, &
             scene%step(self%state%i_step)%prescribed, motion, with_contact=.true.)
          if (len(motion) == 0) return

@@ -8,23 +8,25 @@ module emcon_march_step
    use emcon_constraints, only : constraint_place, constraints_force
    use emcon_correction, only : correction_reason
    use emcon_errors, only : error_t
+   use emcon_given_scheme, only : given_scheme_t
    use emcon_guards, only : guard_slack
    use emcon_holding, only : holding_t
    use emcon_judge, only : judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_loads, only : prescribed_motion
-   use emcon_motion, only : at_rest, instant_t, motion_t
+   use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_newton, only : interrupt_interface, newton_t
    use emcon_numbering, only : gather_dependent, spread_dependent
    use emcon_pair_record, only : pair_record_measure
+   use emcon_pose, only : instant_later, instant_t, pose_at_end, pose_velocity, pose_way
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_t
    use emcon_sparse_solver, only : solver_box_t
    use emcon_stand_off, only : stand_off_add, stand_off_t
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_velocity_update
-   use emcon_system, only : system_t
+   use emcon_system, only : system_respond, system_t
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
@@ -57,6 +59,13 @@ module emcon_march_step
       type(notes_t) :: warnings                  !! for the log, the user and the verdict
    end type increment_t
 
+   !> What the elements and the given forces have come to at the end of a step.
+   type :: ending_t
+      real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) internal forces [M L/T^2]
+      real(wp), allocatable :: energy(:)         !! (n_element) [M L^2/T^2]
+      real(wp) :: potential = 0.0_wp             !! of the given forces [M L^2/T^2]
+   end type ending_t
+
    !> The part of an increment that is one step.
    type :: part_t
       type(instant_t) :: start
@@ -69,6 +78,7 @@ module emcon_march_step
       type(state_t) :: state
       type(ledger_t) :: ledger
       class(scheme_t), allocatable :: scheme
+      type(given_scheme_t), allocatable :: given_scheme(:)   !! (any) by the program
       type(newton_t) :: newton
       type(active_set_t) :: active
       type(velocity_update_t) :: velocity_update
@@ -99,6 +109,7 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
+      type(ending_t) :: ending
       integer :: attempt
 
       self%active%may_cut = part%may_cut
@@ -117,15 +128,38 @@ contains
       end do
       if (status /= step_done) return
       call judge(self, scene, part, increment, status)
-      if (status /= step_done) return
+      if (status == step_done) call find_ending(self, ending, status, error)
+      if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
       if (any(self%active%is_dropped)) then
          call nodes_text(self, scene, self%active%is_dropped, text)
          call note_add(increment%notes, "contact is left out, as it follows from that of other " &
             // "nodes or has lost its surface, at slave nodes " // text)
       end if
-      call commit(self, scene, part%h, increment, error)
+      call commit(self, scene, part%h, ending, increment, error)
    end subroutine march_step
+
+   !> Look at the end of the solved step, where the scheme evaluates forces before it.
+   subroutine find_ending(self, ending, status, error)
+      type(march_t), intent(inout) :: self
+      type(ending_t), intent(out) :: ending
+      integer, intent(inout) :: status           !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_elsewhere
+
+      is_elsewhere = self%motion%pose%place < 1.0_wp
+      associate (system => self%system, motion => self%motion)
+         if (is_elsewhere) call system_respond(system, motion_of(pose_at_end, motion%x, motion%u0, &
+            motion%du), .false.)
+         if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
+         if (allocated(system%response%refusal)) status = step_refused
+         if (status /= step_done .or. allocated(error)) return
+         ending%force = system%response%part(role_internal)%force
+         ending%energy = system%response%energy
+         ending%potential = system%response%potential
+         if (is_elsewhere) call system_respond(system, motion, .false.)
+      end associate
+   end subroutine find_ending
 
    !> The part of the overclosure at the start of the step that is left at `step_time`.
    pure real(wp) function overclosure_left(scene, state, step_time)
@@ -248,13 +282,13 @@ contains
       real(wp) :: u, v
       integer :: k
 
-      finish = instant_t(start%step_time + h, start%total_time + h)
+      finish = instant_later(start, h)
       self%motion%pose = self%scheme%pose(start, h)
       self%motion%u0 = self%state%u
       self%motion%v0 = self%state%v
       self%motion%offset = 0.0_wp
       self%motion%du = 0.0_wp
-      if (self%scheme%has_inertia .and. .not. is_at_rest) self%motion%du = h*self%state%v
+      if (self%scheme%row%masses_resist .and. .not. is_at_rest) self%motion%du = h*self%state%v
       where (.not. self%system%space%is_alive) self%motion%du = 0.0_wp
       self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%i_step))
@@ -264,8 +298,9 @@ contains
                   state%u_start(a, i), u, v)
                self%motion%du(a, i) = u - state%u(a, i)
                self%v1(a, i) = v
-               if (self%scheme%has_inertia) then
-                  self%motion%offset(a, i) = 0.5_wp*h*(state%v(a, i) + v) - self%motion%du(a, i)
+               if (self%scheme%row%masses_resist) then
+                  self%motion%offset(a, i) = pose_way(self%motion%pose, state%v(a, i), v) &
+                     - self%motion%du(a, i)
                else
                   self%newton%driven(a, i) = self%motion%du(a, i)
                end if
@@ -287,10 +322,11 @@ contains
    end subroutine follow_links
 
    !> Take over the solved step: works, velocities, contact and reaction forces.
-   subroutine commit(self, scene, h, increment, error)
+   subroutine commit(self, scene, h, ending, increment, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h
+      type(ending_t), intent(in) :: ending
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
       integer :: i, a, k
@@ -302,7 +338,7 @@ contains
          do i = 1, size(state%v, 2)
             do a = 1, 2
                if (system%space%numbering%unknown(a, i) > 0) then
-                  self%v1(a, i) = self%scheme%velocity(h, state%v(a, i), &
+                  self%v1(a, i) = pose_velocity(self%motion%pose, state%v(a, i), &
                      self%motion%du(a, i))
                   system%response%residual(a, i) = 0.0_wp
                end if
@@ -313,16 +349,16 @@ contains
          if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
          call book_work(self)
          if (scene%step(state%i_step)%initiation == initiation_velocity_update &
-            .and. self%scheme%has_inertia) call restore_energy(self, increment%notes, error)
+            .and. self%scheme%row%masses_resist) call restore_energy(self, increment%notes, error)
          if (allocated(error)) return
          state%u = state%u + self%motion%du
          state%v = self%v1
          state%contact = self%newton%contact
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
-            merge(0.5_wp, 0.0_wp, self%scheme%has_inertia))
-         state%internal = system%response%part(role_internal)%force
-         state%energy = system%response%energy
-         state%potential = system%response%potential
+            merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist))
+         state%internal = ending%force
+         state%energy = ending%energy
+         state%potential = ending%potential
          if (self%newton%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             trim(correction_reason(self%newton%correction)) // ": solved as a saddle point")
          call stand_off_add(increment%stand_off, system, set, h)
@@ -411,7 +447,7 @@ contains
       associate (state => self%state, part => self%system%response%part, &
             set => self%active%set, motion => self%motion)
          contact_work = 0.0_wp
-         if (self%scheme%has_inertia) then
+         if (self%scheme%row%masses_resist) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
             end do

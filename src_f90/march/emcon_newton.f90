@@ -14,6 +14,7 @@ module emcon_newton
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
    use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
+   use emcon_pose, only : pose_is_equilibrium
    use emcon_system, only : system_respond, system_tangent_times, system_t
    use emcon_term, only : role_external, role_inertia
    use emcon_timer, only : stopwatch_start, stopwatch_stop
@@ -160,7 +161,7 @@ contains
          end select
          call correct(self, system, set, motion%du, error)
          if (allocated(error)) return
-         if (motion%pose%is_end .and. is_too_far(self, motion%x)) then
+         if (pose_is_equilibrium(motion%pose) .and. is_too_far(self, motion%x)) then
             status = newton_singular
             return
          end if
@@ -176,7 +177,7 @@ contains
       logical, intent(out) :: goes_on            !! there is another place to look at
 
       goes_on = .false.
-      if (.not. motion%pose%is_end .or. set%n == set%n_held) return
+      if (.not. pose_is_equilibrium(motion%pose) .or. set%n == set%n_held) return
       if (self%line%is_on) then
          call line_search_take(self%line, dot_product(self%way, self%residual))
       else

@@ -136,8 +136,8 @@ contains
       end associate
    end subroutine place_text
 
-   !> The energy balance. In statics the works are sums over increments, exact only in the limit of
-   !> small ones: what they are off by is shown, not judged.
+   !> The energy balance. Unless the scheme keeps energy the works are sums over increments, exact
+   !> only in the limit of small ones: what they are off by is shown, not judged.
    pure subroutine follow_energy(self, march)
       type(verdict_t), intent(inout) :: self
       type(march_t), intent(in) :: march
@@ -148,7 +148,7 @@ contains
          self%largest_energy = max(self%largest_energy, ledger%kinetic + ledger%strain)
          self%largest_drift = max(self%largest_drift, abs(kept - self%total0))
       end associate
-      if (march%scheme%has_inertia) then
+      if (march%scheme%keeps_energy()) then
          self%has_dynamics = .true.
          self%dynamic_drift = max(self%dynamic_drift, abs(kept - self%reference))
       else

@@ -10,6 +10,7 @@ module emcon_run_log
    use emcon_march, only : increment_t
    use emcon_options, only : option_text
    use emcon_scene, only : scene_t
+   use emcon_scheme_registry, only : scheme_given
    use emcon_solver_registry, only : solver_given
    use emcon_stepper, only : stepper_t
    use emcon_steps, only : step_t
@@ -85,8 +86,8 @@ contains
             call solver_text(scene%step(k), how)
             call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
                ", h = " // to_text(scene%step(k)%h) // &
-               trim(merge(", NLGEOM", "        ", scene%step(k)%nlgeom)) // &
-               ", solver " // how)
+               trim(merge(", NLGEOM", "        ", scene%step(k)%nlgeom)) // ", " // &
+               scheme_text(scene%step(k)) // ", solver " // how)
             do i = 1, size(scene%pair)
                if (.not. has_changed(scene, i, k)) cycle
                call formulation_text(scene%pair(i)%formulation, scene%step(k)%contact, how)
@@ -110,6 +111,22 @@ contains
       end subroutine add
 
    end function model_lines
+
+   !> How a step goes on in time.
+   pure function scheme_text(step) result(text)
+      type(step_t), intent(in) :: step
+      character(len=scheme_length(step)) :: text
+
+      text = step%scheme%text
+      if (step%scheme%code == scheme_given) text = "scheme " // step%choice%name
+   end function scheme_text
+
+   pure integer function scheme_length(step) result(n)
+      type(step_t), intent(in) :: step
+
+      n = len_trim(step%scheme%text)
+      if (step%scheme%code == scheme_given) n = len("scheme ") + len(step%choice%name)
+   end function scheme_length
 
    !> What factorises the matrices of a step.
    pure subroutine solver_text(step, text)

@@ -9,10 +9,10 @@ module emcon_options
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
       multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
       smoothing_none
+   use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
    use emcon_solver_registry, only : solvers
    use emcon_steps, only : initiation_admissible, initiation_persistent, &
-      initiation_velocity_update, method_null_space, method_saddle_point, procedure_dynamic, &
-      procedure_static, step_t
+      initiation_velocity_update, method_null_space, method_saddle_point, step_t
    implicit none
    private
    public :: option_row_t, n_option_row, option_row, option_code, option_default, option_words, &
@@ -57,10 +57,12 @@ module emcon_options
       option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", "", ""), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
-      option_row_t("procedure", procedure_static, "STATIC", "", "", ""), &
-      option_row_t("procedure", procedure_dynamic, "DYNAMIC", "", "", "")]
+      option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
+      option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]
 
-   integer, parameter :: n_option_row = size(own) + size(solvers) + size(element_kinds)
+   !> The schemes that *TIME INTEGRATION chooses from: statics, the first, is none.
+   integer, parameter :: n_scheme = size(scheme_rows) - 1
+   integer, parameter :: n_option_row = size(own) + size(solvers) + n_scheme + size(element_kinds)
 
 contains
 
@@ -74,8 +76,12 @@ contains
          row = own(i)
       else if (k <= size(solvers)) then
          row = option_row_t("solver", solvers(k)%code, solvers(k)%word, "", solvers(k)%text, "")
+      else if (k <= size(solvers) + n_scheme) then
+         associate (scheme => scheme_rows(k - size(solvers) + 1))
+            row = option_row_t("scheme", scheme%code, scheme%word, "", scheme%text, "")
+         end associate
       else
-         k = k - size(solvers)
+         k = k - size(solvers) - n_scheme
          row = option_row_t("element", k, element_kinds(k)%name, "", "", "")
       end if
    end function option_row
@@ -122,6 +128,8 @@ contains
          code = step%initiation
       case ("method")
          code = step%constraint_method
+      case ("scheme")
+         code = scheme_energy_momentum
       case ("solver")
          code = step%solver
       case default

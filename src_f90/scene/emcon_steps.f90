@@ -1,20 +1,19 @@
-!> The steps of a deck: procedure, conditions, and how they are solved.
+!> The steps of a deck: scheme, conditions, and how they are solved.
 module emcon_steps
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_requests, only : output_t
+   use emcon_scheme, only : scheme_row_t
    use emcon_solver_registry, only : solver_default
    implicit none
    private
-   public :: prescribed_t, load_t, step_t
+   public :: prescribed_t, load_t, scheme_choice_t, step_t
    public :: load_point, load_pressure, load_gravity
-   public :: procedure_static, procedure_dynamic
    public :: initiation_persistent, initiation_admissible, initiation_velocity_update
    public :: method_null_space, method_saddle_point
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3
-   integer, parameter :: procedure_static = 1, procedure_dynamic = 2
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
       initiation_velocity_update = 3
    integer, parameter :: method_null_space = 1, method_saddle_point = 2
@@ -44,9 +43,17 @@ module emcon_steps
       integer :: amplitude = 0
    end type load_t
 
+   !> The scheme of steps of its card, of this step and later ones.
+   type :: scheme_choice_t
+      type(origin_t) :: origin
+      type(scheme_row_t) :: row                      !! code 0: none was asked for
+      character(len=:), allocatable :: name          !! of one that a program gives
+   end type scheme_choice_t
+
    type :: step_t
       type(origin_t) :: origin
-      integer :: procedure = 0                       !! one of `procedure_`
+      type(scheme_row_t) :: scheme                   !! code 0: no procedure was read
+      type(scheme_choice_t) :: choice                !! by *TIME INTEGRATION
       logical :: nlgeom = .false.
       integer :: max_increments = 0                  !! INC; 0: not limited
       logical :: is_direct = .false.                 !! increments as given

@@ -221,7 +221,7 @@ contains
       class(solid_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = motion%pose%is_end .or. (self%has_linear_laws .and. .not. self%nlgeom)
+      is_symmetric = motion%pose%is_gradient .or. (self%has_linear_laws .and. .not. self%nlgeom)
    end function is_symmetric
 
 end module emcon_solid_term

@@ -1,31 +1,15 @@
 !> A motion over one step, and where in it forces are evaluated.
 !>
 !> A scheme decides where. Forces are discrete gradients over a span of the step, from `from` by
-!> `by`: over the whole of it, or over nothing at its end, where a discrete gradient is the
-!> gradient. Who takes a motion needs not know which: a derivative over the span times `weight` is
-!> that by the end of the step. Source: docs/theory.md, section 2.
+!> `by`: from its start, or over nothing at one place, where a discrete gradient is the gradient.
+!> Who takes a motion needs not know which: a derivative over the span times `weight` is that by
+!> the end of the step. Source: docs/theory.md, section 2.
 module emcon_motion
    use emcon_kinds, only : wp
+   use emcon_pose, only : pose_t
    implicit none
    private
-   public :: instant_t, pose_t, motion_t, motion_init, motion_place, motion_of, at_rest
-
-   !> A moment of a step, as amplitudes see it.
-   type :: instant_t
-      real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
-      real(wp) :: total_time = 0.0_wp            !! since the start of the analysis [T]
-   end type instant_t
-
-   !> Where forces are evaluated and how inertia enters: all that a scheme decides.
-   type :: pose_t
-      !> Inertia s M (b du - w v0): b du - w v0 is the change of velocity, computed with the same b
-      !> as the velocity itself. Two factors for du and v0 would round apart, a bias in each step.
-      real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: no inertia
-      real(wp) :: rate = 0.0_wp                  !! b [1/T]
-      real(wp) :: v_weight = 0.0_wp              !! w
-      logical :: is_end = .false.                !! gradients at the end, not discrete gradients
-      type(instant_t) :: load_instant            !! when loads are taken
-   end type pose_t
+   public :: motion_t, motion_init, motion_place, motion_of, at_rest
 
    type :: motion_t
       type(pose_t) :: pose
@@ -65,21 +49,21 @@ contains
    pure subroutine motion_place(self)
       type(motion_t), intent(inout) :: self
 
-      if (self%pose%is_end) then
-         self%from = self%u0 + self%du
-         self%by = 0.0_wp
-         self%at = self%from
-         self%computed = max(abs(self%from), abs(self%u0))
-         self%weight = 2.0_wp
-         self%load_weight = 1.0_wp
-      else
-         self%from = self%u0
-         self%by = self%du
-         self%at = self%u0 + 0.5_wp*self%du
-         self%computed = abs(self%du)
-         self%weight = 1.0_wp
-         self%load_weight = 0.5_wp
-      end if
+      associate (place => self%pose%place)
+         if (self%pose%is_gradient) then
+            self%from = self%u0 + place*self%du
+            self%by = 0.0_wp
+            self%computed = max(abs(self%from), abs(self%u0))
+            self%weight = 2.0_wp*place
+         else
+            self%from = self%u0
+            self%by = place*self%du
+            self%computed = abs(self%by)
+            self%weight = place
+         end if
+      end associate
+      self%load_weight = self%pose%load_place
+      self%at = self%u0 + self%load_weight*self%du
    end subroutine motion_place
 
    !> The motion from `u0` by `du`, from rest unless `v0` is given, placed.

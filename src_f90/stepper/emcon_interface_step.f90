@@ -24,6 +24,7 @@ module emcon_interface_step
       check_multipliers
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_place
+   use emcon_pose, only : pose_at_end, pose_t
    use emcon_steps, only : initiation_persistent
    use emcon_text, only : to_text
    implicit none
@@ -109,7 +110,8 @@ contains
       type(interface_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
 
-      self%motion%pose%is_end = self%is_end
+      self%motion%pose = pose_t()
+      if (self%is_end) self%motion%pose = pose_at_end
       self%motion%u0 = u0
       self%motion%du = du
       call motion_place(self%motion)
@@ -363,7 +365,7 @@ contains
    pure subroutine take_options(self)
       type(interface_t), intent(inout) :: self
 
-      self%active%has_inertia = .not. self%is_end
+      self%active%masses_resist = .not. self%is_end
       self%active%holds_gap = self%initiation == initiation_persistent .and. .not. self%is_end
       self%active%gap_tolerance = self%gap_tolerance
       self%active%may_cut = self%may_cut

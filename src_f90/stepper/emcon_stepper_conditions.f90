@@ -8,14 +8,14 @@ module emcon_stepper_conditions
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_loads, only : prescribed_motion
-   use emcon_motion, only : instant_t
    use emcon_march, only : march_renumber
+   use emcon_pose, only : instant_t
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
-   use emcon_steps, only : load_gravity, load_point, prescribed_t, procedure_static, step_t
+   use emcon_steps, only : load_gravity, load_point, prescribed_t, step_t
    use emcon_system, only : system_renew
    use emcon_text, only : to_text
    implicit none
@@ -76,7 +76,7 @@ contains
          end if
          associate (load => step%load(i))
             part = part_passed(step, state)
-            if (step%procedure == procedure_static .and. part < 1.0_wp) then
+            if (step%scheme%loads_ramp .and. part < 1.0_wp) then
                present_value = load%value_start + (load%value - load%value_start)*part
                load%value_start = run_start(present_value, value, part)
             end if
@@ -279,7 +279,7 @@ contains
       real(wp) :: part
 
       part = part_passed(step, state)
-      if (step%procedure /= procedure_static .or. prescribed%amplitude > 0) return
+      if (.not. step%scheme%loads_ramp .or. prescribed%amplitude > 0) return
       if (part < 1.0_wp) state%u_start(prescribed%dof, prescribed%node) = run_start(u, value, part)
    end subroutine start_run
 

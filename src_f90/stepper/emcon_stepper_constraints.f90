@@ -7,10 +7,11 @@ module emcon_stepper_constraints
    use emcon_csr_product, only : csr_product
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_motion, only : motion_place, motion_t, pose_t
+   use emcon_motion, only : motion_place, motion_t
    use emcon_null_space, only : null_space_matrices, null_space_multipliers, obstacle_none, &
       obstacle_redundant
    use emcon_numbering, only : numbering_init, numbering_matrix, numbering_t, pick_unknowns
+   use emcon_pose, only : pose_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
    use emcon_stepper_query, only : query_check_field, query_sync, query_t

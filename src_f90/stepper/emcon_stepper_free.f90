@@ -9,11 +9,11 @@ module emcon_stepper_free
    use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
       march_set_time
    use emcon_march_step, only : follow_links
-   use emcon_motion, only : at_rest, motion_of, pose_t
+   use emcon_motion, only : at_rest, motion_of
    use emcon_pair_record, only : pair_record_init
+   use emcon_pose, only : pose_at_end
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
-   use emcon_steps, only : procedure_static
    use emcon_system, only : system_check_response, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
@@ -201,7 +201,7 @@ contains
       real(wp), intent(in), optional :: time
 
       associate (state => self%march%state)
-         if (self%scene%step(state%i_step)%procedure == procedure_static &
+         if (.not. self%scene%step(state%i_step)%scheme%masses_resist &
             .and. any(abs(v) > 0.0_wp)) then
             call raise(error, err_input, "step " // to_text(state%i_step) // &
                " of the deck is static: there are no velocities")
@@ -224,7 +224,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       associate (system => self%march%system)
-         call system_respond(system, motion_of(pose_t(is_end=.true.), self%scene%x, next%u, &
+         call system_respond(system, motion_of(pose_at_end, self%scene%x, next%u, &
             at_rest(next%u)), .false.)
          call system_check_response(system, "u", error)
          if (allocated(error)) return

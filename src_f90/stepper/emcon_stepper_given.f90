@@ -1,5 +1,5 @@
-!> What a program gives to a model between reading its deck and building it: laws, forces, mass,
-!> solvers.
+!> What a program gives to a model between reading its deck and building it: laws, schemes, forces,
+!> mass, solvers.
 !>
 !> Copies are kept, also for a restart file that is loaded afterwards. Nodes that stand in no
 !> element are part of the model where they are given something. Gravity acts on the mass of
@@ -11,19 +11,22 @@ module emcon_stepper_given
       given_find_solver
    use emcon_given_check, only : given_check_force, given_check_mass
    use emcon_given_force, only : given_force_t
+   use emcon_given_scheme, only : given_scheme_add, given_scheme_check, given_scheme_find
    use emcon_law, only : law_t
    use emcon_law_registry, only : law_given
    use emcon_node_potential, only : node_potential_init, node_potential_t
    use emcon_point_function, only : point_function_t
    use emcon_scene, only : where_text
+   use emcon_scheme, only : scheme_t
+   use emcon_scheme_registry, only : scheme_given
    use emcon_solver_registry, only : is_foreign_solver, solver_names, solvers
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    use emcon_stepper, only : stepper_t
-   use emcon_text, only : to_upper
+   use emcon_text, only : squeezed, to_upper
    implicit none
    private
-   public :: stepper_give_law, stepper_give_potential, stepper_give_force, stepper_give_mass, &
-      stepper_give_solver
+   public :: stepper_give_law, stepper_give_scheme, stepper_give_solver
+   public :: stepper_give_potential, stepper_give_force, stepper_give_mass
 
    !> Give the law of a *USER MATERIAL: its strain energy at points, or a type that extends `law_t`.
    interface stepper_give_law
@@ -85,6 +88,36 @@ contains
          end do
       end if
    end subroutine check_material
+
+   !> Give the scheme of time integration that the deck calls `name`, by *TIME INTEGRATION,
+   !> SCHEME=USER, NAME=`name`.
+   subroutine stepper_give_scheme(self, name, scheme, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name           !! small or capital letters
+      class(scheme_t), intent(in) :: scheme
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+      logical :: is_asked_for
+      integer :: i
+
+      call check_stage(self, error)
+      if (.not. allocated(error)) call given_scheme_check(squeezed(name), scheme, error)
+      if (allocated(error)) return
+      is_asked_for = .false.
+      do i = 1, size(self%scene%step)
+         associate (step => self%scene%step(i))
+            if (step%scheme%code == scheme_given) is_asked_for = is_asked_for &
+               .or. step%choice%name == squeezed(name)
+         end associate
+      end do
+      if (.not. is_asked_for) then
+         call raise(error, err_input, "no *DYNAMIC step of the deck has the scheme " // &
+            squeezed(name) // ": *TIME INTEGRATION, SCHEME=USER, NAME=" // squeezed(name))
+      else if (given_scheme_find(self%march%given_scheme, squeezed(name)) > 0) then
+         call raise(error, err_input, "the scheme " // squeezed(name) // " is given already")
+      else
+         call given_scheme_add(self%march%given_scheme, squeezed(name), scheme)
+      end if
+   end subroutine stepper_give_scheme
 
    !> Give a potential V(x, y) [M L^2/T^2] of the present position of each of some nodes.
    subroutine stepper_give_potential(self, name, node, potential, error)
@@ -159,8 +192,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       if (allocated(self%march%scheme)) then
-         call raise(error, err_input, "laws, forces, mass and solvers are given before the model " &
-            // "is built")
+         call raise(error, err_input, "laws, schemes, forces, mass and solvers are given before " &
+            // "the model is built")
       else if (.not. self%is_read) then
          call raise(error, err_input, "there is no scene to give anything to: no deck was read, " &
             // "or reading it failed")

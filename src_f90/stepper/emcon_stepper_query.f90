@@ -12,11 +12,12 @@ module emcon_stepper_query
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_ledger, only : body_momenta
-   use emcon_motion, only : at_rest, instant_t, motion_place
+   use emcon_motion, only : at_rest, motion_place
    use emcon_march, only : march_free, march_init, march_resume, march_t
    use emcon_march_step, only : follow_links, march_guess
    use emcon_null_space, only : null_space_free, null_space_t
    use emcon_numbering, only : pick_unknowns
+   use emcon_pose, only : instant_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_free, only : stepper_check_open
    use emcon_system, only : system_check_response, system_renew, system_respond
@@ -229,7 +230,7 @@ contains
             do k = 1, size(list)
                associate (a => list(k)%dof, i => list(k)%node)
                   du = u1(a, i) - march%state%u(a, i)
-                  if (march%scheme%has_inertia) march%motion%offset(a, i) = &
+                  if (march%scheme%row%masses_resist) march%motion%offset(a, i) = &
                      march%motion%offset(a, i) + (march%motion%du(a, i) - du)
                end associate
             end do

@@ -17,7 +17,7 @@ module emcon_system
    use emcon_reduction, only : reduction_add
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_begin, lists_t, space_begin_step, space_init, space_t
-   use emcon_steps, only : method_null_space, procedure_dynamic
+   use emcon_steps, only : method_null_space
    use emcon_stiffening, only : stiffening_add, stiffening_set, stiffening_t
    use emcon_term, only : response_begin, response_init, response_t, role_external, &
       role_inertia, role_internal, term_box_t
@@ -168,7 +168,7 @@ contains
          call self%term(k)%term%begin_step(scene, i_step, self%space, self%matrix, &
             slot(first(k) + 1:first(k + 1)))
       end do
-      if (scene%step(i_step)%procedure == procedure_dynamic) call check_mass(self, scene, error)
+      if (scene%step(i_step)%scheme%masses_resist) call check_mass(self, scene, error)
    end subroutine system_begin_step
 
    !> In dynamics what is forced needs mass.

@@ -265,7 +265,7 @@ contains
       class(given_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      if (motion%pose%is_end) then
+      if (motion%pose%is_gradient) then
          is_symmetric = self%force%is_symmetric_at_end
       else
          is_symmetric = self%force%is_symmetric_in_steps

@@ -4,13 +4,14 @@ module emcon_loads
    use emcon_csr, only : csr_t
    use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : instant_t, motion_t
+   use emcon_motion, only : motion_t
+   use emcon_pose, only : instant_t
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : space_t
    use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t, &
-      procedure_static, step_t
+      step_t
    use emcon_term, only : response_t, role_external, term_t
    implicit none
    private
@@ -66,7 +67,7 @@ contains
 
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
-         self%is_ramped = step%procedure == procedure_static
+         self%is_ramped = step%scheme%loads_ramp
          self%nlgeom = step%nlgeom
          self%duration = step%duration
       end associate
@@ -233,7 +234,7 @@ contains
          call amplitude_at(scene%amplitude(prescribed%amplitude), instant, factor, rate)
          u = prescribed%value*factor
          v = prescribed%value*rate
-      else if (step%procedure == procedure_static) then
+      else if (step%scheme%loads_ramp) then
          u = u_start + (prescribed%value - u_start) &
             *min(1.0_wp, instant%step_time/step%duration)
       else

@@ -22,6 +22,7 @@ CARD = {
     "smoothing": "*SURFACE SMOOTHING",
     "initiation": "*CONTACT INITIATION",
     "method": "*CONSTRAINT METHOD",
+    "scheme": "*TIME INTEGRATION",
     "solver": "*STATIC",
 }
 

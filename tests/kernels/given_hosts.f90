@@ -6,8 +6,9 @@ module given_hosts
    use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok, &
       given_outside
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : motion_of, motion_t, pose_t
+   use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_function_t, point_ok
+   use emcon_pose, only : pose_t
    use emcon_scene, only : scene_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_space, only : lists_begin, lists_t, space_t

@@ -7,7 +7,8 @@ module small_scenes
    use emcon_mesh, only : surface_t
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_t, prescribed_t, procedure_dynamic, procedure_static, step_t
+   use emcon_scheme_registry, only : scheme_row
+   use emcon_steps, only : load_t, prescribed_t, step_t
    implicit none
    private
    public :: block_t, scene_begin, add_block, block_node, add_surface, add_step, prescribe, clamp
@@ -169,7 +170,7 @@ contains
       type(step_t) :: step
 
       step%origin = origin_t()
-      step%procedure = merge(procedure_static, procedure_dynamic, is_static)
+      step%scheme = scheme_row(merge("STATIC ", "DYNAMIC", is_static), "")
       step%nlgeom = .true.
       step%is_direct = .true.
       step%h = h

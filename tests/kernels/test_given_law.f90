@@ -9,8 +9,9 @@ module test_given_law
    use emcon_law, only : lame_constants
    use emcon_law_registry, only : law_coupled_neo_hooke, law_given, law_linear
    use emcon_march, only : increment_t
-   use emcon_motion, only : motion_of, motion_t, pose_t
+   use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
+   use emcon_pose, only : pose_t
    use emcon_restart, only : restart_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t

@@ -6,7 +6,8 @@ module test_loads
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : prescribed_motion
-   use emcon_motion, only : instant_t, motion_of, pose_t
+   use emcon_motion, only : motion_of
+   use emcon_pose, only : instant_t, pose_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
    use emcon_system, only : system_begin_step, system_init, system_loads, system_t
@@ -74,8 +75,8 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)
       real(wp), intent(out), contiguous :: force(:, :)
 
-      call system_loads(system, motion_of(pose_t(is_end=.true., load_instant=instant), scene%x, u, &
-         0.0_wp*u), force)
+      call system_loads(system, motion_of(pose_t(is_gradient=.true., load_place=1.0_wp, &
+         load_instant=instant), scene%x, u, 0.0_wp*u), force)
    end subroutine forces
 
    !> -p n L t, half on either node, on the deformed edge.

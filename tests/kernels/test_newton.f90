@@ -5,9 +5,10 @@ module test_newton
    use emcon_correction, only : correction_free, correction_reset, correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_motion, only : instant_t, motion_init, motion_t
+   use emcon_motion, only : motion_init, motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_refused, &
       newton_singular, newton_solve, newton_t
+   use emcon_pose, only : instant_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_solver_registry, only : solver_default
@@ -65,7 +66,7 @@ contains
       call correction_reset(trial%newton%correction, method, solver_default)
       call constraints_select(trial%set, none)
       call motion_init(trial%motion, scene%x)
-      trial%motion%pose%is_end = .not. h > 0.0_wp
+      trial%motion%pose%is_gradient = .not. h > 0.0_wp
       if (h > 0.0_wp) trial%motion%pose = scheme%pose(instant_t(), h)
       trial%motion%u0 = scene%u0
       trial%motion%v0 = scene%v0

@@ -6,8 +6,9 @@ module test_reduction
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
-   use emcon_motion, only : instant_t, motion_of, pose_t
+   use emcon_motion, only : motion_of
    use emcon_numbering, only : numbering_init, numbering_t, pick_unknowns
+   use emcon_pose, only : instant_t, pose_t
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t

@@ -6,7 +6,7 @@ module test_scheme
    use emcon_ledger, only : body_momenta, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
-   use emcon_motion, only : instant_t, pose_t
+   use emcon_pose, only : instant_t, pose_t, pose_velocity
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
@@ -41,14 +41,14 @@ contains
       call check_near(error, [pose%mass_scale*pose%rate, pose%mass_scale*pose%v_weight, &
          pose%load_instant%step_time, pose%load_instant%total_time], &
          [8.0_wp, 4.0_wp, 1.25_wp, 10.25_wp], 0.0_wp, 1.0_wp, "mid-point")
-      call check_true(error, .not. pose%is_end, "discrete gradients")
-      call check_near(error, dynamic%velocity(0.5_wp, 3.0_wp, 2.0_wp), 5.0_wp, 0.0_wp, 1.0_wp, &
+      call check_true(error, .not. pose%is_gradient, "discrete gradients")
+      call check_near(error, pose_velocity(pose, 3.0_wp, 2.0_wp), 5.0_wp, 0.0_wp, 1.0_wp, &
          "mean velocity is du/h")
       pose = static%pose(instant_t(1.0_wp, 10.0_wp), 0.5_wp)
       call check_near(error, [pose%mass_scale, pose%load_instant%step_time, &
          pose%load_instant%total_time], [0.0_wp, 1.5_wp, 10.5_wp], 0.0_wp, 1.0_wp, "end")
-      call check_true(error, pose%is_end, "gradients at the end")
-      call check_near(error, static%velocity(0.5_wp, 3.0_wp, 2.0_wp), 0.0_wp, 0.0_wp, 1.0_wp, &
+      call check_true(error, pose%is_gradient, "gradients at the end")
+      call check_near(error, pose_velocity(pose, 3.0_wp, 2.0_wp), 0.0_wp, 0.0_wp, 1.0_wp, &
          "rest")
    end subroutine test_pose
 

@@ -5,7 +5,8 @@ module test_solid
    use emcon_given_law, only : given_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
-   use emcon_motion, only : motion_of, pose_t
+   use emcon_motion, only : motion_of
+   use emcon_pose, only : pose_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_element_respond, solid_init, solid_t
    use emcon_solid_term, only : solid_term_init, solid_term_t

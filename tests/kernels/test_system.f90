@@ -4,8 +4,9 @@ module test_system
    use emcon_csr, only : csr_multiply
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : instant_t, motion_of, motion_t, pose_t
+   use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_pose, only : instant_t, pose_t, pose_velocity
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
@@ -173,7 +174,7 @@ contains
       motion = motion_of(scheme%pose(instant_t(), h), scene%x, u0, du, v0)
       motion%offset = offset
       call system_respond(system, motion, .false.)
-      change = (scheme%velocity(h, v0, du + offset) - v0)/h
+      change = (pose_velocity(motion%pose, v0, du + offset) - v0)/h
       call mass_times(system, change, expected)
       associate (part => system%response%part)
          call check_near(error, part(role_inertia)%force, expected, tol, 20.0_wp, "inertia")

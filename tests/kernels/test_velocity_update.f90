@@ -4,7 +4,8 @@ module test_velocity_update
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : motion_of, pose_t
+   use emcon_motion, only : motion_of
+   use emcon_pose, only : pose_t
    use emcon_scene, only : scene_t
    use emcon_system, only : mass_times, system_begin_step, system_init, system_t
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_free, velocity_update_t

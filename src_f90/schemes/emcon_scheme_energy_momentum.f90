@@ -2,7 +2,7 @@
 !> Source: docs/theory.md, eqs. (2) and (3).
 module emcon_scheme_energy_momentum
    use emcon_kinds, only : wp
-   use emcon_motion, only : instant_t, pose_t
+   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_scheme, only : scheme_t
    implicit none
    private
@@ -11,7 +11,7 @@ module emcon_scheme_energy_momentum
    type, extends(scheme_t) :: scheme_energy_momentum_t
    contains
       procedure :: pose => energy_momentum_pose
-      procedure :: velocity => energy_momentum_velocity
+      procedure :: keeps_energy => energy_momentum_keeps_energy
    end type scheme_energy_momentum_t
 
 contains
@@ -23,18 +23,14 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       type(pose_t) :: pose
 
-      pose%mass_scale = 1.0_wp/h
-      pose%rate = 2.0_wp/h
-      pose%v_weight = 2.0_wp
-      pose%load_instant = instant_t(start%step_time + 0.5_wp*h, start%total_time + 0.5_wp*h)
+      pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+      pose%load_instant = instant_later(start, 0.5_wp*h)
    end function energy_momentum_pose
 
-   elemental function energy_momentum_velocity(self, h, v0, du) result(v1)
+   pure logical function energy_momentum_keeps_energy(self) result(keeps_energy)
       class(scheme_energy_momentum_t), intent(in) :: self
-      real(wp), intent(in) :: h, v0, du          !! [T], [L/T], [L]
-      real(wp) :: v1
 
-      v1 = (2.0_wp/h)*du - v0
-   end function energy_momentum_velocity
+      keeps_energy = .true.
+   end function energy_momentum_keeps_energy
 
 end module emcon_scheme_energy_momentum

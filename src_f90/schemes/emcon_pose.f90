@@ -1,0 +1,80 @@
+!> Where in a step forces are evaluated, and how inertia enters: all that a scheme decides.
+!>
+!> Source: docs/theory.md, section 1.
+module emcon_pose
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: instant_t, pose_t, pose_at_end
+   public :: pose_moving, pose_velocity, pose_way, pose_is_equilibrium, instant_later
+
+   !> A moment of a step, as amplitudes see it.
+   type :: instant_t
+      real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
+      real(wp) :: total_time = 0.0_wp            !! since the start of the analysis [T]
+   end type instant_t
+
+   !> Inertia is s M (b du - w v0): b du - w v0 is the change of velocity, computed with the same b
+   !> as the velocity itself. Two factors for du and v0 would round apart, a bias in each step.
+   !> Forces are discrete gradients from the start of the step to a place in it, or gradients there.
+   type :: pose_t
+      real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: masses do not resist
+      real(wp) :: rate = 0.0_wp                  !! b [1/T]
+      real(wp) :: lapse = 0.0_wp                 !! 1/b, as the scheme rounds it [T]
+      real(wp) :: v_weight = 0.0_wp              !! w
+      real(wp) :: place = 1.0_wp                 !! part of the way from start to end: 0 < . <= 1
+      logical :: is_gradient = .false.           !! at `place`, else discrete from the start to it
+      real(wp) :: load_place = 0.5_wp            !! part of the way at which loads act: 0..1
+      type(instant_t) :: load_instant            !! when loads are taken
+   end type pose_t
+
+   !> Gradients at the end of the step, where masses do not resist.
+   type(pose_t), parameter :: pose_at_end = pose_t(is_gradient=.true., load_place=1.0_wp)
+
+contains
+
+   !> Inertia M (v1 - v0)/h with v1 - v0 = du/lapse - v_weight v0.
+   pure type(pose_t) function pose_moving(h, lapse, v_weight) result(pose)
+      real(wp), intent(in) :: h                  !! > 0, size of the step [T]
+      real(wp), intent(in) :: lapse              !! > 0 [T]
+      real(wp), intent(in) :: v_weight           !! (1)
+
+      pose%mass_scale = 1.0_wp/h
+      pose%rate = 1.0_wp/lapse
+      pose%lapse = lapse
+      pose%v_weight = v_weight
+   end function pose_moving
+
+   !> Velocity at the end of a step from `v0` that moved by `du`: v1 = b du + (1 - w) v0.
+   elemental real(wp) function pose_velocity(pose, v0, du) result(v1)
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in) :: v0                 !! at the start [L/T]
+      real(wp), intent(in) :: du                 !! [L]
+
+      v1 = pose%rate*du + (1.0_wp - pose%v_weight)*v0
+   end function pose_velocity
+
+   !> The way over a step from `v0` that ends with `v1`: the inverse of `pose_velocity`.
+   elemental real(wp) function pose_way(pose, v0, v1) result(du)
+      type(pose_t), intent(in) :: pose
+      real(wp), intent(in) :: v0                 !! at the start [L/T]
+      real(wp), intent(in) :: v1                 !! at the end [L/T]
+
+      du = pose%lapse*((pose%v_weight - 1.0_wp)*v0 + v1)
+   end function pose_way
+
+   !> Are forces to balance without inertia, as gradients of their energies?
+   elemental logical function pose_is_equilibrium(pose) result(is_equilibrium)
+      type(pose_t), intent(in) :: pose
+
+      is_equilibrium = pose%is_gradient .and. .not. pose%mass_scale > 0.0_wp
+   end function pose_is_equilibrium
+
+   elemental type(instant_t) function instant_later(instant, h) result(later)
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(in) :: h                  !! [T]
+
+      later = instant_t(instant%step_time + h, instant%total_time + h)
+   end function instant_later
+
+end module emcon_pose

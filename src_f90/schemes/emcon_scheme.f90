@@ -1,0 +1,52 @@
+!> What a time stepping scheme is: where in a step it evaluates forces, and how inertia enters; the
+!> velocity at the end follows from that (`pose_velocity`). The residual, Newton's method and the
+!> step loop serve all schemes.
+module emcon_scheme
+   use emcon_kinds, only : wp
+   use emcon_pose, only : instant_t, pose_t
+   implicit none
+   private
+   public :: scheme_t, scheme_row_t
+
+   !> What is known of a scheme before there is one: decks are read by it.
+   type :: scheme_row_t
+      integer :: code = 0                        !! one of `scheme_`; 0: none
+      character(len=8) :: card = ""              !! that asks for it
+      character(len=16) :: word = ""             !! SCHEME= in decks; "": the only one of its card
+      character(len=24) :: text = ""             !! in the log; "": the name by which it is given
+      logical :: masses_resist = .false.         !! there are velocities, and pushing makes energy
+      logical :: loads_ramp = .false.            !! without amplitude they run over the step
+   end type scheme_row_t
+
+   type, abstract :: scheme_t
+      type(scheme_row_t) :: row
+   contains
+      procedure(pose_interface), deferred :: pose
+      procedure :: keeps_energy
+   end type scheme_t
+
+   abstract interface
+
+      !> Evaluation of a step of size `h` from `start`.
+      pure function pose_interface(self, start, h) result(pose)
+         import :: instant_t, pose_t, scheme_t, wp
+         class(scheme_t), intent(in) :: self
+         type(instant_t), intent(in) :: start
+         real(wp), intent(in) :: h               !! > 0 [T]
+         type(pose_t) :: pose
+      end function pose_interface
+
+   end interface
+
+contains
+
+   !> Is the energy balance of a step exact? If not, what it is off by is shown, not judged.
+   pure logical function keeps_energy(self)
+      class(scheme_t), intent(in) :: self
+
+      associate (unused => self)
+      end associate
+      keeps_energy = .false.
+   end function keeps_energy
+
+end module emcon_scheme
