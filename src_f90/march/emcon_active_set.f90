@@ -65,9 +65,9 @@ module emcon_active_set
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
       logical, allocatable :: is_put_off(:)      !! (n_constraint) nearly so: they waited once
       logical, allocatable :: is_let_go(:)       !! (n_constraint) they pulled where Newton failed
-      real(wp), allocatable :: before(:, :)      !! (2, n_node) first guess of the present set
-      real(wp), allocatable :: first(:, :)       !! (2, n_node) and of the first set of the step,
-      real(wp), allocatable :: driven(:, :)      !! (2, n_node) with the prescribed motion in it
+      real(wp), allocatable :: before(:, :)      !! (n_dim, n_node) first guess of the present set
+      real(wp), allocatable :: first(:, :)      !! (n_dim, n_node) and of the first set of the step,
+      real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) with the prescribed motion in it
       !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
@@ -99,7 +99,7 @@ contains
    subroutine active_set_overclosure(self, system, x, u, is_meant)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)       !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)       !! (n_dim, n_node) [L]
       logical, intent(in) :: is_meant            !! the step resolves what is closed
       integer :: pair
 
@@ -207,7 +207,7 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: driven(:, :)               !! (2, n_node)
+      real(wp), intent(in), contiguous :: driven(:, :)               !! (n_dim, n_node)
       type(motion_t), intent(inout) :: motion
       integer :: pair
 

@@ -17,8 +17,8 @@ contains
    !> from outside; huge if that never happens. Every node is looked at with every edge.
    real(wp) function touch_time(scene, x, way)
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: x(:, :)            !! (2, n_node) where nodes are [L]
-      real(wp), intent(in) :: way(:, :)          !! (2, n_node) how they move per time [L]
+      real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) where nodes are [L]
+      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) how they move per time [L]
       integer, allocatable :: slave(:, :), master(:, :), node(:)
       integer :: i
 

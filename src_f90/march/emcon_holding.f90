@@ -66,7 +66,7 @@ contains
       type(holding_t), intent(out) :: self
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: u(:, :)            !! (2, n_node)
+      real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node)
       type(look_t) :: look
       type(free_t), allocatable :: free(:)
 
@@ -185,7 +185,7 @@ contains
       type(holding_t), intent(in) :: self
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: u(:, :)            !! (2, n_node)
+      real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node)
       type(look_t), intent(out) :: look
 
       look%rows = self%supports
@@ -245,7 +245,7 @@ contains
       type(free_t), intent(in) :: free
       logical, intent(inout) :: is_active(:)
       type(constraint_set_t) :: set
-      real(wp) :: way(2, size(motion%du, 2)), time, turn
+      real(wp) :: way(size(motion%du, 1), size(motion%du, 2)), time, turn
       real(dp) :: rigid(3*size(free%member)), share(size(free%along))
       logical :: is_next(size(is_active))
       integer :: i
@@ -340,7 +340,7 @@ contains
    !> Move the unknown freedoms on, and those that follow from them.
    subroutine move(system, way, time, du)
       type(system_t), intent(in) :: system
-      real(wp), intent(in) :: way(:, :)                  !! (2, n_node)
+      real(wp), intent(in) :: way(:, :)                  !! (n_dim, n_node)
       real(wp), intent(in) :: time
       real(wp), intent(inout), contiguous :: du(:, :)
       real(wp) :: vector(system%space%numbering%n_unknown)
@@ -348,7 +348,7 @@ contains
 
       do k = 1, size(vector)
          associate (dof => system%space%numbering%dof(k))
-            vector(k) = way(2 - mod(dof, 2), (dof + 1)/2)
+            vector(k) = way(1 + mod(dof - 1, size(way, 1)), (dof - 1)/size(way, 1) + 1)
          end associate
       end do
       call add_to_dofs(system%space%numbering, vector, time, du)

@@ -73,7 +73,7 @@ contains
    !> Of the contacts `set` those that close first on a way, and when; huge if none does.
    pure subroutine gaps_next_to_close(set, way, time, is_next)
       type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in) :: way(:, :)          !! (2, n_node) per time
+      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) per time
       real(wp), intent(out) :: time              !! >= 0, in the unit of `way`
       logical, intent(out) :: is_next(:)         !! (n_constraint)
       real(wp) :: rate(set%n), gap(set%n)
@@ -102,7 +102,7 @@ contains
       integer, intent(in) :: member(:)           !! bodies of an assembly
       real(dp), intent(in) :: z(:, :)            !! (3*members, n) motions that are left of it
       logical, intent(out) :: is_next(:)         !! (n_constraint)
-      real(wp) :: way(2, size(bodies%of_node)), rate(set%n), smallest
+      real(wp) :: way(size(bodies%x, 1), size(bodies%of_node)), rate(set%n), smallest
       integer :: j, k
 
       rate = 0.0_wp

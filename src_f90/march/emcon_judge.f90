@@ -52,7 +52,7 @@ module emcon_judge
    type :: judge_t
       type(outline_t) :: outline
       type(extent_t), allocatable :: extent(:)   !! (n_piece) of the step
-      real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement at a look [L]
+      real(wp), allocatable :: u(:, :)           !! (n_dim, n_node) displacement at a look [L]
       real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges at a look [L]
       integer, allocatable :: near(:), found(:), around(:)     !! work space for lists of edges
       integer, allocatable :: other(:)           !! and of pieces
@@ -71,14 +71,14 @@ contains
       n = size(self%outline%edge, 2)
       allocate(self%extent(self%outline%n_piece), self%near(n), self%found(n), self%around(n))
       allocate(self%other(self%outline%n_piece))
-      allocate(self%low(2, n), self%high(2, n), source=0.0_wp)
-      allocate(self%u(2, size(scene%x, 2)), source=0.0_wp)
+      allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), source=0.0_wp)
+      allocate(self%u(scene%n_dim, size(scene%x, 2)), source=0.0_wp)
    end subroutine judge_init
 
    !> The deepest overlap in the step from `u0` by `du`.
    subroutine judge_step(self, x, u0, du, overlap)
       type(judge_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: overlap
       type(box_tree_t) :: tree
       integer :: p, i, n

@@ -28,7 +28,7 @@ contains
    subroutine ledger_measure(self, system, x, state)
       type(ledger_t), intent(inout) :: self
       type(system_t), intent(in) :: system
-      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
+      real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state
       real(wp) :: momentum(size(x, 1), size(x, 2))   ! of each node
       integer :: i
@@ -54,7 +54,7 @@ contains
    !> Linear and angular momentum of each body: rows px, py, lz.
    subroutine body_momenta(system, x, state, momenta)
       type(system_t), intent(in) :: system
-      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
+      real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state
       real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
       real(wp) :: momentum(size(x, 1), size(x, 2))   ! of each node

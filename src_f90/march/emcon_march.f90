@@ -53,20 +53,16 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(given_t), intent(in), optional :: given
-      integer :: n
-
       call check_schemes(self, scene, error)
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
       call given_copy_solvers(given, self%solver)
-      n = size(scene%x, 2)
       call motion_init(self%motion, scene%x)
-      allocate(self%v1(2, n), source=0.0_wp)
+      allocate(self%v1, source=at_rest(scene%x))
       associate (state => self%state)
-         allocate(state%u(2, n), source=scene%u0)
-         allocate(state%v(2, n), source=scene%v0)
-         allocate(state%u_start(2, n), state%contact(2, n), state%reaction(2, n), source=0.0_wp)
-         allocate(state%internal(2, n), source=0.0_wp)
+         allocate(state%u, source=scene%u0)
+         allocate(state%v, source=scene%v0)
+         allocate(state%u_start, state%contact, state%reaction, state%internal, source=self%v1)
          allocate(state%is_active(self%system%n_constraint), source=.false.)
          allocate(state%lam(self%system%n_constraint), source=0.0_wp)
          allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
@@ -165,7 +161,7 @@ contains
    contains
 
       subroutine follow(field, name)
-         real(wp), intent(inout), contiguous :: field(:, :)      !! (2, n_node)
+         real(wp), intent(inout), contiguous :: field(:, :)      !! (n_dim, n_node)
          character(len=*), intent(in) :: name
          real(wp) :: change(size(field, 2)), largest
          integer :: i

@@ -93,7 +93,7 @@ module emcon_march_step
       integer :: n_level = 0                     !! halvings allowed
       integer :: revision = 0                    !! changes with the numbering of the unknowns
       type(motion_t) :: motion                   !! of the step
-      real(wp), allocatable :: v1(:, :)          !! (2, n_node) velocity at its end
+      real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity at its end
       !> Asked before each iteration, if there is one.
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
    end type march_t
@@ -316,7 +316,7 @@ contains
    !> them: with multipliers they have to move in the same way.
    subroutine follow_links(system, field)
       type(system_t), intent(in) :: system
-      real(wp), intent(inout), contiguous :: field(:, :)     !! (2, n_node)
+      real(wp), intent(inout), contiguous :: field(:, :)     !! (n_dim, n_node)
 
       if (system%linear%n > 0) call spread_dependent(system%space%linked, field)
    end subroutine follow_links
@@ -336,7 +336,7 @@ contains
          call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
          do i = 1, size(state%v, 2)
-            do a = 1, 2
+            do a = 1, size(state%v, 1)
                if (system%space%numbering%unknown(a, i) > 0) then
                   self%v1(a, i) = pose_velocity(self%motion%pose, state%v(a, i), &
                      self%motion%du(a, i))
@@ -413,7 +413,7 @@ contains
          if (.not. allocated(holding%text)) return
          call tell_stabilized(self%active%holding, increment)
          do i = 1, size(self%motion%du, 2)
-            do a = 1, 2
+            do a = 1, size(self%motion%du, 1)
                if (system%space%numbering%unknown(a, i) == 0) cycle
                self%ledger%stabilization = self%ledger%stabilization &
                   - system%response%residual(a, i)*self%motion%du(a, i)

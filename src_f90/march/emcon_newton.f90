@@ -72,9 +72,9 @@ module emcon_newton
       real(wp), allocatable :: dq(:)             !! (n_unknown) the last correction
       real(wp), allocatable :: dlam(:)           !! (n) and that of the multipliers
       real(wp), allocatable :: way(:)            !! (n_unknown) the correction to search along
-      real(wp), allocatable :: contact(:, :)     !! (2, n_node) forces of all constraints of the set
-      real(wp), allocatable :: left(:, :)        !! (2, n_node) the residual with them
-      !> (2, n_node) prescribed motion that the first correction meets by its tangent; 0: none
+      real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) forces of the set of constraints
+      real(wp), allocatable :: left(:, :)        !! (n_dim, n_node) the residual with them
+      !> (n_dim, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
       type(correction_t) :: correction           !! how linear systems are solved
@@ -207,7 +207,7 @@ contains
    !> Has the last correction moved something out of all proportion?
    pure logical function is_too_far(self, x)
       type(newton_t), intent(in) :: self
-      real(wp), intent(in) :: x(:, :)            !! (2, n_node) [L]
+      real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
 
       is_too_far = .false.
       if (size(self%dq) > 0) is_too_far = maxval(abs(self%dq)) &

@@ -34,7 +34,7 @@ contains
       type(system_t), intent(in) :: system
 
       allocate(self%total(system%n_pair))
-      allocate(self%force(2, system%n_constraint), source=0.0_wp)
+      allocate(self%force(size(system%space%is_alive, 1), system%n_constraint), source=0.0_wp)
       allocate(self%area(system%n_constraint), source=0.0_wp)
    end subroutine pair_record_init
 
@@ -44,7 +44,7 @@ contains
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (2, n_node)
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (n_dim, n_node)
       real(wp), intent(in) :: lag                !! 0 or 1/2
       integer :: k, first, last
 

@@ -25,15 +25,16 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: h                  !! [T]
-      real(wp) :: force(set%n), total(2), gap
+      real(wp) :: force(set%n), gap
       integer :: k, first, pair, i
 
       first = set%n_held + 1
       if (first > set%n) return
       do k = first, set%n
          associate (item => set%item(k))
-            total = sum(item%g(:, :item%n_slave), dim=2)
-            force(k) = abs(set%lam(k))*sqrt(dot_product(total, total))   ! norm2 knows the units
+            associate (total => sum(item%g(:, :item%n_slave), dim=2))
+               force(k) = abs(set%lam(k))*sqrt(dot_product(total, total))   ! norm2 knows the units
+            end associate
          end associate
       end do
       do k = first, set%n

@@ -17,15 +17,15 @@ module emcon_state
       real(wp) :: time = 0.0_wp                  !! total time [T]
       real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
       logical :: is_off_grid = .false.           !! after grid point `n_grid`, not at it
-      real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement [L]
-      real(wp), allocatable :: v(:, :)           !! (2, n_node) velocity [L/T]
-      real(wp), allocatable :: u_start(:, :)     !! (2, n_node) displacement at the step's start
+      real(wp), allocatable :: u(:, :)           !! (n_dim, n_node) displacement [L]
+      real(wp), allocatable :: v(:, :)           !! (n_dim, n_node) velocity [L/T]
+      real(wp), allocatable :: u_start(:, :)     !! (n_dim, n_node) displacement at the step's start
       logical, allocatable :: is_active(:)       !! (n_constraint)
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
-      real(wp), allocatable :: contact(:, :)     !! (2, n_node) nodal contact forces
+      real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) nodal contact forces
       type(pair_record_t) :: pairs               !! what each contact pair transmits
-      real(wp), allocatable :: reaction(:, :)    !! (2, n_node) forces at prescribed freedoms
-      real(wp), allocatable :: internal(:, :)    !! (2, n_node) internal forces
+      real(wp), allocatable :: reaction(:, :)    !! (n_dim, n_node) forces at prescribed freedoms
+      real(wp), allocatable :: internal(:, :)    !! (n_dim, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy
       real(wp) :: potential = 0.0_wp             !! energy of the given forces
    end type state_t

@@ -58,7 +58,7 @@ contains
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
-      real(wp), intent(inout), contiguous :: v(:, :)     !! (2, n_node)
+      real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
       real(wp), intent(out) :: restored          !! >= 0 [M L^2/T^2]
       logical, intent(out) :: has_root           !! .false.: `v` is left as it is
       type(error_t), allocatable, intent(out) :: error
@@ -99,7 +99,7 @@ contains
 
       !> The unknown entries of `field` to `push`.
       subroutine pick(field)
-         real(wp), intent(in), contiguous :: field(:, :)     !! (2, n_node)
+         real(wp), intent(in), contiguous :: field(:, :)     !! (n_dim, n_node)
 
          if (keeps_links(system)) then
             call pick_unknowns(system%space%linked, field, self%push)
