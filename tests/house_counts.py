@@ -102,10 +102,12 @@ def silent_arguments(path):
 # ---- literals of the plane ----------------------------------------------------------------------
 
 
-# A 2 here counts or names what it says itself: a dimension of an array, a pass, a power.
+# A 2 here counts or names what it says itself: a dimension of an array, a pass, a power,
+# a constant of a law.
 OTHER = re.compile(
     r"\b(?:size|sum|spread|minval|maxval|any|all|count|merge|min|max|lbound|ubound|norm2)"
-    r"\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\)|\bdo pass = .*|\*\*\s*2\b",
+    r"\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\)|\bdo pass = .*|\*\*\s*2\b"
+    r"|\bconstant\(\d\)",
     re.I,
 )
 PLANAR = re.compile(

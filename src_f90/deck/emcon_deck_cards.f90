@@ -211,7 +211,8 @@ contains
          call refuse_unsupported(reader, card, keywords(i))
       else
          call law_variants(card%name, variants)
-         call check_options(reader, card, trim(keywords(i)%parameters) // variants)
+         if (variants /= "") variants = variants(2:) // ","
+         call check_options(reader, card, variants // trim(keywords(i)%parameters))
          call check_place(reader, place, card, keywords(i))
       end if
    end subroutine read_card

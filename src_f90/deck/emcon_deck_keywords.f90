@@ -1,6 +1,7 @@
 !> The keyword registry: what the deck language knows. One row per keyword.
 module emcon_deck_keywords
    use emcon_kinds, only : wp
+   use emcon_law_registry, only : law_titles
    use emcon_text, only : read_real, squeezed, string_t
    implicit none
    private
@@ -277,7 +278,8 @@ contains
       case ("TIMEDELAY")
          reason = " (shift the times of the amplitude)"
       case ("POLYNOMIAL", "REDUCEDPOLYNOMIAL", "ARRUDA-BOYCE", "VANDERWAALS", "MARLOW")
-         reason = " (use NEO HOOKE, MOONEY-RIVLIN, YEOH or OGDEN)"
+         call law_titles("HYPERELASTIC", reason)
+         reason = " (laws are " // reason // ")"
       case ("READ")
          reason = " (use: emcon restart NAME.rst.h5)"
       case ("INPUT")

@@ -10,9 +10,10 @@ module emcon_law_registry
    use emcon_law_neo_hooke, only : law_neo_hooke_t
    use emcon_law_ogden, only : law_ogden_t
    use emcon_law_yeoh, only : law_yeoh_t
+   use emcon_text, only : to_upper
    implicit none
    private
-   public :: law_row_t, law_rows, law_variants, find_law_row, n_constant, law_create
+   public :: law_row_t, law_rows, law_titles, law_variants, find_law_row, n_constant, law_create
    public :: law_linear, law_neo_hooke, law_coupled_neo_hooke, law_given, law_mooney_rivlin, &
       law_yeoh, law_ogden
 
@@ -73,6 +74,21 @@ contains
          list = list // "," // trim(law_rows(i)%variant)
       end do
    end subroutine law_variants
+
+   !> The same as texts name them: "A, B".
+   pure subroutine law_titles(keyword, list)
+      character(len=*), intent(in) :: keyword    !! without asterisk, upper case
+      character(len=:), allocatable, intent(out) :: list   !! empty: none
+      integer :: i
+
+      list = ""
+      do i = 1, size(law_rows)
+         if (law_rows(i)%keyword /= keyword .or. law_rows(i)%variant == "") cycle
+         if (law_rows(i)%order > 1) cycle
+         if (list /= "") list = list // ", "
+         list = list // to_upper(law_rows(i)%name(:verify(law_rows(i)%name, " 123456789", .true.)))
+      end do
+   end subroutine law_titles
 
    !> Row of a law of the `order`; an order that there is not: 0.
    pure integer function find_law_row(keyword, variant, order) result(i)
