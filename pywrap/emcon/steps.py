@@ -132,11 +132,9 @@ class Step(Cards):
         """`*NEWTON`: relative residual, below 1 (default 1e-10); most iterations (20)."""
         return self._card("NEWTON", {"TYPE": "FULL", "TOLERANCE": tolerance, "MAXIMUM": maximum})
 
-    def time_integration(self, scheme: str, name: str | None = None) -> Step:
-        """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), or USER with the `name` of a scheme that
-        the program gives which runs the deck.
-        """
-        return self._card("TIME INTEGRATION", {"SCHEME": scheme, "NAME": name})
+    def time_integration(self, scheme: str) -> Step:
+        """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), or a name by which a program gives one."""
+        return self._card("TIME INTEGRATION", {"SCHEME": scheme})
 
     # --- output ----------------------------------------------------------------------------
 

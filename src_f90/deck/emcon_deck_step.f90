@@ -14,15 +14,15 @@ module emcon_deck_step
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_options, only : choose_option
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
-   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
-      option_count, option_name, option_real, reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
+      option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
-   use emcon_scheme_registry, only : scheme_given, scheme_row
+   use emcon_scheme_registry, only : scheme_given_row, scheme_row
    use emcon_solver_registry, only : is_foreign_solver, solver_given, solver_names, solvers
    use emcon_steps, only : step_t
    use emcon_text, only : to_text
@@ -302,30 +302,23 @@ contains
       call option_count(reader, card, "MAXIMUM", 1, step%newton_maximum)
    end subroutine read_newton
 
-   !> *TIME INTEGRATION: the scheme of dynamic steps from this one on.
+   !> *TIME INTEGRATION: the scheme of dynamic steps from this one on, or the name of one that a
+   !> program gives.
    subroutine read_scheme(reader, card, step)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
       character(len=:), allocatable :: known
 
-      associate (choice => step%choice)
-         choice%origin = card%origin
-         choice%row = scheme_row("DYNAMIC", option_name(card, "SCHEME"))
-         if (choice%row%code == scheme_given) then
-            call need_name(reader, card, "NAME", choice%name)
-            return
-         end if
-         if (has_option(card, "NAME")) call card_error(reader, card, &
-            "NAME= is for SCHEME=USER, a scheme that a program gives")
-         if (choice%row%code /= 0) return
-      end associate
-      call option_words("scheme", known)
       select case (option_name(card, "SCHEME"))
       case ("MIDPOINT", "TRAPEZOIDAL", "GENERALIZEDALPHA", "CENTRALDIFFERENCE")
+         call option_words("scheme", known)
          call refuse_option(reader, card, "SCHEME", known, "not in this version")
       case default
-         call refuse_option(reader, card, "SCHEME", known, "")
+         step%choice%origin = card%origin
+         step%choice%name = option_name(card, "SCHEME")
+         step%choice%row = scheme_row("DYNAMIC", step%choice%name)
+         if (step%choice%row%code == 0) step%choice%row = scheme_given_row
       end select
    end subroutine read_scheme
 

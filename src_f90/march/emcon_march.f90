@@ -16,6 +16,7 @@ module emcon_march
    use emcon_motion, only : at_rest, motion_init, motion_of
    use emcon_newton, only : interrupt_interface, newton_init
    use emcon_numbering, only : spread_dependent
+   use emcon_options, only : option_words
    use emcon_overclosure, only : overclosure_check
    use emcon_pair_record, only : pair_record_init
    use emcon_pose, only : pose_at_end
@@ -77,15 +78,17 @@ contains
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: known
       integer :: i
 
       do i = 1, size(scene%step)
          associate (choice => scene%step(i)%choice)
             if (scene%step(i)%scheme%code /= scheme_given) cycle
             if (given_scheme_find(self%given_scheme, choice%name) > 0) cycle
-            call raise(error, err_input, where_text(scene, choice%origin) // ": error: *TIME " // &
-               "INTEGRATION: the scheme " // choice%name // " was not given; it comes from a " // &
-               "program that calls the library, see docs/embedding.md")
+            call option_words("scheme", known)
+            call raise(error, err_input, where_text(scene, choice%origin) // ": error: SCHEME=" // &
+               choice%name // ": no program has given this scheme, see docs/embedding.md; EMCON " &
+               // "has " // known)
             return
          end associate
       end do

@@ -47,7 +47,7 @@ module emcon_steps
    type :: scheme_choice_t
       type(origin_t) :: origin
       type(scheme_row_t) :: row                      !! code 0: none was asked for
-      character(len=:), allocatable :: name          !! of one that a program gives
+      character(len=:), allocatable :: name          !! in the deck
    end type scheme_choice_t
 
    type :: step_t

@@ -7,7 +7,7 @@ module emcon_scheme_registry
    use emcon_text, only : squeezed
    implicit none
    private
-   public :: scheme_rows, scheme_static, scheme_energy_momentum, scheme_given
+   public :: scheme_rows, scheme_given_row, scheme_static, scheme_energy_momentum, scheme_given
    public :: scheme_row, scheme_create
 
    integer, parameter :: scheme_static = 1, scheme_energy_momentum = 2, scheme_given = 3
@@ -16,8 +16,11 @@ module emcon_scheme_registry
    type(scheme_row_t), parameter :: scheme_rows(*) = [ &
       scheme_row_t(scheme_static, "STATIC", "", "statics", loads_ramp=.true.), &
       scheme_row_t(scheme_energy_momentum, "DYNAMIC", "ENERGY MOMENTUM", &
-         "energy-momentum scheme", masses_resist=.true.), &
-      scheme_row_t(scheme_given, "DYNAMIC", "USER", "", masses_resist=.true.)]
+         "energy-momentum scheme", masses_resist=.true.)]
+
+   !> Of schemes that a program gives.
+   type(scheme_row_t), parameter :: scheme_given_row = &
+      scheme_row_t(scheme_given, "DYNAMIC", masses_resist=.true.)
 
 contains
 

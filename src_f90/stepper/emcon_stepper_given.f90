@@ -17,8 +17,8 @@ module emcon_stepper_given
    use emcon_node_potential, only : node_potential_init, node_potential_t
    use emcon_point_function, only : point_function_t
    use emcon_scene, only : where_text
-   use emcon_scheme, only : scheme_t
-   use emcon_scheme_registry, only : scheme_given
+   use emcon_scheme, only : scheme_row_t, scheme_t
+   use emcon_scheme_registry, only : scheme_row
    use emcon_solver_registry, only : is_foreign_solver, solver_names, solvers
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    use emcon_stepper, only : stepper_t
@@ -90,28 +90,21 @@ contains
    end subroutine check_material
 
    !> Give the scheme of time integration that the deck calls `name`, by *TIME INTEGRATION,
-   !> SCHEME=USER, NAME=`name`.
+   !> SCHEME=`name`.
    subroutine stepper_give_scheme(self, name, scheme, error)
       type(stepper_t), intent(inout) :: self
       character(len=*), intent(in) :: name           !! small or capital letters
       class(scheme_t), intent(in) :: scheme
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
-      logical :: is_asked_for
-      integer :: i
+      type(scheme_row_t) :: own
 
       call check_stage(self, error)
       if (.not. allocated(error)) call given_scheme_check(squeezed(name), scheme, error)
       if (allocated(error)) return
-      is_asked_for = .false.
-      do i = 1, size(self%scene%step)
-         associate (step => self%scene%step(i))
-            if (step%scheme%code == scheme_given) is_asked_for = is_asked_for &
-               .or. step%choice%name == squeezed(name)
-         end associate
-      end do
-      if (.not. is_asked_for) then
-         call raise(error, err_input, "no *DYNAMIC step of the deck has the scheme " // &
-            squeezed(name) // ": *TIME INTEGRATION, SCHEME=USER, NAME=" // squeezed(name))
+      own = scheme_row("DYNAMIC", squeezed(name))
+      if (own%code /= 0) then
+         call raise(error, err_input, "a scheme cannot be given as " // trim(own%word) // &
+            ": EMCON has its own")
       else if (given_scheme_find(self%march%given_scheme, squeezed(name)) > 0) then
          call raise(error, err_input, "the scheme " // squeezed(name) // " is given already")
       else

@@ -41,7 +41,7 @@ RIGHT, 1, 1.
 *STEP
 *DYNAMIC, DIRECT
 {h}, {end}
-*TIME INTEGRATION, SCHEME=USER, NAME=Theta
+*TIME INTEGRATION, SCHEME=Theta
 *END STEP
 """
 OMEGA = 3.0
@@ -66,7 +66,7 @@ SPINNING = """*NODE
 *STEP, NLGEOM
 *DYNAMIC, DIRECT
 {h}, 1.
-*TIME INTEGRATION, SCHEME=USER, NAME=THETA
+*TIME INTEGRATION, SCHEME=THETA
 *END STEP
 """
 
@@ -112,7 +112,7 @@ ALL, 2
 *STEP
 *DYNAMIC, DIRECT
 0.0625, 4.
-*TIME INTEGRATION, SCHEME=USER, NAME=THETA
+*TIME INTEGRATION, SCHEME=THETA
 *END STEP
 """
 
@@ -189,8 +189,9 @@ def test_contact_works_over_the_whole_step(program: tuple[Path, dict[str, str]],
 
 
 @pytest.mark.parametrize(("name", "theta", "words"), [
-    ("", 0.5, "deck.inp:25: error: *TIME INTEGRATION: the scheme THETA was not given"),
-    ("other", 0.5, "no *DYNAMIC step of the deck has the scheme OTHER"),
+    ("", 0.5, "deck.inp:25: error: SCHEME=THETA: no program has given this scheme"),
+    ("other", 0.5, "deck.inp:25: error: SCHEME=THETA: no program has given this scheme"),
+    ("energy momentum", 0.5, "cannot be given as ENERGY MOMENTUM: EMCON has its own"),
     ("theta", 1.5, "the scheme THETA: place = 1.5 must be above 0 and at most 1")])
 def test_refusals(program: tuple[Path, dict[str, str]], tmp_path: Path, name: str, theta: float,
                   words: str) -> None:

@@ -2,7 +2,7 @@
 !> theta = 1/2 is the mid-point rule, theta = 1 the backward Euler method.
 !>
 !> A scheme from outside: one file against the installed modules. Its row is a *TIME INTEGRATION,
-!> SCHEME=USER with the name by which it is given.
+!> SCHEME= with the name by which it is given.
 module theta_scheme
    use emcon_api, only : instant_later, instant_t, pose_moving, pose_t, scheme_t, wp
    implicit none

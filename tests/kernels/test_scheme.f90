@@ -6,11 +6,13 @@ module test_scheme
    use emcon_ledger, only : body_momenta, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
-   use emcon_pose, only : instant_t, pose_t, pose_velocity
+   use emcon_pose, only : instant_t, pose_is_equilibrium, pose_t, pose_velocity, pose_way
    use emcon_scene, only : scene_t
+   use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_scheme_registry, only : scheme_create, scheme_energy_momentum, scheme_row, scheme_rows
    use emcon_scheme_static, only : scheme_static_t
-   use emcon_text, only : to_text
+   use emcon_text, only : squeezed, to_text
    use small_scenes, only : add_step, block_t, make_block
    implicit none
    private
@@ -25,6 +27,7 @@ contains
 
       tests = [ &
          test_case_t("evaluation and velocity", test_pose), &
+         test_case_t("rows say what schemes do", test_rows), &
          test_case_t("free flight conserves over 1000 steps", test_free_flight), &
          test_case_t("second order", test_order), &
          test_case_t("reversible", test_reversible), &
@@ -51,6 +54,32 @@ contains
       call check_near(error, pose_velocity(pose, 3.0_wp, 2.0_wp), 0.0_wp, 0.0_wp, 1.0_wp, &
          "rest")
    end subroutine test_pose
+
+   !> Each row makes a scheme that is what the row says of it; ways and velocities are inverse.
+   subroutine test_rows(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(scheme_t), allocatable :: scheme
+      type(scheme_row_t) :: row
+      type(pose_t) :: pose
+      integer :: i
+
+      do i = 1, size(scheme_rows)
+         row = scheme_row(scheme_rows(i)%card, squeezed(scheme_rows(i)%word))
+         call check_true(error, row%code == scheme_rows(i)%code, "a card and a word make a row")
+         call scheme_create(row, scheme)
+         pose = scheme%pose(instant_t(), 0.5_wp)
+         call check_true(error, scheme%row%code == row%code, "the row is kept")
+         call check_true(error, pose%mass_scale > 0.0_wp .eqv. row%masses_resist, "masses resist")
+         call check_true(error, pose_is_equilibrium(pose) .neqv. row%masses_resist, "equilibrium")
+         if (.not. row%masses_resist) cycle
+         call check_near(error, pose_velocity(pose, 3.0_wp, pose_way(pose, 3.0_wp, 7.0_wp)), &
+            7.0_wp, 8.0_wp*eps, 1.0_wp, "the velocity that a way ends with")
+      end do
+      row = scheme_row("DYNAMIC", "")
+      call check_true(error, row%code == scheme_energy_momentum, "the default of *DYNAMIC")
+      row = scheme_row("STATIC", "ENERGYMOMENTUM")
+      call check_true(error, row%code == 0, "no such scheme of *STATIC")
+   end subroutine test_rows
 
    !> One element that flies, spins and pulsates, with `n` steps of size `h`.
    subroutine make_flight(scene, h, n)

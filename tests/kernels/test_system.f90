@@ -6,7 +6,7 @@ module test_system
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
-   use emcon_pose, only : instant_t, pose_t, pose_velocity
+   use emcon_pose, only : instant_t, pose_moving, pose_t, pose_velocity
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
@@ -32,6 +32,7 @@ contains
       tests = [ &
          test_case_t("tangent of a dynamic step", test_dynamic_tangent), &
          test_case_t("tangent of a static step", test_static_tangent), &
+         test_case_t("tangent at a place within a step", test_tangent_within), &
          test_case_t("prescribed motion by the tangent", test_driven), &
          test_case_t("inertia is M times the change of velocity", test_inertia), &
          test_case_t("mass times a rigid motion", test_mass)]
@@ -81,6 +82,23 @@ contains
       if (allocated(error)) return
       call check_tangent(error, scene, system, scheme%pose(instant_t(0.5_wp, 0.5_wp), 0.25_wp))
    end subroutine test_static_tangent
+
+   !> Gradients at a place, discrete gradients from the start to it, and loads at another.
+   subroutine test_tangent_within(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(pose_t) :: pose
+
+      call make_system(scene, system, .false., error)
+      if (allocated(error)) return
+      pose = pose_moving(0.25_wp, lapse=0.2_wp, v_weight=1.5_wp)
+      pose%place = 0.375_wp
+      pose%load_place = 0.75_wp
+      call check_tangent(error, scene, system, pose)
+      pose%is_gradient = .true.
+      call check_tangent(error, scene, system, pose)
+   end subroutine test_tangent_within
 
    !> Against central differences of step eps^(1/3): error a multiple of eps^(2/3).
    subroutine check_tangent(error, scene, system, pose)
