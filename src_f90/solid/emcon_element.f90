@@ -54,7 +54,7 @@ contains
       type(element_geometry_t), intent(in) :: geometry
       integer, intent(in) :: k                   !! 1 to n_gp
       type(element_motion_t), intent(in) :: motion
-      type(point_motion_t), intent(out) :: point
+      type(point_motion_t), intent(inout) :: point       !! all of it is set
       real(wp) :: grad0(2, 2), dgrad(2, 2)
 
       call displacement_gradient(geometry, k, motion%from, grad0)
@@ -143,7 +143,7 @@ contains
    pure subroutine point_strain(grad0, dgrad, nlgeom, point)
       real(wp), intent(in) :: grad0(2, 2), dgrad(2, 2)   !! (component, by X)
       logical, intent(in) :: nlgeom              !! .false.: small strains
-      type(point_motion_t), intent(out) :: point
+      type(point_motion_t), intent(inout) :: point
 
       point%strain = [grad0(1, 1), grad0(2, 2), grad0(1, 2) + grad0(2, 1)]
       point%f_mid = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
@@ -153,8 +153,8 @@ contains
             0.5_wp*dot_product(grad0(:, 2), grad0(:, 2)), dot_product(grad0(:, 1), grad0(:, 2))]
          point%f_mid = point%f_mid + (grad0 + 0.5_wp*dgrad)
          point%f_end = point%f_end + (grad0 + dgrad)
-         point%geometric = 0.5_wp
       end if
+      point%geometric = merge(0.5_wp, 0.0_wp, nlgeom)
       associate (f => point%f_mid)
          point%dstrain = [dot_product(f(:, 1), dgrad(:, 1)), dot_product(f(:, 2), dgrad(:, 2)), &
             dot_product(f(:, 1), dgrad(:, 2)) + dot_product(f(:, 2), dgrad(:, 1))]

@@ -173,15 +173,17 @@ contains
       class(inertia_t), intent(in) :: self
       real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
-      real(wp) :: total(size(field, 1))
-      integer :: i, k
+      real(wp) :: total
+      integer :: i, k, a
 
       do i = 1, self%mass%n_row
-         total = 0.0_wp
-         do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
-            total = total + real(self%mass%value(k), wp)*field(:, self%mass%column(k) + 1)
+         do a = 1, size(field, 1)
+            total = 0.0_wp
+            do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
+               total = total + real(self%mass%value(k), wp)*field(a, self%mass%column(k) + 1)
+            end do
+            product(a, i) = total
          end do
-         product(:, i) = total
       end do
    end subroutine inertia_times
 

@@ -117,10 +117,11 @@ contains
       real(wp), intent(in), contiguous :: field(:, :)      !! (n_dim, n_node)
       real(wp), intent(out), contiguous :: product(:, :)   !! (n_dim, n_node)
 
-      product = 0.0_wp
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          call inertia_times(part, field, product)
+      class default
+         product = 0.0_wp
       end select
    end subroutine terms_mass_times
 
