@@ -1,6 +1,5 @@
 !> The elements at each node, and the faces that they share.
 module emcon_deck_adjacency
-   use emcon_element_kinds, only : element_kinds
    use emcon_scene, only : scene_t
    implicit none
    private
@@ -24,7 +23,7 @@ contains
       n_node = size(scene%node_label)
       allocate(self%first(n_node + 1), source=0)
       do e = 1, size(scene%element_label)
-         do k = 1, element_kinds(scene%element_kind(e))%n_node
+         do k = 1, scene%kind(scene%element_kind(e))%n_node
             node = scene%element_node(k, e)
             if (node > 0) self%first(node) = self%first(node) + 1
          end do
@@ -38,7 +37,7 @@ contains
       next = self%first
       allocate(self%element(k - 1))
       do e = 1, size(scene%element_label)
-         do k = 1, element_kinds(scene%element_kind(e))%n_node
+         do k = 1, scene%kind(scene%element_kind(e))%n_node
             node = scene%element_node(k, e)
             if (node == 0) cycle
             self%element(next(node)) = e
@@ -56,7 +55,7 @@ contains
       logical :: has_all
 
       n_neighbours = 0
-      associate (kind => element_kinds(scene%element_kind(element)))
+      associate (kind => scene%kind(scene%element_kind(element)))
          n_face_node = kind%n_face_node
          node = scene%element_node(kind%face_node(1, face), element)
          if (node == 0) return
@@ -86,9 +85,9 @@ contains
       face = 0
       do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
          associate (e => adjacency%element(i))
-            do k = 1, element_kinds(scene%element_kind(e))%n_face
+            do k = 1, scene%kind(scene%element_kind(e))%n_face
                associate (ends => scene%element_node( &
-                  element_kinds(scene%element_kind(e))%face_node(:, k), e))
+                  scene%kind(scene%element_kind(e))%face_node(:, k), e))
                   if (any(ends /= node) .and. any(ends(2:1:-1) /= node)) cycle
                end associate
                n_element = n_element + 1

@@ -3,7 +3,6 @@ module emcon_deck_check
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
-   use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_gravity, load_point
@@ -82,7 +81,7 @@ contains
       if (any(scene%element_node(1, :) == 0)) return
       allocate(is_bare(size(scene%node_label)), source=.true.)
       do i = 1, size(scene%element_label)
-         do k = 1, element_kinds(scene%element_kind(i))%n_node
+         do k = 1, scene%kind(scene%element_kind(i))%n_node
             is_bare(scene%element_node(k, i)) = .false.
          end do
       end do

@@ -9,7 +9,6 @@
 !> last value stays. A load dropped in a static step runs to zero over that step.
 module emcon_deck_conditions
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
-   use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_point, load_t, prescribed_t, step_t
@@ -44,7 +43,7 @@ contains
       allocate(self%load(16), self%load_step(16), self%load_dropped(16), self%load_next(16))
       allocate(self%prescribed_slot(scene%n_dim, size(scene%node_label)), source=0)
       allocate(self%point_slot(scene%n_dim, size(scene%node_label)), source=0)
-      allocate(self%element_slot(0:maxval(element_kinds%n_face), size(scene%element_label)), &
+      allocate(self%element_slot(0:maxval(scene%kind%n_face), size(scene%element_label)), &
          source=0)
    end subroutine conditions_init
 

@@ -10,7 +10,6 @@ module emcon_deck_general_contact
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_deck_surfaces, only : find_surface, surface_names
    use emcon_diagnostics, only : quoted, suggestion
-   use emcon_element_kinds, only : element_kinds
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t, where_text
@@ -188,10 +187,10 @@ contains
       integer :: e, f, i
 
       call adjacency_init(adjacency, scene)
-      allocate(is_in(maxval(element_kinds%n_face), size(scene%element_label)), source=.false.)
+      allocate(is_in(maxval(scene%kind%n_face), size(scene%element_label)), source=.false.)
       do e = 1, size(is_in, 2)
          if (scene%element_node(1, e) == 0) cycle
-         do f = 1, element_kinds(scene%element_kind(e))%n_face
+         do f = 1, scene%kind(scene%element_kind(e))%n_face
             is_in(f, e) = n_neighbours(scene, adjacency, e, f) == 0
          end do
       end do

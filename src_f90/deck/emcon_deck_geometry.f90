@@ -2,7 +2,6 @@
 module emcon_deck_geometry
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, label_list
-   use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    implicit none
@@ -60,7 +59,8 @@ contains
       integer :: k, n, before
 
       element_shape = shape_good
-      n = element_kinds(scene%element_kind(element))%n_node
+      n = scene%kind(scene%element_kind(element))%n_corner
+      if (n == 0) return
       if (any(scene%element_node(:n, element) == 0)) return
       x(:, :n) = scene%x(:, scene%element_node(:n, element))
       ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.

@@ -3,7 +3,6 @@ module emcon_deck_given
    use emcon_deck_named, only : find_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
-   use emcon_element_kinds, only : element_kinds
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
    implicit none
@@ -54,7 +53,7 @@ contains
       end if
       is_bare = .true.
       do e = 1, size(scene%element_label)
-         do k = 1, element_kinds(scene%element_kind(e))%n_node
+         do k = 1, scene%kind(scene%element_kind(e))%n_node
             is_bare(scene%element_node(k, e)) = .false.
          end do
       end do

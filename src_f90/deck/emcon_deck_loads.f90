@@ -9,7 +9,6 @@ module emcon_deck_loads
       refuse_option
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
-   use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
@@ -275,7 +274,7 @@ contains
       integer, intent(in) :: face
       logical :: has_not(size(item))
 
-      has_not = element_kinds(scene%element_kind(item))%n_face < face
+      has_not = scene%kind(scene%element_kind(item))%n_face < face
       if (any(has_not)) call data_error(reader, data, "element " &
          // label_list(pack(scene%element_label(item), has_not)) // " has no face " &
          // to_text(face))

@@ -6,10 +6,12 @@ module emcon_deck_mesh
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, need_name, &
       option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
-   use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
+   use emcon_element_kind, only : element_kind_t, find_element_kind
+   use emcon_element_registry, only : element_kinds_create
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
+   use emcon_shape, only : max_element_nodes
    use emcon_text, only : string_t, to_text
    implicit none
    private
@@ -28,7 +30,7 @@ module emcon_deck_mesh
    !> Elements that stand for something else, as mesh generators write them.
    type :: substitute_t
       character(len=4) :: name
-      character(len=4) :: kind                     !! of `element_kinds`; empty: a line
+      character(len=4) :: kind                     !! of the registry; empty: a line
    end type substitute_t
 
    type(substitute_t), parameter :: substitutes(*) = [ &
@@ -139,8 +141,9 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
       type(origin_t), allocatable :: line_origin_of(:)
-      integer :: i, n, n_line, most
+      integer :: i, k, n, n_line, most
 
+      call element_kinds_create(scene%kind)
       most = count_lines(reader, "ELEMENT")
       allocate(scene%element_label(most), scene%element_origin(most), scene%element_kind(most), &
          scene%element_node(max_element_nodes, most))
@@ -154,7 +157,11 @@ contains
       scene%element_label = scene%element_label(:n)
       scene%element_origin = scene%element_origin(:n)
       scene%element_kind = scene%element_kind(:n)
-      scene%element_node = scene%element_node(:, :n)
+      k = 0
+      do i = 1, n
+         k = max(k, scene%kind(scene%element_kind(i))%n_node)
+      end do
+      scene%element_node = scene%element_node(:k, :n)
       allocate(scene%element_section(n), source=0)
       reader%line_label = reader%line_label(:n_line)
       reader%line_node = reader%line_node(:, :n_line)
@@ -210,10 +217,10 @@ contains
       integer :: kind, n_node, label, node(max_element_nodes), before(2)
 
       card = reader%card(i_card)
-      call find_type(reader, i_card, kind)
+      call find_type(reader, i_card, scene%kind, kind)
       if (kind == 0) return
       n_node = 2
-      if (kind > 0) n_node = element_kinds(kind)%n_node
+      if (kind > 0) n_node = scene%kind(kind)%n_node
       before = [n, n_line]
       call data_open(data, card)
       do while (next_line(reader, data))
@@ -242,9 +249,10 @@ contains
 
    !> What the type of a card stands for: an element kind, or lines; 0 if it is refused. Each type
    !> is told once.
-   subroutine find_type(reader, i_card, kind)
+   subroutine find_type(reader, i_card, kinds, kind)
       type(reader_t), intent(inout) :: reader
       integer, intent(in) :: i_card
+      type(element_kind_t), intent(in) :: kinds(:)
       integer, intent(out) :: kind
       character(len=:), allocatable :: type_name
       integer :: i
@@ -253,7 +261,7 @@ contains
       kind = 0
       associate (card => reader%card(i_card))
          call need_name(reader, card, "TYPE", type_name)
-         if (type_name /= "") kind = find_element_kind(type_name)
+         if (type_name /= "") kind = find_element_kind(kinds, type_name)
          if (kind > 0) return
          is_first = .true.
          do i = 1, i_card - 1
@@ -263,11 +271,11 @@ contains
          do i = 1, size(substitutes)
             if (substitutes(i)%name /= type_name) cycle
             kind = kind_line
-            if (substitutes(i)%kind /= "") kind = find_element_kind(substitutes(i)%kind)
+            if (substitutes(i)%kind /= "") kind = find_element_kind(kinds, substitutes(i)%kind)
             if (is_first) call tell_substitute(reader, card, substitutes(i))
             return
          end do
-         if (type_name /= "" .and. is_first) call refuse_type(reader, card, type_name)
+         if (type_name /= "" .and. is_first) call refuse_type(reader, card, kinds, type_name)
       end associate
       reader%doubt_elements = .true.
       reader%doubt_names = .true.
@@ -288,18 +296,17 @@ contains
       end if
    end subroutine tell_substitute
 
-   subroutine refuse_type(reader, card, type_name)
+   subroutine refuse_type(reader, card, kinds, type_name)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      type(element_kind_t), intent(in) :: kinds(:)
       character(len=*), intent(in) :: type_name
-      type(string_t) :: known(size(element_kinds))
       character(len=:), allocatable :: list
       integer :: i
 
       list = ""
-      do i = 1, size(element_kinds)
-         known(i)%text = trim(element_kinds(i)%name)
-         list = list // " " // known(i)%text
+      do i = 1, size(kinds)
+         list = list // " " // trim(kinds(i)%name)
       end do
       if (any(foreign_types == type_name)) then
          call card_error(reader, card, "element type " // type_name &

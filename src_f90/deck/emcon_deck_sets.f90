@@ -6,7 +6,6 @@ module emcon_deck_sets
    use emcon_deck_named, only : find_set, refuse_name, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
-   use emcon_element_kinds, only : element_kinds
    use emcon_mesh, only : named_set_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
@@ -127,7 +126,7 @@ contains
       if (i_set > 0) then
          associate (item => scene%element_set(i_set)%item)
             do i = 1, size(item)
-               do k = 1, element_kinds(scene%element_kind(item(i)))%n_node
+               do k = 1, scene%kind(scene%element_kind(item(i)))%n_node
                   if (scene%element_node(k, item(i)) > 0) then
                      call append(list, scene%element_node(k, item(i)))
                   end if

@@ -8,7 +8,6 @@ module emcon_deck_surfaces
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
    use emcon_diagnostics, only : label_list, quoted, suggestion
-   use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t, where_text
@@ -232,7 +231,7 @@ contains
             end do
          end if
       end do
-      call drop_repeated(faces, size(scene%element_label), n_repeated)
+      call drop_repeated(faces, n_repeated)
       if (n_repeated > 0) call card_warning(reader, card, to_text(n_repeated) &
          // " faces are named more than once; each is taken once")
       surface%element = faces%element(:faces%n)
@@ -288,7 +287,7 @@ contains
          call data_error(reader, data, "unknown face " // quoted(name) // "; known: S1, S2, S3, S4")
          return
       end if
-      has_not = element_kinds(scene%element_kind(item))%n_face < face
+      has_not = scene%kind(scene%element_kind(item))%n_face < face
       if (any(has_not)) call data_error(reader, data, "element " &
          // label_list(pack(scene%element_label(item), has_not)) // " has no face " // name)
    end subroutine get_face
@@ -301,7 +300,7 @@ contains
       integer :: face
 
       if (scene%element_node(1, element) == 0) return
-      do face = 1, element_kinds(scene%element_kind(element))%n_face
+      do face = 1, scene%kind(scene%element_kind(element))%n_face
          if (n_neighbours(scene, adjacency, element, face) == 0) then
             call append_face(faces, element, face)
          end if
@@ -329,14 +328,15 @@ contains
    end subroutine append_face
 
    !> Keep the first of equal faces.
-   pure subroutine drop_repeated(faces, n_element, n_repeated)
+   pure subroutine drop_repeated(faces, n_repeated)
       type(faces_t), intent(inout) :: faces
-      integer, intent(in) :: n_element
       integer, intent(out) :: n_repeated
       logical, allocatable :: is_in(:, :)
       integer :: i, n
 
-      allocate(is_in(maxval(element_kinds%n_face), n_element), source=.false.)
+      associate (face => faces%face(:faces%n), element => faces%element(:faces%n))
+         allocate(is_in(maxval([0, face]), maxval([0, element])), source=.false.)
+      end associate
       n = 0
       do i = 1, faces%n
          if (is_in(faces%face(i), faces%element(i))) cycle

@@ -6,7 +6,6 @@
 module emcon_outline
    use emcon_bodies, only : bodies_find
    use emcon_chain, only : chain_init, chain_t
-   use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : error_t
    use emcon_joints, only : chain_join
    use emcon_kinds, only : dp, wp
@@ -164,10 +163,10 @@ contains
       integer :: e, f, n
 
       n = 0
-      allocate(edge(2, sum(element_kinds(scene%element_kind)%n_face)))
+      allocate(edge(2, sum(scene%kind(scene%element_kind)%n_face)))
       allocate(thickness(size(edge, 2)))
       do e = 1, size(scene%element_kind)
-         associate (kind => element_kinds(scene%element_kind(e)))
+         associate (kind => scene%kind(scene%element_kind(e)))
             do f = 1, kind%n_face
                edge(:, n + f) = scene%element_node(kind%face_node(:, f), e)
             end do

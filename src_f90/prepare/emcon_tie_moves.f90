@@ -2,7 +2,6 @@
 !>
 !> Source: docs/theory.md, section 11.
 module emcon_tie_moves
-   use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
@@ -95,7 +94,7 @@ contains
       integer :: e, i, n, k
 
       do e = 1, size(scene%element_kind)
-         n = element_kinds(scene%element_kind(e))%n_node
+         n = scene%kind(scene%element_kind(e))%n_node
          associate (node => scene%element_node(:n, e))
             if (all(abs(move(:, node)) <= 0.0_wp)) cycle
             do i = 1, n

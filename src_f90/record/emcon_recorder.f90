@@ -56,12 +56,14 @@ contains
       character(len=*), intent(in) :: base
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: run
+      integer, allocatable :: cell_node(:, :), vtk_type(:)
 
       call run_mark(stepper, run)
       call choose_fields(self, stepper%scene)
       if (self%has_fields) then
+         call find_cells(stepper%scene, cell_node, vtk_type)
          call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), &
-            stepper%scene%element_node, stepper%scene%element_kind, fields_of(self), error)
+            cell_node, vtk_type, fields_of(self), error)
          if (allocated(error)) return
          call vtkhdf_put_run(self%fields, run)
       end if
@@ -73,6 +75,23 @@ contains
       if (allocated(error)) return
       call write_masses(self, stepper, error)
    end subroutine recorder_open
+
+   !> The elements as cells of the field file.
+   pure subroutine find_cells(scene, node, vtk_type)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: node(:, :)    !! (most, n_element), behind the last one 0
+      integer, allocatable, intent(out) :: vtk_type(:)   !! (n_element)
+      integer :: e
+
+      allocate(node, source=scene%element_node)
+      allocate(vtk_type(size(node, 2)))
+      do e = 1, size(vtk_type)
+         associate (kind => scene%kind(scene%element_kind(e)))
+            node(kind%n_vtk + 1:, e) = 0
+            vtk_type(e) = kind%vtk_type
+         end associate
+      end do
+   end subroutine find_cells
 
    !> Go on with the files of `base` after `n_row` rows and `n_frame` frames.
    subroutine recorder_resume(self, stepper, base, n_row, n_frame, error)

@@ -1,6 +1,5 @@
 !> What a run tells of itself: the lines of the log.
 module emcon_run_log
-   use emcon_element_kinds, only : element_kinds
    use emcon_guards, only : guard_slack
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_segment, &
       normal_nodal, smoothing_none
@@ -64,9 +63,9 @@ contains
          call add(to_text(size(scene%x, 2)) // " nodes, " // &
             to_text(system%space%numbering%n_unknown) // " unknowns in step 1, " // &
             to_text(system%space%n_body) // " bodies")
-         do k = 1, size(element_kinds)
+         do k = 1, size(scene%kind)
             if (any(scene%element_kind == k)) call add(to_text(count(scene%element_kind == k)) // &
-               " elements " // trim(element_kinds(k)%name))
+               " elements " // trim(scene%kind(k)%name))
          end do
          call add_link_lines(scene, system, links)
          do k = 1, links%n

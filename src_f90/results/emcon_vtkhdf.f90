@@ -2,7 +2,6 @@
 !>
 !> Layout: VTKHDF 2.0, UnstructuredGrid, transient, one part, the mesh stored once.
 module emcon_vtkhdf
-   use emcon_element_kinds, only : element_kinds
    use emcon_errors, only : error_t, raise, err_internal
    use emcon_hdf5, only : hdf5_file_t, hdf5_make_group
    use emcon_hdf5_data, only : hdf5_read_integers, hdf5_read_reals, hdf5_write_attribute, &
@@ -56,12 +55,12 @@ module emcon_vtkhdf
 contains
 
    !> Begin the file `path` with the mesh; frames follow.
-   subroutine vtkhdf_create(self, path, points, element_node, element_kind, fields, error)
+   subroutine vtkhdf_create(self, path, points, cell_node, vtk_type, fields, error)
       type(vtkhdf_t), intent(out) :: self
       character(len=*), intent(in) :: path
       real(dp), intent(in) :: points(:, :)           !! (n_dim, n_node) reference positions [L]
-      integer, intent(in) :: element_node(:, :)      !! (max_element_nodes, n_element), 0: none
-      integer, intent(in) :: element_kind(:)         !! (n_element) index into `element_kinds`
+      integer, intent(in) :: cell_node(:, :)         !! (most, n_cell), behind the last one 0
+      integer, intent(in) :: vtk_type(:)             !! (n_cell) number of the file format
       type(field_t), intent(in) :: fields(:)
       type(error_t), allocatable, intent(out) :: error
 
@@ -69,10 +68,10 @@ contains
       if (.not. allocated(error)) call make_groups(self%store%file, error)
       if (.not. allocated(error)) call write_points(self%store%file, points, error)
       if (.not. allocated(error)) then
-         call write_cells(self%store%file, element_node, element_kind, error)
+         call write_cells(self%store%file, cell_node, vtk_type, error)
       end if
       if (.not. allocated(error)) then
-         call begin_series(self, fields, [size(points, 2), size(element_kind)], error)
+         call begin_series(self, fields, [size(points, 2), size(vtk_type)], error)
       end if
       if (allocated(error)) call published_abandon(self%store)
    end subroutine vtkhdf_create
@@ -180,29 +179,27 @@ contains
       end if
    end subroutine write_points
 
-   subroutine write_cells(file, element_node, element_kind, error)
+   subroutine write_cells(file, cell_node, vtk_type, error)
       type(hdf5_file_t), intent(inout) :: file
-      integer, intent(in) :: element_node(:, :)
-      integer, intent(in) :: element_kind(:)
+      integer, intent(in) :: cell_node(:, :), vtk_type(:)
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: connectivity(:), offset(:), vtk_type(:)
+      integer, allocatable :: connectivity(:), offset(:)
       integer :: i, n
 
-      allocate(connectivity(size(element_node)), offset(size(element_kind) + 1), source=0)
-      do i = 1, size(element_kind)
-         n = element_kinds(element_kind(i))%n_node
+      allocate(connectivity(size(cell_node)), offset(size(vtk_type) + 1), source=0)
+      do i = 1, size(vtk_type)
+         n = count(cell_node(:, i) > 0)
          offset(i + 1) = offset(i) + n
-         connectivity(offset(i) + 1:offset(i + 1)) = element_node(:n, i) - 1
+         connectivity(offset(i) + 1:offset(i + 1)) = cell_node(:n, i) - 1
       end do
       n = offset(size(offset))
-      vtk_type = element_kinds(element_kind)%vtk_type
       call hdf5_write_integers(file, "/VTKHDF/Connectivity", connectivity(:n), error)
       if (allocated(error)) return
       call hdf5_write_integers(file, "/VTKHDF/Offsets", offset, error)
       if (allocated(error)) return
       call hdf5_write_bytes(file, "/VTKHDF/Types", vtk_type, error)
       if (allocated(error)) return
-      call hdf5_write_integers(file, "/VTKHDF/NumberOfCells", [size(element_kind)], error)
+      call hdf5_write_integers(file, "/VTKHDF/NumberOfCells", [size(vtk_type)], error)
       if (allocated(error)) return
       call hdf5_write_integers(file, "/VTKHDF/NumberOfConnectivityIds", [n], error)
    end subroutine write_cells

@@ -4,7 +4,7 @@
 !> Laws have more to say, in rows of their own: `emcon_law_registry`.
 module emcon_options
    use emcon_couplings, only : tie_t
-   use emcon_element_kinds, only : element_kinds
+   use emcon_element_registry, only : element_rows
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
       multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
@@ -62,7 +62,7 @@ module emcon_options
 
    !> The schemes that *TIME INTEGRATION chooses from: statics, the first, is none.
    integer, parameter :: n_scheme = size(scheme_rows) - 1
-   integer, parameter :: n_option_row = size(own) + size(solvers) + n_scheme + size(element_kinds)
+   integer, parameter :: n_option_row = size(own) + size(solvers) + n_scheme + size(element_rows)
 
 contains
 
@@ -82,7 +82,7 @@ contains
          end associate
       else
          k = k - size(solvers) - n_scheme
-         row = option_row_t("element", k, element_kinds(k)%name, "", "", "")
+         row = option_row_t("element", k, element_rows(k)%name, "", "", "")
       end if
    end function option_row
 

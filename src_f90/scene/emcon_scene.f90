@@ -5,6 +5,7 @@
 module emcon_scene
    use emcon_amplitudes, only : amplitude_t
    use emcon_couplings, only : equation_t, tie_t
+   use emcon_element_kind, only : element_kind_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_materials, only : material_t, section_t
@@ -25,8 +26,10 @@ module emcon_scene
       real(wp), allocatable :: x(:, :)               !! (n_dim, n_node) reference positions [L]
       integer, allocatable :: element_label(:)       !! (n_element)
       type(origin_t), allocatable :: element_origin(:)
-      integer, allocatable :: element_kind(:)        !! (n_element) index into `element_kinds`
-      integer, allocatable :: element_node(:, :)     !! (max_element_nodes, n_element), 0: no node
+      type(element_kind_t), allocatable :: kind(:)   !! known to the deck
+      integer, allocatable :: element_kind(:)        !! (n_element) index into `kind`
+      integer, allocatable :: element_node(:, :)     !! (n_most, n_element) behind the last one, or
+                                                     !! where it is wrong, 0
       integer, allocatable :: element_section(:)     !! (n_element)
       type(named_set_t), allocatable :: node_set(:)
       type(named_set_t), allocatable :: element_set(:)

@@ -1,6 +1,5 @@
 !> The edges of a surface, whatever it is made of.
 module emcon_surface_edges
-   use emcon_element_kinds, only : element_kinds
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    implicit none
@@ -27,7 +26,7 @@ contains
       do i = 1, n
          associate (e => surface%element(i))
             edge(:, i) = scene%element_node( &
-               element_kinds(scene%element_kind(e))%face_node(:, surface%face(i)), e)
+               scene%kind(scene%element_kind(e))%face_node(:, surface%face(i)), e)
          end associate
       end do
    end subroutine surface_edges

@@ -7,19 +7,19 @@
 module emcon_element
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_t
+   use emcon_shape, only : max_node => max_element_nodes
    implicit none
    private
    public :: element_geometry_t, element_motion_t, element_response_t, point_motion_t
    public :: element_point, element_clear, element_add_point, point_is_regular, point_strain
 
-   integer, parameter :: max_node = 4, max_gp = 4
-
    !> What the reference shape of an element gives.
    type :: element_geometry_t
       integer :: n_node = 0
       integer :: n_gp = 0
-      real(wp) :: gradient(2, max_node, max_gp) = 0.0_wp   !! of the shape functions by X [1/L]
-      real(wp) :: weight(max_gp) = 0.0_wp                  !! reference volume of the point [L^3]
+      real(wp), allocatable :: gradient(:, :, :)           !! (2, n_node, n_gp) of the shape
+                                                           !! functions by X [1/L]
+      real(wp), allocatable :: weight(:)                   !! (n_gp) reference volume [L^3]
    end type element_geometry_t
 
    !> Motion of the nodes of an element, from `from` by `by`.
@@ -57,20 +57,21 @@ contains
       type(point_motion_t), intent(inout) :: point       !! all of it is set
       real(wp) :: grad0(2, 2), dgrad(2, 2)
 
-      call displacement_gradient(geometry, k, motion%from, grad0)
-      call displacement_gradient(geometry, k, motion%by, dgrad)
+      call displacement_gradient(geometry%n_node, geometry%gradient(:, :, k), motion%from, grad0)
+      call displacement_gradient(geometry%n_node, geometry%gradient(:, :, k), motion%by, dgrad)
       call point_strain(grad0, dgrad, motion%nlgeom, point)
    end subroutine element_point
 
    !> Nothing, before points are added.
-   pure subroutine element_clear(response, with_tangent)
+   pure subroutine element_clear(n, response, with_tangent)
+      integer, intent(in) :: n                   !! nodes of the element
       type(element_response_t), intent(inout) :: response
       logical, intent(in) :: with_tangent        !! else the tangent stays as it is
 
       response%energy = 0.0_wp
-      response%force = 0.0_wp
-      response%magnitude = 0.0_wp
-      if (with_tangent) response%tangent = 0.0_wp
+      response%force(:, :n) = 0.0_wp
+      response%magnitude(:, :n) = 0.0_wp
+      if (with_tangent) response%tangent(:2*n, :2*n) = 0.0_wp
       response%is_inverted = .false.
    end subroutine element_clear
 
@@ -82,25 +83,35 @@ contains
       type(law_response_t), intent(inout) :: state       !! what the law answers to `point`
       logical, intent(in) :: with_tangent        !! else no tangent is added
       type(element_response_t), intent(inout) :: response
-      real(wp) :: nominal(2, 2), part(2)
-      integer :: n, i
+      real(wp) :: nominal(2, 2)
+      integer :: n
 
       n = geometry%n_node
       response%energy = response%energy + geometry%weight(k)*state%energy
       state%stress = geometry%weight(k)*state%stress
       nominal(:, 1) = point%f_mid(:, 1)*state%stress(1) + point%f_mid(:, 2)*state%stress(3)
       nominal(:, 2) = point%f_mid(:, 1)*state%stress(3) + point%f_mid(:, 2)*state%stress(2)
-      do i = 1, n
-         part = nominal(:, 1)*geometry%gradient(1, i, k) &
-            + nominal(:, 2)*geometry%gradient(2, i, k)
-         response%force(:, i) = response%force(:, i) + part
-         response%magnitude(:, i) = response%magnitude(:, i) + abs(part)
-      end do
+      call add_force(n, geometry%gradient(:, :, k), nominal, response%force, response%magnitude)
       if (with_tangent) then
          state%tangent = geometry%weight(k)*state%tangent
          call add_tangent(n, geometry%gradient(:, :, k), point, state, response%tangent)
       end if
    end subroutine element_add_point
+
+   !> Add nominal stress times the gradients of the shape functions.
+   pure subroutine add_force(n, gradient, nominal, force, magnitude)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: gradient(2, n), nominal(2, 2)
+      real(wp), intent(inout) :: force(2, n), magnitude(2, n)
+      real(wp) :: part(2)
+      integer :: i
+
+      do i = 1, n
+         part = nominal(:, 1)*gradient(1, i) + nominal(:, 2)*gradient(2, i)
+         force(:, i) = force(:, i) + part
+         magnitude(:, i) = magnitude(:, i) + abs(part)
+      end do
+   end subroutine add_force
 
    !> Is the end of the motion one that the law can answer to? Newton's method tries all kinds of
    !> things.
@@ -123,18 +134,17 @@ contains
       is_regular = volume > noise*terms          ! det C, where it is more than round-off
    end function point_is_regular
 
-   !> grad(a, b) = d u_a / d X_b at quadrature point `k`.
-   pure subroutine displacement_gradient(geometry, k, u, grad)
-      type(element_geometry_t), intent(in) :: geometry
-      integer, intent(in) :: k
-      real(wp), intent(in) :: u(2, max_node)
+   !> grad(a, b) = d u_a / d X_b.
+   pure subroutine displacement_gradient(n, gradient, u, grad)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: gradient(2, n), u(2, n)
       real(wp), intent(out) :: grad(2, 2)
       integer :: i
 
       grad = 0.0_wp
-      do i = 1, geometry%n_node
-         grad(:, 1) = grad(:, 1) + u(:, i)*geometry%gradient(1, i, k)
-         grad(:, 2) = grad(:, 2) + u(:, i)*geometry%gradient(2, i, k)
+      do i = 1, n
+         grad(:, 1) = grad(:, 1) + u(:, i)*gradient(1, i)
+         grad(:, 2) = grad(:, 2) + u(:, i)*gradient(2, i)
       end do
    end subroutine displacement_gradient
 
@@ -165,7 +175,7 @@ contains
    !> docs/theory.md, eq. (11).
    pure subroutine add_tangent(n, gradient, point, state, tangent)
       integer, intent(in) :: n
-      real(wp), intent(in) :: gradient(2, max_node)
+      real(wp), intent(in) :: gradient(2, n)
       type(point_motion_t), intent(in) :: point
       type(law_response_t), intent(in) :: state
       real(wp), intent(inout) :: tangent(2*max_node, 2*max_node)

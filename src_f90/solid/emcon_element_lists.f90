@@ -1,6 +1,5 @@
 !> Which degrees of freedom meet in which element.
 module emcon_element_lists
-   use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_solid, only : solid_t
    implicit none
    private
@@ -17,11 +16,11 @@ contains
       integer, allocatable, intent(out) :: list(:)   !! degrees of freedom, element by element
       integer :: e, i, a, k
 
-      allocate(start(solid%n_element + 1), list(n_dim*max_element_nodes*solid%n_element))
+      allocate(start(solid%n_element + 1), list(n_dim*sum(solid%geometry%n_node)))
       k = 0
       do e = 1, solid%n_element
          start(e) = k + 1
-         do i = 1, element_kinds(solid%kind(e))%n_node
+         do i = 1, solid%geometry(e)%n_node
             do a = 1, n_dim
                k = k + 1
                list(k) = n_dim*(solid%node(i, e) - 1) + a

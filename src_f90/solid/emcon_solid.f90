@@ -2,7 +2,6 @@
 module emcon_solid
    use emcon_element, only : element_add_point, element_clear, element_geometry_t, &
       element_motion_t, element_point, element_response_t, point_is_regular, point_motion_t
-   use emcon_element_kinds, only : element_kinds, max_element_nodes
    use emcon_errors, only : err_input, error_t, raise
    use emcon_given_law, only : given_law_t, given_law_take, given_points_make_room, &
       given_response_t, given_rest_stiffness, given_state
@@ -10,20 +9,26 @@ module emcon_solid
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create, law_given
    use emcon_point_function, only : point_gradient, point_ok
-   use emcon_scene, only : scene_t
-   use emcon_shape, only : shape_create, shape_t
+   use emcon_scene, only : scene_t, where_text
+   use emcon_shape, only : shape_table_t, shape_tabulate
    use emcon_text, only : string_t, to_text
    implicit none
    private
    public :: solid_t, solid_init, solid_element_respond, solid_evaluate_given, solid_gather
+
+   !> How stress at the quadrature points of a kind of elements is carried to its nodes.
+   type :: to_nodes_t
+      real(wp), allocatable :: weight(:, :)              !! (n_gp, n_node) part of point in node
+   end type to_nodes_t
 
    type :: solid_t
       integer :: n_element = 0
       integer :: n_node = 0
       integer, allocatable :: label(:)                   !! (n_element)
       type(string_t), allocatable :: material(:)         !! names of the materials
-      integer, allocatable :: kind(:)                    !! (n_element)
-      integer, allocatable :: node(:, :)                 !! (max_element_nodes, n_element)
+      integer, allocatable :: kind(:)                    !! (n_element) index into `to_nodes`
+      type(to_nodes_t), allocatable :: to_nodes(:)       !! one per kind of the scene
+      integer, allocatable :: node(:, :)                 !! (n_most, n_element) as in scene_t
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
       type(law_box_t), allocatable :: law(:)             !! one per material
@@ -31,10 +36,10 @@ module emcon_solid
       logical :: has_given = .false.                     !! some law is a given one
       integer, allocatable :: n_point(:)                 !! quadrature points, of each given law
       integer, allocatable :: first_point(:)             !! (n_element) among these; 0: law of ours
-      real(wp), allocatable :: mass(:, :, :)             !! consistent: (4, 4, n_element) [M]
-      real(wp), allocatable :: volume_mass(:, :)         !! int rho N_i: (4, n_element) [M]
+      real(wp), allocatable :: mass(:, :, :)             !! (n_most, n_most, n_element) [M]
+      real(wp), allocatable :: volume_mass(:, :)         !! int rho N_i: (n_most, n_element) [M]
       real(wp), allocatable :: thickness(:)              !! (n_element) [L]
-      !> (4, n_element) force that a displacement of one causes before anything cancels [M/T^2]
+      !> (n_most, n_element) force that a displacement of one causes before anything cancels [M/T^2]
       real(wp), allocatable :: stiffness(:, :)
    end type solid_t
 
@@ -46,9 +51,9 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(given_law_t), intent(in), optional :: given(:)   !! one for each such material
-      type(shape_t) :: stiffness(size(element_kinds)), mass(size(element_kinds))
+      type(shape_table_t) :: stiffness(size(scene%kind)), mass(size(scene%kind))
       real(wp) :: at_rest(size(scene%material))
-      integer :: e, k, n
+      integer :: e, k, n, n_most
 
       n = size(scene%element_kind)
       self%n_element = n
@@ -62,21 +67,20 @@ contains
       self%kind = scene%element_kind
       self%node = scene%element_node
       allocate(self%law_of(n), self%geometry(n), self%thickness(n))
-      allocate(self%mass(max_element_nodes, max_element_nodes, n), source=0.0_wp)
-      allocate(self%volume_mass(max_element_nodes, n), source=0.0_wp)
-      allocate(self%stiffness(max_element_nodes, n), source=0.0_wp)
+      n_most = size(self%node, 1)
+      allocate(self%mass(n_most, n_most, n), source=0.0_wp)
+      allocate(self%volume_mass(n_most, n), self%stiffness(n_most, n), source=0.0_wp)
       call init_laws(self, scene, at_rest, error, given)
       if (allocated(error)) return
-      do k = 1, size(element_kinds)
-         call shape_create(k, stiffness(k), mass(k))
-      end do
+      call init_kinds(self, scene, stiffness, mass, error)
+      if (allocated(error)) return
       do e = 1, n
          self%law_of(e) = scene%section(scene%element_section(e))%material
          self%thickness(e) = scene%section(scene%element_section(e))%thickness
          call init_element(self, scene%x, scene%material(self%law_of(e))%density, e, &
             stiffness(self%kind(e)), mass(self%kind(e)))
          call estimate_stiffness(self, at_rest(self%law_of(e)), e)
-         if (any(self%geometry(e)%weight(:self%geometry(e)%n_gp) <= 0.0_wp)) then
+         if (any(self%geometry(e)%weight <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
                " is inverted or has no area; check the order of its nodes")
             return
@@ -84,6 +88,33 @@ contains
       end do
       call number_points(self)
    end subroutine solid_init
+
+   !> What the shapes of the kinds say, of those that elements have.
+   subroutine init_kinds(self, scene, stiffness, mass, error)
+      type(solid_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(shape_table_t), intent(inout) :: stiffness(:), mass(:)   !! (n_kind)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, e
+
+      allocate(self%to_nodes(size(scene%kind)))
+      do k = 1, size(scene%kind)
+         e = findloc(self%kind, k, 1)
+         if (e == 0) cycle
+         associate (kind => scene%kind(k))
+            if (.not. allocated(kind%shape)) then
+               call raise(error, err_input, where_text(scene, scene%element_origin(e)) &
+                  // ": error: element " // to_text(self%label(e)) // " is a *USER ELEMENT of " &
+                  // "type " // trim(kind%name) // ": a program has to give the shape of these, " &
+                  // "after the deck is read and before the model is built")
+               return
+            end if
+            call shape_tabulate(kind%shape, .false., stiffness(k))
+            call shape_tabulate(kind%shape, .true., mass(k))
+            call kind%shape%to_nodes(self%to_nodes(k)%weight)
+         end associate
+      end do
+   end subroutine init_kinds
 
    !> The laws, and the largest entry of the tangent of each at rest.
    subroutine init_laws(self, scene, at_rest, error, given)
@@ -144,17 +175,18 @@ contains
       type(solid_t), intent(inout) :: self
       real(wp), intent(in) :: x(:, :), density
       integer, intent(in) :: e
-      type(shape_t), intent(in) :: stiffness, mass
-      real(wp) :: local(2, max_element_nodes), gradient(2, max_element_nodes), det, rho_dv
+      type(shape_table_t), intent(in) :: stiffness, mass
+      real(wp) :: local(2, stiffness%n_node), gradient(2, stiffness%n_node), det, rho_dv
       integer :: n, k, i
 
       n = stiffness%n_node
-      local = 0.0_wp
       do i = 1, n
          local(:, i) = x(:, self%node(i, e)) - x(:, self%node(1, e))
       end do
       self%geometry(e)%n_node = n
       self%geometry(e)%n_gp = stiffness%n_gp
+      allocate(self%geometry(e)%gradient(2, n, stiffness%n_gp), &
+         self%geometry(e)%weight(stiffness%n_gp))
       do k = 1, stiffness%n_gp
          call reference_gradient(n, local, stiffness%slope(:, :, k), gradient, det)
          self%geometry(e)%gradient(:, :, k) = gradient
@@ -163,9 +195,10 @@ contains
       do k = 1, mass%n_gp
          call reference_gradient(n, local, mass%slope(:, :, k), gradient, det)
          rho_dv = density*mass%weight(k)*det*self%thickness(e)
-         self%volume_mass(:, e) = self%volume_mass(:, e) + rho_dv*mass%value(:, k)
+         self%volume_mass(:n, e) = self%volume_mass(:n, e) + rho_dv*mass%value(:, k)
          do i = 1, n
-            self%mass(:, i, e) = self%mass(:, i, e) + rho_dv*mass%value(i, k)*mass%value(:, k)
+            self%mass(:n, i, e) = self%mass(:n, i, e) &
+               + rho_dv*mass%value(i, k)*mass%value(:, k)
          end do
       end do
    end subroutine init_element
@@ -194,8 +227,8 @@ contains
    !> Gradient of the shape functions by X and the Jacobian determinant.
    pure subroutine reference_gradient(n, x, slope, gradient, det)
       integer, intent(in) :: n
-      real(wp), intent(in) :: x(2, max_element_nodes), slope(2, max_element_nodes)
-      real(wp), intent(out) :: gradient(2, max_element_nodes), det
+      real(wp), intent(in) :: x(2, n), slope(2, n)
+      real(wp), intent(out) :: gradient(2, n), det
       real(wp) :: jacobian(2, 2)
       integer :: i
 
@@ -225,7 +258,7 @@ contains
       type(law_response_t) :: state
       integer :: k
 
-      call element_clear(part, with_tangent)
+      call element_clear(self%geometry(e)%n_node, part, with_tangent)
       do k = 1, self%geometry(e)%n_gp
          call element_point(self%geometry(e), k, motion, point)
          if (self%first_point(e) > 0) then

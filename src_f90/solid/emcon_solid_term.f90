@@ -4,7 +4,6 @@
 module emcon_solid_term
    use emcon_csr, only : csr_t
    use emcon_element, only : element_motion_t, element_response_t
-   use emcon_element_kinds, only : max_element_nodes
    use emcon_element_lists, only : element_lists
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_given_law, only : given_law_t, given_response_t
@@ -15,6 +14,7 @@ module emcon_solid_term
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_element_respond, solid_evaluate_given, solid_gather, &
       solid_init, solid_t
+   use emcon_shape, only : max_element_nodes
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_term, only : response_t, role_internal, term_t
    use emcon_text, only : to_text

@@ -7,11 +7,9 @@
 module emcon_stress
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_element, only : element_motion_t, element_point, point_motion_t
-   use emcon_element_kinds, only : max_element_nodes
    use emcon_given_law, only : given_response_t, given_state
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
-   use emcon_shape, only : shape_values
    use emcon_solid, only : solid_evaluate_given, solid_t
    implicit none
    private
@@ -28,7 +26,7 @@ contains
       type(given_response_t) :: given
       type(element_motion_t) :: motion
       integer :: count_at(solid%n_node), e, i, k, node
-      real(wp) :: at_gp(6), weight(max_element_nodes, max_element_nodes), strain(3)
+      real(wp) :: at_gp(6), strain(3)
 
       call respond_at(solid, u, nlgeom, given)
       motion%nlgeom = nlgeom
@@ -36,12 +34,12 @@ contains
       count_at = 0
       do e = 1, solid%n_element
          call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
-         weight = extrapolation(solid%kind(e), solid%geometry(e)%n_gp)
          do k = 1, solid%geometry(e)%n_gp
             call point_state(solid, e, k, motion, given, at_gp, strain)
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
-               stress(:, node) = stress(:, node) + weight(k, i)*at_gp
+               stress(:, node) = stress(:, node) &
+                  + solid%to_nodes(solid%kind(e))%weight(k, i)*at_gp
             end do
          end do
          do i = 1, solid%geometry(e)%n_node
@@ -66,22 +64,6 @@ contains
       zero = 0.0_wp
       call solid_evaluate_given(solid, u, zero, nlgeom, .false., given)
    end subroutine respond_at
-
-   !> weight(k, i): part of quadrature point k in the value at node i.
-   pure function extrapolation(kind, n_gp) result(weight)
-      integer, intent(in) :: kind, n_gp
-      real(wp) :: weight(max_element_nodes, max_element_nodes)
-      real(wp), parameter :: corner(2, 4) = reshape([-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, &
-         1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], [2, 4])
-      real(wp) :: slope(2, max_element_nodes)
-      integer :: i
-
-      weight = 1.0_wp
-      if (n_gp == 1) return
-      do i = 1, 4
-         call shape_values(kind, sqrt(3.0_wp)*corner(:, i), weight(:, i), slope)
-      end do
-   end function extrapolation
 
    !> No motion from displacements `u`.
    pure subroutine place(node, u, motion)
@@ -141,7 +123,7 @@ contains
       stress = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
-         volume(e) = sum(solid%geometry(e)%weight(:solid%geometry(e)%n_gp))
+         volume(e) = sum(solid%geometry(e)%weight)
          call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
          do k = 1, solid%geometry(e)%n_gp
             call point_state(solid, e, k, motion, given, stress_k, strain_k)

@@ -13,7 +13,7 @@ module emcon_interface
    use emcon_contact_registry, only : new_contact
    use emcon_couplings, only : tie_t
    use emcon_csr, only : csr_from_entries, csr_t
-   use emcon_element_kinds, only : max_element_nodes
+   use emcon_element_registry, only : element_kinds_create
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, multiplier_dual, multiplier_standard, &
       contact_pair_t
@@ -97,7 +97,8 @@ contains
             source=[(self%first + i, i = 0, self%n_node - 1)])
          allocate(scene%file(0), scene%node_origin(self%n_node), scene%element_origin(0))
          allocate(scene%element_label(0), scene%element_kind(0), scene%element_section(0))
-         allocate(scene%element_node(max_element_nodes, 0))
+         call element_kinds_create(scene%kind)
+         allocate(scene%element_node(0, 0))
          allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
          allocate(scene%material(0), scene%section(0), scene%pair(0), scene%tie(0))
          allocate(scene%equation(0), scene%step(1))

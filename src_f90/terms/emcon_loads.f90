@@ -2,7 +2,6 @@
 module emcon_loads
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
    use emcon_csr, only : csr_t
-   use emcon_element_kinds, only : element_kinds
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : instant_t
@@ -26,7 +25,7 @@ module emcon_loads
       logical, private :: is_ramped = .false.    !! static: without amplitude, linear over the step
       logical, private :: nlgeom = .false.
       real(wp), private :: duration = 1.0_wp     !! [T]
-      integer, allocatable, private :: node(:, :)        !! (max_element_nodes, n_element)
+      integer, allocatable, private :: node(:, :)        !! (n_most, n_element)
       real(wp), allocatable, private :: volume_mass(:, :)   !! int rho N_i, like `node` [M]
       real(wp), allocatable, private :: thickness(:)     !! (n_element) [L]
       real(wp), allocatable, private :: force(:, :)      !! (2, n_node) [M L/T^2]
@@ -78,7 +77,7 @@ contains
          if (self%load(i)%kind /= load_pressure) cycle
          e = self%load(i)%target
          self%edge(:, i) = scene%element_node( &
-            element_kinds(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
+            scene%kind(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
          dofs = number([2*self%edge(1, i) - 1, 2*self%edge(1, i), 2*self%edge(2, i) - 1, &
             2*self%edge(2, i)])
          do k = 1, 4

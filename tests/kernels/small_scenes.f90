@@ -1,6 +1,6 @@
 !> Scenes of a few elements for the tests, made by hand.
 module small_scenes
-   use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
+   use emcon_element_registry, only : element_kinds_create, find_element_row
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_law_registry, only : law_coupled_neo_hooke
@@ -22,7 +22,7 @@ module small_scenes
 
    !> A rectangle of n(1) by n(2) cells; a cell is one CPE4 or two CPE3.
    type :: block_t
-      integer :: kind = 0                        !! index into `element_kinds`
+      integer :: kind = 0                        !! index into the rows of elements
       integer :: n(2) = 0
       integer :: nodes_before = 0
       integer :: elements_before = 0
@@ -37,7 +37,8 @@ contains
       scene%heading = ""
       allocate(scene%file(0), scene%node_label(0), scene%node_origin(0), scene%x(2, 0))
       allocate(scene%element_label(0), scene%element_origin(0), scene%element_kind(0))
-      allocate(scene%element_node(max_element_nodes, 0), scene%element_section(0))
+      call element_kinds_create(scene%kind)
+      allocate(scene%element_node(4, 0), scene%element_section(0))
       allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
       allocate(scene%material(1), scene%section(1), scene%pair(0), scene%step(0))
       allocate(scene%tie(0), scene%equation(0))
@@ -60,7 +61,7 @@ contains
       integer :: i, j, corner(4)
       real(wp), allocatable :: x(:, :)
 
-      block = block_t(find_element_kind(name), n, size(scene%x, 2), size(scene%element_kind))
+      block = block_t(find_element_row(name), n, size(scene%x, 2), size(scene%element_kind))
       allocate(x(2, (n(1) + 1)*(n(2) + 1)))
       do j = 0, n(2)
          do i = 0, n(1)
@@ -95,7 +96,7 @@ contains
       integer, allocatable :: old(:, :)
 
       call move_alloc(scene%element_node, old)
-      allocate(scene%element_node(max_element_nodes, size(old, 2) + 1))
+      allocate(scene%element_node(4, size(old, 2) + 1))
       scene%element_node(:, :size(old, 2)) = old
       scene%element_node(:, size(old, 2) + 1) = node
       scene%element_kind = [scene%element_kind, kind]
@@ -134,7 +135,7 @@ contains
 
       surface%name = name
       allocate(surface%element(0), surface%face(0))
-      per_cell = merge(1, 2, element_kinds(block%kind)%n_node == 4)
+      per_cell = merge(1, 2, scene%kind(block%kind)%n_node == 4)
       do k = 1, size(sides)
          m = block%n(2 - mod(sides(k), 2))
          do i = 1, m

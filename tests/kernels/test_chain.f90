@@ -3,7 +3,7 @@ module test_chain
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_chain, only : chain_corners, chain_crossing, chain_distance, chain_init, chain_t, &
       chain_tributary
-   use emcon_element_kinds, only : find_element_kind, max_element_nodes
+   use emcon_element_registry, only : find_element_row
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
@@ -191,9 +191,9 @@ contains
       scene%x = x
       scene%u0 = 0.0_wp*x
       deallocate(scene%element_node)
-      allocate(scene%element_node(max_element_nodes, n), source=0)
+      allocate(scene%element_node(3, n), source=0)
       scene%element_node(:2, :) = edge
-      scene%element_kind = [(find_element_kind("CPE3"), i = 1, n)]
+      scene%element_kind = [(find_element_row("CPE3"), i = 1, n)]
       scene%node_label = [(i, i = 1, size(x, 2))]
       surface%name = "CHAIN"
       surface%element = [(i, i = 1, n)]

@@ -82,8 +82,9 @@ contains
       type(given_response_t) :: none
 
       motion%nlgeom = sample%nlgeom
-      motion%from = u0
-      motion%by = du
+      response = element_response_t()
+      motion%from(:, :4) = u0
+      motion%by(:, :4) = du
       call solid_element_respond(sample%solid, 1, motion, none, with_tangent, response)
    end subroutine respond
 
@@ -128,8 +129,8 @@ contains
             call draw(sample, u0, du)
             call respond(sample, u0, zero, .false., start)
             call respond(sample, u0, du, .false., step)
-            call check_near(error, sum(step%force*du), step%energy - start%energy, tol, &
-               sum(step%magnitude*abs(du)), sample%what)
+            call check_near(error, sum(step%force(:, :4)*du), step%energy - start%energy, tol, &
+               sum(step%magnitude(:, :4)*abs(du)), sample%what)
          end do
          if (allocated(error)) return
       end do
@@ -153,8 +154,8 @@ contains
             if (sample%nlgeom) place = place + (u0 + 0.5_wp*du)
             call check_near(error, sum(step%force, dim=2), [0.0_wp, 0.0_wp], tol, &
                sum(step%magnitude), sample%what // ": force")
-            call check_near(error, sum(place(1, :)*step%force(2, :) &
-               - place(2, :)*step%force(1, :)), 0.0_wp, tol, sum(step%magnitude) &
+            call check_near(error, sum(place(1, :)*step%force(2, :4) &
+               - place(2, :)*step%force(1, :4)), 0.0_wp, tol, sum(step%magnitude) &
                *maxval(abs(place)), sample%what // ": moment")
          end do
          if (allocated(error)) return
@@ -284,7 +285,7 @@ contains
          call respond(sample, u0, zero, .false., step)
          call check_near(error, step%energy, area*state%energy, tol, young, &
             sample%what // ": energy")
-         call check_near(error, step%force, expected, tol, young, sample%what // ": force")
+         call check_near(error, step%force(:, :4), expected, tol, young, sample%what // ": force")
          if (allocated(error)) return
       end do
    end subroutine test_patch

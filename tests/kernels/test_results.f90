@@ -206,7 +206,7 @@ contains
       real(dp), parameter :: x(2, 4) = reshape([0, 0, 1, 0, 1, 1, 0, 1], [2, 4])
 
       call vtkhdf_create(vtk, base // ".vtkhdf", x, reshape([1, 2, 3, 0, 1, 3, 4, 0], [4, 2]), &
-         [1, 1], sample_fields(), error)
+         [5, 5], sample_fields(), error)
    end subroutine create_sample
 
    function sample_fields() result(fields)

@@ -1,22 +1,17 @@
 !> Shape functions and quadrature against the polynomials that they have to reproduce.
 module test_shape
    use check, only : check_equal, check_near, test_case_t
-   use emcon_element_kinds, only : element_kinds, find_element_kind, max_element_nodes
+   use emcon_element_kind, only : element_kind_t
+   use emcon_element_registry, only : element_kinds_create, find_element_row
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_shape, only : shape_create, shape_t, shape_values
+   use emcon_shape, only : shape_table_t, shape_tabulate
    use emcon_text, only : to_text
    implicit none
    private
    public :: collect_shape
 
    real(wp), parameter :: tol = 8.0_wp*epsilon(1.0_wp)
-   !> Natural coordinates of the nodes.
-   real(wp), parameter :: triangle(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
-      1.0_wp], [2, 3])
-   real(wp), parameter :: square(2, 4) = reshape([-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, &
-      1.0_wp, -1.0_wp, 1.0_wp], [2, 4])
-
 contains
 
    subroutine collect_shape(tests)
@@ -28,27 +23,23 @@ contains
          test_case_t("one at its own node, zero at the others", test_nodes), &
          test_case_t("slopes", test_slopes), &
          test_case_t("quadrature of polynomials", test_quadrature), &
-         test_case_t("values at the points", test_points)]
+         test_case_t("values at the points", test_points), &
+         test_case_t("from the points to the nodes", test_to_nodes)]
    end subroutine collect_shape
-
-   pure function nodes_of(kind) result(x)
-      integer, intent(in) :: kind
-      real(wp) :: x(2, max_element_nodes)
-
-      x = 0.0_wp
-      if (element_kinds(kind)%name == "CPE3") x(:, :3) = triangle
-      if (element_kinds(kind)%name == "CPE4") x(:, :4) = square
-   end function nodes_of
 
    subroutine test_unity(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: point(2), value(max_element_nodes), slope(2, max_element_nodes)
-      integer :: kind, i
+      type(element_kind_t), allocatable :: kind(:)
+      real(wp), allocatable :: value(:), slope(:, :)
+      real(wp) :: point(2)
+      integer :: i, k
 
-      do kind = 1, size(element_kinds)
+      call element_kinds_create(kind)
+      do k = 1, size(kind)
+         call make_room(kind(k), value, slope)
          do i = 1, 20
             call random_number(point)
-            call shape_values(kind, point, value, slope)
+            call kind(k)%shape%values(point, value, slope)
             call check_near(error, sum(value), 1.0_wp, tol, 1.0_wp, "sum of the values")
             call check_near(error, sum(slope, dim=2), [0.0_wp, 0.0_wp], tol, 1.0_wp, &
                "sum of the slopes")
@@ -56,37 +47,52 @@ contains
       end do
    end subroutine test_unity
 
+   subroutine make_room(kind, value, slope)
+      type(element_kind_t), intent(in) :: kind
+      real(wp), allocatable, intent(out) :: value(:), slope(:, :)
+
+      allocate(value(kind%n_node), slope(2, kind%n_node))
+   end subroutine make_room
+
    subroutine test_linear(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: point(2), value(max_element_nodes), slope(2, max_element_nodes)
       real(wp), parameter :: identity(2, 2) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
-      integer :: kind, i
+      type(element_kind_t), allocatable :: kind(:)
+      real(wp), allocatable :: value(:), slope(:, :), place(:, :)
+      real(wp) :: point(2)
+      integer :: i, k
 
-      do kind = 1, size(element_kinds)
+      call element_kinds_create(kind)
+      do k = 1, size(kind)
+         call make_room(kind(k), value, slope)
+         call kind(k)%shape%places(place)
          do i = 1, 20
             call random_number(point)
-            call shape_values(kind, point, value, slope)
-            call check_near(error, matmul(nodes_of(kind), value), point, tol, 1.0_wp, "position")
-            call check_near(error, matmul(nodes_of(kind), transpose(slope)), identity, tol, &
-               1.0_wp, "its slopes")
+            call kind(k)%shape%values(point, value, slope)
+            call check_near(error, matmul(place, value), point, tol, 1.0_wp, "position")
+            call check_near(error, matmul(place, transpose(slope)), identity, tol, 1.0_wp, &
+               "its slopes")
          end do
       end do
    end subroutine test_linear
 
    subroutine test_nodes(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: x(2, max_element_nodes), expected(max_element_nodes)
-      real(wp) :: value(max_element_nodes), slope(2, max_element_nodes)
-      integer :: kind, i
+      type(element_kind_t), allocatable :: kind(:)
+      real(wp), allocatable :: value(:), slope(:, :), place(:, :), expected(:)
+      integer :: i, k
 
-      do kind = 1, size(element_kinds)
-         x = nodes_of(kind)
-         do i = 1, element_kinds(kind)%n_node
-            expected = 0.0_wp
+      call element_kinds_create(kind)
+      do k = 1, size(kind)
+         call make_room(kind(k), value, slope)
+         call kind(k)%shape%places(place)
+         call check_equal(error, size(place, 2), kind(k)%n_node, "nodes")
+         do i = 1, kind(k)%n_node
+            expected = 0.0_wp*value
             expected(i) = 1.0_wp
-            call shape_values(kind, x(:, i), value, slope)
+            call kind(k)%shape%values(place(:, i), value, slope)
             call check_near(error, value, expected, 0.0_wp, 1.0_wp, &
-               element_kinds(kind)%name // " at node " // to_text(i))
+               kind(k)%name // " at node " // to_text(i))
          end do
       end do
    end subroutine test_nodes
@@ -94,19 +100,23 @@ contains
    !> Along a coordinate the functions are linear: a central difference is exact.
    subroutine test_slopes(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: point(2), way(2), up(max_element_nodes), down(max_element_nodes)
-      real(wp) :: slope(2, max_element_nodes), other(2, max_element_nodes)
-      integer :: kind, a
+      type(element_kind_t), allocatable :: kind(:)
+      real(wp), allocatable :: up(:), down(:), slope(:, :), other(:, :)
+      real(wp) :: point(2), way(2)
+      integer :: k, a
 
-      do kind = 1, size(element_kinds)
+      call element_kinds_create(kind)
+      do k = 1, size(kind)
+         call make_room(kind(k), up, slope)
+         call make_room(kind(k), down, other)
          call random_number(point)
-         call shape_values(kind, point, up, slope)
+         call kind(k)%shape%values(point, up, slope)
          do a = 1, 2
             way = 0.0_wp
             way(a) = 0.5_wp
-            call shape_values(kind, point + way, up, other)
-            call shape_values(kind, point - way, down, other)
-            call check_near(error, slope(a, :), up - down, tol, 1.0_wp, element_kinds(kind)%name)
+            call kind(k)%shape%values(point + way, up, other)
+            call kind(k)%shape%values(point - way, down, other)
+            call check_near(error, slope(a, :), up - down, tol, 1.0_wp, kind(k)%name)
          end do
       end do
    end subroutine test_slopes
@@ -114,20 +124,31 @@ contains
    !> Triangle: 1 point to degree 1, 3 points to degree 2; square: 2 x 2 points to x^3 y^3.
    subroutine test_quadrature(error)
       type(error_t), allocatable, intent(out) :: error
-      type(shape_t) :: stiffness, mass
 
-      call shape_create(find_element_kind("CPE3"), stiffness, mass)
-      call check_rule(error, stiffness, 1, "CPE3, stiffness")
-      call check_rule(error, mass, 2, "CPE3, mass")
-      call shape_create(find_element_kind("CPE4"), stiffness, mass)
-      call check_rule(error, stiffness, 3, "CPE4, stiffness")
-      call check_rule(error, mass, 3, "CPE4, mass")
+      call check_kind(error, "CPE3", 1, 2)
+      call check_kind(error, "CPE4", 3, 3)
    end subroutine test_quadrature
+
+   subroutine check_kind(error, name, degree, mass_degree)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: degree, mass_degree
+      type(element_kind_t), allocatable :: kind(:)
+      type(shape_table_t) :: table
+
+      call element_kinds_create(kind)
+      associate (shape => kind(find_element_row(name))%shape)
+         call shape_tabulate(shape, .false., table)
+         call check_rule(error, table, degree, name // ", stiffness")
+         call shape_tabulate(shape, .true., table)
+         call check_rule(error, table, mass_degree, name // ", mass")
+      end associate
+   end subroutine check_kind
 
    !> int x^p y^q: p! q!/(p + q + 2)! on the triangle, 4/((p + 1)(q + 1)) on the square, if even.
    subroutine check_rule(error, rule, degree, what)
       type(error_t), allocatable, intent(inout) :: error
-      type(shape_t), intent(in) :: rule
+      type(shape_table_t), intent(in) :: rule
       integer, intent(in) :: degree              !! of the product on the triangle, else of each
       character(len=*), intent(in) :: what
       real(wp) :: integral, expected
@@ -153,19 +174,42 @@ contains
 
    subroutine test_points(error)
       type(error_t), allocatable, intent(out) :: error
-      type(shape_t) :: stiffness, mass
-      real(wp) :: value(max_element_nodes), slope(2, max_element_nodes)
-      integer :: kind, k
+      type(element_kind_t), allocatable :: kind(:)
+      type(shape_table_t) :: mass
+      real(wp), allocatable :: value(:), slope(:, :)
+      integer :: i, k
 
-      do kind = 1, size(element_kinds)
-         call shape_create(kind, stiffness, mass)
-         call check_equal(error, stiffness%n_node, element_kinds(kind)%n_node, "nodes")
-         do k = 1, mass%n_gp
-            call shape_values(kind, mass%point(:, k), value, slope)
-            call check_near(error, mass%value(:, k), value, 0.0_wp, 1.0_wp, "values")
-            call check_near(error, mass%slope(:, :, k), slope, 0.0_wp, 1.0_wp, "slopes")
+      call element_kinds_create(kind)
+      do k = 1, size(kind)
+         call make_room(kind(k), value, slope)
+         call shape_tabulate(kind(k)%shape, .true., mass)
+         call check_equal(error, mass%n_node, kind(k)%n_node, "nodes")
+         do i = 1, mass%n_gp
+            call kind(k)%shape%values(mass%point(:, i), value, slope)
+            call check_near(error, mass%value(:, i), value, 0.0_wp, 1.0_wp, "values")
+            call check_near(error, mass%slope(:, :, i), slope, 0.0_wp, 1.0_wp, "slopes")
          end do
       end do
    end subroutine test_points
+
+   !> What is carried to the nodes of a kind is, of a linear function, that function; one point
+   !> tells its mean.
+   subroutine test_to_nodes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(element_kind_t), allocatable :: kind(:)
+      type(shape_table_t) :: table
+      real(wp), allocatable :: weight(:, :), place(:, :)
+      integer :: k
+
+      call element_kinds_create(kind)
+      do k = 1, size(kind)
+         call kind(k)%shape%to_nodes(weight)
+         call shape_tabulate(kind(k)%shape, .false., table)
+         call kind(k)%shape%places(place)
+         call check_near(error, sum(weight, 1), 1.0_wp + 0.0_wp*place(1, :), tol, 1.0_wp, "sums")
+         if (table%n_gp > 1) call check_near(error, matmul(table%point, weight), place, tol, &
+            1.0_wp, kind(k)%name)
+      end do
+   end subroutine test_to_nodes
 
 end module test_shape

@@ -117,8 +117,8 @@ contains
          do e = 1, solid%n_element
             n = solid%geometry(e)%n_node
             associate (node => solid%node(:n, e))
-               motion%from = local(u0(:, node))
-               motion%by = local(du(:, node))
+               motion%from(:, :4) = local(u0(:, node))
+               motion%by(:, :4) = local(du(:, node))
                call solid_element_respond(solid, e, motion, nothing, .false., part)
                force(:, node) = force(:, node) + part%force(:, :n)
                call check_near(error, response%energy(e), part%energy, tol, young, "energy")

@@ -2,7 +2,7 @@
 module tie_scenes
    use check, only : check_equal, check_near, check_true
    use emcon_couplings, only : tie_rows_t, tie_t
-   use emcon_element_kinds, only : find_element_kind, max_element_nodes
+   use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
    use emcon_interactions, only : multiplier_dual, multiplier_standard
    use emcon_kinds, only : wp
@@ -47,7 +47,7 @@ contains
       if (present(is_closed)) n_edge = merge(n, n - 1, is_closed)
       n_old = size(scene%x, 2)
       n_element = size(scene%element_kind)
-      allocate(x(2, n_old + n + n_edge), node(max_element_nodes, n_element + n_edge))
+      allocate(x(2, n_old + n + n_edge), node(4, n_element + n_edge))
       x(:, :n_old) = scene%x
       x(:, n_old + 1:n_old + n) = points
       node(:, :n_element) = scene%element_node
@@ -69,7 +69,7 @@ contains
       n_element = n_element + n_edge
       n = size(scene%x, 2)
       deallocate(scene%element_kind, scene%element_section, scene%node_label)
-      allocate(scene%element_kind(n_element), source=find_element_kind("CPE3"))
+      allocate(scene%element_kind(n_element), source=find_element_row("CPE3"))
       allocate(scene%element_section(n_element), source=1)
       allocate(scene%node_label(n), source=[(i, i = 1, n)])
    end subroutine add_line
