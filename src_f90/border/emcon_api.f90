@@ -16,7 +16,8 @@
 !>    points, a type that extends `point_function_t`, or a law of the invariants of strain, one
 !>    that extends `law_t` of `emcon_law`; by `stepper_give_scheme` a scheme of time integration,
 !>    a type that extends `scheme_t`; by `stepper_give_force` and `stepper_give_mass` the solid of
-!>    a host code, a type that extends `given_force_t`; by `stepper_give_solver` a direct solver, a
+!>    a host code, a type that extends `given_force_t`; by `stepper_give_constraint` conditions that
+!>    always hold, a type that extends `constraint_t`; by `stepper_give_solver` a direct solver, a
 !>    type that extends `sparse_solver_t`.
 !> 2. `stepper_advance` until `stepper_is_done`: the grid of the deck. Or `stepper_step` with sizes
 !>    of the program's own, and `stepper_next_step` for the next step of the deck.
@@ -44,6 +45,7 @@
 !> multipliers over `interface_areas`.
 module emcon_api
    use emcon_contact, only : gap_state_t
+   use emcon_constraint, only : condition_t, constraint_t
    use emcon_csr, only : csr_from_elements, csr_from_entries, csr_multiply, &
       csr_multiply_transposed, csr_t, csr_transpose
    use emcon_csr_product, only : csr_product
@@ -69,6 +71,7 @@ module emcon_api
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t
+   use emcon_motion, only : motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_quantities, only : contact_field, contact_quantity, element_quantity, &
@@ -87,8 +90,8 @@ module emcon_api
       query_curvature_times, query_links, query_multipliers, query_null_space
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
-   use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_mass, &
-      stepper_give_potential, stepper_give_scheme, stepper_give_solver
+   use emcon_stepper_given, only : stepper_give_constraint, stepper_give_force, stepper_give_law, &
+      stepper_give_mass, stepper_give_potential, stepper_give_scheme, stepper_give_solver
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &

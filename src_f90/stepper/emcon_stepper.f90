@@ -7,7 +7,7 @@ module emcon_stepper
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, err_interrupt, error_t, raise
-   use emcon_given, only : given_count, given_t
+   use emcon_given, only : given_count, given_count_conditions, given_t
    use emcon_given_check, only : given_check_scene
    use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
@@ -266,6 +266,8 @@ contains
       call verdict_save(self%verdict, restart)
       n = given_count(self%given)
       if (any(n > 0)) call restart_put(restart, "given", n)
+      n(1) = given_count_conditions(self%given)
+      if (n(1) > 0) call restart_put(restart, "given_conditions", n(:1))
    end subroutine stepper_save
 
    subroutine save_pairs(self, restart)
@@ -354,24 +356,29 @@ contains
       type(restart_t), intent(in) :: restart
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: stored, own
-      integer :: n(2)
+      integer :: n(3), present(3)
 
       n = 0
-      if (restart_size(restart, "given") > 0) call restart_get(restart, "given", n, error)
+      if (restart_size(restart, "given") > 0) call restart_get(restart, "given", n(:2), error)
       if (allocated(error)) return
-      if (all(n == given_count(self%given))) return
+      if (restart_size(restart, "given_conditions") > 0) call restart_get(restart, &
+         "given_conditions", n(3:), error)
+      if (allocated(error)) return
+      present = [given_count(self%given), given_count_conditions(self%given)]
+      if (all(n == present)) return
       call count_text(n, stored)
-      call count_text(given_count(self%given), own)
+      call count_text(present, own)
       call raise(error, err_input, "the restart file is of a model with " // stored // &
          ", not with " // own // ": they are not in the file, read the deck " // &
          "and give them again before the restart file is loaded")
    end subroutine check_given
 
    pure subroutine count_text(n, text)
-      integer, intent(in) :: n(2)
+      integer, intent(in) :: n(3)                !! forces, masses, conditions
       character(len=:), allocatable, intent(out) :: text
 
       text = to_text(n(1)) // " given forces and " // to_text(n(2)) // " masses"
+      if (n(3) > 0) text = text // " and " // to_text(n(3)) // " given conditions"
    end subroutine count_text
 
    subroutine load_source(self, restart, error)

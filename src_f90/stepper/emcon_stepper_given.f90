@@ -1,14 +1,15 @@
 !> What a program gives to a model between reading its deck and building it: laws, schemes, forces,
-!> mass, solvers.
+!> mass, constraints, solvers.
 !>
 !> Copies are kept, also for a restart file that is loaded afterwards. Nodes that stand in no
 !> element are part of the model where they are given something. Gravity acts on the mass of
 !> elements only: the weight of given mass is for the giver to add.
 module emcon_stepper_given
+   use emcon_constraint, only : constraint_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given, only : given_add_force, given_add_law, given_add_solver, given_copy_solvers, &
-      given_find_solver
+   use emcon_given, only : given_add_constraint, given_add_force, given_add_law, &
+      given_add_solver, given_copy_solvers, given_find_solver
    use emcon_given_check, only : given_check_force, given_check_mass
    use emcon_given_force, only : given_force_t
    use emcon_given_scheme, only : given_scheme_add, given_scheme_check, given_scheme_find
@@ -26,7 +27,7 @@ module emcon_stepper_given
    implicit none
    private
    public :: stepper_give_law, stepper_give_scheme, stepper_give_solver
-   public :: stepper_give_potential, stepper_give_force, stepper_give_mass
+   public :: stepper_give_potential, stepper_give_force, stepper_give_mass, stepper_give_constraint
 
    !> Give the law of a *USER MATERIAL: its strain energy at points, or a type that extends `law_t`.
    interface stepper_give_law
@@ -152,6 +153,20 @@ contains
       if (.not. allocated(error)) call given_check_mass(mass, self%scene, error)
       if (.not. allocated(error)) self%given%mass = mass
    end subroutine stepper_give_mass
+
+   !> Give conditions that hold at the end of every step, in both directions: a rod of fixed length,
+   !> a pin. They hold at the start of the first step, too.
+   subroutine stepper_give_constraint(self, constraint, error)
+      type(stepper_t), intent(inout) :: self
+      class(constraint_t), intent(in) :: constraint
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+
+      call check_stage(self, error)
+      if (allocated(error)) return
+      if (constraint%n_constraint < 1) call raise(error, err_input, "a constraint was given " // &
+         "that has no conditions: n_constraint is to be their number")
+      if (.not. allocated(error)) call given_add_constraint(self%given, constraint)
+   end subroutine stepper_give_constraint
 
    !> Give a direct solver, which steps with SOLVER=`name` factorise their matrices by.
    subroutine stepper_give_solver(self, name, solver, error)

@@ -10,7 +10,7 @@ module emcon_given
    implicit none
    private
    public :: given_t, given_add_constraint, given_add_force, given_add_law, given_add_solver, &
-      given_copy_solvers, given_count, given_find_solver
+      given_copy_solvers, given_count, given_count_conditions, given_find_solver
 
    !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
    !> by what decks call them, constraints that always hold.
@@ -66,6 +66,18 @@ contains
       n = [0, merge(1, 0, self%mass%n_row > 0)]
       if (allocated(self%force)) n(1) = size(self%force)
    end function given_count
+
+   !> Number of conditions of all constraints.
+   pure integer function given_count_conditions(self) result(n)
+      type(given_t), intent(in) :: self
+      integer :: i
+
+      n = 0
+      if (.not. allocated(self%constraint)) return
+      do i = 1, size(self%constraint)
+         n = n + self%constraint(i)%constraint%n_constraint
+      end do
+   end function given_count_conditions
 
    !> Append a copy of the strain energy, or of the law, of the material `name`.
    subroutine given_add_law(self, name, energy, law)
