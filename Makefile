@@ -169,7 +169,7 @@ $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 
 # What holds whole models and computes nothing: optimising how those are freed takes half of the
 # time of the library. `private`: what is made on the way keeps its own flags.
-HOLDERS := $(addprefix emcon_,handle interface interface_handle run stepper stepper_query)
+HOLDERS := $(addprefix emcon_,handle run stepper stepper_query)
 $(HOLDERS:%=$(O)/%.o): private FFLAGS_release := -O0 -g1
 
 # The kernel tests are compiled once, with all checks: those of `debug` are these with its library.
@@ -207,7 +207,7 @@ kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/ker
 PY_READY := .venv/run.stamp
 P := $(BUILD)/py
 PACKAGE := pywrap/emcon
-HEADERS := src_f90/border/emcon.h src_f90/border/emcon_interface.h
+HEADERS := src_f90/border/emcon.h
 
 # What C has is what Python calls: the signatures are made from the headers.
 $(P)/_core.pyf: pywrap/make_pyf.py $(HEADERS) $(PY_READY)

@@ -24,8 +24,7 @@ import numpy as np
 NUMBERS = {"int": "integer", "double": "double precision"}
 FORMATS = {"int": "i4", "double": "f8"}
 #: Functions that are over at once keep other Python threads waiting; all others let them run.
-QUICK = re.compile(r"emcon_(interface_)?(get_(?!gaps|null_space|curvature)|add_|set$|free|message"
-                   r"|notes|is_done|version|close|find_)")
+QUICK = re.compile(r"emcon_(get_(?!gaps)|add_|free|message|is_done|version|close|find_)")
 
 
 @dataclass
@@ -184,13 +183,7 @@ class Function:
             self._add(length, f"integer intent(hide),depend({a.name}{check}) :: {length} = "
                               f"shape({a.name},0)")
         if not is_told:
-            # C takes arrays of the size that the handle has. f2py reads `!` as a comment.
-            handle = self.arguments[0]
-            fits = f"sizes.{extent} == {extent}" if is_known else " && ".join(
-                f"(len_{a.name} == 0 || sizes.{extent} == len_{a.name})" for a in inputs)
-            self.call = (f"{handle.kind}_sizes sizes; status = {handle.kind}_get_sizes("
-                         f"{handle.passed}, &sizes); if (status == EMCON_OK) status = ({fits}) ? "
-                         f"{self.call.removeprefix('status = ')[:-1]} : EMCON_ERROR_INPUT;")
+            raise SystemExit(f"make_pyf.py: {self.name} is not told {extent}")
 
     def block(self) -> str:
         call = "{" + "".join(a.before for a in self.arguments) + self.call + "".join(

@@ -1,6 +1,6 @@
-"""The compiled extension: the functions of emcon.h and emcon_interface.h, and their constants.
+"""The compiled extension: the functions of emcon.h, and its constants.
 
-It is made from these headers. Signatures: `__doc__` of each function.
+It is made from this header. Signatures: `__doc__` of each function.
 """
 
 from typing import Any

@@ -110,7 +110,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class NullSpace:
-    """P and DF, (n_unknown, n_unknown - n): P^T T^T g^T = 0 and c T DF = 0.
+    """P and DF, (2 n_node, n_unknown - n): P^T g^T = 0 and c DF = 0, with ties and held freedoms.
 
     If `redundant` is not empty, these places of the selection follow from others, and there are no
     matrices: `Interface.drop` them.
@@ -169,7 +169,10 @@ class Interface:
         self.n_contact = 0      #: contacts possible, known after `prepare`
         self.n_unknown = 0      #: freedoms neither held nor tied to others, known after `prepare`
         self._n_surface = self._n_tie = 0
-        self._handle = _core.emcon_interface_new(x)[1]
+        self._n_row = 0         # rows of ties, which the library counts before contacts
+        self._x = x
+        self._selected: Ints = np.empty(0, np.int32)
+        self._handle = _core.emcon_new(x)[1]
 
     # ---- life ------------------------------------------------------------------------------------
 
@@ -178,7 +181,7 @@ class Interface:
         if self._is_busy:
             raise InputError("the interface is in use by another thread: it cannot be closed")
         handle, self._handle = self._handle, 0
-        _core.emcon_interface_free(handle)
+        _core.emcon_close(handle)
 
     def __enter__(self) -> Interface:
         return self
@@ -196,7 +199,7 @@ class Interface:
         found = routine(self._handle, *arguments)
         results = found if isinstance(found, tuple) else (found,)
         if results[0]:
-            said = text(_core.emcon_interface_message(self._handle))
+            said = text(_core.emcon_message(self._handle))
             raise _KINDS.get(results[0], RuntimeError)(said)
         return results[1] if len(results) == 2 else results[1:]
 
@@ -215,7 +218,7 @@ class Interface:
         edge = _whole("edges", edges, 2, self.n_node)
         if edge.shape[1] != 2 or not len(edge):
             raise InputError(f"edges is to have the shape (k, 2), k > 0, not {edge.shape}")
-        number = self._call(_core.emcon_interface_add_surface, name.encode(), edge)
+        number = self._call(_core.emcon_add_surface, name.encode(), edge)
         self._n_surface = 1 + number
         return self._n_surface - 1
 
@@ -242,7 +245,7 @@ class Interface:
         sides = self._surfaces(slave, master)
         kind = _choice("formulation", formulation)
         options = made("emcon_pair_options", *choice, *angles)
-        self._call(_core.emcon_interface_add_pair, *sides, kind, options)
+        self._call(_core.emcon_add_pair, *sides, kind, options)
 
     @_exclusive(False)
     def add_tie(self, slave: int, master: int, *, multiplier: str = "dual",
@@ -256,7 +259,7 @@ class Interface:
             raise InputError(f"tolerance is {tolerance}, which is negative")
         sides = self._surfaces(slave, master)
         kind = _choice("multiplier", multiplier)
-        self._call(_core.emcon_interface_add_tie, *sides, kind, reach)
+        self._call(_core.emcon_add_tie, *sides, kind, reach)
         self._n_tie += 1
         return self._n_tie - 1
 
@@ -277,9 +280,9 @@ class Interface:
         statics, gradients at the end of the step and closed gaps; set it before `prepare`, too.
         """
         kind = _choice("initiation", initiation)
-        settings = made("emcon_interface_settings", kind, number(gap_tolerance, "gap_tolerance"),
+        settings = made("emcon_contact_settings", kind, number(gap_tolerance, "gap_tolerance"),
                         bool(is_last_try), bool(is_end))
-        self._call(_core.emcon_interface_set, settings)
+        self._call(_core.emcon_set_contact, settings)
 
     @_exclusive(False)
     def prepare(self, held: ArrayLike | None = None) -> Floats:
@@ -287,36 +290,35 @@ class Interface:
 
         `held`: freedoms that the host moves by itself, (n_node, 2) booleans, None for none. Slave
         nodes of ties are moved onto their masters: the host takes over the positions. After an
-        error it may be called again.
+        error in what was given before, begin with a new interface.
         """
         if held is None:
             held = np.zeros((self.n_node, 2), bool)
         flags = flag_array(held, "held", (self.n_node, 2))
-        self._call(_core.emcon_interface_prepare, flags)
+        self._call(_core.emcon_hold, flags)
+        self._call(_core.emcon_build)
         sizes = self._sizes()
         self.n_contact, self.n_unknown = sizes["n_contact"], sizes["n_unknown"]
+        self._n_row = sizes["n_constraint"] - self.n_contact
         self._is_prepared = True
-        return self._call(_core.emcon_interface_get_positions, self.n_node)[0]
+        return self._call(_core.emcon_get_positions, self.n_node)
 
     @property
+    @_exclusive(None)
     def positions(self) -> Floats:
         """Reference positions, (n_node, 2) [L]; after `prepare` those that fulfil the ties."""
-        return self._positions()[0]
+        return self._call(_core.emcon_get_positions, self.n_node)
 
     @property
     def largest_move(self) -> float:
         """How far `prepare` has moved a slave node onto its master at most [L]."""
-        return self._positions()[1]
-
-    @_exclusive(None)
-    def _positions(self) -> tuple[Floats, float]:
-        return self._call(_core.emcon_interface_get_positions, self.n_node)
+        return float(np.linalg.norm(self.positions - self._x, axis=1).max())
 
     @property
-    @_exclusive(None)
+    @_exclusive()
     def notes(self) -> list[str]:
         """Remarks on the ties, made by `prepare`."""
-        lines = text(_core.emcon_interface_notes(self._handle))
+        lines = text(self._call(_core.emcon_get_notes))
         return [line.rstrip() for line in lines.split("\n")] if lines else []
 
     @property
@@ -331,7 +333,8 @@ class Interface:
 
     @_exclusive()
     def _contacts(self) -> tuple[Ints, Ints]:
-        return self._call(_core.emcon_interface_get_contacts, self.n_contact)
+        _, _, label, pair = self._call(_core.emcon_get_contact, self.n_contact)
+        return label - np.int32(1), pair
 
     # ---- ties and held freedoms ------------------------------------------------------------------
 
@@ -340,7 +343,7 @@ class Interface:
         """D and M of a tie, (n_row, n_node) [L]: D x = M x in both directions."""
         if not self._n_tie:
             raise InputError("there is no tie")
-        found = self._call(_core.emcon_interface_get_tie_matrices,
+        found = self._call(_core.emcon_get_tie_matrices,
                            _number("tie", tie, 0, self._n_tie - 1))
         return matrix(found[0]), matrix(found[1])
 
@@ -350,15 +353,15 @@ class Interface:
 
         Rows of held freedoms are empty.
         """
-        return matrix(self._call(_core.emcon_interface_get_links))
+        return matrix(self._call(_core.emcon_links))
 
     def follow(self, field: ArrayLike) -> Floats:
         """A displacement or velocity, (n_node, 2), whose tied freedoms follow the others."""
-        return self._changed(_core.emcon_interface_follow, field)
+        return self._changed(_core.emcon_follow, field)
 
     def gather(self, field: ArrayLike) -> Floats:
         """Forces, (n_node, 2); those on tied freedoms went to the ones that they follow."""
-        return self._changed(_core.emcon_interface_gather, field)
+        return self._changed(_core.emcon_gather, field)
 
     @_exclusive()
     def _changed(self, routine: Any, field: ArrayLike) -> Floats:
@@ -374,22 +377,21 @@ class Interface:
         Returns those that still can.
         """
         was = self._flags("was_active", was_active)
-        return self._call(_core.emcon_interface_begin_step, *self._motion(u0, du),
-                          was).astype(bool)
+        return self._contacts_of(self._call(_core.emcon_begin_contact, *self._motion(u0, du), was))
 
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
         """All gaps at both ends of the step."""
-        data = self._call(_core.emcon_interface_get_gaps, *self._motion(u0, du), self.n_contact)
-        gaps = structures("emcon_gap", data)
+        data = self._call(_core.emcon_get_gaps, *self._motion(u0, du), self.n_contact + self._n_row)
+        gaps = structures("emcon_gap", data)[self._n_row:]
         return Gaps(gaps["is_near"].astype(bool), gaps["is_over"].astype(bool),
-                    *(gaps[part].copy() for part in ("gap_start", "gap_end", "edge")))
+                    *(gaps[part].copy() for part in ("gap0", "gap1", "size")))
 
     @_exclusive()
     def select(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
         """Select the contacts `active`, (n_contact,) booleans; return how many there are."""
         flags = self._flags("active", active)
-        return self._call(_core.emcon_interface_select, *self._motion(u0, du), flags)
+        return self._call(_core.emcon_select, *self._motion(u0, du), flags)
 
     @_exclusive()
     def choose(self, u0: ArrayLike, du: ArrayLike, contact: ArrayLike, target: ArrayLike) -> None:
@@ -401,15 +403,16 @@ class Interface:
         if (np.diff(numbers) <= 0).any():
             raise InputError("contact has numbers that do not ascend")
         gap = real_array(target, "target", (len(numbers),))
-        self._call(_core.emcon_interface_choose, *self._motion(u0, du), numbers, gap)
+        self._call(_core.emcon_choose, *self._motion(u0, du), numbers + np.int32(self._n_row), gap)
 
     @_exclusive()
     def evaluate(self, u0: ArrayLike, du: ArrayLike) -> Constraints:
         """Values and gradients of the selected contacts."""
-        n, contact, *values, g, c = structure("emcon_interface_constraints", self._call(
-            _core.emcon_interface_evaluate, *self._motion(u0, du))).values()
-        return Constraints(whole(contact, n), *(copied(place, n) for place in values), csr(g),
-                           csr(c))
+        n, number, _, _, *values, g, c = structure("emcon_constraint_report", self._call(
+            _core.emcon_evaluate_contact, *self._motion(u0, du))).values()
+        self._selected = whole(number, n)
+        return Constraints(self._selected - np.int32(self._n_row),
+                           *(copied(place, n) for place in values), csr(g), csr(c))
 
     @_exclusive()
     def curvature(self, lam: ArrayLike) -> Csr:
@@ -417,13 +420,13 @@ class Interface:
 
         `lam`: multipliers of the selected contacts as last evaluated, (n,) [M L/T^2].
         """
-        return matrix(self._call(_core.emcon_interface_get_curvature, self._selected("lam", lam)))
+        return matrix(self._call(_core.emcon_curvature, self._of_selected("lam", lam)))
 
     @_exclusive()
     def second_times(self, lam: ArrayLike, direction: ArrayLike) -> Floats:
         """`curvature(lam)` times a direction, (n_node, 2) like the result."""
         along = self._field("direction", direction)
-        return self._call(_core.emcon_interface_second_times, self._selected("lam", lam), along)
+        return self._call(_core.emcon_curvature_times, self._of_selected("lam", lam), along)
 
     @_exclusive()
     def update_active(self, u0: ArrayLike, du: ArrayLike, lam: ArrayLike, active: ArrayLike,
@@ -437,9 +440,9 @@ class Interface:
         u, d = self._motion(u0, du)
         flags = self._flags("active", active)
         sizes = np.empty((0, 2)) if magnitude is None else self._field("magnitude", magnitude)
-        flags, is_done, outcome = self._call(_core.emcon_interface_update_active, u, d,
-                                             self._selected("lam", lam), sizes, flags)
-        return flags.astype(bool), Outcome(outcome) if is_done else None
+        flags, is_done, outcome = self._call(_core.emcon_update_active, u, d,
+                                             self._of_selected("lam", lam), sizes, flags)
+        return self._contacts_of(flags), Outcome(outcome) if is_done else None
 
     @_exclusive()
     def areas(self, u1: ArrayLike) -> tuple[Floats, Floats]:
@@ -448,7 +451,20 @@ class Interface:
         The pressure of a contact is its multiplier over its area. The lengths, (n_contact,) [L],
         are those of slave surface that belong to the contacts at the end.
         """
-        return self._call(_core.emcon_interface_get_areas, self._field("u1", u1), self.n_contact)
+        area, length = self._call(_core.emcon_get_areas, self._field("u1", u1),
+                                  self.n_contact + self._n_row)
+        return area[self._n_row:], length[self._n_row:]
+
+    @_exclusive()
+    def overlap(self, u0: ArrayLike, du: ArrayLike) -> tuple[float, int | None]:
+        """The deepest overlap of bodies in the step, per edge, and the node that is behind.
+
+        It is found by geometry alone, whatever contact says: 0 and None if there is none. Surfaces
+        of pairs are their outlines: of two of which neither closes around its body, nothing is
+        found.
+        """
+        depth, node = self._call(_core.emcon_overlap, *self._motion(u0, du))
+        return depth, node if node >= 0 else None
 
     # ---- without multipliers ---------------------------------------------------------------------
 
@@ -459,7 +475,7 @@ class Interface:
         Raises `AnalysisError` if there is no good choice of unknowns to eliminate: solve with the
         multipliers.
         """
-        p, df, n, place = self._call(_core.emcon_interface_get_null_space)
+        p, df, n, place = self._call(_core.emcon_null_space)
         redundant = whole(place, n)
         if n:
             return NullSpace(None, None, redundant)
@@ -472,22 +488,22 @@ class Interface:
         `redundant`: their places in the selection, as `null_space` tells.
         """
         place = _whole("redundant", redundant, 1, self._n_selected())
-        return self._call(_core.emcon_interface_drop, place, self.n_contact).astype(bool)
+        return self._contacts_of(self._call(_core.emcon_drop, place, self.n_contact + self._n_row))
 
     @_exclusive()
     def multipliers(self, residual: ArrayLike) -> Floats:
-        """lam, (n,), after `null_space`, from the residual T^T r without contact, (n_unknown,)."""
-        force = real_array(residual, "residual", (self.n_unknown,))
-        return self._call(_core.emcon_interface_multipliers, force, self._n_selected())
+        """lam, (n,), after `null_space`, from the residual without contact forces, (n_node, 2)."""
+        force = self._field("residual", residual)
+        return self._call(_core.emcon_multipliers, self.n_node, force,
+                          self.n_contact + self._n_row)[self._selected]
 
     @_exclusive()
     def particular(self, defect: ArrayLike) -> Floats:
-        """The motion of dependent unknowns alone that closes `defect`, (n,); (n_unknown,) [L].
+        """The motion of dependent unknowns alone that closes `defect`, (n,); (n_node, 2) [L].
 
         After `null_space`. Newton's step is this plus DF times that of the others.
         """
-        return self._call(_core.emcon_interface_particular, self._selected("defect", defect),
-                          self.n_unknown)
+        return self._call(_core.emcon_particular, self._of_selected("defect", defect), self.n_node)
 
     # ---- helpers ---------------------------------------------------------------------------------
 
@@ -499,15 +515,20 @@ class Interface:
         return self._field("u0", u0), self._field("du", du)
 
     def _flags(self, name: str, values: ArrayLike) -> Ints:
-        return flag_array(values, name, (self.n_contact,))
+        """One for each constraint: those of ties, which are eliminated, do not act."""
+        flags = flag_array(values, name, (self.n_contact,))
+        return np.concatenate((np.zeros(self._n_row, flags.dtype), flags))
+
+    def _contacts_of(self, flags: Ints) -> Flags:
+        return flags[self._n_row:].astype(bool)
 
     def _n_selected(self) -> int:
         return self._sizes()["n_selected"]
 
     def _sizes(self) -> dict[str, int]:
-        return structure("emcon_interface_sizes", self._call(_core.emcon_interface_get_sizes))
+        return structure("emcon_sizes", self._call(_core.emcon_get_sizes))
 
-    def _selected(self, name: str, values: ArrayLike) -> Floats:
+    def _of_selected(self, name: str, values: ArrayLike) -> Floats:
         """One number for each selected contact."""
         return real_array(values, name, (self._n_selected(),))
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from .arguments import flag_array, positive, real_array
 from .csr import Csr
-from .errors import InputError
+from .errors import AnalysisError, InputError
 from .handle import Handle
 from .memory import copied, csr, matrix, structure, whole
 
@@ -31,6 +31,7 @@ class Evaluation:
         self._handle = stepper._handle
         self._n_node, self._n_unknown = stepper.n_node, stepper.n_unknown
         self._has_null_space = False
+        self._handle.n_reports += 1
         self._handle.change(_evaluate, int(with_tangent), *arguments)
         self._n_changes = self._handle.n_changes
 
@@ -68,7 +69,7 @@ class Evaluation:
         Ties, equations and prescribed freedoms are taken account of. Raises `AnalysisError` if
         there is none: constraints that follow from others.
         """
-        return self._call(_matrices, _core.emcon_null_space)
+        return self._call(_null_space)
 
     def multipliers(self) -> NDArray[np.float64]:
         """The contact forces that the residual without them amounts to, (n_constraint,) [M L/T^2].
@@ -77,7 +78,7 @@ class Evaluation:
         does not act.
         """
         if not self._has_null_space:
-            self._call(_core.emcon_null_space)
+            self._call(_null_space)
             self._has_null_space = True
         return self._call(_multipliers)
 
@@ -106,12 +107,13 @@ class ConstraintReport:
         """Sum over the constraints of factor times (dG/du1) times direction, (n_node, 2).
 
         `factor` (n,) for instance multipliers, `direction` (n_node, 2). Belongs to the last
-        report of a stepper; raises `InputError` for earlier ones.
+        report or evaluation of a stepper; raises `InputError` for earlier ones.
         """
         factor = real_array(factor, "the factor", self.id.shape)
         direction = real_array(direction, "the direction", (self._n_node, 2))
         if self._handle.address and self._n_reports != self._handle.n_reports:
-            raise InputError("this report is stale: constraints were asked for again")
+            raise InputError("this report is stale: constraints were asked for again, "
+                             "or a step was evaluated")
         return self._handle.call(_core.emcon_curvature_times, factor, direction)
 
 
@@ -248,8 +250,17 @@ def _evaluate(address: int, with_tangent: int, h: float, u1: NDArray[np.float64]
 def _multipliers(address: int) -> tuple[int, NDArray[np.float64]]:
     """Those of contact."""
     n, before = _counts(address)
-    status, lam = _core.emcon_multipliers(address, n)
+    status, lam = _core.emcon_multipliers(address, 0, np.empty((0, 2)), n)
     return status, lam[before:]
+
+
+def _null_space(address: int) -> tuple[Any, ...]:
+    """The status, and P and DF."""
+    status, p, df, n, _ = _core.emcon_null_space(address)
+    if n and not status:
+        raise AnalysisError("there is no null space: some of the constraints that act follow from "
+                            "others")
+    return (status,) if status else (0, (matrix(p), matrix(df)))
 
 
 def _matrices(address: int, function: Callable[..., Any], *arguments: Any) -> tuple[Any, ...]:
@@ -267,7 +278,9 @@ def _constraints(address: int, u0: NDArray[np.float64], u1: NDArray[np.float64],
     status, data = _core.emcon_constraints(address, u0, u1, keeps_gap)
     if status:
         return (status,)
-    n, number, pair, node, *gaps, gradient, jacobian = structure(
-        "emcon_constraint_report", data).values()
-    return (0, whole(number, n) - np.int32(_counts(address)[1]), whole(pair, n), whole(node, n),
-            *(copied(place, n) for place in gaps), csr(gradient), csr(jacobian))
+    found = structure("emcon_constraint_report", data)
+    n = found["n"]
+    return (0, whole(found["id"], n) - np.int32(_counts(address)[1]), whole(found["pair"], n),
+            whole(found["node"], n),
+            *(copied(found[name], n) for name in ("gap0", "gap1", "dgap", "size")),
+            csr(found["discrete_gradient"]), csr(found["end_gradient"]))

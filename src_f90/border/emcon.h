@@ -1,7 +1,8 @@
 /* EMCON: energy-momentum conserving contact dynamics. The interface for C (C99) and C++.
  *
- * A model is a deck that was read, at some point of its analysis. All state is in the model: any
- * number of them live side by side, each used from one thread at a time. No function stops the
+ * A model is a deck that was read, at some point of its analysis; or nodes, surfaces, contact pairs
+ * and ties of a host code, which has solids and time steps of its own. All state is in the model:
+ * any number of them live side by side, each used from one thread at a time. No function stops the
  * program or prints; those that can fail return EMCON_OK or a code, and the text of the failure
  * stays with the model until the next one. A call that fails leaves the model as it was, unless
  * the text here says otherwise. A model that was closed must not be used again: that cannot be
@@ -59,6 +60,9 @@ typedef struct emcon_sizes {
    int n_constraint; /* all constraints: rows of ties and equations, then the n_contact contacts */
    int n_load;       /* in the present step of the deck */
    int i_step;       /* the present step of the deck; the first is 1, as in messages */
+   int n_surface;
+   int n_tie;
+   int n_selected;   /* constraints that were selected or evaluated last */
 } emcon_sizes;
 
 typedef struct emcon_increment {
@@ -93,20 +97,71 @@ typedef struct emcon_csr {
    const double *value;    /* row_start[n_row] */
 } emcon_csr;
 
-/* Contacts between two configurations, ascending by their numbers. The gaps of a contact differ by
- * its discrete gradient times u1 - u0. The arrays belong to the model, as those of a matrix. */
+/* Constraints over a step, ascending by their numbers. Number k holds its gap at target[k]: f_k,
+ * their difference times the part of the surface that is covered, has to be 0. Its force on the
+ * nodes is its multiplier times row k of `discrete_gradient`; Newton's method linearises f_k by row
+ * k of `end_gradient`. In statics gap0 is that of the end, dgap is 0, and the gradients are one.
+ * The arrays belong to the model, as those of a matrix. */
 typedef struct emcon_constraint_report {
    int n;
    const int *id;                 /* number among the n_constraint constraints */
-   const int *pair;               /* number of the contact pair */
-   const int *node;               /* number of the slave node */
-   const double *gap0;            /* at u0, > 0 is open */
-   const double *gap1;            /* at u1 */
+   const int *pair;               /* number of the contact pair; -1: of a tie or an equation */
+   const int *node;               /* number of the slave node; -1 likewise */
+   const double *target;          /* > 0 is open; of mortar contact a weighted mean */
+   const double *gap0;            /* f at the start */
+   const double *gap1;            /* f at the end */
    const double *dgap;            /* gap1 - gap0, to relative accuracy */
-   const double *size;            /* length of an edge */
-   emcon_csr discrete_gradient;   /* n x 2*n_node */
-   emcon_csr end_gradient;        /* n x 2*n_node, the gradient at u1 */
+   const double *defect;          /* is to be 0: dgap where the gap of the start is held, or gap1 */
+   const double *size;            /* length of an edge, to which defects relate */
+   emcon_csr discrete_gradient;   /* n x 2*n_node, times the motion it is dgap */
+   emcon_csr end_gradient;        /* n x 2*n_node, the gradient at the end */
 } emcon_constraint_report;
+
+/* Where a possible contact stands at both ends of a step. */
+typedef struct emcon_gap {
+   int is_near;             /* 0: there is no surface within reach, and no gap */
+   int is_over;             /* over the surface, not past its end */
+   double gap0;             /* > 0 is open; of mortar contact a weighted mean */
+   double gap1;
+   double size;             /* length of an edge, to which tolerances relate */
+} emcon_gap;
+
+enum { EMCON_NODE_TO_SEGMENT = 1, EMCON_SEGMENT = 2, EMCON_MORTAR = 3 };     /* formulation */
+enum { EMCON_SEGMENTS = 1, EMCON_ELEMENTS = 2 };                            /* integration */
+enum { EMCON_STANDARD = 1, EMCON_DUAL = 2 };                                /* multiplier */
+enum { EMCON_EDGE_NORMAL = 1, EMCON_NODAL_NORMAL = 2 };                     /* normal */
+enum { EMCON_UNSMOOTHED = 1, EMCON_HERMITE = 2 };                           /* smoothing */
+enum { EMCON_PERSISTENT = 1, EMCON_ADMISSIBLE = 2 };                        /* initiation */
+
+/* How a pair is computed; 0 is the default, so that `emcon_pair_options options = {0}` is all that
+ * is needed before one of them is set. */
+typedef struct emcon_pair_options {
+   int integration;         /* of mortar contact; default EMCON_SEGMENTS, exactly by segments */
+   int n_point;             /* Gauss points, 2..10 on segments, 1..10 on elements */
+   int multiplier;          /* of mortar contact; default EMCON_DUAL */
+   int normal;              /* of slave nodes; default EMCON_NODAL_NORMAL, the mean of the edges' */
+   int smoothing;           /* of the master surface; default EMCON_UNSMOOTHED */
+   double normal_angle;     /* sharper turns are corners, 0..180 degrees; default 60 */
+   double smoothing_angle;  /* the same for smoothing */
+} emcon_pair_options;
+
+/* How contact begins in the steps of a host; 0 is the default. */
+typedef struct emcon_contact_settings {
+   int initiation;          /* EMCON_PERSISTENT, the default: a new contact holds the gap that the
+                               step began with, which keeps energy; EMCON_ADMISSIBLE closes it */
+   double gap_tolerance;    /* no contact begins with a larger gap per edge; 0: any */
+   int is_last_try;         /* 1: the host cannot try the step again in smaller parts */
+   int is_end;              /* 1: statics: gradients at the end of the step, closed gaps; to be set
+                               before emcon_build, too */
+} emcon_contact_settings;
+
+/* How an active set ended. */
+enum {
+   EMCON_STEP_DONE = 0,
+   EMCON_STEP_CYCLING = 5,     /* the sets repeat: try a smaller step */
+   EMCON_STEP_TOO_FAR = 6,     /* the motion leaves what contact was chosen for: a smaller step */
+   EMCON_STEP_STANDS_OFF = 7   /* a contact would begin farther away than gap_tolerance: smaller */
+};
 
 /* Called after each increment; anything but 0 stops the run. */
 typedef int (*emcon_progress)(void *user, const emcon_increment *increment, double fraction_done);
@@ -191,6 +246,39 @@ int emcon_give_force(emcon_model *model, const char *name, const emcon_csr *patt
 
 /* A mass beside that of the elements, n_node x n_node, the same in both directions. */
 int emcon_give_mass(emcon_model *model, const emcon_csr *mass);
+
+/* ---- a model of a host code ------------------------------------------------------------------ */
+
+/* In place of reading a deck: nodes, then surfaces, pairs and ties, then emcon_build. Steps are the
+ * host's: see "contact over a step". Labels are the numbers of nodes, from 1. Complete hosts stand
+ * in tests/embed/interface_bars.c and tests/embed/interface_springs.py; the notation is that of
+ * docs/theory.md, sections 4 and 5. Units are consistent ones; the plane has thickness 1. */
+
+/* Nodes at the reference positions `x`; those that no surface holds may be left out. `*model` has
+ * to be closed also after a failure. */
+int emcon_new(int n_node, const double *x /* n_node x 2 */, emcon_model **model);
+
+/* Add a surface: first and last node of each edge, 2*n_edge numbers, the body to the left, so that
+ * the outward normal is the edge turned by -90 degrees. Edges in any order, connected or in parts,
+ * open or closed. `name` is for messages, NULL: its number. `*surface` is its number. */
+int emcon_add_surface(emcon_model *model, const char *name, int n_edge,
+                      const int *edge /* n_edge x 2 */, int *surface);
+
+/* Add a contact pair; a surface in contact with itself is its own master. `options` NULL: the
+ * defaults. Rigid obstacles are masters of held nodes. */
+int emcon_add_pair(emcon_model *model, int slave, int master, int formulation,
+                   const emcon_pair_options *options);
+
+/* Tie two surfaces that meet, whatever their meshes. `multiplier`: EMCON_STANDARD or EMCON_DUAL;
+ * `tolerance`: how far apart they may be, < 0: a tenth of an edge. emcon_build moves slave nodes
+ * onto their masters: the host takes over emcon_get_positions. */
+int emcon_add_tie(emcon_model *model, int slave, int master, int multiplier, double tolerance);
+
+/* Freedoms that the host moves by itself: 1, else 0. None, if this is not called. */
+int emcon_hold(emcon_model *model, int n_node, const int *held /* n_node x 2 */);
+
+/* Settings, also between steps. */
+int emcon_set_contact(emcon_model *model, const emcon_contact_settings *settings);
 
 /* ---- the run of the deck --------------------------------------------------------------------- */
 
@@ -329,6 +417,14 @@ int emcon_unknowns(emcon_model *model, int n_node, int *unknown /* n_node x 2 */
 /* T, 2*n_node x n_unknown: row 2*node + direction. */
 int emcon_links(emcon_model *model, emcon_csr *matrix);
 
+/* Dependent freedoms of a displacement or velocity follow the others; forces on dependent freedoms
+ * go to those that they follow. `field` is changed in place, unchanged after a failure. */
+int emcon_follow(emcon_model *model, int n_node, double *field /* n_node x 2, in and out */);
+int emcon_gather(emcon_model *model, int n_node, double *field /* n_node x 2, in and out */);
+
+/* D and M of a tie, over nodes, one row for each multiplier: D x = M x in both directions. */
+int emcon_get_tie_matrices(emcon_model *model, int tie, emcon_csr *d, emcon_csr *m);
+
 /* The consistent mass, n_node x n_node, the same in both directions. */
 int emcon_mass(emcon_model *model, emcon_csr *matrix);
 
@@ -356,26 +452,95 @@ int emcon_residual(emcon_model *model, int with_contact, int n_node,
 int emcon_tangent(emcon_model *model, int with_contact, emcon_csr *matrix);
 
 /* Null-space matrix P, and DF of the reparametrisation, for the constraints that act in the last
- * evaluation: P^T G^T = 0 and C DF = 0 for their discrete gradients G and gradients at the end C;
- * 2*n_node x independent unknowns. */
-int emcon_null_space(emcon_model *model, emcon_csr *p, emcon_csr *df);
+ * evaluation, of whichever function: P^T G^T = 0 and C DF = 0 for their discrete gradients G and
+ * gradients at the end C; 2*n_node x independent unknowns. If some constraints follow from others,
+ * `redundant` are the `*n_redundant` places of these, to be given to emcon_drop, and there are no
+ * matrices; a failure where `n_redundant` is NULL. EMCON_ERROR_ANALYSIS: there are no good unknowns
+ * to eliminate, solve with the multipliers. */
+int emcon_null_space(emcon_model *model, emcon_csr *p, emcon_csr *df, int *n_redundant,
+                     const int **redundant);
 
-/* The multipliers, n_constraint, that the residual without contact amounts to, by the dependent
- * unknowns of the last null space; 0 where a constraint does not act. */
-int emcon_multipliers(emcon_model *model, int n_constraint, double *lam /* n_constraint */);
+/* The multipliers, n_constraint, that a residual without contact forces amounts to, by the
+ * dependent unknowns of the last null space: `residual` at the nodes, NULL: that of the last
+ * emcon_evaluate. 0 where a constraint does not act. */
+int emcon_multipliers(emcon_model *model, int n_node,
+                      const double *residual /* n_node x 2, or NULL */, int n_constraint,
+                      double *lam /* n_constraint */);
+
+/* After emcon_null_space: the motion of dependent unknowns alone that closes the `defect` of the n
+ * constraints. Newton's step is this plus DF times that of the others. */
+int emcon_particular(emcon_model *model, int n, const double *defect /* n */, int n_node,
+                     double *du /* n_node x 2 */);
+
+/* Sum over the n constraints of the last evaluation of `factor` times the derivative of the
+ * discrete gradient by the end of the step, 2*n_node x 2*n_node, which the tangent gets with a
+ * minus sign if the factors are multipliers; and the same times `direction`. */
+int emcon_curvature(emcon_model *model, int n, const double *factor /* n */, emcon_csr *matrix);
+int emcon_curvature_times(emcon_model *model, int n, const double *factor /* n */, int n_node,
+                          const double *direction /* n_node x 2 */,
+                          double *product /* n_node x 2 */);
+
+/* ---- contact over a step --------------------------------------------------------------------- */
 
 /* All contacts near from displacements u0 to u1. With `keeps_gap` they are those that hold the mean
- * gap of u0, as persistent contact does: all gaps are counted from there. The last evaluation is
- * forgotten. */
+ * gap of u0, as persistent contact does: all gaps are counted from there. */
 int emcon_constraints(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
                       const double *u1 /* n_node x 2 */, int keeps_gap,
                       emcon_constraint_report *report);
 
-/* Sum over the n contacts of the last report of `factor` times the derivative of the discrete
- * gradient by u1 times `direction`; both fields have 2*n_node numbers. */
-int emcon_curvature_times(emcon_model *model, int n, const double *factor /* n */, int n_node,
-                          const double *direction /* n_node x 2 */,
-                          double *product /* n_node x 2 */);
+/* Begin a step from the displacements u0 with the motion du that is expected. Flags of n_constraint
+ * constraints: which acted at the end of the step before, and which of them still can. One array
+ * may be given for both. Any other evaluation ends the step. */
+int emcon_begin_contact(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                        const double *du /* n_node x 2 */, int n_constraint,
+                        const int *was_active /* n_constraint */,
+                        int *active /* n_constraint */);
+
+/* All gaps; rows of ties and equations have none. */
+int emcon_get_gaps(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                   const double *du /* n_node x 2 */, int n_constraint,
+                   emcon_gap *gap /* n_constraint */);
+
+/* Select the constraints that act, by flags; `*n` becomes their number. */
+int emcon_select(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                 const double *du /* n_node x 2 */, int n_constraint,
+                 const int *active /* n_constraint */, int *n);
+
+/* Select n constraints by their numbers, ascending, with gaps to hold of the caller's own choice.
+ * emcon_update_active does not go with these. */
+int emcon_choose(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                 const double *du /* n_node x 2 */, int n, const int *id /* n */,
+                 const double *target /* n */);
+
+/* Values and gradients of the selected constraints. */
+int emcon_evaluate_contact(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                           const double *du /* n_node x 2 */, emcon_constraint_report *report);
+
+/* The next active set from a solved step: takes in what would penetrate, releases what pulls.
+ * `lam`: the multipliers of the n selected constraints, forces, > 0 pressing. `active`: those
+ * selected, then the next ones. `*is_done`: the set stands, or `*outcome` is not EMCON_STEP_DONE
+ * and the step cannot be ended. `magnitude`: sums of the sizes of the contributions to the
+ * residual, which tell signs of round-off from tension; NULL: the contact forces themselves. */
+int emcon_update_active(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                        const double *du /* n_node x 2 */, int n, const double *lam /* n */,
+                        const double *magnitude /* n_node x 2, or NULL */, int n_constraint,
+                        int *active /* n_constraint, in and out */, int *is_done, int *outcome);
+
+/* Leave selected constraints out for the rest of the step; `active`: what is left. */
+int emcon_drop(emcon_model *model, int n_redundant, const int *redundant /* n_redundant */,
+               int n_constraint, int *active /* n_constraint */);
+
+/* Areas that the multipliers of the step to `u1` act on, so that the pressure is lam/area, and
+ * lengths of slave surface that belong to them at its end. */
+int emcon_get_areas(emcon_model *model, int n_node, const double *u1 /* n_node x 2 */,
+                    int n_constraint, double *area /* n_constraint */,
+                    double *length /* n_constraint */);
+
+/* The deepest overlap of bodies in a step, per edge, found by geometry alone, whatever contact
+ * says; and the node that is behind, -1: none. Surfaces of pairs are their outlines: of two of
+ * which neither closes around its body nothing is found. */
+int emcon_overlap(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
+                  const double *du /* n_node x 2 */, double *depth, int *node);
 
 /* ---- tables: what decks may say -------------------------------------------------------------- */
 
@@ -392,10 +557,10 @@ int emcon_get_law(int i, int *code, int n_text, char *text /* n_text */);
 
 /* ---- single kernels, for tests and for trying things out ------------------------------------- */
 
-/* The law of this code, with its n constants, for a strain 11, 22, 2*12 that goes from `strain` by `dstrain`:
- * the energy at the end, the algorithmic stress S with S . dstrain = change of energy, and its
- * derivative by the strain at the end. EMCON_ERROR_INPUT for no such law, constants that it
- * refuses, or NULL. */
+/* The law of this code, with its n constants, for a strain 11, 22, 2*12 that goes from `strain`
+ * by `dstrain`: the energy at the end, the algorithmic stress S with S . dstrain = change of
+ * energy, and its derivative by the strain at the end. EMCON_ERROR_INPUT for no such law,
+ * constants that it refuses, or NULL. */
 int emcon_law_response(int law, int n, const double *constant /* n */,
                        const double *strain /* 3 */, const double *dstrain /* 3 */,
                        double *energy, double *stress /* 3 */, double *tangent /* 3 x 3 */);

@@ -36,13 +36,13 @@
 !> `query_momenta`, `query_unknowns`, `query_links`, and `query_constraints` with
 !> `query_curvature_times`. After a change of conditions `query_follow`; last `query_free`.
 !>
-!> **Contact and ties for a program that has its own solids.** `interface_init`,
-!> `interface_add_surface`, `interface_add_pair` (options: `contact_options_t`),
-!> `interface_add_tie`, `interface_set`, `interface_prepare`. In each step `interface_begin_step`;
-!> then, until `interface_update_active` is done, `interface_select` or `interface_choose`, and
-!> Newton's method on `interface_evaluate`, `interface_curvature`, with the multipliers or with
-!> `interface_null_space`, `interface_particular`, `interface_multipliers`. Pressures are
-!> multipliers over `interface_areas`.
+!> **Contact and ties for a program that has its own solids.** In place of a deck: `stepper_new`,
+!> `stepper_add_surface`, `stepper_add_pair` (options: `contact_options_t`), `stepper_add_tie`,
+!> `stepper_hold`, `stepper_set_contact`, then `stepper_build`. In each step `query_begin_contact`;
+!> then, until `query_update_active` is done, `query_select` or `query_choose`, and Newton's method
+!> on `query_contact`, `query_curvature`, with the multipliers or with `query_null_space`,
+!> `query_particular`, `query_multipliers`. Pressures are multipliers over `query_areas`;
+!> `query_overlap` judges the step by geometry alone.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_constraint, only : condition_t, constraint_t
@@ -57,17 +57,7 @@ module emcon_api
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
       formulation_segment, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
-   use emcon_interface, only : interface_add_pair, interface_add_surface, interface_add_tie, &
-      interface_follow, interface_gather, interface_init, interface_links, interface_prepare, &
-      interface_t, interface_tie_matrices
-   use emcon_interface_areas, only : interface_areas
-   use emcon_interface_null_space, only : interface_multipliers, interface_null_space, &
-      interface_particular
-   use emcon_interface_settings, only : interface_set
-   use emcon_interface_step, only : constraint_values_t, interface_begin_step, interface_choose, &
-      interface_curvature, interface_drop, interface_evaluate, interface_gaps, &
-      interface_second_times, interface_select, interface_slave_nodes, interface_update_active, &
-      step_cycling, step_done, step_stands_off, step_too_far
+   use emcon_judge, only : overlap_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t
@@ -86,12 +76,18 @@ module emcon_api
       stepper_read, stepper_read_text, stepper_save, stepper_t
    use emcon_stepper_conditions, only : conditions_load, conditions_save, stepper_add_prescribed, &
       stepper_find_load, stepper_remove_prescribed, stepper_set_load, stepper_set_prescribed
-   use emcon_stepper_constraints, only : contact_report_t, query_constraints, &
-      query_curvature_times, query_links, query_multipliers, query_null_space
+   use emcon_stepper_contact, only : contact_report_t, query_areas, query_begin_contact, &
+      query_choose, query_constraints, query_contact, query_curvature, query_curvature_times, &
+      query_drop, query_gaps, query_overlap, query_select, query_update_active, step_cycling, &
+      step_done, step_stands_off, step_too_far
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
    use emcon_stepper_given, only : stepper_give_constraint, stepper_give_force, stepper_give_law, &
       stepper_give_mass, stepper_give_potential, stepper_give_scheme, stepper_give_solver
+   use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &
+      stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
+   use emcon_stepper_null_space, only : query_follow_links, query_gather_links, query_links, &
+      query_multipliers, query_null_space, query_particular
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &

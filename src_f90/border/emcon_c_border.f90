@@ -16,7 +16,8 @@ module emcon_c_border
    implicit none
    private
    public :: find_model, find_read, find_built, address_of, check_count, check_given
-   public :: take_field, take_values, take_flags, put_field, put_values, put_numbers, put_number
+   public :: n_nodes, n_constraints, take_field, take_values, take_flags, take_numbers
+   public :: put_field, put_values, put_numbers, put_number
    public :: put_increment, as_increment, show_matrix, put_matrix, f_text, c_string
 
    interface
@@ -67,6 +68,18 @@ contains
       if (.not. allocated(model%stepper%march%scheme)) call handle_fail(model, &
          "the model is not built yet: call emcon_build", err_input, ierr)
    end subroutine find_built
+
+   pure integer function n_nodes(model)
+      type(model_t), intent(in) :: model
+
+      n_nodes = size(model%stepper%scene%x, 2)
+   end function n_nodes
+
+   pure integer function n_constraints(model)
+      type(model_t), intent(in) :: model
+
+      n_constraints = model%stepper%march%system%n_constraint
+   end function n_constraints
 
    !> An error unless the count called `name` is what the model has.
    subroutine check_count(name, n, expected, error)
@@ -142,6 +155,24 @@ contains
       allocate(list(expected))
       list = array /= 0
    end subroutine take_flags
+
+   !> The `n` numbers called `name`, which count from 0 in C; the largest integer is none.
+   subroutine take_numbers(name, from, n, list, error)
+      character(len=*), intent(in) :: name
+      type(c_ptr), intent(in) :: from
+      integer(c_int), intent(in) :: n
+      integer, allocatable, intent(out) :: list(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int), pointer :: array(:)
+
+      allocate(list(0))
+      if (n > 0) call check_given(name, from, error)
+      if (n < 0 .and. .not. allocated(error)) call raise(error, err_input, "the size of " // name &
+         // " is " // to_text(int(n)))
+      if (allocated(error) .or. n == 0) return
+      call c_f_pointer(from, array, [n])
+      list = min(array, huge(array) - 1) + 1
+   end subroutine take_numbers
 
    !> Copy a field to an array of C.
    subroutine put_field(field, to)

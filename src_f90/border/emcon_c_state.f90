@@ -33,6 +33,9 @@ contains
       to%n_node = size(model%stepper%scene%x, 2)
       to%n_element = size(model%stepper%scene%element_label)
       to%n_step = size(model%stepper%scene%step)
+      to%n_surface = size(model%stepper%scene%surface)
+      to%n_tie = size(model%stepper%scene%tie)
+      to%n_selected = model%query%march%active%set%n
       if (.not. allocated(model%stepper%march%scheme)) return
       associate (system => model%stepper%march%system)
          to%n_contact = system%n_constraint - system%first_constraint(1)

@@ -11,7 +11,7 @@ module emcon_c_step
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_restart, only : restart_read, restart_t, restart_write
-   use emcon_stepper, only : stepper_load, stepper_save
+   use emcon_stepper, only : stepper_check_solids, stepper_load, stepper_save
    use emcon_stepper_conditions, only : conditions_load, conditions_save
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
@@ -129,6 +129,7 @@ contains
       call find_built(handle, model, emcon_save)
       if (emcon_save /= err_none) return
       call check_given("path", path, error)
+      if (.not. allocated(error)) call stepper_check_solids(model%stepper, error)
       if (.not. allocated(error)) then
          call stepper_save(model%stepper, restart)
          call conditions_save(model%stepper, restart)

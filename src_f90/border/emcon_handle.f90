@@ -11,22 +11,23 @@ module emcon_handle
    use emcon_errors, only : err_input, err_none, error_t
    use emcon_stepper, only : stepper_build, stepper_close, stepper_read, stepper_read_text, &
       stepper_t
-   use emcon_stepper_constraints, only : contact_report_t
+   use emcon_stepper_contact, only : contact_report_t
    use emcon_stepper_query, only : query_follow, query_free, query_t
    use emcon_text, only : string_t
    implicit none
    private
    public :: model_t, handle_new, handle_free, handle_find, handle_fail, handle_pass
    public :: handle_read, handle_read_text, handle_read_passages, handle_build
-   public :: at_mass, at_tangent, at_links, at_p, at_df
+   public :: at_mass, at_tangent, at_links, at_p, at_df, at_curvature, at_d, at_m
 
    !> Places of the matrices that a model was asked for.
-   integer, parameter :: at_mass = 1, at_tangent = 2, at_links = 3, at_p = 4, at_df = 5
+   integer, parameter :: at_mass = 1, at_tangent = 2, at_links = 3, at_p = 4, at_df = 5, &
+      at_curvature = 6, at_d = 7, at_m = 8
 
    type :: model_t
       type(stepper_t) :: stepper
       type(query_t) :: query
-      type(csr_t) :: matrix(5)                   !! asked for last, each kind in its place
+      type(csr_t) :: matrix(8)                   !! asked for last, each kind in its place
       type(contact_report_t) :: report           !! of the constraints asked for last
       character(len=:), allocatable :: message   !! of the last failure
       character(kind=c_char), allocatable :: c_text(:)   !! the same as C was given it
@@ -34,6 +35,7 @@ module emcon_handle
       character(kind=c_char), allocatable :: c_verdict(:), c_notes(:)
       integer(c_int), allocatable :: c_place(:, :)       !! the numbers in `report`, from 0
       real(c_double), allocatable :: c_gap(:, :)         !! the gaps in it
+      integer(c_int), allocatable :: c_redundant(:)      !! of the last null space, from 0
    end type model_t
 
 contains

@@ -8,6 +8,7 @@ module emcon_march
    use emcon_given, only : given_copy_solvers, given_find_solver, given_t
    use emcon_given_scheme, only : given_scheme_find
    use emcon_holding, only : holding_begin, holding_t
+   use emcon_interactions, only : contact_options_t
    use emcon_judge, only : judge_init, judge_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
@@ -237,7 +238,7 @@ contains
          do i = 1, size(self%system%contact)
             associate (contact => self%system%contact(i)%contact)
                call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
-               call contact%configure(scene%x, step%contact)
+               call contact%configure(scene%x, options_of(i))
             end associate
          end do
          call active_set_overclosure(self%active, self%system, scene%x, state%u_start, &
@@ -260,6 +261,18 @@ contains
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
       self%revision = self%revision + 1
+
+   contains
+
+      !> The options of a pair, else those of the step.
+      type(contact_options_t) function options_of(i)
+         integer, intent(in) :: i                !! number of the contact
+
+         options_of = scene%step(self%state%i_step)%contact
+         if (i > size(scene%pair)) return
+         if (scene%pair(i)%has_options) options_of = scene%pair(i)%options
+      end function options_of
+
    end subroutine prepare
 
    !> What solves the systems of the step: a solver of EMCON, or one that was given.

@@ -16,6 +16,18 @@ module emcon_interactions
    integer, parameter :: normal_edge = 1, normal_nodal = 2
    integer, parameter :: smoothing_none = 1, smoothing_hermite = 2
 
+   !> How the contact of a step is computed: *MORTAR and *SURFACE SMOOTHING.
+   type :: contact_options_t
+      integer :: integration = integration_segments
+      integer :: n_point = 0                         !! POINTS=; 0: not given
+      integer :: multiplier = multiplier_dual
+      integer :: normal = normal_nodal
+      integer :: smoothing = smoothing_none
+      !> Turns sharper than this are corners: normals are not averaged, surfaces not smoothed there
+      real(wp) :: normal_angle = 60.0_wp             !! [degrees]
+      real(wp) :: smoothing_angle = 60.0_wp          !! [degrees]
+   end type contact_options_t
+
    type :: contact_pair_t
       type(origin_t) :: origin
       integer :: slave = 0                           !! index into `scene_t%surface`
@@ -31,18 +43,8 @@ module emcon_interactions
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
+      logical :: has_options = .false.               !! of its own, in place of the step's
+      type(contact_options_t) :: options
    end type contact_pair_t
-
-   !> How the contact of a step is computed: *MORTAR and *SURFACE SMOOTHING.
-   type :: contact_options_t
-      integer :: integration = integration_segments
-      integer :: n_point = 0                         !! POINTS=; 0: not given
-      integer :: multiplier = multiplier_dual
-      integer :: normal = normal_nodal
-      integer :: smoothing = smoothing_none
-      !> Turns sharper than this are corners: normals are not averaged, surfaces not smoothed there
-      real(wp) :: normal_angle = 60.0_wp             !! [degrees]
-      real(wp) :: smoothing_angle = 60.0_wp          !! [degrees]
-   end type contact_options_t
 
 end module emcon_interactions

@@ -18,6 +18,7 @@ module emcon_scene
    public :: scene_t, where_text
 
    type :: scene_t
+      logical :: is_hosted = .false.                 !! a host code's nodes: it computes its solids
       type(string_t), allocatable :: file(:)         !! names of the deck files
       character(len=:), allocatable :: heading
       integer :: n_dim = 2

@@ -127,6 +127,7 @@ contains
       is_too_full = .false.
       is_bare = reshape(self%is_alive, [size(is_bare)])
       is_bare(lists%freedom) = .false.
+      if (size(lists%freedom) == 0) is_bare = .false.    ! nothing is known to act: no matrix
       bare = pack([(i, i = 1, size(is_bare))], is_bare)
       allocate(number, source=freedom_numbers(self%numbering))
       associate (numbering => self%numbering, n => size(lists%freedom), &

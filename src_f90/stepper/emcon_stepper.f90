@@ -27,8 +27,8 @@ module emcon_stepper
    private
    public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &
       stepper_build, stepper_advance, stepper_is_done
-   public :: stepper_close, stepper_fraction, stepper_save, stepper_load, contact_gaps, &
-      stepper_contact_seconds
+   public :: stepper_check_solids, stepper_close, stepper_fraction, stepper_save, stepper_load, &
+      contact_gaps, stepper_contact_seconds
 
    type :: stepper_t
       type(scene_t) :: scene
@@ -38,6 +38,7 @@ module emcon_stepper
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.
       logical :: is_read = .false.               !! `scene` is complete
+      logical :: may_cut = .true.                !! a host can try a step again in smaller parts
       type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
       type(notes_t) :: notes                     !! what was done before the first step
       type(verdict_t) :: verdict                 !! on the increments so far
@@ -138,13 +139,10 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      call given_check_scene(self%given, self%scene, error)
+      if (.not. self%scene%is_hosted) call given_check_scene(self%given, self%scene, error)
       if (allocated(error)) return
       call ties_prepare(self%scene, self%notes, error)
-      if (allocated(error)) return
-      call initial_contact_prepare(self%scene, self%notes, error)
-      if (allocated(error)) return
-      call ties_move_nodes(self%scene, self%notes, error)    ! contact may have moved masters
+      if (.not. (allocated(error) .or. self%scene%is_hosted)) call prepare_contact(self, error)
       if (allocated(error)) return
       call march_init(self%march, self%scene, error, self%given)
       if (allocated(error)) return
@@ -153,6 +151,14 @@ contains
       call notes_append(self%notes, self%march%system%notes)
       call verdict_start(self%verdict, self%march)
    end subroutine build
+
+   subroutine prepare_contact(self, error)
+      type(stepper_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      call initial_contact_prepare(self%scene, self%notes, error)
+      if (.not. allocated(error)) call ties_move_nodes(self%scene, self%notes, error)
+   end subroutine prepare_contact
 
    !> Free what libraries hold for `self`; call it before the object goes, also after an error.
    subroutine stepper_close(self)
@@ -175,7 +181,8 @@ contains
       type(increment_t), intent(out) :: increment
       type(error_t), allocatable, intent(out) :: error
 
-      if (stepper_is_done(self)) return
+      call stepper_check_solids(self, error)
+      if (stepper_is_done(self) .or. allocated(error)) return
       if (march_is_done(self%march)) then
          call march_begin_step(self%march, self%scene, self%march%state%i_step + 1, error)
          if (allocated(error)) return
@@ -189,6 +196,15 @@ contains
       end if
       call verdict_update(self%verdict, self%scene, self%march, increment)
    end subroutine stepper_advance
+
+   !> The model has solids, and steps of its own.
+   pure subroutine stepper_check_solids(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (self%scene%is_hosted) call raise(error, err_input, &
+         "the model has no solids and no deck: its host makes the steps")
+   end subroutine stepper_check_solids
 
    !> Part of the analysis that is done, by time: 0..1.
    pure real(wp) function stepper_fraction(self)

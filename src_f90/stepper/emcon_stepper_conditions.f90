@@ -4,7 +4,6 @@
 !> multiplied by. Without one, the linear runs of a static step go on from where they are to the new
 !> value at the end of the step; in a dynamic step it holds from the next step on.
 module emcon_stepper_conditions
-   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_loads, only : prescribed_motion
@@ -14,7 +13,7 @@ module emcon_stepper_conditions
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_free, only : stepper_check_open
+   use emcon_stepper_check, only : check_number, stepper_check_open
    use emcon_steps, only : load_gravity, load_point, prescribed_t, step_t
    use emcon_system, only : system_renew
    use emcon_text, only : to_text
@@ -66,7 +65,7 @@ contains
       real(wp) :: part, present_value
 
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) call check_value(value, error)
+      if (.not. allocated(error)) call check_number("the value", value, error)
       if (allocated(error)) return
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
          if (i < 1 .or. i > size(step%load)) then
@@ -99,7 +98,7 @@ contains
       integer :: node, k
 
       call find_prescribed(self, label, dof, node, k, error)
-      if (.not. allocated(error)) call check_value(value, error)
+      if (.not. allocated(error)) call check_number("the value", value, error)
       if (allocated(error)) return
       if (k == 0) then
          call refuse_freedom(error, label, dof, "is not prescribed")
@@ -129,7 +128,7 @@ contains
       integer :: node, k
 
       call find_prescribed(self, label, dof, node, k, error)
-      if (.not. allocated(error)) call check_value(value, error)
+      if (.not. allocated(error)) call check_number("the value", value, error)
       if (allocated(error)) return
       if (k > 0) then
          call refuse_freedom(error, label, dof, "is prescribed already")
@@ -298,13 +297,6 @@ contains
 
       part_passed = min(1.0_wp, state%step_time/step%duration)
    end function part_passed
-
-   subroutine check_value(value, error)
-      real(wp), intent(in) :: value
-      type(error_t), allocatable, intent(out) :: error
-
-      if (.not. ieee_is_finite(value)) call raise(error, err_input, "the value is not finite")
-   end subroutine check_value
 
    !> An input error: "degree of freedom 1 of node 7 is not prescribed", or what else it is.
    pure subroutine refuse_freedom(error, label, dof, what)

@@ -13,7 +13,9 @@ module emcon_stepper_free
    use emcon_pair_record, only : pair_record_init
    use emcon_pose, only : pose_at_end
    use emcon_state, only : state_t
-   use emcon_stepper, only : stepper_t
+   use emcon_stepper, only : stepper_check_solids, stepper_t
+   use emcon_stepper_check, only : check_field, check_list, check_number, check_size, &
+      stepper_check_open
    use emcon_system, only : system_check_response, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
@@ -21,7 +23,7 @@ module emcon_stepper_free
    implicit none
    private
    public :: stepper_step, stepper_next_step, stepper_set_state
-   public :: snapshot_t, stepper_snapshot, stepper_restore, stepper_check_open
+   public :: snapshot_t, stepper_snapshot, stepper_restore
 
    !> Smaller than this part of the time that has passed in the step of the deck, no step is made:
    !> time would not tell it from its start.
@@ -49,6 +51,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call stepper_check_open(self, error)
+      if (.not. allocated(error)) call stepper_check_solids(self, error)
       if (allocated(error)) return
       if (.not. ieee_is_finite(h)) then
          call raise(error, err_input, "a step needs a size h > 0 that is finite")
@@ -84,15 +87,6 @@ contains
       self%march%state = before%state
       self%march%ledger = before%ledger
    end subroutine stepper_next_step
-
-   !> There is a model to work with.
-   subroutine stepper_check_open(self, error)
-      type(stepper_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
-
-      if (.not. allocated(self%march%scheme)) call raise(error, err_input, &
-         "there is no model: no deck was opened, or opening it failed")
-   end subroutine stepper_check_open
 
    !> Put the given parts of the state in place of the present ones; on an error nothing changes.
    !> Dependent nodes of ties and equations follow the others. Energies and momenta are measured
@@ -139,20 +133,9 @@ contains
       character(len=*), intent(in) :: name
       real(wp), intent(inout), contiguous :: field(:, :)     !! (2, n_node)
       type(error_t), allocatable, intent(out) :: error
-      integer :: i
 
-      if (any(shape(given) /= shape(field))) then
-         call raise(error, err_input, name // " is to have 2 components at each of " // &
-            to_text(size(field, 2)) // " nodes, not " // to_text(size(given, 1)) // " at " // &
-            to_text(size(given, 2)))
-         return
-      end if
-      do i = 1, size(given, 2)
-         if (all(ieee_is_finite(given(:, i)))) cycle
-         call raise(error, err_input, name // " is not finite at node " // &
-            to_text(self%scene%node_label(i)))
-         return
-      end do
+      call check_field(name, given, self%scene, error)
+      if (allocated(error)) return
       field = given
       call follow_links(self%march%system, field)
    end subroutine take_field
@@ -171,11 +154,9 @@ contains
          where (.not. is_active) next%lam = 0.0_wp
       end if
       if (.not. present(lam)) return
-      call check_size("lam", size(lam), size(next%lam), error)
+      call check_list("lam", lam, size(next%lam), error)
       if (allocated(error)) return
-      if (.not. all(ieee_is_finite(lam))) then
-         call raise(error, err_input, "lam is not finite")
-      else if (any(abs(lam) > 0.0_wp .and. .not. next%is_active)) then
+      if (any(abs(lam) > 0.0_wp .and. .not. next%is_active)) then
          call raise(error, err_input, "lam is not 0 at constraint " // &
             to_text(findloc(abs(lam) > 0.0_wp .and. .not. next%is_active, .true., 1)) // &
             ", which does not act")
@@ -183,15 +164,6 @@ contains
          next%lam = lam
       end if
    end subroutine take_contact
-
-   subroutine check_size(name, n, expected, error)
-      character(len=*), intent(in) :: name
-      integer, intent(in) :: n, expected
-      type(error_t), allocatable, intent(out) :: error
-
-      if (n /= expected) call raise(error, err_input, name // " is to have " // &
-         to_text(expected) // " entries, one for each possible constraint, not " // to_text(n))
-   end subroutine check_size
 
    !> Velocities and time have to fit the present step of the deck.
    subroutine check_motion(self, v, error, time)
@@ -208,12 +180,10 @@ contains
             return
          end if
          if (.not. present(time)) return
-         if (.not. ieee_is_finite(time)) then
-            call raise(error, err_input, "the time is not finite")
-         else if (time < state%start_time) then
-            call raise(error, err_input, "time " // to_text(time) // " is before the start of " // &
-               "step " // to_text(state%i_step) // " of the deck, " // to_text(state%start_time))
-         end if
+         call check_number("the time", time, error)
+         if (allocated(error) .or. .not. time < state%start_time) return
+         call raise(error, err_input, "time " // to_text(time) // " is before the start of " // &
+            "step " // to_text(state%i_step) // " of the deck, " // to_text(state%start_time))
       end associate
    end subroutine check_motion
 

@@ -6,7 +6,7 @@
 module emcon_stepper_query
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_active_set, only : active_set_select
-   use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
+   use emcon_constraints, only : constraints_add_curvature, &
       constraints_evaluate, constraints_force, constraints_merge_pattern, constraints_rows
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
@@ -19,13 +19,13 @@ module emcon_stepper_query
    use emcon_numbering, only : pick_unknowns
    use emcon_pose, only : instant_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_free, only : stepper_check_open
+   use emcon_stepper_check, only : check_field, check_list, check_size, stepper_check_open
    use emcon_system, only : system_check_response, system_renew, system_respond
    use emcon_term_registry, only : terms_mass
    use emcon_text, only : to_text
    implicit none
    private
-   public :: query_t, query_free, query_sync, query_follow, query_check_field
+   public :: query_t, query_free, query_sync, query_follow
    public :: query_guess, query_evaluate, query_residual, query_tangent, query_unknowns, &
       query_mass, query_momenta
 
@@ -33,7 +33,8 @@ module emcon_stepper_query
       type(march_t) :: march                     !! its own; the state is that of the model
       logical :: is_evaluated = .false.          !! by `query_evaluate`, for the present model
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) sum of lam_k g_k
-      type(constraint_set_t) :: near             !! of the last `query_constraints`
+      logical :: has_set = .false.               !! the constraints selected last are evaluated
+      logical :: has_begun = .false.             !! a step of contact, by `query_begin_contact`
       type(null_space_t) :: null_space           !! of the last `query_null_space`
       logical :: has_tangent = .false.           !! of the last evaluation
       logical :: has_null_space = .false.
@@ -73,7 +74,7 @@ contains
       end if
       self%march%state = stepper%march%state
       if (self%revision /= stepper%march%revision) then
-         self%is_evaluated = .false.
+         call forget(self)
          call march_resume(self%march, stepper%scene, error)
          if (allocated(error)) return
          self%march%state = stepper%march%state
@@ -87,28 +88,17 @@ contains
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
 
-      if (self%revision == stepper%march%revision) return
-      self%is_evaluated = .false.
-      self%has_null_space = .false.
+      if (self%revision /= stepper%march%revision) call forget(self)
    end subroutine query_follow
 
-   !> A nodal field called `name` has the right shape and is finite.
-   subroutine query_check_field(stepper, field, name, error)
-      type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in) :: field(:, :)            !! (2, n_node)
-      character(len=*), intent(in) :: name
-      type(error_t), allocatable, intent(out) :: error
-      integer :: n
+   pure subroutine forget(self)
+      type(query_t), intent(inout) :: self
 
-      n = size(stepper%scene%x, 2)
-      if (size(field, 1) /= 2 .or. size(field, 2) /= n) then
-         call raise(error, err_input, name // " is to have 2 components at each of " // &
-            to_text(n) // " nodes, not " // to_text(size(field, 1)) // " at " // &
-            to_text(size(field, 2)))
-      else if (.not. all(ieee_is_finite(field))) then
-         call raise(error, err_input, name // " is not finite")
-      end if
-   end subroutine query_check_field
+      self%is_evaluated = .false.
+      self%has_set = .false.
+      self%has_begun = .false.
+      self%has_null_space = .false.
+   end subroutine forget
 
    !> Where a step of size `h` from the present state would start its iteration: prescribed freedoms
    !> at their places at the end, free ones moved on by their velocities.
@@ -121,14 +111,14 @@ contains
 
       u1 = 0.0_wp
       call query_sync(self, stepper, error)
-      if (.not. allocated(error)) call query_check_field(stepper, u1, "u1", error)
-      if (.not. allocated(error)) call check_size(h, error)
+      if (.not. allocated(error)) call check_field("u1", u1, stepper%scene, error)
+      if (.not. allocated(error)) call check_duration(h, error)
       if (allocated(error)) return
       call march_guess(self%march, stepper%scene, now(self), h, is_at_rest=.false.)
       u1 = self%march%state%u + self%march%motion%du
    end subroutine query_guess
 
-   subroutine check_size(h, error)
+   subroutine check_duration(h, error)
       real(wp), intent(in) :: h
       type(error_t), allocatable, intent(out) :: error
 
@@ -137,7 +127,7 @@ contains
       else if (.not. h > 0.0_wp) then
          call raise(error, err_input, "a step needs a size h > 0, not " // to_text(h))
       end if
-   end subroutine check_size
+   end subroutine check_duration
 
    !> The instant of the present state.
    pure type(instant_t) function now(self)
@@ -162,11 +152,10 @@ contains
       logical, intent(in), optional :: is_active(:)  !! (n_constraint)
       logical :: is_finite
 
-      self%is_evaluated = .false.
-      self%has_null_space = .false.
+      call forget(self)
       call query_sync(self, stepper, error)
-      if (.not. allocated(error)) call query_check_field(stepper, u1, "u1", error)
-      if (.not. allocated(error)) call check_size(h, error)
+      if (.not. allocated(error)) call check_field("u1", u1, stepper%scene, error)
+      if (.not. allocated(error)) call check_duration(h, error)
       if (.not. allocated(error)) call take_contact(self, error, lam, is_active)
       if (allocated(error)) return
       call take_motion(self, stepper, h, u1)
@@ -186,6 +175,7 @@ contains
       end associate
       if (allocated(error)) return
       self%is_evaluated = .true.
+      self%has_set = .true.
       self%has_tangent = with_tangent
    end subroutine query_evaluate
 
@@ -195,22 +185,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: lam(:)
       logical, intent(in), optional :: is_active(:)
-      integer :: n
 
       associate (state => self%march%state)
-         n = size(state%lam)
-         if (present(lam)) n = size(lam)
-         if (n == size(state%lam) .and. present(is_active)) n = size(is_active)
-         if (n /= size(state%lam)) then
-            call raise(error, err_input, "lam and the active set are to have " // &
-               to_text(size(state%lam)) // " entries, one for each possible constraint, not " // &
-               to_text(n))
-            return
-         end if
+         if (present(lam)) call check_list("lam", lam, size(state%lam), error)
+         if (present(is_active)) call check_size("the active set", size(is_active), &
+            size(state%lam), error)
+         if (allocated(error)) return
          if (present(is_active)) state%is_active = is_active
-         if (.not. present(lam)) return
-         state%lam = lam
-         if (.not. all(ieee_is_finite(lam))) call raise(error, err_input, "lam is not finite")
+         if (present(lam)) state%lam = lam
       end associate
    end subroutine take_contact
 

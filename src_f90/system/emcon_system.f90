@@ -67,6 +67,7 @@ contains
       if (allocated(error)) return
       call lay_out(self, scene, lists)
       call space_init(self%space, size(scene%x, 2), lists, scene%equation)
+      if (scene%is_hosted) self%space%is_alive = .true.
       call response_init(self%response, size(scene%x, 1), size(scene%x, 2), &
          size(scene%element_kind))
    end subroutine system_init

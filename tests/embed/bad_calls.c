@@ -29,6 +29,8 @@ static void without_model(void)
    emcon_ledger ledger;
    emcon_snapshot *snapshot;
    emcon_constraint_report report;
+   emcon_contact_settings settings = {0};
+   emcon_gap gap;
 
    TELL(emcon_open("none.inp", NULL, 0, NULL));
    TELL(emcon_read("none.inp", NULL, 0, NULL));
@@ -77,8 +79,28 @@ static void without_model(void)
    TELL(emcon_evaluate(m, 1, 1, x, 1, 1, x, i));
    TELL(emcon_residual(m, 1, 1, x, 1, x));
    TELL(emcon_tangent(m, 1, &matrix));
-   TELL(emcon_null_space(m, &matrix, &matrix));
-   TELL(emcon_multipliers(m, 1, x));
+   TELL(emcon_null_space(m, &matrix, &matrix, NULL, NULL));
+   TELL(emcon_multipliers(m, 1, x, 1, x));
+   TELL(emcon_particular(m, 1, x, 1, x));
+   TELL(emcon_curvature(m, 1, x, &matrix));
+   TELL(emcon_follow(m, 1, x));
+   TELL(emcon_gather(m, 1, x));
+   TELL(emcon_get_tie_matrices(m, 0, &matrix, &matrix));
+   TELL(emcon_new(1, x, NULL));
+   TELL(emcon_add_surface(m, NULL, 1, i, i));
+   TELL(emcon_add_pair(m, 0, 1, EMCON_MORTAR, NULL));
+   TELL(emcon_add_tie(m, 0, 1, EMCON_DUAL, -1));
+   TELL(emcon_hold(m, 1, i));
+   TELL(emcon_set_contact(m, &settings));
+   TELL(emcon_begin_contact(m, 1, x, x, 1, i, i));
+   TELL(emcon_get_gaps(m, 1, x, x, 1, &gap));
+   TELL(emcon_select(m, 1, x, x, 1, i, i));
+   TELL(emcon_choose(m, 1, x, x, 1, i, x));
+   TELL(emcon_evaluate_contact(m, 1, x, x, &report));
+   TELL(emcon_update_active(m, 1, x, x, 1, x, x, 1, i, i, i));
+   TELL(emcon_drop(m, 1, i, 1, i));
+   TELL(emcon_get_areas(m, 1, x, 1, x, x));
+   TELL(emcon_overlap(m, 1, x, x, x, i));
    TELL(emcon_constraints(m, 1, x, x, 0, &report));
    TELL(emcon_curvature_times(m, 1, x, 1, x, x));
    TELL(emcon_get_law(0, i, 0, NULL));
@@ -119,8 +141,8 @@ static void with_rubbish(double *x, const emcon_sizes *sizes)
 
    TELL(emcon_residual(m, 1, n, x, 0, NULL));
    TELL(emcon_tangent(m, 1, &matrix));
-   TELL(emcon_null_space(m, &matrix, NULL));
-   TELL(emcon_multipliers(m, nc, x));
+   TELL(emcon_null_space(m, &matrix, NULL, NULL, NULL));
+   TELL(emcon_multipliers(m, 0, NULL, nc, x));
    TELL(emcon_curvature_times(m, 0, x, n, x, x));
    TELL(emcon_get_state(m, n - 1, x, NULL));
    TELL(emcon_get_state(m, -1, x, NULL));

@@ -38,8 +38,8 @@ static void stale(void)
           *lam = numbers(sizes.n_constraint);
    REFUSED(emcon_residual(m, 1, sizes.n_node, nodal, sizes.n_unknown, unknown));
    REFUSED(emcon_tangent(m, 1, &a));
-   REFUSED(emcon_null_space(m, &a, &b));
-   REFUSED(emcon_multipliers(m, sizes.n_constraint, lam));
+   REFUSED(emcon_null_space(m, &a, &b, NULL, NULL));
+   REFUSED(emcon_multipliers(m, 0, NULL, sizes.n_constraint, lam));
    free(nodal);
    free(unknown);
    free(lam);
@@ -58,8 +58,8 @@ static void evaluate(void)
    WORKS(emcon_evaluate(m, 1e-3, n, u1, 1, 0, NULL, NULL));
    WORKS(emcon_residual(m, 1, n, nodal, sizes.n_unknown, unknown));
    WORKS(emcon_tangent(m, 1, &a));
-   WORKS(emcon_null_space(m, &a, &b));
-   WORKS(emcon_multipliers(m, nc, lam));
+   WORKS(emcon_null_space(m, &a, &b, NULL, NULL));
+   WORKS(emcon_multipliers(m, 0, NULL, nc, lam));
    WORKS(emcon_evaluate(m, 1e-3, n, u1, 0, nc, lam, active));
    REFUSED(emcon_evaluate(m, 1e-3, n + 1, u1, 0, 0, NULL, NULL));
    REFUSED(emcon_evaluate(m, 1e-3, n, u1, 0, nc + 1, lam, NULL));

@@ -3,10 +3,10 @@
 !>
 !> usage: fortran_contact
 program fortran_contact
-   use emcon_api, only : constraint_values_t, contact_options_t, csr_multiply, csr_product, csr_t, &
-      dp, error_t, formulation_mortar, formulation_nts, formulation_segment, interface_add_pair, &
-      interface_add_surface, interface_begin_step, interface_evaluate, interface_init, &
-      interface_links, interface_null_space, interface_prepare, interface_select, interface_t, wp
+   use emcon_api, only : contact_options_t, contact_report_t, csr_multiply, csr_product, csr_t, dp, &
+      error_t, formulation_mortar, formulation_nts, formulation_segment, query_begin_contact, &
+      query_contact, query_free, query_null_space, query_select, query_t, stepper_add_pair, &
+      stepper_add_surface, stepper_build, stepper_close, stepper_hold, stepper_new, stepper_t, wp
    implicit none
    integer, parameter :: n_node = 6
    !> The floor from right to left and the body from left to right: each has its body to the left.
@@ -34,53 +34,55 @@ contains
    !> The body turns and comes down; the floor is held.
    subroutine look_at(formulation)
       integer, intent(in) :: formulation
-      type(interface_t) :: face
-      type(constraint_values_t) :: values
+      type(stepper_t) :: stepper
+      type(query_t) :: query
+      type(contact_report_t) :: values
       type(error_t), allocatable :: error
       real(wp) :: u0(2, n_node), du(2, n_node)
       logical, allocatable :: active(:)
       logical :: held(2, n_node)
       integer :: slave, master, i
 
-      call interface_init(face, x, error)
-      if (.not. allocated(error)) call interface_add_surface(face, "BODY", body, slave, error)
-      if (.not. allocated(error)) call interface_add_surface(face, "FLOOR", floor, master, error)
-      if (.not. allocated(error)) call interface_add_pair(face, slave, master, formulation, &
+      call stepper_new(stepper, x, error)
+      if (.not. allocated(error)) call stepper_add_surface(stepper, "BODY", body, slave, error)
+      if (.not. allocated(error)) call stepper_add_surface(stepper, "FLOOR", floor, master, error)
+      if (.not. allocated(error)) call stepper_add_pair(stepper, slave, master, formulation, &
          contact_options_t(), error)
       held = .false.
       held(:, :2) = .true.
-      if (.not. allocated(error)) call interface_prepare(face, held, error)
+      if (.not. allocated(error)) call stepper_hold(stepper, held, error)
+      if (.not. allocated(error)) call stepper_build(stepper, error)
       call require(error)
       u0 = 0.0_wp
       du(:, :2) = 0.0_wp
       do i = 3, n_node
          du(:, i) = [0.1_wp - 0.2_wp*x(2, i), 0.2_wp*x(1, i) - 0.7_wp]
       end do
-      allocate(active(face%n_constraint))
-      call interface_begin_step(face, u0, du, spread(.true., 1, size(active)), active, error)
-      if (.not. allocated(error)) call interface_select(face, u0, du, active, error)
-      if (.not. allocated(error)) call interface_evaluate(face, u0, du, values, error)
+      call query_begin_contact(query, stepper, u0, du, &
+         spread(.true., 1, stepper%march%system%n_constraint), active, error)
+      if (.not. allocated(error)) call query_select(query, stepper, u0, du, active, error)
+      if (.not. allocated(error)) call query_contact(query, stepper, u0, du, values, error)
       call require(error)
-      call report(face, values, du)
+      call report(query, values, du)
+      call query_free(query)
+      call stepper_close(stepper)
    end subroutine look_at
 
    !> Number of constraints; largest change of a gap; by how much g . du differs from that; largest
-   !> entry of P^T T^T G^T.
-   subroutine report(face, values, du)
-      type(interface_t), intent(inout) :: face
-      type(constraint_values_t), intent(in) :: values
+   !> entry of P^T G^T.
+   subroutine report(query, values, du)
+      type(query_t), intent(inout) :: query
+      type(contact_report_t), intent(in) :: values
       real(wp), intent(in) :: du(:, :)
       type(error_t), allocatable :: error
-      type(csr_t) :: p, df, links, product, crossed
+      type(csr_t) :: p, df, crossed
       real(wp) :: along(values%n)
       integer, allocatable :: redundant(:)
 
-      call csr_multiply(values%g, reshape(du, [size(du)]), along)
-      call interface_links(face, links, error)
-      if (.not. allocated(error)) call interface_null_space(face, p, df, redundant, error)
+      call csr_multiply(values%discrete_gradient, reshape(du, [size(du)]), along)
+      call query_null_space(query, p, df, redundant, error)
       call require(error)
-      call csr_product(links, p, product)
-      call csr_product(values%g, product, crossed)
+      call csr_product(values%discrete_gradient, p, crossed)
       print "(2(i0, 1x), 3es25.16)", values%n, size(redundant), maxval(abs(values%dgap)), &
          maxval(abs(along - values%dgap)), maxval([0.0_dp, abs(crossed%value)])
    end subroutine report

@@ -11,9 +11,11 @@ C     It prints, for each of the three contact formulations:
 C     steps, steps in contact, relative drift of the energy, smallest
 C     gap, vertical velocity of the falling truss before and after.
 C
-C     Build, in one line, with the folder of the library in $LIB:
-C        gfortran -std=legacy host_driver.f -L$LIB -lemcon
-C           -Wl,-rpath,$LIB -o host_driver
+C     Build, in one line, with the folder of the library in $LIB and that
+C     of its header in $INCLUDE; fortran_77.c, over the functions of C,
+C     has the subroutines EMNEW and so on:
+C        gfortran -std=legacy host_driver.f -I$INCLUDE fortran_77.c
+C           -L$LIB -lemcon -Wl,-rpath,$LIB -o host_driver
 C
       PROGRAM HOST
       IMPLICIT DOUBLE PRECISION (A-H,O-Z)
@@ -109,7 +111,7 @@ C
       CALL CHECK(IERR)
       CALL EMPAIR(IH, ISLAVE, MASTER, IFORM, IOPT, ANGLE, IERR)
       CALL CHECK(IERR)
-      CALL EMPREP(IH, NNODE, IHELD, X, NCON, NU, DMOVE, IERR)
+      CALL EMPREP(IH, NNODE, IHELD, X, NCON, IERR)
       CALL CHECK(IERR)
       DO 10 I = 1, NCON
          IACT(I) = 0
@@ -278,8 +280,7 @@ C
      +   IHELD(2,MAXN), NNODE
       COMMON /CONTAC/ ALAM(MAXK), IH(3), IACT(MAXK), NCON
       DIMENSION DU(2,MAXN), AMAG(2,MAXN)
-      DIMENSION IWAS(MAXK), ID(MAXK), TARGET(MAXK), NEAR(MAXK),
-     +   G0(MAXK), G1(MAXK)
+      DIMENSION IWAS(MAXK), NEAR(MAXK), G0(MAXK), G1(MAXK)
       DO 10 I = 1, NNODE
          DU(1,I) = H*V(1,I)
          DU(2,I) = H*V(2,I)
@@ -291,7 +292,7 @@ C-EM
       CALL EMBEG(IH, NNODE, NCON, U, DU, IWAS, IACT, IERR)
       CALL CHECK(IERR)
    30 CONTINUE
-      CALL EMSEL(IH, NNODE, NCON, U, DU, IACT, K, ID, TARGET, IERR)
+      CALL EMSEL(IH, NNODE, NCON, U, DU, IACT, K, IERR)
       CALL CHECK(IERR)
       CALL NEWTON(H, DU, K, AMAG)
       CALL EMUPD(IH, NNODE, NCON, U, DU, K, ALAM, AMAG, IACT, IDONE,
@@ -365,8 +366,7 @@ C-EM     Rows of discrete gradients and of gradients at the end.
    50       CONTINUE
    60    CONTINUE
 C-EM     Their derivatives.
-         CALL EMCURV(IH, K, ALAM, NNODE, MAXNZ, NZ, IROW, ICOL, VAL,
-     +      IERR)
+         CALL EMCURV(IH, K, ALAM, MAXNZ, NZ, IROW, ICOL, VAL, IERR)
          CALL CHECK(IERR)
          DO 75 I = 1, N
             DO 70 IZ = IROW(I), IROW(I+1) - 1

@@ -11,7 +11,7 @@
  * the falling truss before and after.
  *
  * cc interface_bars.c $(pkg-config --cflags --libs emcon) -lm */
-#include <emcon_interface.h>
+#include <emcon.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@ typedef struct host {
    int is_held[N_DOF];
    int bar[N_BAR][2], n_bar, n_node;
    double stiffness;                      /* EA */
-   emcon_interface *face;                 /* emcon: from here on */
+   emcon_model *face;                 /* emcon: from here on */
    int n_contact;
    int active[MAX_CONTACT];
    double lam[MAX_CONTACT];
@@ -165,8 +165,8 @@ static void solve(int n, double (*a)[N_MAX], double *b)
 static void require(host *h, int status)
 {
    if (status == EMCON_OK) return;
-   fprintf(stderr, "error %d: %s\n", status, emcon_interface_message(h->face));
-   emcon_interface_free(h->face);
+   fprintf(stderr, "error %d: %s\n", status, emcon_message(h->face));
+   emcon_close(h->face);
    exit(status);
 }
 
@@ -175,15 +175,16 @@ static void require(host *h, int status)
 static void make_interface(host *h, int formulation)
 {
    static const int lower[] = {9, 8, 8, 7, 7, 6, 6, 5}, upper[] = {10, 11, 11, 12};
-   emcon_interface_sizes sizes;
+   emcon_sizes sizes;
    int master, slave;
 
-   require(h, emcon_interface_new(h->n_node, h->x, &h->face));
-   require(h, emcon_interface_add_surface(h->face, "lower truss", 4, lower, &master));
-   require(h, emcon_interface_add_surface(h->face, "upper truss", 2, upper, &slave));
-   require(h, emcon_interface_add_pair(h->face, slave, master, formulation, NULL));
-   require(h, emcon_interface_prepare(h->face, h->is_held));
-   require(h, emcon_interface_get_sizes(h->face, &sizes));
+   require(h, emcon_new(h->n_node, h->x, &h->face));
+   require(h, emcon_add_surface(h->face, "lower truss", 4, lower, &master));
+   require(h, emcon_add_surface(h->face, "upper truss", 2, upper, &slave));
+   require(h, emcon_add_pair(h->face, slave, master, formulation, NULL));
+   require(h, emcon_hold(h->face, h->n_node, h->is_held));
+   require(h, emcon_build(h->face));
+   require(h, emcon_get_sizes(h->face, &sizes));
    h->n_contact = sizes.n_contact;
    if (h->n_contact > MAX_CONTACT) exit(1);
 }
@@ -196,7 +197,8 @@ static void newton(host *h, double dt, int n, double *du, double *magnitude)
 {
    static double a[N_MAX][N_MAX];
    double b[N_MAX], r[N_DOF], size = 0, step = HUGE_VAL, last;
-   emcon_interface_constraints contact;
+   emcon_constraint_report contact;
+   const emcon_csr *g = &contact.discrete_gradient, *c = &contact.end_gradient;
    emcon_csr curvature;
    int iteration, i, j, k;
 
@@ -204,8 +206,8 @@ static void newton(host *h, double dt, int n, double *du, double *magnitude)
    for (k = 0; k < n; k++) h->lam[k] = 0;
    for (iteration = 0; iteration < 25; iteration++) {
       respond(h, dt, du, r, a, magnitude);
-      require(h, emcon_interface_evaluate(h->face, h->u, du, &contact));
-      require(h, emcon_interface_get_curvature(h->face, n, h->lam, &curvature));
+      require(h, emcon_evaluate_contact(h->face, N_NODE, h->u, du, &contact));
+      require(h, emcon_curvature(h->face, n, h->lam, &curvature));
       for (i = 0; i < N_DOF; i++) {
          b[i] = -r[i];
          for (j = curvature.row_start[i]; j < curvature.row_start[i + 1]; j++)
@@ -213,10 +215,10 @@ static void newton(host *h, double dt, int n, double *du, double *magnitude)
       }
       for (k = 0; k < n; k++) {
          b[N_DOF + k] = -contact.defect[k];
-         for (j = contact.g.row_start[k]; j < contact.g.row_start[k + 1]; j++) {
-            a[contact.g.column[j]][N_DOF + k] = -contact.g.value[j];
-            a[N_DOF + k][contact.c.column[j]] = contact.c.value[j];
-            b[contact.g.column[j]] += contact.g.value[j]*h->lam[k];
+         for (j = g->row_start[k]; j < g->row_start[k + 1]; j++) {
+            a[g->column[j]][N_DOF + k] = -g->value[j];
+            a[N_DOF + k][c->column[j]] = c->value[j];
+            b[g->column[j]] += g->value[j]*h->lam[k];
          }
       }
       for (i = 0; i < N_DOF; i++) {
@@ -248,25 +250,26 @@ static void advance(host *h, double dt, double *gap, double *pressure)
    int i, k, n, is_done = 0, outcome = EMCON_STEP_DONE;
 
    for (i = 0; i < N_DOF; i++) du[i] = h->is_held[i] ? 0 : dt*h->v[i];
-   require(h, emcon_interface_begin_step(h->face, h->u, du, h->n_contact, h->active, h->active));
+   require(h, emcon_begin_contact(h->face, N_NODE, h->u, du, h->n_contact, h->active,
+                                  h->active));
    while (!is_done) {
-      require(h, emcon_interface_select(h->face, h->u, du, h->n_contact, h->active, &n));
+      require(h, emcon_select(h->face, N_NODE, h->u, du, h->n_contact, h->active, &n));
       newton(h, dt, n, du, magnitude);
-      require(h, emcon_interface_update_active(h->face, h->u, du, n, h->lam, magnitude,
-                                               h->n_contact, h->active, &is_done, &outcome));
+      require(h, emcon_update_active(h->face, N_NODE, h->u, du, n, h->lam, magnitude,
+                                     h->n_contact, h->active, &is_done, &outcome));
    }
    if (outcome != EMCON_STEP_DONE) {
       fprintf(stderr, "the step failed, %d\n", outcome);
       exit(1);
    }
-   require(h, emcon_interface_get_gaps(h->face, h->u, du, h->n_contact, state));
+   require(h, emcon_get_gaps(h->face, N_NODE, h->u, du, h->n_contact, state));
    for (i = 0; i < N_DOF; i++) {
       h->u[i] += du[i];
       h->v[i] = 2*du[i]/dt - h->v[i];
    }
-   require(h, emcon_interface_get_areas(h->face, h->u, h->n_contact, area, NULL));
+   require(h, emcon_get_areas(h->face, N_NODE, h->u, h->n_contact, area, NULL));
    for (i = k = 0; i < h->n_contact; i++) {
-      if (state[i].is_near) *gap = fmin(*gap, state[i].gap_end);
+      if (state[i].is_near) *gap = fmin(*gap, state[i].gap1);
       if (h->active[i]) *pressure = fmax(*pressure, h->lam[k++]/area[i]);
    }
 }
@@ -300,7 +303,7 @@ int main(int argc, char **argv)
       for (i = 2*N_LOWER + 1; i < N_DOF; i += 2) after += h.v[i]/(N_NODE - N_LOWER);
       printf("%d %d %.3e %.3e %.3e %.3f %.3f\n", n_step, n_touch, drift, gap, pressure, before,
              after);
-      emcon_interface_free(h.face);
+      emcon_close(h.face);
    }
    return 0;
 }

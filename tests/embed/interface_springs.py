@@ -97,10 +97,9 @@ class Lattices:
 def newton(host: Lattices, face: Interface, h: float, du: Floats) -> tuple[Floats, Floats, Floats]:
     """Solve a step for the selected contacts, starting from `du`: du, multipliers, magnitude.
 
-    In the null space of the contacts: unknowns w with u = T w, moved by dw = part + DF y, and the
-    residual seen through P^T, where no contact force shows.
+    In the null space of the contacts: the motion is part + DF y, and the residual is seen through
+    P^T, where no contact force shows.
     """
-    t = face.links().toarray()                                               # emcon
     reach = abs(host.x).max()
     last = np.inf
     for _ in range(25):
@@ -110,12 +109,11 @@ def newton(host: Lattices, face: Interface, h: float, du: Floats) -> tuple[Float
         if len(space.redundant):
             raise ArithmeticError(f"contacts {contact.contact[space.redundant]} are redundant")
         p, df = space.p.toarray(), space.df.toarray()
-        lam = face.multipliers(t.T @ residual)
+        lam = face.multipliers(residual.reshape(du.shape))
         tangent -= face.curvature(lam).toarray()
-        part = face.particular(contact.defect)
-        linear = t.T @ tangent @ t
-        y = np.linalg.solve(p.T @ linear @ df, -p.T @ (t.T @ residual + linear @ part))
-        motion = t @ (part + df @ y)
+        part = face.particular(contact.defect).ravel()
+        y = np.linalg.solve(p.T @ tangent @ df, -p.T @ (residual + tangent @ part))
+        motion = part + df @ y
         du = du + motion.reshape(du.shape)
         step = abs(motion).max()
         if step <= 4*EPS*reach or last <= step < 1e-10*reach:

@@ -102,7 +102,7 @@ static void check_null_space(emcon_model *model, double h, const emcon_sizes *si
    require(emcon_get_multipliers(model, sizes->n_constraint, NULL, acts), model);
    require(emcon_guess(model, h, sizes->n_node, u1), model);
    require(emcon_evaluate(model, h, sizes->n_node, u1, 0, sizes->n_constraint, NULL, acts), model);
-   require(emcon_null_space(model, &p, &df), model);
+   require(emcon_null_space(model, &p, &df, NULL, NULL), model);
    require(emcon_constraints(model, sizes->n_node, u0, u1, 1, &report), model);
    for (i = 0; i < report.n; i++) {
       if (!acts[report.id[i]]) continue;

@@ -26,7 +26,7 @@ WITHOUT_ARRAYS = [""]*10 + [
 ]
 RUBBISH = [
     "no step was evaluated", "no step was evaluated", "no step was evaluated", "no null space",
-    "no constraints were asked for", "n_node is 105, but the model has 106", "n_node is -1",
+    "no constraints were evaluated", "n_node is 105, but the model has 106", "n_node is -1",
     "n_constraint is 5, but the model has 4", "n_node is 107", "n_constraint is 11", "not 0", "",
     "without tangent", "n_unknown is 203, but the model has 204", "finite", "not -0.1", "finite",
     "finite", "last one of the deck", "built already", "time -1 is before", "no load 51: .* has 50",

@@ -12,11 +12,11 @@ from embed_tools import API, HERE, ROOT, build, check_memory, run
 RING = ROOT/"input_decks"/"ring.inp"
 EPS = 2.0**-52
 # Modules that emcon_api stands for, by their files; other modules it takes single names from.
-STANDS_FOR = ["emcon_stepper*", "emcon_interface*", "emcon_quantities", "emcon_version"]
+STANDS_FOR = ["emcon_stepper*", "emcon_quantities", "emcon_version"]
 # For the other rooms of the library, not for programs.
-INNER_MODULES = {"emcon_interface_check", "emcon_interface_stage", "emcon_interface_handle"}
-INNER_NAMES = {"stepper_read_source", "stepper_check_open", "query_sync", "query_check_field",
-               "query_check_factors", "field_names", "pair_variables"}
+INNER_MODULES = {"emcon_stepper_check"}
+INNER_NAMES = {"stepper_read_source", "stepper_check_solids", "query_sync", "field_names",
+               "pair_variables"}
 
 
 def statements(path: Path) -> list[str]:

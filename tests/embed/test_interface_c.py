@@ -14,13 +14,13 @@ SOURCE = HERE/"interface_bars.c"
 DRIFT = 400*np.finfo(float).eps
 
 BAD_CALLS = """
-#include <emcon_interface.h>
+#include <emcon.h>
 #include <math.h>
 #include <stdio.h>
 
-static void tell(emcon_interface *face, int status)
+static void tell(emcon_model *face, int status)
 {
-   const char *text = emcon_interface_message(face);
+   const char *text = emcon_message(face);
 
    printf("%d %s\\n", status, status && text ? text : "");
 }
@@ -33,76 +33,81 @@ int main(void)
    int lower[] = {1, 0}, upper[] = {3, 2}, wrong[] = {1, 9}, held[8] = {0}, active[2] = {0};
    int contact[] = {1, 0}, surface, n, outcome, done;
    emcon_pair_options options = {0};
-   emcon_interface_settings settings = {0};
-   emcon_interface_sizes sizes;
-   emcon_interface *face;
+   emcon_contact_settings settings = {0};
+   emcon_sizes sizes;
+   emcon_model *face;
    emcon_csr d, m;
-   emcon_interface_constraints values;
+   emcon_constraint_report values;
 
-   TELL(NULL, emcon_interface_prepare(NULL, NULL));
-   TELL(face, emcon_interface_new(-1, x, &face));
-   emcon_interface_free(face);
-   TELL(face, emcon_interface_new(4, NULL, &face));
-   emcon_interface_free(face);
+   TELL(NULL, emcon_hold(NULL, 4, held));
+   TELL(face, emcon_new(-1, x, &face));
+   emcon_close(face);
+   TELL(face, emcon_new(4, NULL, &face));
+   emcon_close(face);
    bad[5] = NAN;
-   TELL(face, emcon_interface_new(4, bad, &face));
-   TELL(face, emcon_interface_add_surface(face, "any", 1, lower, &surface));
-   TELL(face, emcon_interface_prepare(face, NULL));
-   emcon_interface_free(face);
-   TELL(face, emcon_interface_new(4, x, &face));
-   TELL(face, emcon_interface_add_pair(face, 0, 1, EMCON_MORTAR, NULL));
-   TELL(face, emcon_interface_add_surface(face, NULL, 1, wrong, &surface));
-   TELL(face, emcon_interface_add_surface(face, NULL, 1, lower, &surface));
-   TELL(face, emcon_interface_add_surface(face, "upper", 1, upper, &surface));
-   TELL(face, emcon_interface_add_pair(face, surface, 2, EMCON_MORTAR, NULL));
-   TELL(face, emcon_interface_add_pair(face, surface, 0, 9, NULL));
+   TELL(face, emcon_new(4, bad, &face));
+   TELL(face, emcon_add_surface(face, "any", 1, lower, &surface));
+   TELL(face, emcon_build(face));
+   emcon_close(face);
+   TELL(face, emcon_new(4, x, &face));
+   TELL(face, emcon_add_pair(face, 0, 1, EMCON_MORTAR, NULL));
+   TELL(face, emcon_add_surface(face, NULL, 1, wrong, &surface));
+   TELL(face, emcon_add_surface(face, NULL, 1, lower, &surface));
+   TELL(face, emcon_add_surface(face, "upper", 1, upper, &surface));
+   TELL(face, emcon_add_pair(face, surface, 2, EMCON_MORTAR, NULL));
+   TELL(face, emcon_add_pair(face, surface, 0, 9, NULL));
    options.normal_angle = 200;
-   TELL(face, emcon_interface_add_pair(face, surface, 0, EMCON_MORTAR, &options));
-   TELL(face, emcon_interface_add_tie(face, 1, 1, EMCON_DUAL, -1));
-   TELL(face, emcon_interface_add_pair(face, surface, 0, EMCON_MORTAR, NULL));
+   TELL(face, emcon_add_pair(face, surface, 0, EMCON_MORTAR, &options));
+   TELL(face, emcon_add_tie(face, 1, 1, EMCON_DUAL, -1));
+   TELL(face, emcon_add_pair(face, surface, 0, EMCON_MORTAR, NULL));
    settings.gap_tolerance = -1;
-   TELL(face, emcon_interface_set(face, &settings));
-   held[3] = 7;
-   TELL(face, emcon_interface_prepare(face, held));
-   TELL(face, emcon_interface_begin_step(face, u, u, 2, active, active));
-   TELL(face, emcon_interface_prepare(face, NULL));
-   TELL(face, emcon_interface_prepare(face, NULL));
-   TELL(face, emcon_interface_get_tie_matrices(face, 0, &d, &m));
-   TELL(face, emcon_interface_evaluate(face, u, u, &values));
-   TELL(face, emcon_interface_begin_step(face, u, bad, 2, active, active));
-   TELL(face, emcon_interface_begin_step(face, u, u, 3, held, NULL));
-   TELL(face, emcon_interface_begin_step(face, u, u, 2, active, active));
-   TELL(face, emcon_interface_choose(face, u, u, 2, contact, lam));
-   TELL(face, emcon_interface_get_curvature(face, 2, lam, &d));
+   TELL(face, emcon_set_contact(face, &settings));
+   TELL(face, emcon_begin_contact(face, 4, u, u, 2, active, active));
+   TELL(face, emcon_build(face));
+   TELL(face, emcon_build(face));
+   TELL(face, emcon_hold(face, 4, held));
+   TELL(face, emcon_step(face, 0.1, NULL));
+   TELL(face, emcon_advance(face, NULL));
+   TELL(face, emcon_save(face, "none.h5"));
+   TELL(face, emcon_get_tie_matrices(face, 0, &d, &m));
+   TELL(face, emcon_evaluate_contact(face, 4, u, u, &values));
+   TELL(face, emcon_begin_contact(face, 4, u, bad, 2, active, active));
+   TELL(face, emcon_begin_contact(face, 4, u, u, 3, held, NULL));
+   TELL(face, emcon_begin_contact(face, 4, u, u, 2, active, active));
+   TELL(face, emcon_choose(face, 4, u, u, 2, contact, lam));
+   TELL(face, emcon_curvature(face, 2, lam, &d));
    active[0] = 1;
-   TELL(face, emcon_interface_select(face, u, u, 2, active, &n));
-   TELL(face, emcon_interface_get_null_space(face, &d, &m, &n, NULL));
-   TELL(face, emcon_interface_update_active(face, u, u, 2, lam, NULL, 2, active, &done, &outcome));
-   TELL(face, emcon_interface_drop(face, 2, active, 2, active));
+   TELL(face, emcon_select(face, 4, u, u, 2, active, &n));
+   TELL(face, emcon_null_space(face, &d, &m, &n, NULL));
+   TELL(face, emcon_update_active(face, 4, u, u, 2, lam, NULL, 2, active, &done, &outcome));
+   TELL(face, emcon_drop(face, 2, active, 2, active));
+   TELL(face, emcon_constraints(face, 4, u, u, 0, &values));
+   TELL(face, emcon_get_gaps(face, 4, u, u, 2, NULL));
    u[4] = 100;
    u[6] = 100;
-   TELL(face, emcon_interface_begin_step(face, u, u, 2, active, NULL));
-   TELL(face, emcon_interface_select(face, u, u, 2, active, &n));
-   TELL(face, emcon_interface_get_sizes(face, &sizes));
+   TELL(face, emcon_begin_contact(face, 4, u, u, 2, active, NULL));
+   TELL(face, emcon_select(face, 4, u, u, 2, active, &n));
+   TELL(face, emcon_get_sizes(face, &sizes));
    printf("%d %d %d\\n", sizes.n_contact, sizes.n_unknown, sizes.n_selected);
-   emcon_interface_free(face);
-   emcon_interface_free(NULL);
+   emcon_close(face);
+   emcon_close(NULL);
    return 0;
 }
 """
 TOLD = [
-    "2", "2 the size of x is -2", "2 x is NULL", "2 x[5] is not a finite number",
-    "called before interface_init", "2 interface_prepare: called before interface_init", "0",
-    "there is no surface yet", "2 edge[1] is 9, not in 0..3", "0", "0",
-    "2 master is 2, not in 0..1", "formulation is 9, not in 1..3", "not in 0..180 degrees",
-    "slave and master are both surface upper", "0", "gap_tolerance is negative",
-    "held[3] is 7, neither 0 nor 1", "called before interface_prepare", "0",
-    "called after interface_prepare", "2 tie is 0, but there are none",
-    "before interface_begin_step", "du[5] is not a finite number",
-    "was_active has 3 entries, not 2", "0",
-    "contact[1] is 0 after 1", "lam has 2 entries, not 0", "0", "before interface_evaluate",
-    "before interface_evaluate", "redundant[0] is 1, not in 0..0", "0",
-    "constraint 0 (slave node 2 of pair 0) has no surface within reach", "0", "2 8 0",
+    "2", "2 n_node is not above 0", "2 x is NULL", "2 x is not finite at node 3",
+    "there is no scene", "there is no scene", "0",
+    "2 slave is 1, but there are none", "2 edge(2, 1) is 10, not in 1..4", "0", "0",
+    "2 master is 3, not in 1..2", "formulation is 9, not in 1..3",
+    "normal_angle is 200, above 180", "slave and master are both surface upper", "0",
+    "gap_tolerance is -1, below 0", "not built yet", "0", "built already",
+    "given before the model is built", "its host makes the steps", "its host makes the steps",
+    "its host makes the steps", "2 tie is 1, but there are none", "no step of contact was begun",
+    "du is not finite at node 3", "n_constraint is 3, but the model has 2", "0",
+    "constraint 1 comes after 2", "n is 2, but the model has 0", "0",
+    "constraints were selected", "no constraints were evaluated", "redundant is 2, not in 1..1",
+    "0", "no step of contact was begun", "0",
+    "constraint 1 (slave node 3 of pair 1) has no surface within reach", "0", "2 8 0",
 ]
 
 
@@ -131,10 +136,10 @@ def test_a_host_in_c_keeps_its_energy_through_an_impact(
 def test_the_example_of_the_docs(installed: dict[str, str], tmp_path: Path) -> None:
     text = (ROOT/"docs"/"embedding.md").read_text(encoding="utf-8")
     (example,) = [block for block in re.findall(r"```c\n(.*?)```", text, re.DOTALL)
-                  if "emcon_interface_new" in block]
+                  if "emcon_new" in block]
     source = tmp_path/"example.c"
     source.write_text("""
-#include <emcon_interface.h>
+#include <emcon.h>
 #include <stdio.h>
 
 int main(void)

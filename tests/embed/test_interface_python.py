@@ -167,13 +167,14 @@ def test_null_space_sees_no_contact_force() -> None:
         t = face.links().toarray()
         assert (t == np.eye(2*face.n_node)).all() and not len(space.redundant)
         p, df = space.p.toarray(), space.df.toarray()
-        assert p.shape == df.shape == (face.n_unknown, face.n_unknown - found.n)
-        assert abs(found.g @ t @ p).max() < 10*TOL
-        assert abs(found.c @ t @ df).max() < 10*TOL
+        assert p.shape == df.shape == (2*face.n_node, face.n_unknown - found.n)
+        assert abs(found.g @ p).max() < 10*TOL
+        assert abs(found.c @ df).max() < 10*TOL
         part = face.particular(found.defect)
-        assert abs(found.c @ (t @ part) + found.defect).max() < 10*TOL
+        assert abs(found.c @ part.ravel() + found.defect).max() < 10*TOL
         lam = random.random(found.n)
-        assert abs(face.multipliers(t.T @ (lam @ found.g)) - lam).max() < 100*TOL
+        force = (lam @ found.g).reshape(du.shape)
+        assert abs(face.multipliers(force) - lam).max() < 100*TOL
 
 
 def disc_in_hole(multiplier: str) -> Interface:
@@ -213,7 +214,7 @@ def test_ties_meet_in_the_mean(multiplier: str) -> None:
         assert face.n_contact == 0 and not len(face.begin_step(u, u, none))
         assert face.select(u, u, none) == 0 and face.evaluate(u, u).g.shape == (0, 2*face.n_node)
         assert face.curvature([]).data.size == 0
-        assert face.null_space().p.shape == (face.n_unknown, face.n_unknown)
+        assert face.null_space().p.shape == (2*face.n_node, face.n_unknown)
         assert face.update_active(u, u, [], none)[1] is Outcome.DONE
 
 
@@ -261,6 +262,21 @@ def test_active_set_takes_in_what_penetrates_and_releases_what_pulls(formulation
             face.drop([9])
 
 
+def test_geometry_finds_what_is_behind_an_outline() -> None:
+    lower = np.array([[0, 0], [2, 0], [2, 1], [0, 1]])
+    with Interface(np.vstack((lower, SQUARE + np.array([0.5, 1.1])))) as face:
+        master, slave = (face.add_surface(name, chain(4, first) % 4 + first)
+                         for name, first in (("lower", 0), ("upper", 4)))
+        face.add_pair(slave, master, "node to segment")
+        face.prepare()
+        u0, du = np.zeros((2, 8, 2))
+        assert face.overlap(u0, du) == (0, None)
+        du[4:, 1] = -0.15
+        depth, node = face.overlap(u0, du)                # per edge of the upper one
+        assert depth == pytest.approx(0.05, rel=10*TOL)
+        assert node in (2, 3, 4, 5)
+
+
 # ---- bad calls -----------------------------------------------------------------------------------
 
 BAD_NODES = [
@@ -289,7 +305,7 @@ def test_bad_surfaces_pairs_and_ties_are_refused() -> None:
         refuse(r"\(1, 3\)", face.add_surface, "bad", [[1, 2, 3]])
         refuse("integers", face.add_surface, "bad", [[1.0, 2.0]])
         refuse("shape", face.add_surface, "bad", [])
-        refuse("branches at node 0", face.add_surface, "bad", [[0, 1], [0, 2]])
+        refuse("branches at node 1", face.add_surface, "bad", [[0, 1], [0, 2]])
         refuse("no length", face.add_surface, "bad", [[1, 1]])
         low = face.add_surface("low", [[1, 0]])
         up = face.add_surface("up", np.array([[3, 2]], np.int64))
@@ -305,11 +321,9 @@ def test_bad_surfaces_pairs_and_ties_are_refused() -> None:
         refuse("smoothing_angle", face.add_pair, up, low, smoothing_angle=np.inf)
         refuse("both surface up", face.add_tie, up, up)
         refuse("tolerance is -1", face.add_tie, up, low, tolerance=-1)
-        refuse("neither a pair nor a tie", face.prepare)
         refuse("initiation is 'late'", face.configure, initiation="late")
-        refuse("gap_tolerance is negative", face.configure, gap_tolerance=-1)
-        face.add_pair(up, side, "node to segment")
-        refuse("low|share node 2", face.prepare)
+        refuse("gap_tolerance is -1, below 0", face.configure, gap_tolerance=-1)
+        refuse("share node 3", face.add_pair, up, side, "node to segment")
     with Interface(SQUARE) as face:
         low, up = face.add_surface("low", [[1, 0]]), face.add_surface("up", [[3, 2]])
         face.add_pair(up, low)
@@ -333,18 +347,18 @@ def test_bad_steps_are_refused_and_the_interface_stays_usable() -> None:
         refuse(r"u0 .*\(16, 2\), not \(2, 16\)", face.begin_step, u0.T, du, none)
         refuse("was_active", face.begin_step, u0, du, none[1:])
         refuse("was_active", face.begin_step, u0, du, none.astype(int))
-        refuse("before interface_begin_step", face.gaps, u0, du)
-        refuse("before interface_begin_step", face.evaluate, u0, du)
+        refuse("no step of contact was begun", face.gaps, u0, du)
+        refuse("no step of contact was begun", face.evaluate, u0, du)
         face.begin_step(u0, du, none)
         refuse("do not ascend", face.choose, u0, du, [2, 1], [0.0, 0.0])
         refuse(r"contact\[0\] is 7", face.choose, u0, du, [7], [0.0])
         refuse("target", face.choose, u0, du, [2], [0.0, 0.0])
         all_of_them = ~none
         face.select(u0, du, all_of_them)
-        refuse("before interface_evaluate", face.curvature, np.ones(7))
-        refuse("before interface_evaluate", face.null_space)
+        refuse("no constraints were evaluated", face.curvature, np.ones(7))
+        refuse("constraints were selected", face.null_space)
         refuse(r"lam .*\(7,\)", face.curvature, [1.0])
-        refuse("before interface_null_space", face.particular, np.zeros(7))
+        refuse("no null space", face.particular, np.zeros(7))
         found = face.evaluate(u0, du)
         refuse("lam is not finite", face.second_times, np.full(7, np.nan), du)
         refuse("direction", face.second_times, np.ones(7), du[1:])
@@ -354,7 +368,7 @@ def test_bad_steps_are_refused_and_the_interface_stays_usable() -> None:
         far = u0.copy()
         far[9:, 1] += 100
         face.begin_step(far, du, none)
-        refuse(r"constraint 0 \(slave node 9 of pair 0\)", face.select, far, du, all_of_them)
+        refuse(r"constraint 1 \(slave node 10 of pair 1\)", face.select, far, du, all_of_them)
         face.begin_step(u0, du, none)
         face.select(u0, du, all_of_them)
         assert (face.evaluate(u0, du).g.data == found.g.data).all()
@@ -382,20 +396,21 @@ def test_fields_over_other_nodes_are_refused_below_python_too() -> None:
     handle, short = face._handle, u0[1:].copy()
     flags, contacts = np.zeros(short.shape, np.int32), np.zeros(face.n_contact, np.int32)
     numbers = np.zeros(0)
-    assert _core.emcon_interface_begin_step(handle, u0, u0, contacts)[0] == 0
+    assert _core.emcon_begin_contact(handle, u0, u0, contacts)[0] == 0
     for name, *arguments in (
-        ("prepare", flags), ("get_positions", len(short)), ("follow", short), ("gather", short),
-        ("begin_step", short, short, contacts), ("get_gaps", short, short, face.n_contact),
+        ("hold", flags), ("get_positions", len(short)), ("follow", short), ("gather", short),
+        ("begin_contact", short, short, contacts), ("get_gaps", short, short, face.n_contact),
         ("select", short, short, contacts), ("choose", short, short, contacts[:0], numbers),
-        ("evaluate", short, short), ("second_times", numbers, short),
+        ("evaluate_contact", short, short), ("curvature_times", numbers, short),
         ("update_active", short, short, numbers, short, contacts),
-        ("get_areas", short, face.n_contact),
+        ("get_areas", short, face.n_contact), ("overlap", short, short),
+        ("multipliers", len(short), short, face.n_contact),
     ):  # fmt: skip
-        answer = getattr(_core, f"emcon_interface_{name}")(handle, *arguments)
+        answer = getattr(_core, f"emcon_{name}")(handle, *arguments)
         assert (answer[0] if isinstance(answer, tuple) else answer) == 2, name
     with pytest.raises(_core.__core_error, match="len_du==n_node"):
-        _core.emcon_interface_evaluate(handle, u0, short)
-    assert _core.emcon_interface_evaluate(handle, u0, u0)[0] == 0
+        _core.emcon_evaluate_contact(handle, u0, short)
+    assert _core.emcon_evaluate_contact(handle, u0, u0)[0] == 0
 
 
 def test_use_from_two_threads_at_once_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -407,10 +422,10 @@ def test_use_from_two_threads_at_once_is_refused(monkeypatch: pytest.MonkeyPatch
         def __getattr__(self, name: str) -> object:
             return getattr(_core, name)
 
-        def emcon_interface_evaluate(self, *arguments: object) -> object:
+        def emcon_evaluate_contact(self, *arguments: object) -> object:
             inside.set()
             assert leave.wait(60)
-            return _core.emcon_interface_evaluate(*arguments)
+            return _core.emcon_evaluate_contact(*arguments)
 
     monkeypatch.setattr(interface_module, "_core", Slow())
     with face, ThreadPoolExecutor(1) as pool:

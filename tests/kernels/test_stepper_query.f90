@@ -9,8 +9,8 @@ module test_stepper_query
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
    use emcon_stepper_conditions, only : stepper_remove_prescribed
-   use emcon_stepper_constraints, only : contact_report_t, query_constraints, &
-      query_curvature_times, query_links, query_multipliers, query_null_space
+   use emcon_stepper_contact, only : contact_report_t, query_constraints, query_curvature_times
+   use emcon_stepper_null_space, only : query_links, query_multipliers, query_null_space
    use emcon_stepper_free, only : snapshot_t, stepper_restore, stepper_snapshot
    use emcon_stepper_query, only : query_evaluate, query_free, query_guess, query_mass, &
       query_momenta, query_residual, query_t, query_tangent, query_unknowns
@@ -119,13 +119,14 @@ contains
          type(query_t), intent(inout) :: query
          type(contact_report_t) :: report
          type(csr_t) :: matrix, p, d
+         integer, allocatable :: redundant(:)
          real(wp), allocatable :: u1(:, :), momenta(:, :)
 
          allocate(u1, mold=stepper%scene%x)
          call query_guess(query, stepper, 3.0_wp*drop_h, u1, error)
          if (.not. allocated(error)) call query_evaluate(query, stepper, 0.5_wp*drop_h, u1, &
             .true., error)
-         if (.not. allocated(error)) call query_null_space(query, p, d, error)
+         if (.not. allocated(error)) call query_null_space(query, p, d, redundant, error)
          if (.not. allocated(error)) call query_tangent(query, .true., matrix, error)
          u1(2, :) = u1(2, :) - 0.25_wp*stepper%scene%x(2, :)
          if (.not. allocated(error)) call query_constraints(query, stepper, &
@@ -154,6 +155,7 @@ contains
          type(snapshot_t) :: after
          type(query_t) :: query
          type(csr_t) :: p, d
+         integer, allocatable :: redundant(:)
          real(wp), allocatable :: nodal(:, :), unknown(:), lam(:)
          real(wp) :: largest
 
@@ -174,10 +176,9 @@ contains
             stepper%march%system%space%numbering%unknown > 0), after%state%reaction*merge(0.0_wp, &
             1.0_wp, stepper%march%system%space%numbering%unknown > 0), 1.0e3_wp*eps, &
             1.0_wp/drop_h + young, "reactions")
-         if (.not. allocated(error) .or. k > 1) call query_null_space(query, p, d, error)
+         if (.not. allocated(error) .or. k > 1) call query_null_space(query, p, d, redundant, error)
          if (allocated(error)) return
-         allocate(lam(size(after%state%lam)))
-         call query_multipliers(query, lam, error)
+         call query_multipliers(query, stepper, lam, error)
          if (allocated(error)) return
          call check_near(error, lam, after%state%lam, 1.0e4_wp*eps, maxval(abs(lam)), &
             "multipliers")
@@ -372,13 +373,13 @@ contains
       call open_number(k, stepper, error)
       if (allocated(error)) return
       call make_motion(stepper, u0, u1)
-      allocate(along, product, mold=u0)
+      allocate(along, mold=u0)
       call shake(along, 1.0_wp)
       call gradient_at(probe, high)
       if (.not. allocated(error)) call gradient_at(-probe, low)
       if (.not. allocated(error)) call gradient_at(0.0_wp, low, high)
       if (allocated(error)) return
-      call query_curvature_times(query, factor, along, product, error)
+      call query_curvature_times(query, stepper, factor, along, product, error)
       if (allocated(error)) return
       call check_true(error, maxval(abs(product)) > 0.1_wp, "there is curvature")
       call check_near(error, reshape(product, [size(product)]), low, difference_tol, &
@@ -429,6 +430,7 @@ contains
       type(query_t) :: query
       type(contact_report_t) :: report
       type(csr_t) :: p, d, rows, links
+      integer, allocatable :: redundant(:)
       logical, allocatable :: acts(:)
 
       call open_number(k, stepper, error)
@@ -436,7 +438,7 @@ contains
       if (.not. allocated(error)) call query_links(stepper, links, error)
       if (.not. allocated(error)) call query_evaluate(query, stepper, drop_h, after%state%u, &
          .false., error, after%state%lam, after%state%is_active)
-      if (.not. allocated(error)) call query_null_space(query, p, d, error)
+      if (.not. allocated(error)) call query_null_space(query, p, d, redundant, error)
       if (.not. allocated(error)) call query_constraints(query, stepper, &
          stepper%march%state%u, after%state%u, .true., report, error)
       if (allocated(error)) return
@@ -507,6 +509,7 @@ contains
       type(stepper_t) :: stepper, closed
       type(query_t) :: query
       type(csr_t) :: p, d
+      integer, allocatable :: redundant(:)
       real(wp), allocatable :: u1(:, :), lam(:)
 
       call open_number(1, stepper, error)
@@ -515,7 +518,7 @@ contains
       lam = stepper%march%state%lam
       call query_evaluate(query, closed, drop_h, u1, .true., failed)
       call check_error(error, failed, err_input, "there is no model", "closed")
-      call query_null_space(query, p, d, failed)
+      call query_null_space(query, p, d, redundant, failed)
       call check_error(error, failed, err_input, "no step was evaluated", "too early")
       call query_evaluate(query, stepper, drop_h, u1(:, 2:), .true., failed)
       call check_error(error, failed, err_input, "at each of 16 nodes, not 2 at 15", "shape")
@@ -529,7 +532,7 @@ contains
       u1(1, 14) = 5.0_wp
       call query_evaluate(query, stepper, drop_h, u1, .true., failed)
       call check_error(error, failed, err_analysis, "element 5 is inverted", "inverted")
-      call query_multipliers(query, lam, failed)
+      call query_multipliers(query, stepper, lam, failed)
       call check_error(error, failed, err_input, "no null space", "multipliers")
       call query_free(query)
       call stepper_close(stepper)

@@ -6,19 +6,26 @@
 module truss_host
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, error_t, raise
-   use emcon_interface, only : interface_links, interface_t
-   use emcon_interface_null_space, only : interface_multipliers, interface_null_space, &
-      interface_particular
-   use emcon_interface_step, only : constraint_values_t, interface_begin_step, &
-      interface_curvature, interface_drop, interface_evaluate, interface_select, &
-      interface_update_active, step_done
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
+   use emcon_stepper, only : stepper_build, stepper_t
+   use emcon_stepper_contact, only : contact_report_t, query_begin_contact, query_contact, &
+      query_curvature, query_drop, query_select, query_update_active, step_done
+   use emcon_stepper_host, only : stepper_hold, stepper_new
+   use emcon_stepper_null_space, only : query_multipliers, query_null_space, query_particular
+   use emcon_stepper_query, only : query_t
    use emcon_text, only : to_text
    use sparse_samples, only : dense_of
    implicit none
    private
+   public :: face_t, face_new, face_build, face_n
    public :: truss_t, truss_begin, truss_add, truss_step, truss_energy, truss_momentum
+
+   !> A model of the host's nodes, and what it is asked.
+   type :: face_t
+      type(stepper_t) :: stepper
+      type(query_t) :: query
+   end type face_t
 
    type :: truss_t
       real(wp), allocatable :: x(:, :), u(:, :), v(:, :)   !! (2, n_node)
@@ -32,6 +39,31 @@ module truss_host
    integer, parameter :: most_iterations = 25, most_sets = 100
 
 contains
+
+   subroutine face_new(face, x, error)
+      type(face_t), intent(out) :: face
+      real(wp), intent(in) :: x(:, :)
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_new(face%stepper, x, error)
+   end subroutine face_new
+
+   !> Finish a model whose freedoms `held` the host moves by itself.
+   subroutine face_build(face, held, error)
+      type(face_t), intent(inout) :: face
+      logical, intent(in) :: held(:, :)                    !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_hold(face%stepper, held, error)
+      if (.not. allocated(error)) call stepper_build(face%stepper, error)
+   end subroutine face_build
+
+   !> How many constraints are possible.
+   pure integer function face_n(face)
+      type(face_t), intent(in) :: face
+
+      face_n = face%stepper%march%system%n_constraint
+   end function face_n
 
    subroutine truss_begin(self)
       type(truss_t), intent(out) :: self
@@ -151,7 +183,7 @@ contains
    !> One energy-momentum step of size `h`; the active set and contact are the library's.
    subroutine truss_step(self, face, h, error)
       type(truss_t), intent(inout) :: self
-      type(interface_t), intent(inout) :: face
+      type(face_t), intent(inout) :: face
       real(wp), intent(in) :: h
       type(error_t), allocatable, intent(out) :: error
       real(wp), allocatable :: du(:, :), magnitude(:, :), lam(:)
@@ -162,20 +194,19 @@ contains
 
       allocate(du, source=h*self%v)
       allocate(magnitude, mold=du)
-      allocate(active(face%n_constraint))
-      call interface_begin_step(face, self%u, du, self%is_active, active, error)
+      call query_begin_contact(face%query, face%stepper, self%u, du, self%is_active, active, error)
       do i_set = 1, most_sets
          if (allocated(error)) return
-         call interface_select(face, self%u, du, active, error)
+         call query_select(face%query, face%stepper, self%u, du, active, error)
          if (allocated(error)) return
          call solve(self, face, h, du, lam, magnitude, redundant, error)
          if (allocated(error)) return
          if (size(redundant) > 0) then
-            call interface_drop(face, redundant, active, error)
+            call query_drop(face%query, redundant, active, error)
             cycle
          end if
-         call interface_update_active(face, self%u, du, lam, active, is_done, status, error, &
-            magnitude)
+         call query_update_active(face%query, face%stepper, self%u, du, lam, active, is_done, &
+            status, error, magnitude)
          if (allocated(error)) return
          if (.not. is_done) cycle
          if (status /= step_done) exit
@@ -191,54 +222,49 @@ contains
    !> Newton's method in the null space of the selected constraints, until nothing moves any more.
    subroutine solve(self, face, h, du, lam, magnitude, redundant, error)
       type(truss_t), intent(in) :: self
-      type(interface_t), intent(inout) :: face
+      type(face_t), intent(inout) :: face
       real(wp), intent(in) :: h
       real(wp), intent(inout) :: du(:, :)
       real(wp), allocatable, intent(out) :: lam(:)
       real(wp), intent(out) :: magnitude(:, :)
       integer, allocatable, intent(out) :: redundant(:)
       type(error_t), allocatable, intent(out) :: error
-      type(constraint_values_t) :: values
-      type(csr_t) :: links, p, df, curvature
+      type(contact_report_t) :: values
+      type(csr_t) :: p, df, curvature
       real(wp) :: residual(2, size(du, 2)), tangent(size(du), size(du))
-      real(wp), allocatable :: t(:, :), dw(:), part(:), reduced(:, :), rhs(:), r(:)
+      real(wp), allocatable :: part(:, :), reduced(:, :), rhs(:), all(:)
       real(dp), allocatable :: x(:, :)
       real(wp) :: step, last
       integer :: iteration
       logical :: is_singular
 
-      call interface_links(face, links, error)
-      if (allocated(error)) return
-      t = real(dense_of(links), wp)
-      allocate(part(face%n_unknown), r(face%n_unknown))
       last = huge(last)
       do iteration = 1, most_iterations
          call respond(self, h, du, residual, tangent, magnitude)
-         r = matmul(reshape(residual, [size(residual)]), t)
-         call interface_evaluate(face, self%u, du, values, error)
+         call query_contact(face%query, face%stepper, self%u, du, values, error)
          if (allocated(error)) return
-         call interface_null_space(face, p, df, redundant, error)
+         call query_null_space(face%query, p, df, redundant, error)
          if (allocated(error) .or. size(redundant) > 0) return
-         if (.not. allocated(lam)) allocate(lam(values%n))
-         call interface_multipliers(face, r, lam, error)
+         call query_multipliers(face%query, face%stepper, all, error, residual)
          if (allocated(error)) return
-         call interface_curvature(face, lam, curvature, error)
+         lam = all(values%id)
+         call query_curvature(face%query, lam, curvature, error)
          if (allocated(error)) return
          tangent = tangent - real(dense_of(curvature), wp)
-         call interface_particular(face, values%defect, part, error)
+         call query_particular(face%query, face%stepper, values%defect, part, error)
          if (allocated(error)) return
          associate (pw => real(dense_of(p), wp), dfw => real(dense_of(df), wp), &
-               n => matmul(transpose(t), matmul(tangent, t)))
-            rhs = -matmul(r + matmul(n, part), pw)
-            reduced = matmul(transpose(pw), matmul(n, dfw))
+               r => reshape(residual, [size(du)]), first => reshape(part, [size(du)]))
+            rhs = -matmul(r + matmul(tangent, first), pw)
+            reduced = matmul(transpose(pw), matmul(tangent, dfw))
             if (allocated(x)) deallocate(x)
             allocate(x(size(rhs), 1))
             call dense_solve(real(reduced, dp), reshape(real(rhs, dp), [size(rhs), 1]), x, &
                is_singular)
-            dw = part + matmul(dfw, real(x(:, 1), wp))
+            part = part + reshape(matmul(dfw, real(x(:, 1), wp)), shape(part))
          end associate
-         du = du + reshape(matmul(t, dw), shape(du))
-         step = maxval(abs(dw))
+         du = du + part
+         step = maxval(abs(part))
          if (step <= 4.0_wp*epsilon(step)*maxval(abs(self%x))) return
          if (iteration > 5 .and. .not. step < last) return
          last = step

@@ -1,0 +1,107 @@
+!> What callers of a stepper may hand over wrongly, in words: which argument, where in it.
+module emcon_stepper_check
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t
+   use emcon_stepper, only : stepper_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: stepper_check_open, check_field, check_list, check_size, check_choice, check_number
+
+contains
+
+   !> There is a model to work with.
+   pure subroutine stepper_check_open(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. allocated(self%march%scheme)) call raise(error, err_input, &
+         "there is no model: none was built, or building it failed")
+   end subroutine stepper_check_open
+
+   !> A nodal field called `name` has the right shape and is finite.
+   pure subroutine check_field(name, field, scene, error)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: field(:, :)                  !! (2, n_node)
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+      integer :: i
+
+      if (allocated(error)) return
+      if (any(shape(field) /= shape(scene%x))) then
+         call raise(error, err_input, name // " is to have 2 components at each of " // &
+            to_text(size(scene%x, 2)) // " nodes, not " // to_text(size(field, 1)) // " at " // &
+            to_text(size(field, 2)))
+         return
+      end if
+      do i = 1, size(field, 2)
+         if (all(ieee_is_finite(field(:, i)))) cycle
+         call raise(error, err_input, name // " is not finite at node " // &
+            to_text(scene%node_label(i)))
+         return
+      end do
+   end subroutine check_field
+
+   !> A list called `name` has `n` entries, all finite.
+   pure subroutine check_list(name, list, n, error)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: list(:)
+      integer, intent(in) :: n
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+      integer :: i
+
+      call check_size(name, size(list), n, error)
+      if (allocated(error)) return
+      i = findloc(ieee_is_finite(list), .false., 1)
+      if (i > 0) call raise(error, err_input, name // " is not finite at entry " // to_text(i))
+   end subroutine check_list
+
+   !> A list called `name` has as many entries as it has to.
+   pure subroutine check_size(name, n, expected, error)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: n, expected
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+
+      if (allocated(error) .or. n == expected) return
+      call raise(error, err_input, name // " is to have " // to_text(expected) // " entries, not " &
+         // to_text(n))
+   end subroutine check_size
+
+   !> A choice, or a number, called `name` is in `least`..`most`.
+   pure subroutine check_choice(name, value, least, most, error)
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: value, least, most
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+
+      if (allocated(error) .or. (value >= least .and. value <= most)) return
+      if (most < least) call raise(error, err_input, name // " is " // to_text(value) // &
+         ", but there are none")
+      if (most >= least) call raise(error, err_input, name // " is " // to_text(value) // &
+         ", not in " // to_text(least) // ".." // to_text(most))
+   end subroutine check_choice
+
+   !> A number called `name` is finite, and not below `least` nor above `most`.
+   pure subroutine check_number(name, value, error, least, most)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: value
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+      real(wp), intent(in), optional :: least, most
+
+      if (allocated(error)) return
+      if (.not. ieee_is_finite(value)) then
+         call raise(error, err_input, name // " is not finite")
+         return
+      end if
+      if (present(least)) then
+         if (value < least) call raise(error, err_input, name // " is " // to_text(value) // &
+            ", below " // to_text(least))
+      end if
+      if (present(most)) then
+         if (value > most) call raise(error, err_input, name // " is " // to_text(value) // &
+            ", above " // to_text(most))
+      end if
+   end subroutine check_number
+
+end module emcon_stepper_check

@@ -1,0 +1,327 @@
+!> A model without solids, for a host code that has its own: nodes, surfaces as edges, pairs, ties.
+!>
+!> `stepper_new` in place of reading a deck; then surfaces, pairs, ties and held freedoms, and
+!> `stepper_build`. What the host then asks for in each step: emcon_stepper_contact. Nodes that no
+!> surface holds may be left out. Edges run with the body to the left, so the outward normal is the
+!> edge turned by -90 degrees. The plane has thickness 1. Rigid obstacles: surfaces of held nodes.
+!> Source: docs/theory.md, sections 4, 5 and 11.
+module emcon_stepper_host
+   use emcon_chain, only : chain_init, chain_t
+   use emcon_couplings, only : tie_t
+   use emcon_csr, only : csr_from_entries, csr_t
+   use emcon_element_registry, only : element_kinds_create
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+      formulation_nts, integration_elements, integration_segments, multiplier_dual, &
+      multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
+   use emcon_kinds, only : dp, wp
+   use emcon_mesh, only : surface_t
+   use emcon_scheme_registry, only : scheme_row
+   use emcon_sort, only : find_sorted
+   use emcon_stepper, only : stepper_t
+   use emcon_stepper_check, only : check_choice, check_field, check_number, stepper_check_open
+   use emcon_steps, only : initiation_admissible, initiation_persistent, prescribed_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: stepper_new, stepper_add_surface, stepper_add_pair, stepper_add_tie, stepper_hold, &
+      stepper_set_contact, stepper_tie_matrices
+
+   !> Gauss points at most, as in a deck.
+   integer, parameter :: most_points = 10
+   real(wp), parameter :: half_turn = 180.0_wp   !! [degrees]
+
+contains
+
+   !> Begin with the nodes of the host.
+   subroutine stepper_new(self, x, error)
+      type(stepper_t), intent(out) :: self
+      real(wp), intent(in) :: x(:, :)                      !! (2, n_node) reference positions [L]
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, n
+
+      n = size(x, 2)
+      if (n == 0) then
+         call raise(error, err_input, "x has no nodes")
+         return
+      end if
+      associate (scene => self%scene)
+         scene%is_hosted = .true.
+         scene%heading = ""
+         allocate(scene%x, source=x)
+         allocate(scene%node_label, source=[(i, i = 1, n)])
+         call check_field("x", x, scene, error)
+         if (allocated(error)) return
+         allocate(scene%u0(2, n), scene%v0(2, n), source=0.0_wp)
+         allocate(scene%file(0), scene%node_origin(n), scene%element_origin(0))
+         allocate(scene%element_label(0), scene%element_kind(0), scene%element_section(0))
+         call element_kinds_create(scene%kind)
+         allocate(scene%element_node(2, 0))      ! room for an edge
+         allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
+         allocate(scene%material(0), scene%section(0), scene%pair(0), scene%tie(0))
+         allocate(scene%equation(0), scene%step(1))
+         scene%step(1)%scheme = scheme_row("DYNAMIC", "")
+         allocate(scene%step(1)%prescribed(0), scene%step(1)%load(0), scene%step(1)%output(0))
+      end associate
+      allocate(self%diagnostic(0))
+      self%is_read = .true.
+   end subroutine stepper_new
+
+   !> Add a surface: edges in any order, in one or several connected parts, open or closed.
+   subroutine stepper_add_surface(self, name, edge, i_surface, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name                 !! for messages; empty: its number
+      integer, intent(in) :: edge(:, :)                    !! (2, n_edge) first and last node
+      integer, intent(out) :: i_surface                    !! its number, from 1
+      type(error_t), allocatable, intent(out) :: error
+      type(surface_t) :: surface
+      type(chain_t) :: chain
+
+      i_surface = 0
+      call check_stage(self, error)
+      if (.not. allocated(error)) call check_edges(edge, self%scene%x, error)
+      if (allocated(error)) return
+      surface%name = name
+      if (name == "") surface%name = to_text(size(self%scene%surface) + 1)
+      allocate(surface%element(0), surface%face(0))
+      allocate(surface%edge, source=edge)
+      call chain_init(chain, self%scene, surface, error)
+      if (allocated(error)) return
+      self%scene%surface = [self%scene%surface, surface]
+      i_surface = size(self%scene%surface)
+   end subroutine stepper_add_surface
+
+   !> Edges of a surface: existing nodes, and a length.
+   pure subroutine check_edges(edge, x, error)
+      integer, intent(in) :: edge(:, :)
+      real(wp), intent(in) :: x(:, :)            !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      if (size(edge, 1) /= 2 .or. size(edge, 2) == 0) call raise(error, err_input, &
+         "edge has the shape (" // to_text(size(edge, 1)) // ", " // to_text(size(edge, 2)) // &
+         "), not (2, n_edge) with n_edge > 0")
+      do i = 1, size(edge, 2)
+         call check_choice("edge(1, " // to_text(i) // ")", edge(1, i), 1, size(x, 2), error)
+         call check_choice("edge(2, " // to_text(i) // ")", edge(2, i), 1, size(x, 2), error)
+         if (allocated(error)) return
+         if (any(abs(x(:, edge(1, i)) - x(:, edge(2, i))) > 0.0_wp)) cycle
+         call raise(error, err_input, "edge(:, " // to_text(i) // ") = " // to_text(edge(1, i)) // &
+            ", " // to_text(edge(2, i)) // " has no length")
+      end do
+   end subroutine check_edges
+
+   !> Add a contact pair; a surface in contact with itself is its own master.
+   subroutine stepper_add_pair(self, slave, master, formulation, options, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: slave, master                 !! numbers of surfaces
+      integer, intent(in) :: formulation                   !! one of `formulation_`
+      type(contact_options_t), intent(in) :: options
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_pair_t) :: pair
+
+      call check_surfaces(self, slave, master, error)
+      call check_choice("formulation", formulation, formulation_nts, formulation_mortar, error)
+      call check_options(options, error)
+      if (.not. allocated(error)) call check_apart(self, slave, master, error)
+      if (allocated(error)) return
+      pair%slave = slave
+      pair%master = master
+      pair%formulation = formulation
+      pair%has_options = .true.
+      pair%options = options
+      self%scene%pair = [self%scene%pair, pair]
+   end subroutine stepper_add_pair
+
+   pure subroutine check_options(options, error)
+      type(contact_options_t), intent(in) :: options
+      type(error_t), allocatable, intent(inout) :: error
+
+      call check_choice("integration", options%integration, integration_segments, &
+         integration_elements, error)
+      call check_choice("multiplier", options%multiplier, multiplier_standard, multiplier_dual, &
+         error)
+      call check_choice("normal", options%normal, normal_edge, normal_nodal, error)
+      call check_choice("smoothing", options%smoothing, smoothing_none, smoothing_hermite, error)
+      if (options%n_point /= 0) call check_choice("n_point", options%n_point, &
+         merge(2, 1, options%integration == integration_segments), most_points, error)
+      call check_number("normal_angle", options%normal_angle, error, 0.0_wp, half_turn)
+      call check_number("smoothing_angle", options%smoothing_angle, error, 0.0_wp, half_turn)
+   end subroutine check_options
+
+   !> The two surfaces of a pair share no node.
+   subroutine check_apart(self, slave, master, error)
+      type(stepper_t), intent(in) :: self
+      integer, intent(in) :: slave, master
+      type(error_t), allocatable, intent(out) :: error
+      logical, allocatable :: is_slave(:)
+      integer :: i, k
+
+      if (slave == master) return
+      allocate(is_slave(size(self%scene%x, 2)), source=.false.)
+      associate (one => self%scene%surface(slave), other => self%scene%surface(master))
+         is_slave([one%edge(1, :), one%edge(2, :)]) = .true.
+         do i = 1, size(other%edge, 2)
+            do k = 1, 2
+               if (.not. is_slave(other%edge(k, i)) .or. allocated(error)) cycle
+               call raise(error, err_input, "slave surface " // one%name // " and master surface " &
+                  // other%name // " of a pair share node " // to_text(other%edge(k, i)))
+            end do
+         end do
+      end associate
+   end subroutine check_apart
+
+   !> Add a tie of two surfaces that meet, whatever their meshes.
+   subroutine stepper_add_tie(self, slave, master, multiplier, tolerance, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: slave, master                 !! numbers of surfaces
+      integer, intent(in) :: multiplier                    !! one of `multiplier_`
+      real(wp), intent(in) :: tolerance                    !! how far apart [L]; < 0: a tenth of an
+                                                           !! edge
+      type(error_t), allocatable, intent(out) :: error
+      type(tie_t) :: tie
+
+      call check_surfaces(self, slave, master, error)
+      call check_choice("multiplier", multiplier, multiplier_standard, multiplier_dual, error)
+      call check_number("tolerance", tolerance, error)
+      if (.not. allocated(error) .and. slave == master) call raise(error, err_input, &
+         "slave and master are both surface " // self%scene%surface(slave)%name)
+      if (allocated(error)) return
+      tie%name = to_text(size(self%scene%tie) + 1) // " (" // &
+         self%scene%surface(slave)%name // " on " // self%scene%surface(master)%name // ")"
+      tie%slave = slave
+      tie%master = master
+      tie%multiplier = multiplier
+      tie%tolerance = tolerance
+      self%scene%tie = [self%scene%tie, tie]
+   end subroutine stepper_add_tie
+
+   !> Both surfaces exist.
+   subroutine check_surfaces(self, slave, master, error)
+      type(stepper_t), intent(in) :: self
+      integer, intent(in) :: slave, master
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_stage(self, error)
+      if (allocated(error)) return
+      call check_choice("slave", slave, 1, size(self%scene%surface), error)
+      call check_choice("master", master, 1, size(self%scene%surface), error)
+   end subroutine check_surfaces
+
+   !> Freedoms that the host moves by itself; of several calls the last one counts.
+   subroutine stepper_hold(self, held, error)
+      type(stepper_t), intent(inout) :: self
+      logical, intent(in) :: held(:, :)                    !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+      type(prescribed_t), allocatable :: list(:)
+      integer :: d
+
+      call check_stage(self, error)
+      if (allocated(error)) return
+      if (any(shape(held) /= shape(self%scene%x))) then
+         call raise(error, err_input, "held is to have 2 flags at each of " // &
+            to_text(size(self%scene%x, 2)) // " nodes, not " // to_text(size(held, 1)) // " at " &
+            // to_text(size(held, 2)))
+         return
+      end if
+      allocate(list(size(held)))
+      list%node = [((d + 1)/2, d = 1, size(held))]
+      list%dof = [(2 - mod(d, 2), d = 1, size(held))]
+      self%scene%step(1)%prescribed = pack(list, reshape(held, [size(held)]))
+   end subroutine stepper_hold
+
+   !> How contact begins, also between steps; unchanged after an error. A persistent one holds the
+   !> gap that its first step begins with, which keeps energy; an admissible one closes it.
+   subroutine stepper_set_contact(self, initiation, gap_tolerance, may_cut, is_end, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: initiation          !! persistent or admissible
+      real(wp), intent(in) :: gap_tolerance      !! largest that contact begins at, per edge; 0: any
+      logical, intent(in) :: may_cut             !! the host can try a step again in smaller parts
+      !> Statics: gradients at the end of the step, where new contacts are closed. Where this is set
+      !> before the model is built, corners are those of decks with static steps.
+      logical, intent(in) :: is_end
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_hosted(self, error)
+      call check_choice("initiation", initiation, initiation_persistent, initiation_admissible, &
+         error)
+      call check_number("gap_tolerance", gap_tolerance, error, least=0.0_wp)
+      if (allocated(error)) return
+      self%may_cut = may_cut
+      self%scene%step(1)%initiation = initiation
+      self%scene%step(1)%gap_tolerance = gap_tolerance
+      self%scene%step(1)%scheme = scheme_row("DYNAMIC", "")
+      if (is_end) self%scene%step(1)%scheme = scheme_row("STATIC", "")
+   end subroutine stepper_set_contact
+
+   !> D and M of tie `t`, over nodes: D x = M x in both directions. A row for each multiplier.
+   subroutine stepper_tie_matrices(self, t, d, m, error)
+      type(stepper_t), intent(in) :: self
+      integer, intent(in) :: t                             !! from 1, in the order of the model
+      type(csr_t), intent(out) :: d, m                     !! (n_row x n_node) [L]
+      type(error_t), allocatable, intent(out) :: error
+      type(chain_t) :: slave
+      integer, allocatable :: row(:), column(:)
+      logical, allocatable :: is_slave(:)
+      integer :: k, s
+
+      call stepper_check_open(self, error)
+      if (.not. allocated(error)) call check_choice("tie", t, 1, size(self%scene%tie), error)
+      if (allocated(error)) return
+      call chain_init(slave, self%scene, self%scene%surface(self%scene%tie(t)%slave), error)
+      if (allocated(error)) return
+      associate (rows => self%scene%tie(t)%rows)
+         allocate(row(size(rows%node)), is_slave(size(rows%node)))
+         do k = 1, size(rows%slave)
+            row(rows%start(k) + 1:rows%start(k + 1)) = k
+         end do
+         do s = 1, size(rows%node)
+            is_slave(s) = find_sorted(slave%node, rows%node(s)) > 0
+         end do
+         column = merge(rows%node, 0, is_slave)
+         call fill(d, row, column, rows%weight)
+         column = merge(0, rows%node, is_slave)
+         call fill(m, row, column, -rows%weight)
+      end associate
+
+   contains
+
+      subroutine fill(matrix, row, column, weight)
+         type(csr_t), intent(out) :: matrix
+         integer, intent(in) :: row(:), column(:)
+         real(wp), intent(in) :: weight(:)
+         integer, allocatable :: slot(:)
+         integer :: i
+
+         call csr_from_entries(matrix, size(self%scene%tie(t)%rows%slave), size(self%scene%x, 2), &
+            row, column, slot)
+         do i = 1, size(slot)
+            if (slot(i) > 0) matrix%value(slot(i)) = matrix%value(slot(i)) + real(weight(i), dp)
+         end do
+      end subroutine fill
+
+   end subroutine stepper_tie_matrices
+
+   !> The model is one of a host, and not built yet.
+   subroutine check_stage(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_hosted(self, error)
+      if (.not. allocated(error) .and. allocated(self%march%scheme)) call raise(error, err_input, &
+         "surfaces, pairs, ties and held freedoms are given before the model is built")
+   end subroutine check_stage
+
+   subroutine check_hosted(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. self%is_read) then
+         call raise(error, err_input, "there are no nodes: making the model, or building it, " // &
+            "failed")
+      else if (.not. self%scene%is_hosted) then
+         call raise(error, err_input, "a deck says this itself: it is for models of a host's nodes")
+      end if
+   end subroutine check_hosted
+
+end module emcon_stepper_host

@@ -1,0 +1,173 @@
+!> The null space of the constraints that act in the last evaluation, and the linear links, asked
+!> for from outside. Source: docs/theory.md, section 5.
+module emcon_stepper_null_space
+   use emcon_constraints, only : constraints_rows
+   use emcon_csr, only : csr_multiply, csr_t
+   use emcon_csr_product, only : csr_product
+   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_march_step, only : follow_links
+   use emcon_null_space, only : null_space_matrices, null_space_multipliers, &
+      null_space_particular, obstacle_none, obstacle_redundant
+   use emcon_numbering, only : gather_dependent, numbering_matrix, pick_unknowns
+   use emcon_stepper, only : stepper_t
+   use emcon_stepper_check, only : check_field, check_list, stepper_check_open
+   use emcon_stepper_query, only : query_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: query_null_space, query_multipliers, query_particular
+   public :: query_links, query_follow_links, query_gather_links
+
+contains
+
+   !> Null-space matrix P, and DF of the reparametrisation, for the constraints that act in the last
+   !> evaluation: P^T G^T = 0 and C DF = 0 for their discrete gradients G and their gradients at the
+   !> end C, over all degrees of freedom, with the linear links in them.
+   !>
+   !> `redundant`: places of constraints that follow from others, for `query_drop`; then there are
+   !> no matrices.
+   subroutine query_null_space(self, p, d, redundant, error)
+      type(query_t), intent(inout) :: self
+      type(csr_t), intent(out) :: p, d               !! (2 n_node x independent unknowns)
+      integer, allocatable, intent(out) :: redundant(:)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: links
+
+      self%has_null_space = .false.
+      allocate(redundant(0))
+      if (.not. self%has_set) call raise(error, err_input, "no step was evaluated since the " // &
+         "model was made, its unknowns changed, or constraints were selected")
+      if (allocated(error)) return
+      associate (set => self%march%active%set, system => self%march%system, &
+            null_space => self%null_space)
+         call links_of(system, links)
+         if (set%n == 0) then
+            p = links
+            d = links
+            self%has_null_space = .true.
+            return
+         end if
+         call constraints_rows(set, system%space%numbering)
+         call null_space_matrices(null_space, set, system%space%numbering)
+         select case (null_space%obstacle)
+         case (obstacle_none)
+            call csr_product(links, null_space%p, p)
+            call csr_product(links, null_space%d, d)
+            self%has_null_space = .true.
+         case (obstacle_redundant)
+            redundant = null_space%rows%redundant(:null_space%rows%n_redundant)
+         case default
+            call raise(error, err_analysis, "there is no null space: an active constraint has " // &
+               "no unknown that is fit to be eliminated; solve with the multipliers")
+         end select
+      end associate
+   end subroutine query_null_space
+
+   !> The multipliers that a residual without contact forces amounts to, by the dependent unknowns
+   !> of the last null space: `residual`, else that of the last `query_evaluate`. Those of
+   !> constraints that do not act are 0.
+   subroutine query_multipliers(self, stepper, lam, error, residual)
+      type(query_t), intent(in) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), allocatable, intent(out) :: lam(:)             !! (n_constraint) [M L/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: residual(:, :)         !! (2, n_node) [M L/T^2]
+      real(wp), allocatable :: of_unknown(:), active(:)
+
+      call check_null_space(self, error)
+      if (present(residual)) then
+         call check_field("residual", residual, stepper%scene, error)
+      else if (.not. (self%is_evaluated .or. allocated(error))) then
+         call raise(error, err_input, "the last evaluation has no residual: give one")
+      end if
+      if (allocated(error)) return
+      associate (set => self%march%active%set, system => self%march%system)
+         allocate(lam(system%n_constraint), source=0.0_wp)
+         if (set%n == 0) return
+         allocate(of_unknown(system%space%numbering%n_unknown), active(set%n))
+         if (present(residual)) then
+            call pick_unknowns(system%space%numbering, residual, of_unknown)
+         else
+            call pick_unknowns(system%space%numbering, system%response%residual, of_unknown)
+         end if
+         call null_space_multipliers(self%null_space, set, system%space%numbering, of_unknown, &
+            active)
+         lam(set%id) = active
+      end associate
+   end subroutine query_multipliers
+
+   !> The motion of dependent unknowns alone that closes `defect` to first order, by the last null
+   !> space; Newton's step is this plus DF times that of the others.
+   subroutine query_particular(self, stepper, defect, du, error)
+      type(query_t), intent(in) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: defect(:)                        !! (n) [L]
+      real(wp), allocatable, intent(out) :: du(:, :)           !! (2, n_node) [L]
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: links
+      real(wp), allocatable :: dw(:), flat(:)
+
+      call check_null_space(self, error)
+      call check_list("defect", defect, self%march%active%set%n, error)
+      if (allocated(error)) return
+      allocate(du(2, size(stepper%scene%x, 2)), source=0.0_wp)
+      if (size(defect) == 0) return
+      allocate(dw(self%march%system%space%numbering%n_unknown), flat(size(du)))
+      call null_space_particular(self%null_space%gap, defect, dw)
+      call links_of(self%march%system, links)
+      call csr_multiply(links, dw, flat)
+      du = reshape(flat, shape(du))
+   end subroutine query_particular
+
+   subroutine check_null_space(self, error)
+      type(query_t), intent(in) :: self
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. self%has_null_space) call raise(error, err_input, &
+         "there is no null space of the last evaluation")
+   end subroutine check_null_space
+
+   !> T: all displacements from the unknowns, u = T q up to prescribed motion. A row of a prescribed
+   !> freedom is empty, one of a dependent freedom holds the weights of those that it follows.
+   subroutine query_links(stepper, links, error)
+      type(stepper_t), intent(in) :: stepper
+      type(csr_t), intent(out) :: links              !! (2 n_node x n_unknown)
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_check_open(stepper, error)
+      if (.not. allocated(error)) call links_of(stepper%march%system, links)
+   end subroutine query_links
+
+   subroutine links_of(system, links)
+      type(system_t), intent(in) :: system
+      type(csr_t), intent(out) :: links
+      integer :: d
+
+      call numbering_matrix(system%space%numbering, [(d, d = 1, 2*size(system%space%body))], links)
+   end subroutine links_of
+
+   !> Dependent freedoms of a displacement or velocity from those that they follow.
+   subroutine query_follow_links(stepper, field, error)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(inout), contiguous :: field(:, :)       !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_check_open(stepper, error)
+      call check_field("field", field, stepper%scene, error)
+      if (.not. allocated(error)) call follow_links(stepper%march%system, field)
+   end subroutine query_follow_links
+
+   !> Forces on dependent freedoms go to those that they follow.
+   subroutine query_gather_links(stepper, field, error)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(inout), contiguous :: field(:, :)       !! (2, n_node)
+      type(error_t), allocatable, intent(out) :: error
+
+      call stepper_check_open(stepper, error)
+      call check_field("field", field, stepper%scene, error)
+      if (.not. allocated(error) .and. stepper%march%system%linear%n > 0) call gather_dependent( &
+         stepper%march%system%space%linked, field)
+   end subroutine query_gather_links
+
+end module emcon_stepper_null_space
