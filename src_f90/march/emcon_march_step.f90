@@ -14,7 +14,7 @@ module emcon_march_step
    use emcon_judge, only : judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
-   use emcon_loads, only : prescribed_motion
+   use emcon_prescribed, only : prescribed_motion
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_newton, only : interrupt_interface, newton_t
    use emcon_numbering, only : gather_dependent, spread_dependent

@@ -33,13 +33,14 @@ contains
    pure subroutine linear_rows_init(self, scene)
       type(linear_rows_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
-      integer :: t, k, a, n, most
+      integer :: t, k, a, n, n_dim, most
 
+      n_dim = size(scene%x, 1)
       self%n = size(scene%equation)
       most = 0
       do t = 1, size(scene%tie)
-         self%n = self%n + 2*size(scene%tie(t)%rows%slave)
-         most = most + 2*size(scene%tie(t)%rows%node)
+         self%n = self%n + n_dim*size(scene%tie(t)%rows%slave)
+         most = most + n_dim*size(scene%tie(t)%rows%node)
       end do
       do k = 1, size(scene%equation)
          most = most + size(scene%equation(k)%node)
@@ -52,14 +53,14 @@ contains
       do t = 1, size(scene%tie)
          associate (rows => scene%tie(t)%rows)
             do k = 1, size(rows%slave)
-               do a = 1, 2
+               do a = 1, n_dim
                   n = n + 1
                   self%tie(n) = t
                   self%place(n) = k
-                  self%own(n) = 2*(rows%slave(k) - 1) + a
+                  self%own(n) = n_dim*(rows%slave(k) - 1) + a
                   self%size(n) = rows%size(k)
                   associate (from => rows%start(k) + 1, to => rows%start(k + 1))
-                     call add_row(self, n, 2*(rows%node(from:to) - 1) + a, &
+                     call add_row(self, n, n_dim*(rows%node(from:to) - 1) + a, &
                         rows%weight(from:to)/rows%size(k))
                   end associate
                end do
@@ -70,9 +71,9 @@ contains
          n = n + 1
          associate (equation => scene%equation(k))
             self%place(n) = k
-            self%own(n) = 2*(equation%node(1) - 1) + equation%dof(1)
+            self%own(n) = n_dim*(equation%node(1) - 1) + equation%dof(1)
             self%size(n) = maxval(maxval(scene%x, 2) - minval(scene%x, 2))
-            call add_row(self, n, 2*(equation%node - 1) + equation%dof, &
+            call add_row(self, n, n_dim*(equation%node - 1) + equation%dof, &
                equation%coefficient/maxval(abs(equation%coefficient)))
          end associate
       end do

@@ -6,7 +6,7 @@
 module emcon_stepper_conditions
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_loads, only : prescribed_motion
+   use emcon_prescribed, only : prescribed_motion
    use emcon_march, only : march_renumber
    use emcon_pose, only : instant_t
    use emcon_restart, only : restart_get, restart_put, restart_size, restart_t

@@ -349,13 +349,14 @@ contains
       type(constraint_set_t), intent(in) :: self
       type(numbering_t), intent(in) :: numbering
       type(csr_t), intent(inout) :: merged
-      integer :: k, i, j
+      integer :: k, i, j, n_dim
 
       do k = self%n_linear + 1, self%n
          associate (item => self%item(k))
-            if (all(abs(item%h(:2*item%n_node, :2*item%n_node)) <= 0.0_wp)) cycle
-            do j = 1, 2*item%n_node
-               do i = 1, 2*item%n_node
+            n_dim = size(item%g, 1)
+            if (all(abs(item%h(:n_dim*item%n_node, :n_dim*item%n_node)) <= 0.0_wp)) cycle
+            do j = 1, n_dim*item%n_node
+               do i = 1, n_dim*item%n_node
                   call subtract_terms(dof_of(item, i), dof_of(item, j), self%lam(k)*item%h(i, j))
                end do
             end do
@@ -388,7 +389,9 @@ contains
       type(condition_t), intent(in) :: item
       integer, intent(in) :: i
 
-      dof_of = 2*(item%node((i + 1)/2) - 1) + 2 - mod(i, 2)
+      associate (n_dim => size(item%g, 1))
+         dof_of = n_dim*(item%node((i - 1)/n_dim + 1) - 1) + mod(i - 1, n_dim) + 1
+      end associate
    end function dof_of
 
 end module emcon_constraints

@@ -25,7 +25,7 @@ module emcon_given_term
       type(force_response_t) :: answer           !! the last one
       integer, allocatable, private :: slot(:)   !! of the pattern, as `reduction_slot`
       integer, allocatable, private :: label(:)  !! (n_node)
-      real(wp), allocatable, private :: position(:, :)   !! (2, n_node) sizes of positions [L]
+      real(wp), allocatable, private :: position(:, :)   !! (n_dim, n_node) sizes of positions [L]
    contains
       procedure :: lay_out
       procedure :: begin_step
@@ -42,9 +42,10 @@ contains
       class(given_force_t), intent(in) :: force
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, k, n
+      integer :: i, k, n, n_dim
 
       self%role = role_internal
+      n_dim = size(scene%x, 1)
       n = size(scene%x, 2)
       call given_check_force(force, n, error)
       if (allocated(error)) return
@@ -55,14 +56,13 @@ contains
       associate (pattern => self%force%pattern)
          do i = 1, pattern%n_row
             do k = pattern%row_start(i) + 1, pattern%row_start(i + 1)
-               self%may_hold([(i + 1)/2, pattern%column(k)/2 + 1]) = .true.
+               self%may_hold([(i - 1)/n_dim, pattern%column(k)/n_dim] + 1) = .true.
             end do
          end do
          allocate(self%slot(size(pattern%column)), source=0)
          allocate(self%answer%tangent(size(pattern%column)), source=0.0_dp)
       end associate
-      allocate(self%answer%force(2, n), self%answer%magnitude(2, n), self%position(2, n), &
-         source=0.0_wp)
+      allocate(self%answer%force, self%answer%magnitude, self%position, source=0.0_wp*scene%x)
    end subroutine given_term_init
 
    !> The freedoms of the pattern, two by two.
@@ -198,21 +198,23 @@ contains
    !> not where it is held: there is a size to relate a residual to also without any load.
    pure subroutine complete_magnitude(pattern, force, magnitude)
       type(csr_t), intent(in) :: pattern
-      real(wp), intent(in) :: force(:, :)                !! (2, n_node)
-      real(wp), intent(inout) :: magnitude(:, :)         !! (2, n_node)
-      integer :: a, i, j, k
+      real(wp), intent(in) :: force(:, :)                !! (n_dim, n_node)
+      real(wp), intent(inout) :: magnitude(:, :)         !! (n_dim, n_node)
+      integer :: a, i, k, n_dim
 
       if (any(magnitude > 0.0_wp)) then
          magnitude = max(magnitude, abs(force))
          return
       end if
       magnitude = abs(force)
+      n_dim = size(force, 1)
       do i = 1, size(force, 2)
-         do a = 1, 2
-            do k = pattern%row_start(2*(i - 1) + a) + 1, pattern%row_start(2*(i - 1) + a + 1)
-               j = pattern%column(k)
-               magnitude(a, i) = max(magnitude(a, i), abs(force(1 + mod(j, 2), j/2 + 1)))
-            end do
+         do a = 1, n_dim
+            associate (row => n_dim*(i - 1) + a)
+               do k = pattern%row_start(row) + 1, pattern%row_start(row + 1)
+                  magnitude(a, i) = max(magnitude(a, i), abs(value_at(force, pattern%column(k))))
+               end do
+            end associate
          end do
       end do
    end subroutine complete_magnitude
@@ -221,39 +223,51 @@ contains
    pure subroutine add_rounding(pattern, tangent, position, rounding)
       type(csr_t), intent(in) :: pattern
       real(dp), intent(in) :: tangent(:)
-      real(wp), intent(in) :: position(:, :)             !! (2, n_node)
-      real(wp), intent(inout) :: rounding(:, :)          !! (2, n_node)
-      integer :: a, i, j, k
+      real(wp), intent(in) :: position(:, :)             !! (n_dim, n_node)
+      real(wp), intent(inout) :: rounding(:, :)          !! (n_dim, n_node)
+      integer :: a, i, k, n_dim
 
+      n_dim = size(position, 1)
       do i = 1, size(position, 2)
-         do a = 1, 2
-            do k = pattern%row_start(2*(i - 1) + a) + 1, pattern%row_start(2*(i - 1) + a + 1)
-               j = pattern%column(k)
-               rounding(a, i) = rounding(a, i) &
-                  + abs(real(tangent(k), wp))*position(1 + mod(j, 2), j/2 + 1)
-            end do
+         do a = 1, n_dim
+            associate (row => n_dim*(i - 1) + a)
+               do k = pattern%row_start(row) + 1, pattern%row_start(row + 1)
+                  rounding(a, i) = rounding(a, i) &
+                     + abs(real(tangent(k), wp))*value_at(position, pattern%column(k))
+               end do
+            end associate
          end do
       end do
    end subroutine add_rounding
+
+   !> Entry `column`, from 0, of a nodal field.
+   pure real(wp) function value_at(field, column)
+      real(wp), intent(in) :: field(:, :)                !! (n_dim, n_node)
+      integer, intent(in) :: column
+
+      associate (n_dim => size(field, 1))
+         value_at = field(1 + mod(column, n_dim), column/n_dim + 1)
+      end associate
+   end function value_at
 
    !> Add the tangent of a motion times `direction` to `product`, where there is one.
    subroutine tangent_times(self, motion, direction, product)
       class(given_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion                             !! placed
-      real(wp), intent(in), contiguous :: direction(:, :)              !! (2, n_node) [L]
-      real(wp), intent(inout), contiguous :: product(:, :)             !! (2, n_node) [M L/T^2]
+      real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
+      real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
       type(response_t) :: verdict
-      integer :: i, j, k
+      integer :: i, k, n_dim
 
+      n_dim = size(direction, 1)
       call ask(self, motion, .true.)
       call judge(self, verdict)
       if (allocated(verdict%refusal) .or. allocated(verdict%failure)) return
       associate (pattern => self%force%pattern)
          do i = 1, pattern%n_row
-            associate (to => product(2 - mod(i, 2), (i + 1)/2))
+            associate (to => product(1 + mod(i - 1, n_dim), (i - 1)/n_dim + 1))
                do k = pattern%row_start(i) + 1, pattern%row_start(i + 1)
-                  j = pattern%column(k)
-                  to = to + real(self%answer%tangent(k), wp)*direction(1 + mod(j, 2), j/2 + 1)
+                  to = to + real(self%answer%tangent(k), wp)*value_at(direction, pattern%column(k))
                end do
             end associate
          end do

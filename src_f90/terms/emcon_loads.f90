@@ -1,20 +1,20 @@
 !> Loads and prescribed motion of one step, as functions of time and configuration.
 module emcon_loads
-   use emcon_amplitudes, only : amplitude_t, find_amplitude_value
+   use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : instant_t
+   use emcon_prescribed, only : amplitude_at
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : space_t
-   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t, &
-      step_t
+   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t
    use emcon_term, only : response_t, role_external, term_t
    implicit none
    private
-   public :: loads_t, loads_init, prescribed_motion
+   public :: loads_t, loads_init
 
    !> Point loads, pressures and gravity of a step.
    type, extends(term_t) :: loads_t
@@ -118,17 +118,6 @@ contains
       end associate
    end function load_value
 
-   pure subroutine amplitude_at(amplitude, instant, value, rate)
-      type(amplitude_t), intent(in) :: amplitude
-      type(instant_t), intent(in) :: instant
-      real(wp), intent(out) :: value, rate
-      real(wp) :: time
-
-      time = instant%step_time
-      if (amplitude%is_total_time) time = instant%total_time
-      call find_amplitude_value(amplitude, time, value, rate)
-   end subroutine amplitude_at
-
    !> The loads of a motion, which act on it where it is placed.
    subroutine respond(self, motion, response, value, side)
       class(loads_t), intent(inout) :: self
@@ -213,32 +202,5 @@ contains
          end do
       end do
    end subroutine add_pressure_stiffness
-
-   !> Displacement and velocity of a prescribed degree of freedom at `instant`; `u_start` is its
-   !> displacement at the start of the step. The velocity is the slope to the left.
-   pure subroutine prescribed_motion(scene, step, prescribed, instant, u_start, u, v)
-      type(scene_t), intent(in) :: scene
-      type(step_t), intent(in) :: step
-      type(prescribed_t), intent(in) :: prescribed
-      type(instant_t), intent(in) :: instant
-      real(wp), intent(in) :: u_start            !! [L]
-      real(wp), intent(out) :: u                 !! [L]
-      real(wp), intent(out) :: v                 !! [L/T]
-      real(wp) :: factor, rate
-
-      v = 0.0_wp
-      if (prescribed%is_frozen) then
-         u = u_start
-      else if (prescribed%amplitude > 0) then
-         call amplitude_at(scene%amplitude(prescribed%amplitude), instant, factor, rate)
-         u = prescribed%value*factor
-         v = prescribed%value*rate
-      else if (step%scheme%loads_ramp) then
-         u = u_start + (prescribed%value - u_start) &
-            *min(1.0_wp, instant%step_time/step%duration)
-      else
-         u = prescribed%value
-      end if
-   end subroutine prescribed_motion
 
 end module emcon_loads

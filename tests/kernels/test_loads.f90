@@ -5,7 +5,7 @@ module test_loads
    use emcon_csr, only : csr_find
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_loads, only : prescribed_motion
+   use emcon_prescribed, only : prescribed_motion
    use emcon_motion, only : motion_of
    use emcon_pose, only : instant_t, pose_t
    use emcon_scene, only : scene_t

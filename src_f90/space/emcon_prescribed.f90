@@ -1,0 +1,54 @@
+!> What is prescribed as a function of time: amplitudes, and the motion of driven freedoms.
+module emcon_prescribed
+   use emcon_amplitudes, only : amplitude_t, find_amplitude_value
+   use emcon_kinds, only : wp
+   use emcon_pose, only : instant_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : prescribed_t, step_t
+   implicit none
+   private
+   public :: amplitude_at, prescribed_motion
+
+contains
+
+   !> Value and rate of an amplitude: of step time, or of total time.
+   pure subroutine amplitude_at(amplitude, instant, value, rate)
+      type(amplitude_t), intent(in) :: amplitude
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(out) :: value             !! relative
+      real(wp), intent(out) :: rate              !! its slope to the left [1/T]
+      real(wp) :: time
+
+      time = instant%step_time
+      if (amplitude%is_total_time) time = instant%total_time
+      call find_amplitude_value(amplitude, time, value, rate)
+   end subroutine amplitude_at
+
+   !> Displacement and velocity of a prescribed degree of freedom at `instant`; `u_start` is its
+   !> displacement at the start of the step. The velocity is the slope to the left.
+   pure subroutine prescribed_motion(scene, step, prescribed, instant, u_start, u, v)
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(prescribed_t), intent(in) :: prescribed
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(in) :: u_start            !! [L]
+      real(wp), intent(out) :: u                 !! [L]
+      real(wp), intent(out) :: v                 !! [L/T]
+      real(wp) :: factor, rate
+
+      v = 0.0_wp
+      if (prescribed%is_frozen) then
+         u = u_start
+      else if (prescribed%amplitude > 0) then
+         call amplitude_at(scene%amplitude(prescribed%amplitude), instant, factor, rate)
+         u = prescribed%value*factor
+         v = prescribed%value*rate
+      else if (step%scheme%loads_ramp) then
+         u = u_start + (prescribed%value - u_start) &
+            *min(1.0_wp, instant%step_time/step%duration)
+      else
+         u = prescribed%value
+      end if
+   end subroutine prescribed_motion
+
+end module emcon_prescribed
