@@ -12,8 +12,10 @@ module emcon_march
    use emcon_judge, only : judge_init, judge_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
+   use emcon_march_grid, only : grid_whole, march_count_grid, march_grid_time, march_is_done, &
+      march_set_time
    use emcon_march_parts, only : march_in_parts
-   use emcon_march_step, only : increment_t, march_t
+   use emcon_march_types, only : increment_t, march_t
    use emcon_motion, only : at_rest, motion_init, motion_of
    use emcon_newton, only : interrupt_interface, newton_init
    use emcon_numbering, only : spread_dependent
@@ -27,8 +29,7 @@ module emcon_march
    use emcon_solver_registry, only : solver_given
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_persistent, method_saddle_point, step_t
-   use emcon_system, only : system_begin_step, system_check_response, system_init, &
-      system_respond
+   use emcon_system, only : system_begin_step, system_check_response, system_init, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
@@ -38,12 +39,8 @@ module emcon_march
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
       march_resume, march_renumber, march_free, march_free_increment, march_set_time, march_watch
 
-   !> An increment is halved so often at most, unless the deck gives h_min.
-   integer, parameter :: default_levels = 12, most_levels = 24
    !> Increments without a cut after which an automatic increment is doubled.
    integer, parameter :: easy_increments = 5
-   !> Closer than this a step's duration counts as a whole number of increments.
-   real(wp), parameter :: whole = 1.0e3_wp*epsilon(1.0_wp)
    !> Fields in a deck are rounded by less than this part of their largest value.
    real(wp), parameter :: deck_rounding = 1.0e-6_wp
 
@@ -249,8 +246,8 @@ contains
             self%meant_overlap = overlap%depth
             call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
          end if
-         call count_grid(self, step)
-         if (.not. state%is_off_grid) state%step_time = grid_time(self, step, state%n_grid)
+         call march_count_grid(self, step)
+         if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
          call system_respond(self%system, motion_of(pose_at_end, scene%x, state%u, &
             at_rest(state%u)), .false.)
          call system_check_response(self%system, "at the start of the step", error)
@@ -307,48 +304,6 @@ contains
       call scheme_create(step%scheme, self%scheme, self%given_scheme(k)%scheme)
    end subroutine choose_scheme
 
-   !> Grid increments in the step, and by how much they may grow and shrink.
-   subroutine count_grid(self, step)
-      type(march_t), intent(inout) :: self
-      type(step_t), intent(in) :: step
-      real(wp) :: ratio, h_max
-
-      ratio = step%duration/step%h
-      self%n_grid = nint(ratio)
-      if (abs(ratio - real(self%n_grid, wp)) > whole*ratio) self%n_grid = ceiling(ratio)
-      self%n_grid = max(1, self%n_grid)
-      h_max = step%h_max
-      if (.not. h_max > 0.0_wp) then
-         h_max = merge(step%h, step%duration, step%scheme%masses_resist)
-      end if
-      self%most_stride = 1
-      if (.not. step%is_direct) then
-         do while (2*self%most_stride*step%h <= h_max .and. self%most_stride < self%n_grid)
-            self%most_stride = 2*self%most_stride
-         end do
-      end if
-      self%n_level = default_levels
-      if (step%h_min > 0.0_wp) then
-         self%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
-      end if
-   end subroutine count_grid
-
-   pure logical function march_is_done(self)
-      type(march_t), intent(in) :: self
-
-      march_is_done = self%state%n_grid >= self%n_grid
-   end function march_is_done
-
-   !> Time since the start of the step at grid point `n`.
-   pure real(wp) function grid_time(self, step, n)
-      type(march_t), intent(in) :: self
-      type(step_t), intent(in) :: step
-      integer, intent(in) :: n
-
-      grid_time = real(n, wp)*step%h
-      if (n >= self%n_grid) grid_time = step%duration
-   end function grid_time
-
    !> Advance by one increment; on failure the state is that of the last part that succeeded, after
    !> an interrupt that before the increment.
    subroutine march_increment(self, scene, increment, error)
@@ -374,7 +329,8 @@ contains
          if (state%is_off_grid) then
             call raise(error, err_input, "time " // to_text(state%time, 9) // " lies between " // &
                "two increments of the deck; go on to time " // to_text(state%start_time + &
-               grid_time(self, step, state%n_grid + 1), 9) // " with a step of a size of its own")
+               march_grid_time(self, step, state%n_grid + 1), 9) // &
+               " with a step of a size of its own")
             return
          end if
          stride = min(state%grid_stride, self%n_grid - state%n_grid)
@@ -392,7 +348,7 @@ contains
          end if
          state%n_grid = state%n_grid + stride
          state%increment = state%increment + 1
-         state%step_time = grid_time(self, step, state%n_grid)
+         state%step_time = march_grid_time(self, step, state%n_grid)
          state%time = state%start_time + state%step_time
          increment%n_active = count(state%is_active(self%system%first_constraint(1) + 1:))
          if (increment%n_cut > 0) then
@@ -419,10 +375,10 @@ contains
       real(wp) :: t0
 
       associate (step => scene%step(self%state%i_step))
-         t0 = grid_time(self, step, self%state%n_grid)
-         increment%h = grid_time(self, step, n_end) - t0
+         t0 = march_grid_time(self, step, self%state%n_grid)
+         increment%h = march_grid_time(self, step, n_end) - t0
          if (n_end < self%n_grid .or. abs(real(n_end, wp)*step%h - step%duration) &
-            <= whole*step%duration) increment%h = real(n_end - self%state%n_grid, wp)*step%h
+            <= grid_whole*step%duration) increment%h = real(n_end - self%state%n_grid, wp)*step%h
       end associate
       call march_in_parts(self, scene, t0, increment, error)
    end subroutine cross_grid
@@ -454,35 +410,5 @@ contains
          self%system%first_constraint(1) + 1:))
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine march_free_increment
-
-   !> Let the state be that of `time` since the start of the step [T]. What differs by no more than
-   !> the rounding of sums from a point of the grid is that point.
-   subroutine march_set_time(self, scene, time)
-      type(march_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: time               !! >= 0 [T]
-      integer :: n
-
-      associate (state => self%state, step => scene%step(self%state%i_step))
-         n = self%n_grid
-         if (time < step%duration) n = min(n, nint(time/step%h))
-         if (n == self%n_grid - 1 .and. is_same(time, step%duration)) n = self%n_grid
-         state%is_off_grid = .not. is_same(time, grid_time(self, step, n))
-         state%step_time = time
-         if (.not. state%is_off_grid) state%step_time = grid_time(self, step, n)
-         if (state%step_time < grid_time(self, step, n)) n = n - 1
-         state%n_grid = n
-         state%time = state%start_time + state%step_time
-      end associate
-
-   contains
-
-      pure logical function is_same(a, b)
-         real(wp), intent(in) :: a, b
-
-         is_same = abs(a - b) <= whole*b
-      end function is_same
-
-   end subroutine march_set_time
 
 end module emcon_march

@@ -4,7 +4,8 @@ module emcon_march_parts
       step_overlaps, step_refused, step_singular, step_stands_off, step_too_far
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_march_step, only : cycling_text, increment_t, march_step, march_t, part_t
+   use emcon_march_step, only : cycling_text, march_step
+   use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_rigid_motion, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_system, only : system_may_hold

@@ -8,7 +8,7 @@ module emcon_stepper_free
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
       march_set_time
-   use emcon_march_step, only : follow_links
+   use emcon_march_guess, only : follow_links
    use emcon_motion, only : at_rest, motion_of
    use emcon_pair_record, only : pair_record_init
    use emcon_pose, only : pose_at_end

@@ -6,7 +6,7 @@ module emcon_stepper_null_space
    use emcon_csr_product, only : csr_product
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_march_step, only : follow_links
+   use emcon_march_guess, only : follow_links
    use emcon_null_space, only : null_space_matrices, null_space_multipliers, &
       null_space_particular, obstacle_none, obstacle_redundant
    use emcon_numbering, only : gather_dependent, numbering_matrix, pick_unknowns

@@ -14,7 +14,7 @@ module emcon_stepper_query
    use emcon_ledger, only : body_momenta
    use emcon_motion, only : at_rest, motion_place
    use emcon_march, only : march_free, march_init, march_resume, march_t
-   use emcon_march_step, only : follow_links, march_guess
+   use emcon_march_guess, only : follow_links, march_guess
    use emcon_null_space, only : null_space_free, null_space_t
    use emcon_numbering, only : pick_unknowns
    use emcon_pose, only : instant_t

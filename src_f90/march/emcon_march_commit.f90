@@ -1,0 +1,167 @@
+!> What follows from a solved step: velocities, works, forces, and what the user is told.
+module emcon_march_commit
+   use emcon_constraints, only : constraints_force
+   use emcon_correction, only : correction_reason
+   use emcon_errors, only : error_t
+   use emcon_holding, only : holding_t
+   use emcon_kinds, only : wp
+   use emcon_march_guess, only : follow_links
+   use emcon_march_types, only : ending_t, increment_t, march_t
+   use emcon_numbering, only : gather_dependent
+   use emcon_pair_record, only : pair_record_measure
+   use emcon_pose, only : pose_velocity
+   use emcon_scene, only : scene_t
+   use emcon_stand_off, only : stand_off_add
+   use emcon_steps, only : initiation_velocity_update
+   use emcon_term, only : role_external, role_inertia, role_internal
+   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_velocity_update, only : velocity_update_apply
+   implicit none
+   private
+   public :: march_commit
+
+contains
+
+   !> Take over the solved step: works, velocities, contact and reaction forces.
+   subroutine march_commit(self, scene, h, ending, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      type(ending_t), intent(in) :: ending
+      type(increment_t), intent(inout) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i, a, k
+
+      associate (state => self%state, system => self%system, set => self%active%set)
+         system%response%residual = system%response%residual - self%newton%contact
+         call gather_dependent(system%space%numbering, system%response%residual)
+         call book_stabilization(self, increment)
+         do i = 1, size(state%v, 2)
+            do a = 1, size(state%v, 1)
+               if (system%space%numbering%unknown(a, i) > 0) then
+                  self%v1(a, i) = pose_velocity(self%motion%pose, state%v(a, i), &
+                     self%motion%du(a, i))
+                  system%response%residual(a, i) = 0.0_wp
+               end if
+            end do
+         end do
+         call follow_links(system, self%v1)
+         state%reaction = system%response%residual
+         if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
+         call book_work(self)
+         if (scene%step(state%i_step)%initiation == initiation_velocity_update &
+            .and. self%scheme%row%masses_resist) call restore_energy(self, increment%notes, error)
+         if (allocated(error)) return
+         state%u = state%u + self%motion%du
+         state%v = self%v1
+         state%contact = self%newton%contact
+         call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
+            merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist))
+         state%internal = ending%force
+         state%energy = ending%energy
+         state%potential = ending%potential
+         if (self%newton%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
+            trim(correction_reason(self%newton%correction)) // ": solved as a saddle point")
+         call stand_off_add(increment%stand_off, system, set, h)
+         increment%is_guarded = increment%is_guarded .or. &
+            any(set%id > system%first_constraint(system%n_pair + 1))
+         increment%residual = self%newton%history(:self%newton%n_history)
+         if (self%newton%last > self%newton%tolerance .and. .not. self%newton%is_idle) then
+            increment%unconverged = max(increment%unconverged, self%newton%last)
+            call note_add(increment%notes, "a relative residual of " // &
+               to_text(self%newton%last, 3) // " is accepted as round-off")
+         end if
+         state%is_active = .false.
+         state%lam = 0.0_wp
+         do k = 1, set%n
+            state%is_active(set%id(k)) = .true.
+            state%lam(set%id(k)) = set%lam(k)
+         end do
+      end associate
+   end subroutine march_commit
+
+   !> Give back by a jump of the velocities what closing contacts have taken.
+   subroutine restore_energy(self, notes, error)
+      type(march_t), intent(inout) :: self
+      type(notes_t), intent(inout) :: notes      !! for the log
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: restored
+      logical :: has_root
+
+      call velocity_update_apply(self%velocity_update, self%system, self%active%set, self%v1, &
+         restored, has_root, error)
+      if (allocated(error)) return
+      self%ledger%contact_work = self%ledger%contact_work + restored
+      if (restored > 0.0_wp) call note_add(notes, "velocity update restores an energy of " // &
+         to_text(restored))
+      if (.not. has_root) call note_add(notes, &
+         "velocity update: no root, the energy lost in this step is not restored")
+   end subroutine restore_energy
+
+   !> Tell of what moves with nothing to hold it, and of what was brought into contact without load.
+   !> The stiffness of STABILIZE is in the tangent alone: it bears what the balance leaves over.
+   subroutine book_stabilization(self, increment)
+      type(march_t), intent(inout) :: self
+      type(increment_t), intent(inout) :: increment
+      integer :: i, a
+
+      associate (holding => self%active%holding, system => self%system)
+         if (.not. holding%is_needed) return
+         if (any(holding%brought > 0.0_wp .and. self%active%is_active)) call note_add( &
+            increment%warnings, holding%brought_text // ", on which no load does work: moved " // &
+            "over a gap of " // to_text(maxval(holding%brought, mask=self%active%is_active), 3) &
+            // " onto the surface nearest to it")
+         if (.not. allocated(holding%text)) return
+         call tell_stabilized(self%active%holding, increment)
+         do i = 1, size(self%motion%du, 2)
+            do a = 1, size(self%motion%du, 1)
+               if (system%space%numbering%unknown(a, i) == 0) cycle
+               self%ledger%stabilization = self%ledger%stabilization &
+                  - system%response%residual(a, i)*self%motion%du(a, i)
+            end do
+         end do
+      end associate
+   end subroutine book_stabilization
+
+   !> Tell once in a step of a body that moves with nothing to hold it.
+   subroutine tell_stabilized(holding, increment)
+      type(holding_t), intent(inout) :: holding
+      type(increment_t), intent(inout) :: increment
+      integer :: n
+
+      n = index(holding%text, " free to ")
+      if (allocated(holding%told)) then
+         if (holding%told == holding%text(:n)) return
+      end if
+      holding%told = holding%text(:n)
+      call note_add(increment%warnings, holding%text // ", on which no load does work: the " // &
+         "smallest motion is taken, as STABILIZE asks for")
+   end subroutine tell_stabilized
+
+   !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
+   !> docs/theory.md, eq. (23)); in statics forces are taken as linear over the step.
+   subroutine book_work(self)
+      type(march_t), intent(inout) :: self
+      real(wp) :: contact_work
+      integer :: k
+
+      associate (state => self%state, part => self%system%response%part, &
+            set => self%active%set, motion => self%motion)
+         contact_work = 0.0_wp
+         if (self%scheme%row%masses_resist) then
+            do k = 1, set%n
+               contact_work = contact_work + set%lam(k)*set%item(k)%dgap
+            end do
+            self%ledger%external_work = self%ledger%external_work &
+               + sum(part(role_external)%force*motion%du) + sum(state%reaction*motion%du) &
+               + sum(part(role_inertia)%force*motion%offset)
+         else
+            contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*motion%du)
+            self%ledger%external_work = self%ledger%external_work - contact_work &
+               + 0.5_wp*sum((state%internal + part(role_internal)%force)*motion%du)
+         end if
+         self%ledger%contact_work = self%ledger%contact_work + contact_work
+      end associate
+   end subroutine book_work
+
+end module emcon_march_commit

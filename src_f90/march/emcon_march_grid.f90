@@ -1,0 +1,91 @@
+!> The grid of increments of a step: times are counted in integers, and meet its end exactly.
+module emcon_march_grid
+   use emcon_kinds, only : wp
+   use emcon_march_types, only : march_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : step_t
+   implicit none
+   private
+   public :: march_count_grid, march_grid_time, march_is_done, march_set_time, grid_whole
+
+   !> An increment is halved so often at most, unless the deck gives h_min.
+   integer, parameter :: default_levels = 12, most_levels = 24
+   !> Closer than this a step's duration counts as a whole number of increments.
+   real(wp), parameter :: grid_whole = 1.0e3_wp*epsilon(1.0_wp)
+
+contains
+
+   !> Grid increments in the step, and by how much they may grow and shrink.
+   subroutine march_count_grid(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      real(wp) :: ratio, h_max
+
+      ratio = step%duration/step%h
+      self%n_grid = nint(ratio)
+      if (abs(ratio - real(self%n_grid, wp)) > grid_whole*ratio) self%n_grid = ceiling(ratio)
+      self%n_grid = max(1, self%n_grid)
+      h_max = step%h_max
+      if (.not. h_max > 0.0_wp) then
+         h_max = merge(step%h, step%duration, step%scheme%masses_resist)
+      end if
+      self%most_stride = 1
+      if (.not. step%is_direct) then
+         do while (2*self%most_stride*step%h <= h_max .and. self%most_stride < self%n_grid)
+            self%most_stride = 2*self%most_stride
+         end do
+      end if
+      self%n_level = default_levels
+      if (step%h_min > 0.0_wp) then
+         self%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
+      end if
+   end subroutine march_count_grid
+
+   !> Is the last increment of the step done?
+   pure logical function march_is_done(self)
+      type(march_t), intent(in) :: self
+
+      march_is_done = self%state%n_grid >= self%n_grid
+   end function march_is_done
+
+   !> Time since the start of the step at grid point `n`.
+   pure real(wp) function march_grid_time(self, step, n)
+      type(march_t), intent(in) :: self
+      type(step_t), intent(in) :: step
+      integer, intent(in) :: n                   !! >= 0
+
+      march_grid_time = real(n, wp)*step%h
+      if (n >= self%n_grid) march_grid_time = step%duration
+   end function march_grid_time
+
+   !> Let the state be that of `time` since the start of the step [T]. What differs by no more than
+   !> the rounding of sums from a point of the grid is that point.
+   subroutine march_set_time(self, scene, time)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: time               !! >= 0 [T]
+      integer :: n
+
+      associate (state => self%state, step => scene%step(self%state%i_step))
+         n = self%n_grid
+         if (time < step%duration) n = min(n, nint(time/step%h))
+         if (n == self%n_grid - 1 .and. is_same(time, step%duration)) n = self%n_grid
+         state%is_off_grid = .not. is_same(time, march_grid_time(self, step, n))
+         state%step_time = time
+         if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, n)
+         if (state%step_time < march_grid_time(self, step, n)) n = n - 1
+         state%n_grid = n
+         state%time = state%start_time + state%step_time
+      end associate
+
+   contains
+
+      pure logical function is_same(a, b)
+         real(wp), intent(in) :: a, b
+
+         is_same = abs(a - b) <= grid_whole*b
+      end function is_same
+
+   end subroutine march_set_time
+
+end module emcon_march_grid

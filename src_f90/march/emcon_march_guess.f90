@@ -1,0 +1,67 @@
+!> The first guess of a step: prescribed motion, and what the velocities lead to.
+module emcon_march_guess
+   use emcon_kinds, only : wp
+   use emcon_march_types, only : march_t
+   use emcon_numbering, only : spread_dependent
+   use emcon_pose, only : instant_later, instant_t, pose_way
+   use emcon_prescribed, only : prescribed_motion
+   use emcon_scene, only : scene_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: march_guess, follow_links
+
+contains
+
+   !> First guess of the motion, and the motion and velocity of prescribed freedoms, with the offset
+   !> of docs/theory.md, eq. (4).
+   subroutine march_guess(self, scene, start, h, is_at_rest)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      logical, intent(in) :: is_at_rest          !! free nodes do not move in the guess
+      type(instant_t) :: finish
+      real(wp) :: u, v
+      integer :: k
+
+      finish = instant_later(start, h)
+      self%motion%pose = self%scheme%pose(start, h)
+      self%motion%u0 = self%state%u
+      self%motion%v0 = self%state%v
+      self%motion%offset = 0.0_wp
+      self%motion%du = 0.0_wp
+      if (self%scheme%row%masses_resist .and. .not. is_at_rest) self%motion%du = h*self%state%v
+      where (.not. self%system%space%is_alive) self%motion%du = 0.0_wp
+      self%newton%driven = 0.0_wp
+      associate (state => self%state, step => scene%step(self%state%i_step))
+         do k = 1, size(step%prescribed)
+            associate (a => step%prescribed(k)%dof, i => step%prescribed(k)%node)
+               call prescribed_motion(scene, step, step%prescribed(k), finish, &
+                  state%u_start(a, i), u, v)
+               self%motion%du(a, i) = u - state%u(a, i)
+               self%v1(a, i) = v
+               if (self%scheme%row%masses_resist) then
+                  self%motion%offset(a, i) = pose_way(self%motion%pose, state%v(a, i), v) &
+                     - self%motion%du(a, i)
+               else
+                  self%newton%driven(a, i) = self%motion%du(a, i)
+               end if
+            end associate
+         end do
+      end associate
+      call follow_links(self%system, self%motion%du)
+      call follow_links(self%system, self%motion%offset)
+      call follow_links(self%system, self%newton%driven)
+   end subroutine march_guess
+
+   !> Let dependent entries of a motion follow the others, also where `numbering` does not know
+   !> them: with multipliers they have to move in the same way.
+   subroutine follow_links(system, field)
+      type(system_t), intent(in) :: system
+      real(wp), intent(inout), contiguous :: field(:, :)     !! (n_dim, n_node)
+
+      if (system%linear%n > 0) call spread_dependent(system%space%linked, field)
+   end subroutine follow_links
+
+end module emcon_march_guess

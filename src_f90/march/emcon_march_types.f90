@@ -1,0 +1,80 @@
+!> What a march through time holds, what one increment took, and what a step is.
+module emcon_march_types
+   use emcon_active_set, only : active_set_t
+   use emcon_given_scheme, only : given_scheme_t
+   use emcon_judge, only : judge_t, overlap_t
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_t
+   use emcon_motion, only : motion_t
+   use emcon_newton, only : interrupt_interface, newton_t
+   use emcon_pose, only : instant_t
+   use emcon_scheme, only : scheme_t
+   use emcon_sparse_solver, only : solver_box_t
+   use emcon_stand_off, only : stand_off_t
+   use emcon_state, only : state_t
+   use emcon_system, only : system_t
+   use emcon_text, only : notes_t
+   use emcon_timer, only : stopwatch_t
+   use emcon_velocity_update, only : velocity_update_t
+   implicit none
+   private
+   public :: march_t, increment_t, part_t, ending_t
+
+   !> What one increment took.
+   type :: increment_t
+      real(wp) :: h = 0.0_wp
+      real(wp) :: done = 0.0_wp                  !! part of `h` that the state has gone on by
+      integer :: n_newton = 0                    !! iterations, over all cuts and active sets
+      integer :: n_cut = 0
+      integer :: n_active = 0
+      logical :: is_guarded = .false.            !! guards act in it
+      integer :: n_held = 0                      !! contacts held closed that come and go
+      type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge
+      type(stand_off_t) :: stand_off             !! air across which contact forces act
+      real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
+      !> Largest relative residual above Newton's tolerance that was accepted; 0: there is none.
+      real(wp) :: unconverged = 0.0_wp
+      type(notes_t) :: notes                     !! for the log
+      type(notes_t) :: warnings                  !! for the log, the user and the verdict
+   end type increment_t
+
+   !> What the elements and the given forces have come to at the end of a step.
+   type :: ending_t
+      real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) internal forces [M L/T^2]
+      real(wp), allocatable :: energy(:)         !! (n_element) [M L^2/T^2]
+      real(wp) :: potential = 0.0_wp             !! of the given forces [M L^2/T^2]
+   end type ending_t
+
+   !> The part of an increment that is one step.
+   type :: part_t
+      type(instant_t) :: start
+      real(wp) :: h = 0.0_wp                     !! > 0 [T]
+      logical :: may_cut = .false.               !! smaller ones are possible
+   end type part_t
+
+   type :: march_t
+      type(system_t) :: system
+      type(state_t) :: state
+      type(ledger_t) :: ledger
+      class(scheme_t), allocatable :: scheme
+      type(given_scheme_t), allocatable :: given_scheme(:)   !! (any) by the program
+      type(newton_t) :: newton
+      type(active_set_t) :: active
+      type(velocity_update_t) :: velocity_update
+      type(solver_box_t), allocatable :: solver(:)   !! that a program has given
+      type(notes_t) :: warnings                  !! to be told with the next increment
+      type(judge_t) :: judge
+      type(stopwatch_t) :: judge_clock
+      !> Overlap per edge with which a step began that resolves it
+      real(wp) :: meant_overlap = 0.0_wp
+      integer :: n_grid = 0                      !! grid increments in the step
+      integer :: most_stride = 1                 !! largest increment, in grid increments
+      integer :: n_level = 0                     !! halvings allowed
+      integer :: revision = 0                    !! changes with the numbering of the unknowns
+      type(motion_t) :: motion                   !! of the step
+      real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity at its end
+      !> Asked before each iteration, if there is one.
+      procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
+   end type march_t
+
+end module emcon_march_types
