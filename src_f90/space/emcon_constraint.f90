@@ -27,6 +27,8 @@ module emcon_constraint
    type, abstract :: constraint_t
       character(len=:), allocatable :: name           !! for messages
       integer :: n_constraint = 0                     !! number of conditions
+      !> Nodes whose bodies it may hold, for the check of static steps; not allocated: of none
+      integer, allocatable :: stands_on(:)
    contains
       procedure :: take_positions
       procedure(linearise_interface), deferred :: linearise

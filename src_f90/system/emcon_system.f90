@@ -181,7 +181,7 @@ contains
       type(csr_t) :: mass
       integer :: i, k
 
-      call system_may_hold(self, may_hold)
+      call terms_may_hold(self%term, may_hold)
       if (.not. any(may_hold)) return
       call terms_mass(self%term, mass)
       do i = 1, size(may_hold)
@@ -197,15 +197,28 @@ contains
    end subroutine check_mass
 
    !> The nodes whose bodies forces may hold that are not those of elements.
+   pure subroutine terms_may_hold(term, may_hold)
+      type(term_box_t), intent(in) :: term(:)
+      logical, intent(out) :: may_hold(:)        !! (n_node)
+      integer :: k
+
+      may_hold = .false.
+      do k = 1, size(term)
+         if (allocated(term(k)%term%may_hold)) may_hold = may_hold .or. term(k)%term%may_hold
+      end do
+   end subroutine terms_may_hold
+
+   !> The nodes whose bodies such forces may hold, or constraints beside those of the deck.
    pure subroutine system_may_hold(self, may_hold)
       type(system_t), intent(in) :: self
       logical, intent(out) :: may_hold(:)        !! (n_node)
       integer :: k
 
-      may_hold = .false.
-      do k = 1, size(self%term)
-         if (allocated(self%term(k)%term%may_hold)) &
-            may_hold = may_hold .or. self%term(k)%term%may_hold
+      call terms_may_hold(self%term, may_hold)
+      do k = 1, size(self%held)
+         associate (constraint => self%held(k)%constraint)
+            if (allocated(constraint%stands_on)) may_hold(constraint%stands_on) = .true.
+         end associate
       end do
    end subroutine system_may_hold
 

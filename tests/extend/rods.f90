@@ -22,6 +22,7 @@ contains
       class(rods_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)
 
+      self%stands_on = reshape(self%node, [size(self%node)])
       self%length = norm2(x(:, self%node(2, :)) - x(:, self%node(1, :)), 1)
    end subroutine take_positions
 

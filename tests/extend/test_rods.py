@@ -77,6 +77,34 @@ BOB, WALL
 BOB, GRAV, 10., 0., -1.
 *END STEP
 """
+# A block that nothing but three rods holds, in statics.
+HUNG = """*NODE, NSET=ALL
+1, 0., 3.
+2, 0., 0.
+3, 1., 0.
+4, 1., 1.
+5, 0., 1.
+6, 1., 3.
+*ELEMENT, TYPE=CPE4, ELSET=BLOCK
+1, 2, 3, 4, 5
+*MATERIAL, NAME=STUFF
+*HYPERELASTIC, COUPLED NEO HOOKE
+1000., 0.3
+*DENSITY
+1.
+*SOLID SECTION, ELSET=BLOCK, MATERIAL=STUFF
+*GIVEN FORCES
+*BOUNDARY
+1, 1, 2
+6, 1, 2
+*STEP, NLGEOM
+*STATIC
+1., 1.
+*CONSTRAINT METHOD, TYPE=<method>
+*DLOAD
+BLOCK, GRAV, 10., 0., -1.
+*END STEP
+"""
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +135,17 @@ def test_rods_keep_their_length_and_do_no_work(program: tuple[Path, dict[str, st
     assert drift <= 4*EPS*work*n_step              # some roundings a step
     assert work > 1                                # it falls
     assert (n_active > 0) == touches
+
+
+@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
+def test_rods_hold_a_body_in_statics(program: tuple[Path, dict[str, str]], tmp_path: Path,
+                                     method: str) -> None:
+    deck = tmp_path/"hung.inp"
+    deck.write_text(HUNG.replace("<method>", method))
+    out = run(program[0], deck, *"1  1 5  6 4  1 4".split(), env=program[1])
+    strain, _, work, _ = map(float, out.split())
+    assert strain <= 16*EPS
+    assert 0 < work < 0.1                          # it sags by less than a hundredth
 
 
 def test_a_constraint_without_conditions_is_refused(program: tuple[Path, dict[str, str]],
