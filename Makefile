@@ -169,7 +169,7 @@ $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 
 # What holds whole models and computes nothing: optimising how those are freed takes half of the
 # time of the library. `private`: what is made on the way keeps its own flags.
-HOLDERS := $(addprefix emcon_,handle run stepper stepper_query)
+HOLDERS := $(addprefix emcon_,c handle run stepper stepper_query)
 $(HOLDERS:%=$(O)/%.o): private FFLAGS_release := -O0 -g1
 
 # The kernel tests are compiled once, with all checks: those of `debug` are these with its library.

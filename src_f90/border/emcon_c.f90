@@ -2,18 +2,19 @@
 !> emcon.h.
 module emcon_c
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, &
-      c_f_procpointer, c_funptr, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
-   use emcon_c_border, only : address_of, as_increment, c_string, check_given, f_text, find_built, &
-      find_model, find_read, put_increment, put_number
+      c_f_procpointer, c_funptr, c_int, c_loc, c_null_ptr, c_ptr
+   use emcon_c_border, only : as_increment, c_string, check_given, f_text, put_increment, &
+      put_number
    use emcon_c_types, only : log_interface, progress_interface
    use emcon_deck_source, only : passage_t
    use emcon_errors, only : err_input, err_interrupt, err_none, error_t, raise
-   use emcon_handle, only : handle_build, handle_fail, handle_free, handle_new, handle_pass, &
-      handle_read, handle_read_passages, handle_read_text, model_t
+   use emcon_handle, only : find_built, find_model, find_read, handle_fail, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_run_log, only : model_lines
-   use emcon_stepper, only : stepper_advance, stepper_fraction, stepper_is_done
+   use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_fraction, &
+      stepper_is_done, stepper_read, stepper_read_text
+   use emcon_stepper_query, only : query_free
    use emcon_text, only : string_t
    use emcon_version, only : version
    implicit none
@@ -44,13 +45,13 @@ contains
       type(c_ptr), intent(in) :: place
       type(model_t), pointer, intent(out) :: model
       type(c_ptr), pointer :: handle
-      integer(c_int) :: ierr
 
       model => null()
       if (.not. c_associated(place)) return
       call c_f_pointer(place, handle)
-      handle = transfer(handle_new(), c_null_ptr)
-      call find_model(handle, model, ierr)
+      allocate(model)
+      model%message = ""
+      handle = c_loc(model)
    end subroutine new_handle
 
    integer(c_int) function emcon_read(deck, parameters, is_lenient, handle) bind(c)
@@ -63,9 +64,9 @@ contains
       call new_handle(handle, model)
       if (.not. associated(model)) return
       call check_given("deck", deck, error)
-      call handle_pass(model, error, emcon_read)
-      if (emcon_read == err_none) call handle_read(address_of(c_loc(model)), f_text(deck), &
-         f_text(parameters), is_lenient /= 0, emcon_read)
+      if (.not. allocated(error)) call stepper_read(model%stepper, trim(f_text(deck)), &
+         lines_of(f_text(parameters)), is_lenient /= 0, error)
+      call pass_read(model, error, emcon_read)
    end function emcon_read
 
    integer(c_int) function emcon_read_text(text, name, parameters, is_lenient, handle) bind(c)
@@ -79,9 +80,10 @@ contains
       if (.not. associated(model)) return
       call check_given("text", text, error)
       call check_given("name", name, error)
-      call handle_pass(model, error, emcon_read_text)
-      if (emcon_read_text == err_none) call handle_read_text(address_of(c_loc(model)), &
-         f_text(text), f_text(name), f_text(parameters), is_lenient /= 0, emcon_read_text)
+      if (.not. allocated(error)) call stepper_read_text(model%stepper, f_text(text), &
+         [passage_t()], lines_of(f_text(name)), lines_of(f_text(parameters)), is_lenient /= 0, &
+         error)
+      call pass_read(model, error, emcon_read_text)
    end function emcon_read_text
 
    integer(c_int) function emcon_read_passages(text, n_passage, passage, names, parameters, &
@@ -101,20 +103,59 @@ contains
       call check_given("names", names, error)
       if (.not. allocated(error) .and. n_passage < 1) call raise(error, err_input, &
          "n_passage is not above 0")
-      call handle_pass(model, error, emcon_read_passages)
-      if (emcon_read_passages /= err_none) return
-      call c_f_pointer(passage, at, [4, int(n_passage)])
-      call handle_read_passages(address_of(c_loc(model)), f_text(text), &
-         [(passage_t(at(1, k), at(2, k), at(3, k), at(4, k) /= 0), k = 1, n_passage)], &
-         f_text(names), f_text(parameters), is_lenient /= 0, emcon_read_passages)
+      if (.not. allocated(error)) then
+         call c_f_pointer(passage, at, [4, int(n_passage)])
+         call stepper_read_text(model%stepper, f_text(text), [(passage_t(at(1, k), at(2, k), &
+            at(3, k), at(4, k) /= 0), k = 1, n_passage)], lines_of(f_text(names)), &
+            lines_of(f_text(parameters)), is_lenient /= 0, error)
+      end if
+      call pass_read(model, error, emcon_read_passages)
    end function emcon_read_passages
+
+   !> After a failure the message holds all that is wrong with the deck, one per line.
+   subroutine pass_read(model, error, ierr)
+      type(model_t), intent(inout) :: model
+      type(error_t), allocatable, intent(in) :: error
+      integer(c_int), intent(out) :: ierr
+      integer :: i
+
+      call handle_pass(model, error, ierr)
+      if (.not. (allocated(error) .and. allocated(model%stepper%diagnostic))) return
+      associate (text => model%stepper%diagnostic)
+         do i = 1, size(text)
+            if (text(i)%text /= error%message) model%message = model%message // new_line("a") // &
+               text(i)%text
+         end do
+      end associate
+   end subroutine pass_read
+
+   !> The lines of a text.
+   function lines_of(text) result(line)
+      character(len=*), intent(in) :: text
+      type(string_t), allocatable :: line(:)
+      type(string_t) :: new(1)
+      integer :: first, last
+
+      allocate(line(0))
+      first = 1
+      do while (first <= len_trim(text))
+         last = index(text(first:), new_line("a"))
+         if (last == 0) last = len_trim(text) - first + 2
+         new(1)%text = text(first:first + last - 2)
+         line = [line, new]
+         first = first + last
+      end do
+   end function lines_of
 
    integer(c_int) function emcon_build(handle) bind(c)
       type(c_ptr), value :: handle
       type(model_t), pointer :: model
+      type(error_t), allocatable :: error
 
       call find_read(handle, model, emcon_build)
-      if (emcon_build == err_none) call handle_build(address_of(handle), emcon_build)
+      if (emcon_build /= err_none) return
+      call stepper_build(model%stepper, error)
+      call handle_pass(model, error, emcon_build)
    end function emcon_build
 
    integer(c_int) function emcon_open(deck, parameters, is_lenient, handle) bind(c)
@@ -130,8 +171,14 @@ contains
 
    subroutine emcon_close(handle) bind(c)
       type(c_ptr), value :: handle
+      type(model_t), pointer :: model
+      integer(c_int) :: ierr
 
-      call handle_free(address_of(handle))
+      call find_model(handle, model, ierr)
+      if (.not. associated(model)) return
+      call query_free(model%query)
+      call stepper_close(model%stepper)
+      deallocate(model)
    end subroutine emcon_close
 
    type(c_ptr) function emcon_message(handle) bind(c)

@@ -1,21 +1,21 @@
-!> What all functions of the C interface share: the model of a handle, and texts, arrays and
-!> matrices on their way over the border.
+!> What all functions of the C interface share: texts, arrays and matrices on their way over the
+!> border.
 !>
 !> One rule for all: an output that is NULL is left out; so is an input where the header says so,
 !> and the Fortran side then has an array that is not allocated.
 module emcon_c_border
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, c_int, &
-      c_int64_t, c_loc, c_null_char, c_ptr, c_size_t
+      c_loc, c_null_char, c_ptr, c_size_t
    use emcon_c_types, only : csr_c, increment_c
    use emcon_csr, only : csr_t
-   use emcon_errors, only : err_input, err_none, error_t, raise
-   use emcon_handle, only : handle_fail, handle_find, model_t
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_handle, only : model_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_text, only : to_text
    implicit none
    private
-   public :: find_model, find_read, find_built, address_of, check_count, check_given
+   public :: check_count, check_given
    public :: n_nodes, n_constraints, take_field, take_values, take_flags, take_numbers
    public :: put_field, put_values, put_numbers, put_number
    public :: put_increment, as_increment, show_matrix, put_matrix, f_text, c_string
@@ -28,46 +28,6 @@ module emcon_c_border
    end interface
 
 contains
-
-   !> The address that a C handle is.
-   pure integer(c_int64_t) function address_of(handle)
-      type(c_ptr), intent(in) :: handle
-
-      address_of = transfer(handle, 0_c_int64_t)
-   end function address_of
-
-   !> The model of a handle; null, and an error code, for NULL.
-   subroutine find_model(handle, model, ierr)
-      type(c_ptr), intent(in) :: handle
-      type(model_t), pointer, intent(out) :: model
-      integer(c_int), intent(out) :: ierr
-
-      call handle_find(address_of(handle), model, ierr)
-   end subroutine find_model
-
-   !> The same for a model whose deck was read.
-   subroutine find_read(handle, model, ierr)
-      type(c_ptr), intent(in) :: handle
-      type(model_t), pointer, intent(out) :: model
-      integer(c_int), intent(out) :: ierr
-
-      call find_model(handle, model, ierr)
-      if (ierr /= err_none) return
-      if (.not. model%stepper%is_read) call handle_fail(model, &
-         "there is no scene: reading the deck or building its model failed", err_input, ierr)
-   end subroutine find_read
-
-   !> The same for a model that was built.
-   subroutine find_built(handle, model, ierr)
-      type(c_ptr), intent(in) :: handle
-      type(model_t), pointer, intent(out) :: model
-      integer(c_int), intent(out) :: ierr
-
-      call find_read(handle, model, ierr)
-      if (ierr /= err_none) return
-      if (.not. allocated(model%stepper%march%scheme)) call handle_fail(model, &
-         "the model is not built yet: call emcon_build", err_input, ierr)
-   end subroutine find_built
 
    pure integer function n_nodes(model)
       type(model_t), intent(in) :: model

@@ -2,9 +2,9 @@
 !> emcon.h.
 module emcon_c_conditions
    use, intrinsic :: iso_c_binding, only : c_double, c_int, c_ptr
-   use emcon_c_border, only : find_built, put_number
+   use emcon_c_border, only : put_number
    use emcon_errors, only : err_none, error_t
-   use emcon_handle, only : handle_pass, model_t
+   use emcon_handle, only : find_built, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_stepper, only : stepper_t
    use emcon_stepper_conditions, only : stepper_add_prescribed, stepper_find_load, &

@@ -3,13 +3,13 @@
 module emcon_c_contact
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, &
       c_null_ptr, c_ptr
-   use emcon_c_border, only : check_count, check_given, find_built, n_constraints, n_nodes, &
-      put_field, put_matrix, put_number, put_numbers, put_values, show_matrix, take_field, &
-      take_flags, take_numbers, take_values
+   use emcon_c_border, only : check_count, check_given, n_constraints, n_nodes, put_field, &
+      put_matrix, put_number, put_numbers, put_values, show_matrix, take_field, take_flags, &
+      take_numbers, take_values
    use emcon_c_types, only : constraint_report_c, gap_c
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : err_analysis, err_none, error_t, raise
-   use emcon_handle, only : at_curvature, at_df, at_p, handle_pass, model_t
+   use emcon_handle, only : at_curvature, at_df, at_p, find_built, handle_pass, model_t
    use emcon_judge, only : overlap_t
    use emcon_kinds, only : wp
    use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &

@@ -2,12 +2,12 @@
 !> said in emcon.h.
 module emcon_c_given
    use, intrinsic :: iso_c_binding, only : c_double, c_f_pointer, c_funptr, c_int, c_ptr
-   use emcon_c_border, only : check_given, f_text, find_read
+   use emcon_c_border, only : check_given, f_text
    use emcon_c_types, only : csr_c
    use emcon_callbacks, only : give_force_callback, give_law_callback, give_potential_callback
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, err_none, error_t, raise
-   use emcon_handle, only : handle_pass, model_t
+   use emcon_handle, only : find_read, handle_pass, model_t
    use emcon_kinds, only : dp
    use emcon_stepper_given, only : stepper_give_mass
    implicit none

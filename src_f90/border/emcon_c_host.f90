@@ -3,11 +3,11 @@
 module emcon_c_host
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_ptr
    use emcon_c, only : new_handle
-   use emcon_c_border, only : check_count, check_given, f_text, find_built, find_read, n_nodes, &
-      put_field, put_matrix, put_number, take_field, take_flags, take_numbers
+   use emcon_c_border, only : check_count, check_given, f_text, n_nodes, put_field, put_matrix, &
+      put_number, take_field, take_flags, take_numbers
    use emcon_c_types, only : contact_settings_c, pair_options_c
    use emcon_errors, only : err_input, err_none, error_t, raise
-   use emcon_handle, only : at_d, at_m, handle_pass, model_t
+   use emcon_handle, only : at_d, at_m, find_built, find_read, handle_pass, model_t
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &

@@ -1,10 +1,10 @@
 !> The C interface: what the engine computes for a step. What each function does is said in emcon.h.
 module emcon_c_query
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_int, c_ptr
-   use emcon_c_border, only : check_count, check_given, find_built, n_constraints, n_nodes, &
-      put_field, put_matrix, put_numbers, put_values, take_field, take_flags, take_values
+   use emcon_c_border, only : check_count, check_given, n_constraints, n_nodes, put_field, &
+      put_matrix, put_numbers, put_values, take_field, take_flags, take_values
    use emcon_errors, only : err_none, error_t
-   use emcon_handle, only : at_links, at_mass, at_tangent, handle_pass, model_t
+   use emcon_handle, only : at_links, at_mass, at_tangent, find_built, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_stepper_null_space, only : query_links
    use emcon_stepper_query, only : query_evaluate, query_guess, query_mass, query_residual, &

@@ -1,11 +1,11 @@
 !> The C interface: what a model holds. What each function does is said in emcon.h.
 module emcon_c_state
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, c_ptr
-   use emcon_c_border, only : c_string, check_count, check_given, f_text, find_built, find_read, &
-      put_field, put_number, put_numbers, put_values
+   use emcon_c_border, only : c_string, check_count, check_given, f_text, put_field, put_number, &
+      put_numbers, put_values
    use emcon_c_types, only : ledger_c, sizes_c
    use emcon_errors, only : err_input, err_none, error_t, raise
-   use emcon_handle, only : handle_pass, model_t
+   use emcon_handle, only : find_built, find_read, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_quantities, only : contact_quantity
    use emcon_stepper_query, only : query_momenta

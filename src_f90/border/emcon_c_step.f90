@@ -4,10 +4,10 @@ module emcon_c_step
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_pointer, c_int, c_loc, &
       c_null_ptr, c_ptr
    use emcon_c, only : new_handle
-   use emcon_c_border, only : check_given, f_text, find_built, find_read, put_increment, &
-      take_field, take_flags, take_values
+   use emcon_c_border, only : check_given, f_text, put_increment, take_field, take_flags, &
+      take_values
    use emcon_errors, only : err_input, err_none, error_t
-   use emcon_handle, only : handle_pass, model_t
+   use emcon_handle, only : find_built, find_read, handle_pass, model_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_restart, only : restart_read, restart_t, restart_write

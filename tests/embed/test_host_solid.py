@@ -128,7 +128,7 @@ def examples(language: str) -> list[str]:
     """The blocks of docs/embedding.md that drive a model."""
     text = (ROOT/"docs"/"embedding.md").read_text(encoding="utf-8")
     return [block for block in re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
-            if "interface" not in block]
+            if "interface" not in block and "emcon_new" not in block]
 
 
 def run_example(source: Path, compiler: str, standard: str, env: dict[str, str]) -> None:
