@@ -11,6 +11,7 @@ module emcon_solver_registry
    implicit none
    private
    public :: solver_row_t, solvers, solver_names, solver_create, is_foreign_solver
+   public :: factors_symmetric
    public :: solver_default, solver_umfpack, solver_mumps, solver_given
 
    !> The default: CHOLMOD for definite matrices, UMFPACK for others; MUMPS where these are not.
@@ -89,6 +90,14 @@ contains
       solver%choice = choice
       solver%symmetry = symmetry
    end subroutine solver_create
+
+   !> Are symmetric matrices that are not definite factorised as such, negative pivots counted?
+   pure logical function factors_symmetric(choice)
+      integer, intent(in) :: choice              !! one of `solver_` that is built, or above
+
+      factors_symmetric = choice == solver_mumps .or. (choice == solver_default &
+         .and. .not. has_suitesparse)
+   end function factors_symmetric
 
    subroutine create_own(choice, symmetry, solver)
       integer, intent(in) :: choice, symmetry

@@ -11,8 +11,8 @@ module emcon_correction
    use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
       null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
       obstacle_pivot
-   use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
-      saddle_point_t
+   use emcon_saddle_point, only : saddle_point_factorise, saddle_point_free, saddle_point_init, &
+      saddle_point_reset, saddle_point_solve, saddle_point_t
    use emcon_solver_registry, only : solver_create, solver_default
    use emcon_sparse_solver, only : matrix_definite, matrix_general, sparse_solver_t
    use emcon_steps, only : method_null_space
@@ -71,7 +71,7 @@ contains
       call solver_create(self%choice, matrix_general, self%solver, self%given)
       call solver_create(self%choice, matrix_definite, self%definite_solver, self%given)
       call solver_create(self%choice, matrix_general, self%null_space%solver, self%given)
-      call solver_create(self%choice, matrix_general, self%saddle_point%solver, self%given)
+      call saddle_point_reset(self%saddle_point, self%choice, self%given)
    end subroutine make_solvers
 
    !> Free what the solvers hold.
@@ -82,7 +82,7 @@ contains
       call self%solver%free()
       call self%definite_solver%free()
       call self%null_space%solver%free()
-      call self%saddle_point%solver%free()
+      call saddle_point_free(self%saddle_point)
    end subroutine correction_free
 
    !> Prepare for the active constraints at their present gradients; `n_redundant` > 0: some of

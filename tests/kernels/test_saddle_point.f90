@@ -1,13 +1,14 @@
 !> Saddle point: the system of the paper, and the same correction as by null space.
 module test_saddle_point
-   use check, only : check_near, check_true, test_case_t
-   use emcon_csr, only : csr_multiply_transposed
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_csr, only : csr_find, csr_from_entries, csr_multiply_transposed, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_null_space, only : null_space_factorise, null_space_free, null_space_init, &
       null_space_multipliers, null_space_solve, null_space_t
-   use emcon_saddle_point, only : saddle_point_factorise, saddle_point_init, saddle_point_solve, &
-      saddle_point_t
+   use emcon_saddle_point, only : saddle_point_factorise, saddle_point_free, saddle_point_init, &
+      saddle_point_reset, saddle_point_solve, saddle_point_t
+   use emcon_solver_registry, only : solver_default, solver_mumps
    use random_constraints, only : make_problem, problem_t, tol_dp
    use sparse_samples, only : dense_of
    implicit none
@@ -22,7 +23,8 @@ contains
       tests = [ &
          test_case_t("blocks of the matrix", test_blocks), &
          test_case_t("same as null space", test_null_space), &
-         test_case_t("dependent constraints are singular", test_singular)]
+         test_case_t("dependent constraints are singular", test_singular), &
+         test_case_t("symmetric: as such, negative pivots counted", test_symmetric)]
    end subroutine collect_saddle_point
 
    !> [N, -s Gb^T; s G1, 0].
@@ -113,5 +115,88 @@ contains
       call check_true(error, is_singular, "it is singular")
       call saddle%solver%free()
    end subroutine test_singular
+
+   !> N + N^T + shift and equal gradients: LDL^T gives the correction of LU. A definite N has as many
+   !> negative pivots as there are constraints, fewer where one is repeated; what is not symmetric
+   !> goes to LU.
+   subroutine test_symmetric(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(saddle_point_t) :: saddle, other
+      real(wp), allocatable :: dq(:, :), lam(:, :)
+      logical :: is_singular
+      integer :: n
+
+      call make_problem(problem)
+      n = size(problem%residual)
+      call make_symmetric(problem%matrix)
+      problem%set%gap_rows%value = problem%set%force_rows%value
+      allocate(dq(n, 2), lam(problem%set%n, 2))
+      call saddle_point_reset(saddle, solver_mumps)
+      call solve(saddle, 1)
+      call check_true(error, saddle%is_symmetric, "it is taken as symmetric")
+      if (allocated(error)) return
+      call check_equal(error, saddle%symmetric_solver%n_negative, problem%set%n, "negative pivots")
+      call saddle_point_reset(other, solver_default)
+      call solve(other, 2)
+      if (allocated(error)) return
+      call check_near(error, dq(:, 1), dq(:, 2), tol_dp, 1.0_wp + maxval(abs(dq)), "dq")
+      call check_near(error, lam(:, 1), lam(:, 2), tol_dp, 10.0_wp + maxval(abs(lam)), "lam")
+
+      problem%set%gap_rows%value(1) = 2.0_dp*problem%set%gap_rows%value(1) + 1.0_dp
+      call solve(saddle, 1)
+      call check_true(error, .not. saddle%is_symmetric, "it is not symmetric")
+      problem%set%force_rows%value = 0.0_dp
+      problem%set%gap_rows%value = 0.0_dp
+      call saddle_point_factorise(saddle, problem%set, problem%matrix, is_singular, error)
+      if (allocated(error)) return
+      call check_true(error, is_singular .and. saddle%is_symmetric, "dependent: singular")
+      call saddle_point_free(saddle)
+      call saddle_point_free(other)
+
+   contains
+
+      subroutine solve(saddle, k)
+         type(saddle_point_t), intent(inout) :: saddle
+         integer, intent(in) :: k
+
+         if (allocated(error)) return
+         call saddle_point_init(saddle, problem%set, problem%matrix, error)
+         if (.not. allocated(error)) call saddle_point_factorise(saddle, problem%set, &
+            problem%matrix, is_singular, error)
+         if (.not. allocated(error)) call check_true(error, .not. is_singular, "regular")
+         if (.not. allocated(error)) call saddle_point_solve(saddle, problem%set, &
+            problem%residual, dq(:, k), lam(:, k), error)
+      end subroutine solve
+
+   end subroutine test_symmetric
+
+   !> N + N^T, definite by a diagonal that is larger than all others of its row.
+   subroutine make_symmetric(matrix)
+      type(csr_t), intent(inout) :: matrix
+      type(csr_t) :: sum_of_both
+      integer, allocatable :: row(:), column(:), slot(:)
+      integer :: i, k, n
+
+      n = size(matrix%column)
+      column = matrix%column + 1
+      allocate(row(n))
+      do i = 1, matrix%n_row
+         row(matrix%row_start(i) + 1:matrix%row_start(i + 1)) = i
+      end do
+      call csr_from_entries(sum_of_both, matrix%n_row, matrix%n_row, [row, column], [column, row], &
+         slot)
+      sum_of_both%value = 0.0_dp
+      do k = 1, 2*n
+         sum_of_both%value(slot(k)) = sum_of_both%value(slot(k)) &
+            + matrix%value(1 + modulo(k - 1, n))
+      end do
+      do i = 1, matrix%n_row
+         k = csr_find(sum_of_both, i, i)
+         sum_of_both%value(k) = 2.0_dp*sum(abs(sum_of_both%value( &
+            sum_of_both%row_start(i) + 1:sum_of_both%row_start(i + 1))))
+      end do
+      matrix = sum_of_both
+   end subroutine make_symmetric
 
 end module test_saddle_point
