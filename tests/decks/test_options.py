@@ -9,7 +9,7 @@ from emcon.options import LAWS, OPTIONS, host_choices
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DECK = (ROOT / "docs/deck.md").read_text()
-HEADERS = [ROOT / "src_f90/border" / name for name in ("emcon.h", "emcon_interface.h")]
+HEADER = (ROOT / "src_f90/border/emcon.h").read_text()
 #: Options without a default: decks have to say which.
 NEEDED = {"procedure", "element"}
 #: The cards that choose.
@@ -81,12 +81,11 @@ def test_values_of_an_option(option):
     assert sum(row.is_default for row in rows) == (option not in NEEDED)
 
 
-def test_enumerations_of_the_headers():
-    """Each name of an option in the headers is that of a row, with its code, and the other way."""
+def test_enumerations_of_the_header():
+    """Each name of an option in the header is that of a row, with its code, and the other way."""
     rows = {(row.c_name, row.code) for rows in OPTIONS.values() for row in rows if row.c_name}
     assert all(getattr(_core, name) == code for name, code in rows)
-    text = HEADERS[1].read_text()
-    found = re.findall(r"^enum \{(.*)\};\s+/\* (\w+) \*/$", text, re.M)
+    found = re.findall(r"^enum \{(.*)\};\s+/\* (\w+) \*/$", HEADER, re.M)
     assert {option for _, option in found} == {option for option in OPTIONS
                                                if option != "tie multiplier"
                                                and any(row.c_name for row in OPTIONS[option])}
