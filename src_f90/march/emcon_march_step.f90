@@ -1,7 +1,7 @@
 !> One step in time: first guess, solution, the judge's look at it, and what follows from it.
 module emcon_march_step
-   use emcon_active_set, only : active_set_begin, active_set_solve, step_done, step_overlaps, &
-      step_refused
+   use emcon_active_set, only : active_set_begin, step_done, step_overlaps, step_refused
+   use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_constraints, only : constraint_place
    use emcon_errors, only : error_t
@@ -124,8 +124,9 @@ contains
          if (goes_in(self, scene, overlap)) status = step_overlaps
       end if
       call stopwatch_stop(self%judge_clock)
-      if (status == step_done .and. overlap%depth > increment%overlap%depth) &
+      if (status == step_done .and. overlap%depth > increment%overlap%depth) then
          increment%overlap = overlap
+      end if
    end subroutine judge
 
    !> Has the step brought bodies deeper into each other than guards allow, at nodes that contact of

@@ -279,8 +279,9 @@ contains
       self%damping = min(1.0_wp, 2.0_wp*self%damping)
       associate (n => self%n_history)
          if (n < 4) return
-         if (self%last >= stall_gain*minval(self%history(n - 2:n - 1))) &
+         if (self%last >= stall_gain*minval(self%history(n - 2:n - 1))) then
             self%damping = max(least_damping, 0.25_wp*self%damping)
+         end if
       end associate
    end subroutine choose_damping
 

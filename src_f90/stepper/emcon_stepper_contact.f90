@@ -11,8 +11,9 @@
 !> displacements are the host's: it may repeat a step with another size. Source: docs/theory.md,
 !> sections 4 and 5.
 module emcon_stepper_contact
-   use emcon_active_set, only : active_set_advance, active_set_begin, active_set_drop, &
-      active_set_select, step_cycling, step_done, step_stands_off, step_too_far
+   use emcon_active_set, only : active_set_begin, active_set_drop, active_set_select, &
+      step_cycling, step_done, step_stands_off, step_too_far
+   use emcon_active_set_update, only : active_set_advance
    use emcon_constraints, only : constraint_place, constraints_evaluate, constraints_force, &
       constraints_rows, constraints_select
    use emcon_contact, only : gap_state_t

@@ -1,0 +1,130 @@
+!> Which constraints act in a step: a primal-dual active set around Newton's method.
+!>
+!> A constraint is taken in when its gap would be negative at the end of the step, and let go when
+!> its multiplier is. If a set comes back, the union of the sets in the cycle is taken and
+!> constraints are only added from then on: at once for persistent contact, which makes no energy
+!> if it is held too long; else only where the step cannot be cut any more. Of constraints that say
+!> nearly the same one acts until the other is needed too. Where Newton's method does not converge,
+!> what pulls is let go before the step is cut; in statics, where no set stands, the step is tried
+!> with sharp convex corners before. Linear constraints that are not eliminated act always. Source:
+!> docs/theory.md, section 6.
+module emcon_active_set_solve
+   use emcon_active_set, only : active_set_drop, active_set_let_go, active_set_put_off, &
+      active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_not_held
+   use emcon_active_set_update, only : active_set_advance
+   use emcon_errors, only : error_t
+   use emcon_holding, only : holding_complete, holding_find_free
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, &
+      newton_t
+   use emcon_scene, only : scene_t
+   use emcon_system, only : system_t
+   use emcon_timer, only : stopwatch_start, stopwatch_stop
+   implicit none
+   private
+   public :: active_set_solve
+
+contains
+
+   !> Solve the step that has begun; `motion%du` is the first guess and the result.
+   subroutine active_set_solve(self, system, scene, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_done, is_held
+
+      self%first = motion%du
+      self%driven = newton%driven
+      do
+         call stopwatch_start(system%contact_clock)
+         if (self%holding%is_needed) call hold(self, system, scene, newton%driven, motion)
+         call active_set_select(self, system, motion)
+         call stopwatch_stop(system%contact_clock)
+         status = step_not_held
+         if (allocated(self%holding%text)) return
+         self%before = motion%du
+         call newton_solve(newton, system, self%set, motion, status, error)
+         if (allocated(error)) return
+         self%lam(self%set%id) = self%set%lam
+         self%n_newton = self%n_newton + newton%n_iteration
+         if (status == newton_redundant) then
+            associate (redundant => newton%correction%redundant, is_near => &
+                  newton%correction%is_near)
+               call active_set_put_off(self, pack(redundant, is_near))
+               call active_set_drop(self, pack(redundant, .not. is_near))
+            end associate
+            cycle
+         end if
+         if (status == newton_diverged) then
+            call active_set_let_go(self, motion%du, is_done)
+            if (is_done) call begin_sharp(self, system, newton, motion, is_done)
+            if (is_done) return
+            cycle
+         end if
+         newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
+         if (status /= newton_converged .or. size(system%contact) == 0) return
+         call stopwatch_start(system%contact_clock)
+         call active_set_advance(self, system, motion, is_done, status)
+         if (is_done .and. status == step_done .and. self%holding%is_needed) then
+            call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
+            if (.not. is_held) status = step_not_held
+         end if
+         call stopwatch_stop(system%contact_clock)
+         if (status == step_cycling) call begin_sharp(self, system, newton, motion, is_done)
+         if (is_done) return
+      end do
+   end subroutine active_set_solve
+
+   !> Begin the step again with convex corners that are not rounded: in statics, where a node that
+   !> is pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.
+   subroutine begin_sharp(self, system, newton, motion, is_done)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      logical, intent(out) :: is_done
+      integer :: pair, n_newton
+
+      is_done = self%masses_resist
+      if (is_done) return
+      is_done = .true.
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact)
+            if (contact%may_sharpen .and. .not. contact%is_sharp) is_done = .false.
+         end associate
+      end do
+      if (is_done) return
+      n_newton = self%n_newton
+      motion%du = self%first
+      newton%driven = self%driven
+      do pair = 1, size(system%contact)
+         system%contact(pair)%contact%is_sharp = system%contact(pair)%contact%may_sharpen
+      end do
+      call active_set_restart(self, system, motion)
+      self%n_newton = n_newton
+   end subroutine begin_sharp
+
+   !> Take in what holds the bodies that would be free with the present set. The prescribed motion
+   !> `driven`, which the first correction of Newton's method meets, is left out on the way.
+   subroutine hold(self, system, scene, driven, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: driven(:, :)               !! (n_dim, n_node)
+      type(motion_t), intent(inout) :: motion
+      integer :: pair
+
+      motion%du = motion%du - driven
+      call holding_complete(self%holding, system, scene, motion, self%is_active)
+      motion%du = motion%du + driven
+      do pair = 1, size(system%contact)
+         call system%contact(pair)%contact%begin_step(motion%x, motion%u0, motion%du)
+      end do
+   end subroutine hold
+
+end module emcon_active_set_solve

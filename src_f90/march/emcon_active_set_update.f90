@@ -1,0 +1,203 @@
+!> The next set of active constraints, from the gaps and multipliers of one that solves the step.
+!> Source: docs/theory.md, section 6.
+module emcon_active_set_update
+   use emcon_active_set, only : active_set_t, most_sets, step_cycling, step_done, step_stands_off, &
+      step_too_far, touch_tol
+   use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: active_set_advance
+
+   !> Penetration and tension below these multiples of epsilon are round-off.
+   real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
+   real(wp), parameter :: force_noise = 1.0e3_wp*epsilon(1.0_wp)
+   !> A step is solved again so often at most because stencils were chosen for another motion.
+   integer, parameter :: most_stale = 3
+
+contains
+
+   !> The next set from the motion and the multipliers that solve the step with the present one;
+   !> `is_done` if that one stands, or if `status` tells of a failure.
+   subroutine active_set_advance(self, system, motion, is_done, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: is_done            !! else solve the step again with the next set
+      integer, intent(out) :: status                     !! one of the `step_` codes
+      logical :: has_changed
+
+      call update(self, system, motion, has_changed, status)
+      if (self%is_stale .and. self%n_stale < most_stale) then
+         self%n_stale = self%n_stale + 1
+         self%n_tried = 0
+         status = step_done
+         is_done = .false.
+         return
+      end if
+      if (self%is_stale .and. status == step_done) status = step_too_far
+      is_done = status /= step_done .or. .not. has_changed
+      if (is_done) return
+      if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)
+      is_done = status /= step_done
+   end subroutine active_set_advance
+
+   !> The next set, from the gaps and multipliers of the converged one. Of the conditions gap >= 0,
+   !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does
+   !> not is taken in where gap < 0.
+   subroutine update(self, system, motion, has_changed, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: has_changed
+      integer, intent(out) :: status             !! one of the `step_` codes
+      logical :: changes
+      integer :: pair, i, id, k
+
+      status = step_done
+      has_changed = .false.
+      self%is_stale = .false.
+      k = count(self%is_active(:system%first_constraint(1)))
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact)
+            ! The motion may be more than was expected.
+            call contact%begin_step(motion%x, motion%u0, motion%du)
+            call contact%measure(motion%x, motion%u0, motion%du)
+            do i = 1, contact%n_constraint
+               id = system%first_constraint(pair) + i
+               if (self%is_active(id)) then
+                  k = k + 1
+                  call look_at_active(self, contact%state(i), k, self%was_active(id), status)
+                  changes = is_let_go(self, system, contact, i, k)
+                  if (changes .and. self%holding%is_needed) self%holding%has_pulled(id) = .true.
+               else
+                  call look_at_open(self, contact, i, id, changes, status)
+                  ! What the pairs take in may hold the bodies away from their guards.
+                  if (contact%slack > 0.0_wp .and. has_changed) changes = .false.
+                  if (changes .and. begins_unseen(self, contact, i)) status = step_too_far
+               end if
+               if (changes) self%is_active(id) = .not. self%is_active(id)
+               has_changed = has_changed .or. changes
+            end do
+         end associate
+      end do
+   end subroutine update
+
+   !> Can the step stand on constraint `k` of the set, which acts? If its stencil has moved on, the
+   !> step is solved again with that for the motion that came out.
+   pure subroutine look_at_active(self, gap, k, was_active, status)
+      type(active_set_t), intent(inout) :: self
+      type(gap_state_t), intent(in) :: gap
+      integer, intent(in) :: k
+      logical, intent(in) :: was_active          !! in the step before
+      integer, intent(inout) :: status
+      real(wp) :: held
+
+      if (.not. gap%is_covered) status = step_too_far
+      ! A new contact may not be held at a larger distance than the deck allows.
+      if (self%holds_gap .and. .not. was_active .and. self%gap_tolerance > 0.0_wp &
+         .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
+      held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
+      self%is_stale = self%is_stale .or. &
+         (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
+   end subroutine look_at_active
+
+   !> Has constraint `k` of the set, the `i`-th of `contact`, lost its surface, or does it pull?
+   pure logical function is_let_go(self, system, contact, i, k)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i, k
+      real(wp) :: noise
+
+      noise = force_noise*sum(system%response%magnitude(:, contact%node(i)))
+      if (.not. self%masses_resist) noise = noise + force_noise &
+         *sum(system%response%rounding(:, contact%node(i)))
+      is_let_go = contact%state(i)%is_leaving .or. &
+         .not. (self%only_adds .or. self%set%lam(k) >= -noise)
+   end function is_let_go
+
+   !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact
+   !> that was left out and closes all the same does not follow from others: it had lost its
+   !> surface.
+   pure subroutine look_at_open(self, contact, i, id, closes, status)
+      type(active_set_t), intent(in) :: self
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i, id
+      logical, intent(out) :: closes
+      integer, intent(inout) :: status
+      real(wp) :: allowed(0:1)
+
+      closes = .false.
+      associate (gap => contact%state(i))
+         if (.not. (gap%is_near .and. gap%is_over)) return
+         allowed = self%left*self%overclosure(id) + gap%closed
+         if (self%is_dropped(id)) then
+            if (self%may_cut .and. gap%gap1 < min(gap%gap0, allowed(1)) - touch_tol*gap%size) then
+               status = step_too_far
+            end if
+         else if (gap%is_arriving .and. self%masses_resist .and. .not. may_arrive(gap)) then
+            return
+         else if (gap%is_arriving .and. self%masses_resist .and. self%may_cut) then
+            status = step_too_far
+         else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
+            < -contact%deepest_start*gap%size) then
+            closes = .not. gap%gap1 - allowed(1) >= -gap_noise*gap%size
+         end if
+      end associate
+   end subroutine look_at_open
+
+   !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one;
+   !> in the smallest it begins at once, if it is deep.
+   pure logical function may_arrive(gap)
+      type(gap_state_t), intent(in) :: gap
+
+      may_arrive = gap%was_open .and. .not. gap%gap1 >= -deepest_arrival*gap%size
+   end function may_arrive
+
+   !> Would the `i`-th constraint of `contact` begin to act with a stencil chosen for another
+   !> motion?
+   pure logical function begins_unseen(self, contact, i)
+      type(active_set_t), intent(in) :: self
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i
+
+      associate (gap => contact%state(i))
+         begins_unseen = .not. gap%is_covered .or. &
+            (self%masses_resist .and. gap%gap0 > contact%farthest_start)
+      end associate
+   end function begins_unseen
+
+   !> Number of the present set among those tried, 0 if it is new.
+   pure integer function first_tried(self)
+      type(active_set_t), intent(in) :: self
+
+      do first_tried = 1, self%n_tried
+         if (all(self%tried(:, first_tried) .eqv. self%is_active)) return
+      end do
+      first_tried = 0
+   end function first_tried
+
+   !> The sets since the first coming of the present one are a cycle: end it by their union, from
+   !> which nothing is let go any more, or by a cut.
+   pure subroutine end_cycle(self, status)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(inout) :: status
+      integer :: first
+
+      first = max(1, first_tried(self))
+      associate (cycle => self%tried(:, first:self%n_tried))
+         self%comes_and_goes = any(cycle, dim=2) .and. .not. all(cycle, dim=2)
+         self%is_active = any(cycle, dim=2)
+      end associate
+      if (self%only_adds .or. (self%may_cut .and. .not. self%holds_gap)) then
+         status = step_cycling
+      else
+         self%only_adds = .true.
+         self%n_tried = 0
+      end if
+   end subroutine end_cycle
+
+end module emcon_active_set_update
