@@ -14,7 +14,8 @@
 !>    `stepper%diagnostic` holds all that is wrong with the deck. What a deck cannot say is given
 !>    between reading and building: by `stepper_give_law` and `stepper_give_potential` an energy at
 !>    points, a type that extends `point_function_t`, or a law of the invariants of strain, one
-!>    that extends `law_t` of `emcon_law`; by `stepper_give_scheme` a scheme of time integration,
+!>    that extends `law_t` of `emcon_law`; by `stepper_give_element` the shape of elements, a type
+!>    that extends `shape_t`; by `stepper_give_scheme` a scheme of time integration,
 !>    a type that extends `scheme_t`; by `stepper_give_force` and `stepper_give_mass` the solid of
 !>    a host code, a type that extends `given_force_t`; by `stepper_give_constraint` conditions that
 !>    always hold, a type that extends `constraint_t`; by `stepper_give_solver` a direct solver, a
@@ -68,6 +69,7 @@ module emcon_api
       node_quantity, pair_components, pair_quantity, quantity_components
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_scheme, only : scheme_t
+   use emcon_shape, only : shape_t
    use emcon_sparse_solver, only : matrix_definite, matrix_general, matrix_symmetric, &
       sparse_solver_t
    use emcon_state, only : state_t
@@ -82,8 +84,9 @@ module emcon_api
       step_done, step_stands_off, step_too_far
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
-   use emcon_stepper_given, only : stepper_give_constraint, stepper_give_force, stepper_give_law, &
-      stepper_give_mass, stepper_give_potential, stepper_give_scheme, stepper_give_solver
+   use emcon_stepper_given, only : stepper_give_constraint, stepper_give_element, &
+      stepper_give_force, stepper_give_law, stepper_give_mass, stepper_give_potential, &
+      stepper_give_scheme, stepper_give_solver
    use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &
       stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
    use emcon_stepper_null_space, only : query_follow_links, query_gather_links, query_links, &

@@ -13,6 +13,7 @@ module emcon_deck
    use emcon_deck_fields, only : data_open, data_t, next_line, refuse_lines
    use emcon_deck_general_contact, only : read_general_contact
    use emcon_deck_geometry, only : check_shapes
+   use emcon_deck_element_kinds, only : read_element_kinds
    use emcon_deck_given, only : read_given
    use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_materials, only : read_materials, read_sections
@@ -70,6 +71,7 @@ contains
       call check_data(reader)
       call read_heading(reader, scene)
       call read_nodes(reader, scene)
+      call read_element_kinds(reader, scene)
       call read_elements(reader, scene)
       call read_sets(reader, scene)
       call read_given(reader, scene)

@@ -45,6 +45,8 @@ module emcon_deck_keywords
       keyword_t("INCLUDE", in_both, "INPUT="), &
       keyword_t("NODE", in_model, "NSET=,!SYSTEM:R,!INPUT"), &
       keyword_t("ELEMENT", in_model, "TYPE=,ELSET=,!INPUT,!OFFSET:0"), &
+      keyword_t("USER ELEMENT", in_model, "TYPE=,NODES=,FACES=,COORDINATES=,!PROPERTIES:0," &
+         // "!IPROPERTIES:0,!VARIABLES:1,~UNSYMM,!LINEAR,!TENSOR,!INTEGRATION,!FILE"), &
       keyword_t("NSET", in_both, "NSET=,GENERATE,ELSET=,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM"), &
@@ -140,6 +142,7 @@ module emcon_deck_keywords
       keyword_t("FILM", in_step, "", no_thermal), &
       keyword_t("RADIATE", in_step, "", no_thermal), &
       keyword_t("HEAT TRANSFER", in_step, "", no_thermal), &
+      keyword_t("UEL PROPERTY", in_model, "", "use *SOLID SECTION"), &
       keyword_t("SHELL SECTION", in_model, "", no_rods), &
       keyword_t("BEAM SECTION", in_model, "", no_rods), &
       keyword_t("MEMBRANE SECTION", in_model, "", no_rods), &

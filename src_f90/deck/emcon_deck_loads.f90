@@ -2,6 +2,7 @@
 module emcon_deck_loads
    use emcon_deck_conditions, only : conditions_t, drop_loads, drop_prescribed, put_load, &
       put_prescribed
+   use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, get_real, is_blank, next_line
    use emcon_deck_named, only : get_elements, get_nodes
@@ -255,7 +256,7 @@ contains
       call data_open(data, card)
       do while (next_line(reader, data))
          call check_count(reader, data, 2, 6, "element or element set, load type, magnitude")
-         if (data%ok) call read_load_type(reader, data, new)
+         if (data%ok) call read_load_type(reader, data, maxval(scene%kind%n_face), new)
          if (data%ok) call get_elements(reader, data, 1, scene, item)
          if (data%ok) call check_faces(reader, data, scene, item, new%place)
          if (.not. data%ok) cycle
@@ -280,10 +281,11 @@ contains
          // to_text(face))
    end subroutine check_faces
 
-   !> Kind, place, value and direction of a load on elements.
-   subroutine read_load_type(reader, data, new)
+   !> Kind, place, value and direction of a load on elements, of up to `n_face` faces.
+   subroutine read_load_type(reader, data, n_face, new)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
+      integer, intent(in) :: n_face
       type(load_t), intent(inout) :: new
       character(len=:), allocatable :: name
       real(wp) :: length
@@ -294,14 +296,15 @@ contains
       new%direction = 0.0_wp
       call get_real(reader, data, 3, "magnitude", new%value)
       if (.not. data%ok) return
-      select case (name)
-      case ("P1", "P2", "P3", "P4")
+      new%place = face_number(name, "P", n_face)
+      if (new%place > 0) then
          new%kind = load_pressure
-         new%place = index("1234", name(2:2))
          call check_count(reader, data, 2, 3, "element or element set, load type, pressure")
+         return
+      end if
+      select case (name)
       case ("GRAV")
          new%kind = load_gravity
-         new%place = 0
          do k = 1, 3
             call get_real(reader, data, 3 + k, "direction", new%direction(k))
          end do
@@ -317,10 +320,10 @@ contains
          end if
       case ("CENTRIF", "CORIO", "BX", "BY", "BZ", "P1NU", "P2NU", "P3NU", "P4NU", "HP1", "NEWTON")
          call data_error(reader, data, "load type " // name // " is known but not supported; " &
-            // "supported: P1, P2, P3, P4, GRAV")
+            // "supported: " // face_names("P", n_face) // ", GRAV")
       case default
          call data_error(reader, data, "unknown load type " // quoted(name) &
-            // "; known: P1, P2, P3, P4, GRAV")
+            // "; known: " // face_names("P", n_face) // ", GRAV")
       end select
    end subroutine read_load_type
 

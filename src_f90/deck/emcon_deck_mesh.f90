@@ -1,5 +1,6 @@
 !> *NODE and *ELEMENT.
 module emcon_deck_mesh
+   use emcon_deck_element_kinds, only : has_user_card, is_user_type
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       drop_zeros, get_integer, get_real, next_line
    use emcon_deck_labels, only : find_label, label_map_init
@@ -7,7 +8,6 @@ module emcon_deck_mesh
       option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
    use emcon_element_kind, only : element_kind_t, find_element_kind
-   use emcon_element_registry, only : element_kinds_create
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
@@ -25,7 +25,7 @@ module emcon_deck_mesh
       "C3D15", "C3D20", "C3D20R", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
       "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
-      "DASHPTA", "GAPUNI", "DCOUP3D", "U1"]
+      "DASHPTA", "GAPUNI", "DCOUP3D"]
 
    !> Elements that stand for something else, as mesh generators write them.
    type :: substitute_t
@@ -143,7 +143,6 @@ contains
       type(origin_t), allocatable :: line_origin_of(:)
       integer :: i, k, n, n_line, most
 
-      call element_kinds_create(scene%kind)
       most = count_lines(reader, "ELEMENT")
       allocate(scene%element_label(most), scene%element_origin(most), scene%element_kind(most), &
          scene%element_node(max_element_nodes, most))
@@ -157,7 +156,7 @@ contains
       scene%element_label = scene%element_label(:n)
       scene%element_origin = scene%element_origin(:n)
       scene%element_kind = scene%element_kind(:n)
-      k = 0
+      k = 2                                        ! room for an edge
       do i = 1, n
          k = max(k, scene%kind(scene%element_kind(i))%n_node)
       end do
@@ -275,6 +274,7 @@ contains
             if (is_first) call tell_substitute(reader, card, substitutes(i))
             return
          end do
+         if (has_user_card(reader, type_name)) is_first = .false.
          if (type_name /= "" .and. is_first) call refuse_type(reader, card, kinds, type_name)
       end associate
       reader%doubt_elements = .true.
@@ -308,7 +308,10 @@ contains
       do i = 1, size(kinds)
          list = list // " " // trim(kinds(i)%name)
       end do
-      if (any(foreign_types == type_name)) then
+      if (is_user_type(type_name)) then
+         call card_error(reader, card, "element type " // type_name // " is defined by no *USER " &
+            // "ELEMENT")
+      else if (any(foreign_types == type_name)) then
          call card_error(reader, card, "element type " // type_name &
             // " is known but not supported by this version; supported:" // list)
       else

@@ -1,6 +1,7 @@
 !> *SURFACE, and the faces that elements share.
 module emcon_deck_surfaces
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, find_face, n_neighbours
+   use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_blank, next_line
    use emcon_deck_labels, only : find_label
@@ -281,10 +282,10 @@ contains
       logical :: has_not(size(item))
 
       call get_name(reader, data, 2, "face", name)
-      face = 0
-      if (len(name) == 2) face = index("1234", name(2:2))*index("S", name(1:1))
+      face = face_number(name, "S", maxval(scene%kind%n_face))
       if (face == 0) then
-         call data_error(reader, data, "unknown face " // quoted(name) // "; known: S1, S2, S3, S4")
+         call data_error(reader, data, "unknown face " // quoted(name) // "; known: " &
+            // face_names("S", maxval(scene%kind%n_face)))
          return
       end if
       has_not = scene%kind(scene%element_kind(item))%n_face < face

@@ -122,7 +122,7 @@ contains
       character(len=:), allocatable, intent(out) :: fault    !! empty: nothing
       !> Sums over a few nodes, of polynomials that the giver evaluates as he likes.
       real(wp), parameter :: tol = 1024.0_wp*epsilon(1.0_wp)
-      real(wp), allocatable :: place(:, :)
+      real(wp), allocatable :: place(:, :), point(:, :), weight(:)
       type(shape_table_t) :: table
       integer :: i, k
 
@@ -133,13 +133,14 @@ contains
          return
       end if
       do i = 1, 2
-         call shape_tabulate(shape, i == 2, table)
-         if (table%n_gp < 1 .or. size(table%point, 2) /= table%n_gp) then
+         call shape%rule(i == 2, point, weight)
+         if (size(weight) < 1 .or. size(point, 2) /= size(weight)) then
             fault = "a rule of its quadrature has no points, or not as many as weights"
-         else if (.not. all(table%weight > 0.0_wp)) then
+         else if (.not. all(weight > 0.0_wp)) then
             fault = "a weight of its quadrature is not positive"
          end if
          if (fault /= "") return
+         call shape_tabulate(shape, i == 2, table)
          do k = 1, table%n_gp
             if (.not. abs(sum(table%value(:, k)) - 1.0_wp) <= tol*sum(abs(table%value(:, k)))) &
                fault = "the sum of its shape functions is not 1"

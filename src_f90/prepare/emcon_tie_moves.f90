@@ -94,7 +94,7 @@ contains
       integer :: e, i, n, k
 
       do e = 1, size(scene%element_kind)
-         n = scene%kind(scene%element_kind(e))%n_node
+         n = scene%kind(scene%element_kind(e))%n_corner
          associate (node => scene%element_node(:n, e))
             if (all(abs(move(:, node)) <= 0.0_wp)) cycle
             do i = 1, n

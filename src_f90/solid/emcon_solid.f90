@@ -104,8 +104,8 @@ contains
          associate (kind => scene%kind(k))
             if (.not. allocated(kind%shape)) then
                call raise(error, err_input, where_text(scene, scene%element_origin(e)) &
-                  // ": error: element " // to_text(self%label(e)) // " is a *USER ELEMENT of " &
-                  // "type " // trim(kind%name) // ": a program has to give the shape of these, " &
+                  // ": error: element " // to_text(self%label(e)) // " is of type " &
+                  // trim(kind%name) // ", a *USER ELEMENT: a program has to give its shape, " &
                   // "after the deck is read and before the model is built")
                return
             end if

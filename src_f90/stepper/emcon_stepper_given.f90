@@ -1,5 +1,5 @@
-!> What a program gives to a model between reading its deck and building it: laws, schemes, forces,
-!> mass, constraints, solvers.
+!> What a program gives to a model between reading its deck and building it: laws, elements,
+!> schemes, forces, mass, constraints, solvers.
 !>
 !> Copies are kept, also for a restart file that is loaded afterwards. Nodes that stand in no
 !> element are part of the model where they are given something. Gravity acts on the mass of
@@ -7,6 +7,8 @@
 module emcon_stepper_given
    use emcon_constraint, only : constraint_t
    use emcon_csr, only : csr_t
+   use emcon_element_kind, only : find_element_kind
+   use emcon_element_registry, only : element_rows
    use emcon_errors, only : err_input, error_t, raise
    use emcon_given, only : given_add_constraint, given_add_force, given_add_law, &
       given_add_solver, given_copy_solvers, given_find_solver
@@ -20,13 +22,14 @@ module emcon_stepper_given
    use emcon_scene, only : where_text
    use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_registry, only : scheme_row
+   use emcon_shape, only : shape_fault, shape_t
    use emcon_solver_registry, only : is_foreign_solver, solver_names, solvers
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : squeezed, to_upper
    implicit none
    private
-   public :: stepper_give_law, stepper_give_scheme, stepper_give_solver
+   public :: stepper_give_law, stepper_give_element, stepper_give_scheme, stepper_give_solver
    public :: stepper_give_potential, stepper_give_force, stepper_give_mass, stepper_give_constraint
 
    !> Give the law of a *USER MATERIAL: its strain energy at points, or a type that extends `law_t`.
@@ -89,6 +92,35 @@ contains
          end do
       end if
    end subroutine check_material
+
+   !> Give the shape of the elements of a *USER ELEMENT.
+   subroutine stepper_give_element(self, name, shape, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name           !! TYPE of the card; small or capital letters
+      class(shape_t), intent(in) :: shape
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+      character(len=:), allocatable :: word, fault
+      integer :: k
+
+      word = to_upper(trim(adjustl(name)))
+      call check_stage(self, error)
+      if (allocated(error)) return
+      k = find_element_kind(self%scene%kind, word)
+      if (k == 0) then
+         call raise(error, err_input, "there is no element type " // word // " in the deck: to " &
+            // "give its shape, it has to be the TYPE of a *USER ELEMENT")
+      else if (k <= size(element_rows)) then
+         call raise(error, err_input, "a shape cannot be given for " // word &
+            // ": EMCON has its own")
+      else if (allocated(self%scene%kind(k)%shape)) then
+         call raise(error, err_input, "the shape of " // word // " is given already")
+      else
+         call shape_fault(shape, self%scene%kind(k)%n_node, fault)
+         if (fault /= "") call raise(error, err_input, "the shape given for " // word // ": " &
+            // fault)
+         if (fault == "") allocate(self%scene%kind(k)%shape, source=shape)
+      end if
+   end subroutine stepper_give_element
 
    !> Give the scheme of time integration that the deck calls `name`, by *TIME INTEGRATION,
    !> SCHEME=`name`.
@@ -200,8 +232,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       if (allocated(self%march%scheme)) then
-         call raise(error, err_input, "laws, schemes, forces, mass and solvers are given before " &
-            // "the model is built")
+         call raise(error, err_input, "laws, elements, schemes, forces, mass, constraints and " &
+            // "solvers are given before the model is built")
       else if (.not. self%is_read) then
          call raise(error, err_input, "there is no scene to give anything to: no deck was read, " &
             // "or reading it failed")

@@ -5,13 +5,25 @@ module test_shape
    use emcon_element_registry, only : element_kinds_create, find_element_row
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_shape, only : shape_table_t, shape_tabulate
+   use emcon_shape, only : shape_fault, shape_t, shape_table_t, shape_tabulate
+   use emcon_shape_quadrilateral_plane, only : shape_quadrilateral_t
    use emcon_text, only : to_text
    implicit none
    private
    public :: collect_shape
 
    real(wp), parameter :: tol = 8.0_wp*epsilon(1.0_wp)
+
+   !> A quadrilateral that says no more than it has to, and has a fault.
+   type, extends(shape_t) :: plain_t
+      type(shape_quadrilateral_t) :: own
+      integer :: fault = 0
+   contains
+      procedure :: places => plain_places
+      procedure :: values => plain_values
+      procedure :: rule => plain_rule
+   end type plain_t
+   integer, parameter :: fault_value = 1, fault_slope = 2, fault_weight = 3, fault_points = 4
 contains
 
    subroutine collect_shape(tests)
@@ -24,7 +36,8 @@ contains
          test_case_t("slopes", test_slopes), &
          test_case_t("quadrature of polynomials", test_quadrature), &
          test_case_t("values at the points", test_points), &
-         test_case_t("from the points to the nodes", test_to_nodes)]
+         test_case_t("from the points to the nodes", test_to_nodes), &
+         test_case_t("a shape from outside that cannot be one", test_faults)]
    end subroutine collect_shape
 
    subroutine test_unity(error)
@@ -198,6 +211,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(element_kind_t), allocatable :: kind(:)
       type(shape_table_t) :: table
+      type(plain_t) :: plain
       real(wp), allocatable :: weight(:, :), place(:, :)
       integer :: k
 
@@ -210,6 +224,58 @@ contains
          if (table%n_gp > 1) call check_near(error, matmul(table%point, weight), place, tol, &
             1.0_wp, kind(k)%name)
       end do
+      call plain%to_nodes(weight)
+      call plain%own%places(place)
+      call check_near(error, sum(weight, 1), 1.0_wp + 0.0_wp*place(1, :), tol, 1.0_wp, "fit: sums")
+      call check_near(error, matmul(place/sqrt(3.0_wp), weight), place, tol, 1.0_wp, "fit")
    end subroutine test_to_nodes
+
+   subroutine test_faults(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(shape_quadrilateral_t) :: quad
+      character(len=:), allocatable :: fault
+
+      call shape_fault(plain_t(quad), 4, fault)
+      call check_equal(error, fault, "", "none")
+      call shape_fault(plain_t(quad), 5, fault)
+      call check_equal(error, fault, "it has 4 nodes, not 5", "nodes")
+      call shape_fault(plain_t(quad, fault_value), 4, fault)
+      call check_equal(error, fault, "the sum of its shape functions is not 1", "values")
+      call shape_fault(plain_t(quad, fault_slope), 4, fault)
+      call check_equal(error, fault, "the sum of the slopes of its shape functions is not 0", &
+         "slopes")
+      call shape_fault(plain_t(quad, fault_weight), 4, fault)
+      call check_equal(error, fault, "a weight of its quadrature is not positive", "weights")
+      call shape_fault(plain_t(quad, fault_points), 4, fault)
+      call check_equal(error, fault, &
+         "a rule of its quadrature has no points, or not as many as weights", "points")
+   end subroutine test_faults
+
+   pure subroutine plain_places(self, place)
+      class(plain_t), intent(in) :: self
+      real(wp), allocatable, intent(out) :: place(:, :)
+
+      call self%own%places(place)
+   end subroutine plain_places
+
+   pure subroutine plain_values(self, point, value, slope)
+      class(plain_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)
+      real(wp), intent(out) :: value(:), slope(:, :)
+
+      call self%own%values(point, value, slope)
+      if (self%fault == fault_value) value(1) = value(1) + sqrt(epsilon(1.0_wp))
+      if (self%fault == fault_slope) slope(2, 1) = slope(2, 1) + sqrt(epsilon(1.0_wp))
+   end subroutine plain_values
+
+   pure subroutine plain_rule(self, is_mass, point, weight)
+      class(plain_t), intent(in) :: self
+      logical, intent(in) :: is_mass
+      real(wp), allocatable, intent(out) :: point(:, :), weight(:)
+
+      call self%own%rule(is_mass, point, weight)
+      if (self%fault == fault_weight .and. is_mass) weight(1) = 0.0_wp
+      if (self%fault == fault_points) point = point(:, :3)
+   end subroutine plain_rule
 
 end module test_shape
