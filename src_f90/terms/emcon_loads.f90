@@ -127,6 +127,7 @@ contains
       real(wp) :: p
       integer :: i, j, node
 
+      if (size(self%load) == 0) return
       self%force = 0.0_wp
       do i = 1, size(self%load)
          associate (load => self%load(i))
