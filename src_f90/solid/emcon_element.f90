@@ -179,12 +179,12 @@ contains
       type(point_motion_t), intent(in) :: point
       type(law_response_t), intent(in) :: state
       real(wp), intent(inout) :: tangent(2*max_node, 2*max_node)
-      real(wp) :: b_mid(3, 2*max_node), b_end(3), db(3), stress_gradient(2), geometric
+      real(wp) :: b_mid(2*max_node, 3), b_end(3), db(3), stress_gradient(2), geometric
       integer :: i, j, a
 
       do i = 1, n
-         call strain_operator(gradient(:, i), point%f_mid, 1, b_mid(:, 2*i - 1))
-         call strain_operator(gradient(:, i), point%f_mid, 2, b_mid(:, 2*i))
+         call strain_operator(gradient(:, i), point%f_mid, 1, b_mid(2*i - 1, :))
+         call strain_operator(gradient(:, i), point%f_mid, 2, b_mid(2*i, :))
       end do
       do j = 1, n
          do a = 1, 2
@@ -193,7 +193,7 @@ contains
                + state%tangent(:, 3)*b_end(3)
             do i = 1, 2*n
                tangent(i, 2*j - 2 + a) = tangent(i, 2*j - 2 + a) &
-                  + (b_mid(1, i)*db(1) + b_mid(2, i)*db(2) + b_mid(3, i)*db(3))
+                  + (b_mid(i, 1)*db(1) + b_mid(i, 2)*db(2) + b_mid(i, 3)*db(3))
             end do
          end do
          stress_gradient = point%geometric*[ &
