@@ -10,11 +10,28 @@ module emcon_dgrad_series
 
    !> Below this the power series is used; 1/4 costs at most 14 terms in double precision.
    real(wp), parameter :: series_limit = 0.25_wp
-   !> coth x - 1/x by odd powers of x: to 2e-13 below the limit, which is for second derivatives.
-   real(wp), parameter :: coth_limit = 0.5_wp
-   real(wp), parameter :: coth_series(8) = [1.0_wp/3.0_wp, -1.0_wp/45.0_wp, 2.0_wp/945.0_wp, &
-      -1.0_wp/4725.0_wp, 2.0_wp/93555.0_wp, -1382.0_wp/638512875.0_wp, 4.0_wp/18243225.0_wp, &
-      -3617.0_wp/162820783125.0_wp]
+   !> Below this coth x - 1/x by odd powers of x, as many as quadruple precision takes. With
+   !> x coth x = 1 + sum a_n x^(2 n): (2 n + 1) a_n = [n = 1] - sum of a_i a_(n - i), 0 < i < n.
+   real(wp), parameter :: coth_limit = 1.0_wp
+   real(wp), parameter :: coth_series(36) = [ &
+      3.33333333333333333333333333333333333e-1_wp, -2.22222222222222222222222222222222222e-2_wp, &
+      2.11640211640211640211640211640211640e-3_wp, -2.11640211640211640211640211640211640e-4_wp, &
+      2.13777991555769333547111324889102667e-5_wp, -2.16440428080639720851361063001274641e-6_wp, &
+      2.19259478518737777997037256296515556e-7_wp, -2.22146087899796790760583685160923464e-8_wp, &
+      2.25078465168089928542084279839637560e-9_wp, -2.28051512045921828658638112567162873e-10_wp, &
+      2.31064325990026240965325466481291632e-11_wp, -2.34117068198248839592094445312427212e-12_wp, &
+      2.37210174002336542950284820301158180e-13_wp, -2.40344153333077061790918875276835470e-14_wp, &
+      2.43519540291833687311218225352645232e-15_wp, -2.46736880451720747058996032267756213e-16_wp, &
+      2.49996727712208089798954278824165610e-17_wp, -2.53299643574063483151787015907095574e-18_wp, &
+      2.56646197028262866112248769462595426e-19_wp, -2.60036964601372735885625685250534225e-20_wp, &
+      2.63472530441538013417410807260829745e-21_wp, -2.66953486415739495345488831615228825e-22_wp, &
+      2.70480432210903099042259283034509318e-23_wp, -2.74053975436995134482617571751325756e-24_wp, &
+      2.77674731731644348411464069837640529e-25_wp, -2.81343324866187935418649618115667206e-26_wp, &
+      2.85060386853129178748946579779104056e-27_wp, -2.88826558055017480583487737922187991e-28_wp, &
+      2.92642487294767575486724335496866722e-29_wp, -2.96508831967436434999174002885573250e-30_wp, &
+      3.00426258153476993912663913010851260e-31_wp, -3.04395440733488177270925477484422003e-32_wp, &
+      3.08417063504480988747762173743200042e-33_wp, -3.12491819297680688273490904234837182e-34_wp, &
+      3.16620410097885352941595693637011871e-35_wp, -3.20803547164401383743174928465003316e-36_wp]
 
 contains
 
@@ -177,7 +194,7 @@ contains
    !> Divided difference of k coth(k x) - coth(x) between a and b, by the power series.
    pure real(wp) function coth_chord(k, a, b) result(chord)
       real(wp), intent(in) :: k, a, b
-      real(wp) :: power, last, difference
+      real(wp) :: power, last, difference, term
       integer :: i
 
       chord = 0.0_wp
@@ -186,7 +203,9 @@ contains
       difference = 1.0_wp                        ! of x^(2i - 1) between a and b
       do i = 1, size(coth_series)
          power = power*k*k
-         chord = chord + coth_series(i)*(power - 1.0_wp)*difference
+         term = coth_series(i)*(power - 1.0_wp)*difference
+         chord = chord + term
+         if (abs(term) <= 0.01_wp*epsilon(a)*abs(chord)) exit
          difference = a*(a*difference + last*b) + last*b*b
          last = last*b*b
       end do

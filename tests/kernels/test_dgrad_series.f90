@@ -1,7 +1,8 @@
 !> Functions of one variable near zero, against power series and quadruple precision.
 module test_dgrad_series
    use check, only : check_near, check_true, test_case_t
-   use emcon_dgrad_series, only : atanh_excess, expm1_of, log1p_excess, log1p_of, sinh_ratio
+   use emcon_dgrad_series, only : atanh_excess, cosh_chord, expm1_of, log1p_excess, log1p_of, &
+      sinh_ratio
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
@@ -29,8 +30,31 @@ contains
          test_case_t("exp(a) - 1", test_expm1), &
          test_case_t("atanh(w)/w - 1", test_atanh), &
          test_case_t("sinh(x)/x", test_sinh), &
-         test_case_t("smallest and largest arguments", test_ends)]
+         test_case_t("smallest and largest arguments", test_ends), &
+         test_case_t("divided difference of cosh(k q)", test_cosh_chord)]
    end subroutine collect_dgrad_series
+
+   !> In c = cosh q: cosh 2q = 2 c^2 - 1 and cosh 3q = 4 c^3 - 3 c, so that the difference is
+   !> 2 (c0 + c1) or 4 (c0^2 + c0 c1 + c1^2) - 3, and its derivative by c1 2 or 4 (c0 + 2 c1).
+   subroutine test_cosh_chord(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: c0, c1, slope, rate, third(2)
+      integer :: i, j
+
+      do i = 0, 60
+         do j = 0, 60
+            c0 = cosh(0.01_wp*real(i, wp))
+            c1 = cosh(0.01_wp*real(j, wp))
+            call cosh_chord(2.0_wp, c0 - 1.0_wp, c1 - 1.0_wp, slope, rate)
+            call check_near(error, [slope, rate], [2.0_wp*(c0 + c1), 2.0_wp], tol, 8.0_wp, &
+               "k = 2, " // to_text(c0) // " to " // to_text(c1))
+            call cosh_chord(3.0_wp, c0 - 1.0_wp, c1 - 1.0_wp, slope, rate)
+            third = [4.0_wp*(c0*c0 + c0*c1 + c1*c1) - 3.0_wp, 4.0_wp*(c0 + 2.0_wp*c1)]
+            call check_near(error, [slope, rate], third, tol, 24.0_wp, &
+               "k = 3, " // to_text(c0) // " to " // to_text(c1))
+         end do
+      end do
+   end subroutine test_cosh_chord
 
    !> +-10^-k, and between -0.999 and 3 in small steps, so that no seam of a series is missed.
    pure function arguments() result(list)
