@@ -1,7 +1,8 @@
 !> A program that gives the shape of elements of nine nodes to EMCON and runs a deck with them.
 !> Arguments: the deck, the type by which the shape is given, the base of the field file. It prints
 !> the total energy, its largest change, the largest number of active contacts; position and
-!> displacement of each node; the stress of each element; and what the log says of elements.
+!> displacement of each node; the momentum; the stress of each element; and what the log says of
+!> elements.
 program shaped
    use emcon_api, only : element_quantity, error_t, increment_t, stepper_advance, stepper_build, &
       stepper_close, stepper_give_element, stepper_is_done, stepper_read, stepper_t, string_t, wp
@@ -55,6 +56,7 @@ contains
             write (*, "(a, 4es24.16)") "node", x(:, i), u(:, i)
          end do
       end associate
+      write (*, "(a, 2es24.16)") "momentum", stepper%march%ledger%momentum
       allocate(stress, source=element_quantity(stepper, "S"))
       do i = 1, size(stress, 2)
          write (*, "(a, 6es24.16)") "stress", stress(:, i)

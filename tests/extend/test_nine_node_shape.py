@@ -142,6 +142,17 @@ def test_contact_keeps_energy(program: tuple[Path, dict[str, str]], tmp_path: Pa
         assert np.all(np.diff(file["VTKHDF/Offsets"][:]) == 8)
 
 
+def test_pressure_and_weight(program: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
+    """What a pressure on the top face and gravity push in a time; dead loads of small strains."""
+    nodes, elements, _ = block((2, 1), (0.0, 0.0), 1, 1)
+    deck = tmp_path/"pushed.inp"
+    deck.write_text(mesh(nodes, elements) + "*STEP\n*DYNAMIC, DIRECT\n0.1, 1.\n*DLOAD\n"
+                    "ALL, P5, 0.3\nALL, P6, 0.3\nALL, GRAV, 0.2, 1., 0.\n*END STEP\n")
+    out = run(program[0], deck, "U9", tmp_path/"pushed", env=program[1])
+    # Force of a node: about ten roundings in each of ten steps.
+    assert table(out, "momentum")[0] == pytest.approx([0.4, -0.6], rel=100*np.finfo(float).eps)
+
+
 @pytest.mark.parametrize("name, words", [
     ("", "is of type U9, a *USER ELEMENT: a program has to give its shape"),
     ("CPE4", "a shape cannot be given for CPE4"),
