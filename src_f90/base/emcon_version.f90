@@ -4,5 +4,5 @@ module emcon_version
    private
    public :: version
 
-   character(len=*), parameter :: version = "0.3.0"
+   character(len=*), parameter :: version = "0.4.0"
 end module emcon_version

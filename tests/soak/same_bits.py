@@ -22,6 +22,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 STORE = ROOT / "build" / "bits"
 #: A run that takes longer is cut, and the decks that were are counted.
 SECONDS = 60
+NOT_COMPARED = r"/cpu$|_SECONDS|^run/version$|^texts/build$"
 WITHOUT = re.compile(r"[\d.]+ s of the processor|cpu[^,}\n]*", re.I)
 
 
@@ -66,7 +67,7 @@ def table(path):
 
 
 def arrays(path):
-    """Names and bytes of all arrays of an HDF5 file that are not times of the machine."""
+    """Names and bytes of all arrays of an HDF5 file but times of the machine and its version."""
     parts = []
     with h5py.File(path, "r") as file:
         file.visititems(
@@ -74,7 +75,7 @@ def arrays(path):
             if isinstance(item, h5py.Dataset)
             else None
         )
-    parts = [(name, a) for name, a in parts if not re.search(r"/cpu$|_SECONDS", name)]
+    parts = [(name, a) for name, a in parts if not re.search(NOT_COMPARED, name)]
     return b"".join(name.encode() + repr(a.shape).encode() + a.tobytes() for name, a in parts)
 
 
@@ -110,7 +111,7 @@ def digest(data):
 def outcomes(program, decks):
     """Outcome of each deck, from the store where this very program has run it."""
     program = pathlib.Path(program).resolve()
-    store = STORE / f"of-{digest(program.read_bytes())}.json"
+    store = STORE / f"of-{digest(program.read_bytes() + pathlib.Path(__file__).read_bytes())}.json"
     known = json.loads(store.read_text()) if store.exists() else {}
     new = [deck for deck in decks if key(deck) not in known]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
