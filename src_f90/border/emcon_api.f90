@@ -78,10 +78,9 @@ module emcon_api
       stepper_read, stepper_read_text, stepper_save, stepper_t
    use emcon_stepper_conditions, only : conditions_load, conditions_save, stepper_add_prescribed, &
       stepper_find_load, stepper_remove_prescribed, stepper_set_load, stepper_set_prescribed
-   use emcon_stepper_contact, only : contact_report_t, query_areas, query_begin_contact, &
-      query_choose, query_constraints, query_contact, query_curvature, query_curvature_times, &
-      query_drop, query_gaps, query_overlap, query_select, query_update_active, step_cycling, &
-      step_done, step_stands_off, step_too_far
+   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &
+      query_contact, query_drop, query_gaps, query_overlap, query_select, query_update_active, &
+      step_cycling, step_done, step_stands_off, step_too_far
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
    use emcon_stepper_given, only : stepper_give_constraint, stepper_give_element, &
@@ -93,6 +92,8 @@ module emcon_api
       query_multipliers, query_null_space, query_particular
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
+   use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature, &
+      query_curvature_times
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &
       load_pressure
    use emcon_text, only : string_t

@@ -13,9 +13,9 @@ module emcon_c_contact
    use emcon_judge, only : overlap_t
    use emcon_kinds, only : wp
    use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &
-      query_constraints, query_contact, query_curvature, query_curvature_times, query_drop, &
-      query_gaps, query_overlap, query_select, query_update_active
+      query_contact, query_drop, query_gaps, query_overlap, query_select, query_update_active
    use emcon_stepper_null_space, only : query_multipliers, query_null_space, query_particular
+   use emcon_stepper_report, only : query_constraints, query_curvature, query_curvature_times
    implicit none
    private
    public :: emcon_constraints_c, emcon_begin_contact, emcon_get_gaps, emcon_select, emcon_choose, &

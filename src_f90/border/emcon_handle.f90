@@ -8,8 +8,8 @@ module emcon_handle
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, err_none, error_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_contact, only : contact_report_t
    use emcon_stepper_query, only : query_follow, query_t
+   use emcon_stepper_report, only : contact_report_t
    implicit none
    private
    public :: model_t, find_model, find_read, find_built, handle_fail, handle_pass

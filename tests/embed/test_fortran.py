@@ -15,7 +15,8 @@ EPS = 2.0**-52
 STANDS_FOR = ["emcon_stepper*", "emcon_quantities", "emcon_version"]
 # For the other rooms of the library, not for programs.
 INNER_MODULES = {"emcon_stepper_check"}
-INNER_NAMES = {"stepper_read_source", "stepper_check_solids", "query_sync", "field_names",
+INNER_NAMES = {"stepper_read_source", "stepper_check_solids", "query_sync", "report_place",
+               "report_evaluate", "report_check_list", "field_names",
                "pair_variables"}
 
 

@@ -13,14 +13,14 @@ module test_interface
    use emcon_march, only : increment_t
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance
-   use emcon_stepper_contact, only : contact_report_t, query_areas, query_begin_contact, &
-      query_choose, query_contact, query_curvature, query_curvature_times, query_gaps, &
-      query_select
+   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &
+      query_contact, query_gaps, query_select
    use emcon_stepper_free, only : stepper_step
    use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &
       stepper_set_contact, stepper_tie_matrices
    use emcon_stepper_null_space, only : query_follow_links, query_links, query_null_space, &
       query_particular
+   use emcon_stepper_report, only : contact_report_t, query_curvature, query_curvature_times
    use emcon_steps, only : initiation_persistent
    use emcon_system, only : system_init, system_t
    use emcon_text, only : notes_t, to_text

@@ -9,11 +9,11 @@ module test_stepper_query
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
    use emcon_stepper_conditions, only : stepper_remove_prescribed
-   use emcon_stepper_contact, only : contact_report_t, query_constraints, query_curvature_times
    use emcon_stepper_null_space, only : query_links, query_multipliers, query_null_space
    use emcon_stepper_free, only : snapshot_t, stepper_restore, stepper_snapshot
    use emcon_stepper_query, only : query_evaluate, query_free, query_guess, query_mass, &
       query_momenta, query_residual, query_t, query_tangent, query_unknowns
+   use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature_times
    use emcon_text, only : to_text
    use small_scenes, only : shake, young
    use stepper_scenes, only : check_same_state, drop_h, make_drop, make_tied_drop, open_scene

@@ -9,11 +9,12 @@ module truss_host
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_stepper, only : stepper_build, stepper_t
-   use emcon_stepper_contact, only : contact_report_t, query_begin_contact, query_contact, &
-      query_curvature, query_drop, query_select, query_update_active, step_done
+   use emcon_stepper_contact, only : query_begin_contact, query_contact, query_drop, &
+      query_select, query_update_active, step_done
    use emcon_stepper_host, only : stepper_hold, stepper_new
    use emcon_stepper_null_space, only : query_multipliers, query_null_space, query_particular
    use emcon_stepper_query, only : query_t
+   use emcon_stepper_report, only : contact_report_t, query_curvature
    use emcon_text, only : to_text
    use sparse_samples, only : dense_of
    implicit none
