@@ -173,21 +173,22 @@ contains
       class(inertia_t), intent(in) :: self
       real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
-      real(wp) :: total(2)
+      real(wp) :: one, other
       integer :: i, k, a, b
 
       do i = 1, self%mass%n_row
-         do a = 1, size(field, 1), 2             ! two directions at a time
+         do a = 1, size(field, 1), 2               ! two directions at a time
             b = min(a + 1, size(field, 1))
-            total = 0.0_wp
+            one = 0.0_wp
+            other = 0.0_wp
             do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
                associate (m => real(self%mass%value(k), wp), j => self%mass%column(k) + 1)
-                  total(1) = total(1) + m*field(a, j)
-                  total(2) = total(2) + m*field(b, j)
+                  one = one + m*field(a, j)
+                  other = other + m*field(b, j)
                end associate
             end do
-            product(a, i) = total(1)
-            product(b, i) = total(2)
+            product(a, i) = one
+            product(b, i) = other
          end do
       end do
    end subroutine inertia_times
