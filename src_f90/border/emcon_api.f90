@@ -17,7 +17,7 @@
 !>    that extends `law_t` of `emcon_law`; by `stepper_give_element` the shape of elements, a type
 !>    that extends `shape_t`; by `stepper_give_scheme` a scheme of time integration,
 !>    a type that extends `scheme_t`; by `stepper_give_force` and `stepper_give_mass` the solid of
-!>    a host code, a type that extends `given_force_t`; by `stepper_give_constraint` conditions that
+!>    a host code, a type that extends `host_force_t`; by `stepper_give_constraint` conditions that
 !>    always hold, a type that extends `constraint_t`; by `stepper_give_solver` a direct solver, a
 !>    type that extends `sparse_solver_t`.
 !> 2. `stepper_advance` until `stepper_is_done`: the grid of the deck. Or `stepper_step` with sizes
@@ -53,8 +53,8 @@ module emcon_api
    use emcon_deck_source, only : passage_t
    use emcon_errors, only : err_analysis, err_file, err_input, err_internal, err_interrupt, &
       err_none, error_t
-   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok, &
-      given_outside
+   use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok, &
+      host_outside
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
       formulation_segment, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none

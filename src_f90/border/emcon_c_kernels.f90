@@ -24,8 +24,8 @@ contains
       real(c_double), pointer :: values(:), from(:), by(:)
 
       ierr = err_input
-      if (.not. (c_associated(constant) .and. c_associated(strain) .and. c_associated(dstrain))) &
-         return
+      if (.not. c_associated(constant) .or. .not. c_associated(strain)) return
+      if (.not. c_associated(dstrain)) return
       if (n < 0) return
       call c_f_pointer(constant, values, [n])
       call c_f_pointer(strain, from, [3])

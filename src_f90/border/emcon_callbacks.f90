@@ -8,7 +8,7 @@ module emcon_callbacks
       c_int, c_loc, c_null_funptr, c_null_ptr, c_ptr
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given_force, only : force_response_t, given_force_t
+   use emcon_host_force, only : force_response_t, host_force_t
    use emcon_kinds, only : dp, wp
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_stepper, only : stepper_t
@@ -27,7 +27,7 @@ module emcon_callbacks
    end type point_callback_t
 
    !> Forces between nodes with a sparse tangent: the solid of a host.
-   type, extends(given_force_t) :: force_callback_t
+   type, extends(host_force_t) :: force_callback_t
       type(c_funptr) :: function = c_null_funptr
       type(c_ptr) :: user = c_null_ptr
    contains
@@ -155,7 +155,7 @@ contains
       if (wants_hessian) hessian(:, :, :n) = real(ddw, wp)
    end subroutine point_callback_evaluate
 
-   !> As `given_force_t` has it.
+   !> As `host_force_t` has it.
    subroutine force_callback_respond(self, u0, du, wants_tangent, response)
       class(force_callback_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)

@@ -93,7 +93,7 @@ contains
       type(contact_pair_t), allocatable :: pair(:)
       type(origin_t), allocatable :: line(:)       !! of each pair
       type(data_t) :: data
-      type(contact_pair_t) :: common
+      type(contact_pair_t) :: of_card
       integer :: i, n, n_before, most
 
       most = 0
@@ -107,14 +107,14 @@ contains
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "CONTACTPAIR") cycle
          n_before = n
-         common = contact_pair_t(origin=reader%card(i)%origin)
-         call read_formulation(reader, reader%card(i), common%formulation)
-         call read_sides(reader, reader%card(i), common)
+         of_card = contact_pair_t(origin=reader%card(i)%origin)
+         call read_formulation(reader, reader%card(i), of_card%formulation)
+         call read_sides(reader, reader%card(i), of_card)
          call data_open(data, reader%card(i))
          do while (next_line(reader, data))
             n = n + 1
             line(n) = line_origin(reader, data%i_line)
-            pair(n) = common
+            pair(n) = of_card
             call get_surfaces(reader, data, scene, pair(n)%slave, pair(n)%master)
             call set_sides(scene, pair(n))
             call check_nodal(reader, data, scene, pair(n))
@@ -147,21 +147,21 @@ contains
 
    !> SIDES of a card: are the nodes of both surfaces held, of the first, or is it left to the
    !> program? Integrated gaps of both would hold the same covered lengths twice.
-   subroutine read_sides(reader, card, common)
+   subroutine read_sides(reader, card, of_card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      type(contact_pair_t), intent(inout) :: common
+      type(contact_pair_t), intent(inout) :: of_card
       character(len=*), parameter :: known = "AUTO, ONE, BOTH"
 
-      common%is_asked = has_option(card, "SIDES")
+      of_card%is_asked = has_option(card, "SIDES")
       select case (option_name(card, "SIDES"))
       case ("", "AUTO")
-         common%may_choose = .true.
+         of_card%may_choose = .true.
       case ("ONE")
          continue
       case ("BOTH")
-         common%both_sides = common%formulation == formulation_nts
-         if (any(common%formulation == [formulation_segment, formulation_mortar])) then
+         of_card%both_sides = of_card%formulation == formulation_nts
+         if (any(of_card%formulation == [formulation_segment, formulation_mortar])) then
             call refuse_option(reader, card, "SIDES", "AUTO, ONE", "SEGMENT and MORTAR hold what " &
                // "lies between the surfaces once; use TYPE=NODE TO SURFACE")
          end if
@@ -288,7 +288,7 @@ contains
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(inout) :: pair(:)
-      type(contact_pair_t) :: common
+      type(contact_pair_t) :: of_card
       character(len=:), allocatable :: name
       logical :: is_known
       integer :: i
@@ -301,27 +301,27 @@ contains
       end do
       if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))
-      if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, common)
-      call read_guard(reader, card, any(pair%both_sides), common)
+      if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
+      call read_guard(reader, card, any(pair%both_sides), of_card)
       do i = 1, size(pair)
-         pair(i)%adjust_distance = common%adjust_distance
-         pair(i)%adjust_set = common%adjust_set
-         pair(i)%is_guarded = common%is_guarded
+         pair(i)%adjust_distance = of_card%adjust_distance
+         pair(i)%adjust_set = of_card%adjust_set
+         pair(i)%is_guarded = of_card%is_guarded
       end do
    end subroutine read_pair_options
 
    !> GUARD= of a card: are nodes that the pairs do not hold kept from going in too far?
-   subroutine read_guard(reader, card, both_sides, common)
+   subroutine read_guard(reader, card, both_sides, of_card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       logical, intent(in) :: both_sides
-      type(contact_pair_t), intent(inout) :: common
+      type(contact_pair_t), intent(inout) :: of_card
 
       select case (option_name(card, "GUARD"))
       case ("", "YES")
-         common%is_guarded = .true.
+         of_card%is_guarded = .true.
       case ("NO")
-         common%is_guarded = .false.
+         of_card%is_guarded = .false.
       case default
          call refuse_option(reader, card, "GUARD", "YES, NO", "")
       end select
@@ -330,11 +330,11 @@ contains
    end subroutine read_guard
 
    !> ADJUST= a distance or a node set.
-   subroutine read_adjust(reader, card, scene, common)
+   subroutine read_adjust(reader, card, scene, of_card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(inout) :: common
+      type(contact_pair_t), intent(inout) :: of_card
       character(len=:), allocatable :: value
       real(wp) :: distance
       logical :: is_number
@@ -345,10 +345,10 @@ contains
       if (is_number .and. distance < 0.0_wp) then
          call card_error(reader, card, "the distance ADJUST=" // value // " is negative")
       else if (is_number) then
-         common%adjust_distance = distance
+         of_card%adjust_distance = distance
       else
-         common%adjust_set = find_set(scene%node_set, value)
-         if (common%adjust_set == 0 .and. .not. reader%doubt_names) then
+         of_card%adjust_set = find_set(scene%node_set, value)
+         if (of_card%adjust_set == 0 .and. .not. reader%doubt_names) then
             call card_error(reader, card, "ADJUST=" // quoted(value) // " is neither a number " &
                // "nor a node set" // suggestion(value, set_names(scene%node_set)))
          end if

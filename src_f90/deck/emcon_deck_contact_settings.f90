@@ -26,8 +26,9 @@ contains
       if (option_name(card, "TYPE") == "") step%initiation = option_default("initiation")
       call choose_option(reader, card, "TYPE", "initiation", step%initiation)
       call option_real(reader, card, "GAP TOLERANCE", step%gap_tolerance)
-      if (has_option(card, "GAPTOLERANCE") .and. step%initiation /= initiation_persistent) &
-         call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
+      if (has_option(card, "GAPTOLERANCE") .and. step%initiation /= initiation_persistent) then
+        call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
+      end if
    end subroutine read_initiation
 
    !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.

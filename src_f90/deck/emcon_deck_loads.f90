@@ -227,9 +227,10 @@ contains
          call get_integer(reader, data, 2, "degree of freedom", new%place)
          new%value = 0.0_wp
          call get_real(reader, data, 3, "force", new%value)
-         if (data%ok .and. new%place > merge(scene%n_dim, last_freedom, new%value /= 0.0_wp)) &
-            call data_error(reader, data, "degree of freedom " // to_text(new%place) &
+         if (data%ok .and. new%place > merge(scene%n_dim, last_freedom, new%value /= 0.0_wp)) then
+           call data_error(reader, data, "degree of freedom " // to_text(new%place) &
             // " does not exist; known: 1, 2")
+         end if
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (.not. data%ok .or. new%place > scene%n_dim) cycle
          do i = 1, size(item)

@@ -142,11 +142,13 @@ contains
          if (fault /= "") return
          call shape_tabulate(shape, i == 2, table)
          do k = 1, table%n_gp
-            if (.not. abs(sum(table%value(:, k)) - 1.0_wp) <= tol*sum(abs(table%value(:, k)))) &
-               fault = "the sum of its shape functions is not 1"
+            if (.not. abs(sum(table%value(:, k)) - 1.0_wp) <= tol*sum(abs(table%value(:, k)))) then
+              fault = "the sum of its shape functions is not 1"
+            end if
             associate (slope => table%slope(:, :, k))
-               if (.not. all(abs(sum(slope, 2)) <= tol*sum(abs(slope)))) &
-                  fault = "the sum of the slopes of its shape functions is not 0"
+               if (.not. all(abs(sum(slope, 2)) <= tol*sum(abs(slope)))) then
+                 fault = "the sum of the slopes of its shape functions is not 0"
+               end if
             end associate
          end do
       end do

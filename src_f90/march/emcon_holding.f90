@@ -14,9 +14,9 @@ module emcon_holding
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs
-   use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t, rigid_field, rigid_force
-   use emcon_rigid_motion, only : describe_motion
-   use emcon_rigid_rows, only : rigid_rows_append, rigid_rows_find, rigid_rows_t
+   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, mechanism_field, mechanism_force
+   use emcon_mechanism_text, only : describe_motion
+   use emcon_mechanism_rows, only : mechanism_rows_append, mechanism_rows_find, mechanism_rows_t
    use emcon_scene, only : scene_t
    use emcon_system, only : system_loads, system_stiffen, system_t
    implicit none
@@ -30,7 +30,7 @@ module emcon_holding
       logical :: is_needed = .false.             !! contact alone holds some body
       logical :: stabilizes = .false.            !! what no load works on needs not be held
       real(wp) :: tolerance = 0.0_wp             !! loads below this part of all are none
-      type(rigid_rows_t) :: supports             !! prescribed freedoms, ties and equations
+      type(mechanism_rows_t) :: supports             !! prescribed freedoms, ties and equations
       logical, allocatable :: is_loose(:)        !! (n_body) it has a motion that nothing holds
       logical :: is_pushed = .false.             !! a load works on what `text` tells of
       character(len=:), allocatable :: text      !! what nothing holds; not allocated: all is held
@@ -44,8 +44,8 @@ module emcon_holding
 
    !> The bodies and contacts of one look at the scene.
    type :: look_t
-      type(rigid_bodies_t) :: bodies
-      type(rigid_rows_t) :: rows
+      type(mechanisms_t) :: bodies
+      type(mechanism_rows_t) :: rows
       integer, allocatable :: assembly(:), order(:)
       integer :: n_assembly = 0
    end type look_t
@@ -73,7 +73,7 @@ contains
       associate (step => scene%step(system%i_step))
          self%tolerance = step%newton_tolerance
          self%stabilizes = step%stabilizes
-         call rigid_rows_find(system, step%prescribed, self%supports)
+         call mechanism_rows_find(system, step%prescribed, self%supports)
       end associate
       allocate(self%is_loose(system%space%n_body), source=.false.)
       allocate(self%has_pulled(system%n_constraint), source=.false.)
@@ -169,7 +169,7 @@ contains
 
    !> The bodies of an assembly that move, and how.
    subroutine tell(bodies, system, scene, free, text)
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       type(free_t), intent(in) :: free
@@ -190,9 +190,9 @@ contains
 
       look%rows = self%supports
       if (scene%step(system%i_step)%nlgeom) then
-         call rigid_bodies_find(system, scene, scene%x + u, look%rows, .false., .true., look%bodies)
+         call mechanisms_find(system, scene, scene%x + u, look%rows, .false., .true., look%bodies)
       else
-         call rigid_bodies_find(system, scene, scene%x, look%rows, .false., .true., look%bodies)
+         call mechanisms_find(system, scene, scene%x, look%rows, .false., .true., look%bodies)
       end if
    end subroutine take_look
 
@@ -208,7 +208,7 @@ contains
 
       call take_look(self, system, scene, motion%u0 + motion%du, look)
       call gaps_evaluate(system, motion, is_active, set)
-      call rigid_rows_append(look%rows, set%item)
+      call mechanism_rows_append(look%rows, set%item)
    end subroutine look_at_contacts
 
    !> The assemblies that can move.
@@ -241,7 +241,7 @@ contains
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(inout) :: motion
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       type(free_t), intent(in) :: free
       logical, intent(inout) :: is_active(:)
       type(constraint_set_t) :: set
@@ -252,7 +252,7 @@ contains
 
       share = free%along/norm2(free%along)
       rigid = matmul(free%z, share)
-      call rigid_field(bodies, free%member, rigid, way)
+      call mechanism_field(bodies, free%member, rigid, way)
       call gaps_evaluate(system, motion, gaps_that_can_act(system) &
          .and. .not. is_active, set)
       call gaps_next_to_close(set, way, time, is_next)
@@ -285,7 +285,7 @@ contains
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(in) :: motion
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       type(free_t), intent(in) :: free
       logical, intent(inout) :: is_active(:)
       type(constraint_set_t) :: set
@@ -305,7 +305,7 @@ contains
       type(holding_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       type(free_t), intent(in) :: free
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: is_next(:)          !! (n_constraint)
@@ -324,13 +324,13 @@ contains
       type(holding_t), intent(in) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       type(free_t), intent(inout) :: free
       real(dp) :: total(3*size(free%member)), along(size(free%z, 2)), magnitude
       real(wp) :: force(size(motion%x, 1), size(motion%x, 2))
 
       call system_loads(system, motion, force)
-      call rigid_force(bodies, free%member, force, total, magnitude)
+      call mechanism_force(bodies, free%member, force, total, magnitude)
       along = matmul(total, free%z)
       free%is_loaded = magnitude > 0.0_dp
       if (norm2(along) <= max(real(self%tolerance, dp), free%noise)*magnitude) along = 0.0_dp

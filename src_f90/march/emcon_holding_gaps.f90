@@ -5,7 +5,7 @@ module emcon_holding_gaps
       constraints_select
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
-   use emcon_rigid_bodies, only : rigid_bodies_t, rigid_field
+   use emcon_mechanisms, only : mechanisms_t, mechanism_field
    use emcon_system, only : system_t
    implicit none
    private
@@ -98,7 +98,7 @@ contains
    !> Of the contacts `set` those with the smallest gap that prevent a motion that is left.
    pure subroutine gaps_nearest(set, bodies, member, z, is_next)
       type(constraint_set_t), intent(in) :: set
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)           !! bodies of an assembly
       real(dp), intent(in) :: z(:, :)            !! (3*members, n) motions that are left of it
       logical, intent(out) :: is_next(:)         !! (n_constraint)
@@ -107,7 +107,7 @@ contains
 
       rate = 0.0_wp
       do j = 1, size(z, 2)
-         call rigid_field(bodies, member, z(:, j), way)
+         call mechanism_field(bodies, member, z(:, j), way)
          do k = 1, set%n
             associate (item => set%item(k))
                rate(k) = max(rate(k), abs(condition_rate(item, way)) &

@@ -5,8 +5,8 @@ module emcon_march
    use emcon_active_set, only : active_set_init, active_set_overclosure
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : err_analysis, err_input, err_interrupt, error_t, raise
-   use emcon_given, only : given_copy_solvers, given_find_solver, given_t
-   use emcon_given_scheme, only : given_scheme_find
+   use emcon_host, only : host_copy_solvers, host_find_solver, host_t
+   use emcon_host_scheme, only : host_scheme_find
    use emcon_holding, only : holding_begin, holding_t
    use emcon_interactions, only : contact_options_t
    use emcon_judge, only : judge_init, judge_step, overlap_t
@@ -23,7 +23,7 @@ module emcon_march
    use emcon_overclosure, only : overclosure_check
    use emcon_pair_record, only : pair_record_init
    use emcon_pose, only : pose_at_end
-   use emcon_rigid_motion, only : free_motion_text
+   use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_create, scheme_given
    use emcon_solver_registry, only : solver_given
@@ -51,11 +51,11 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(given_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: given
       call check_schemes(self, scene, error)
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
-      call given_copy_solvers(given, self%solver)
+      call host_copy_solvers(given, self%solver)
       call motion_init(self%motion, scene%x)
       allocate(self%v1, source=at_rest(scene%x))
       associate (state => self%state)
@@ -82,7 +82,7 @@ contains
       do i = 1, size(scene%step)
          associate (choice => scene%step(i)%choice)
             if (scene%step(i)%scheme%code /= scheme_given) cycle
-            if (given_scheme_find(self%given_scheme, choice%name) > 0) cycle
+            if (host_scheme_find(self%given_scheme, choice%name) > 0) cycle
             call option_words("scheme", known)
             call raise(error, err_input, where_text(scene, choice%origin) // ": error: SCHEME=" // &
                choice%name // ": no program has given this scheme, see docs/embedding.md; EMCON " &
@@ -283,7 +283,7 @@ contains
          call correction_reset(self%newton%correction, method, step%solver)
          call velocity_update_reset(self%velocity_update, step%solver)
       else
-         i = given_find_solver(self%solver, step%solver_name)
+         i = host_find_solver(self%solver, step%solver_name)
          call correction_reset(self%newton%correction, method, solver_given + i, &
             self%solver(i)%solver)
          call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
@@ -300,7 +300,7 @@ contains
          call scheme_create(step%scheme, self%scheme)
          return
       end if
-      k = given_scheme_find(self%given_scheme, step%choice%name)
+      k = host_scheme_find(self%given_scheme, step%choice%name)
       call scheme_create(step%scheme, self%scheme, self%given_scheme(k)%scheme)
    end subroutine choose_scheme
 

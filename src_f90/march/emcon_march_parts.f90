@@ -6,7 +6,7 @@ module emcon_march_parts
    use emcon_kinds, only : wp
    use emcon_march_step, only : cycling_text, march_step
    use emcon_march_types, only : increment_t, march_t, part_t
-   use emcon_rigid_motion, only : free_motion_text
+   use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_system, only : system_may_hold
    use emcon_text, only : note_add, notes_append, notes_t, to_text

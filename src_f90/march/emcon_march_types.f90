@@ -1,7 +1,7 @@
 !> What a march through time holds, what one increment took, and what a step is.
 module emcon_march_types
    use emcon_active_set, only : active_set_t
-   use emcon_given_scheme, only : given_scheme_t
+   use emcon_host_scheme, only : host_scheme_t
    use emcon_judge, only : judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -57,7 +57,7 @@ module emcon_march_types
       type(state_t) :: state
       type(ledger_t) :: ledger
       class(scheme_t), allocatable :: scheme
-      type(given_scheme_t), allocatable :: given_scheme(:)   !! (any) by the program
+      type(host_scheme_t), allocatable :: given_scheme(:)   !! (any) by the program
       type(newton_t) :: newton
       type(active_set_t) :: active
       type(velocity_update_t) :: velocity_update

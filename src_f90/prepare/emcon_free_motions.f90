@@ -9,8 +9,8 @@
 module emcon_free_motions
    use emcon_bodies, only : bodies_find
    use emcon_kinds, only : dp, wp
-   use emcon_rigid_bodies, only : rigid_bodies_t, rigid_body_free, rigid_motions_at
-   use emcon_rigid_rows, only : rigid_rows_t
+   use emcon_mechanisms, only : mechanisms_t, mechanism_free, rigid_motions_at
+   use emcon_mechanism_rows, only : mechanism_rows_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
    implicit none
    private
@@ -25,8 +25,8 @@ contains
    !> Bodies that rows join, and the rows in the order of assemblies, then of the bodies that they
    !> join. Held bodies join nothing.
    subroutine find_assemblies(bodies, rows, assembly, n_assembly, order)
-      type(rigid_bodies_t), intent(in) :: bodies
-      type(rigid_rows_t), intent(inout) :: rows
+      type(mechanisms_t), intent(in) :: bodies
+      type(mechanism_rows_t), intent(inout) :: rows
       integer, allocatable, intent(out) :: assembly(:)   !! (bodies) 0: held
       integer, intent(out) :: n_assembly                 !! in the order of their first bodies
       integer, allocatable, intent(out) :: order(:)      !! (rows that join or hold something)
@@ -41,7 +41,7 @@ contains
       allocate(rows%low(rows%n), rows%high(rows%n), source=0)
       do k = 1, rows%n
          do s = rows%start(k) + 1, rows%start(k + 1)
-            b = rigid_body_free(bodies, rows%dof(s))
+            b = mechanism_free(bodies, rows%dof(s))
             if (b == 0) cycle
             if (rows%low(k) == 0) rows%low(k) = b
             call add_link(rows%low(k), b)
@@ -68,8 +68,8 @@ contains
 
    !> What the rows `list` leave of the motions of an assembly.
    subroutine find_free_motions(bodies, rows, list, member, z, noise)
-      type(rigid_bodies_t), intent(in) :: bodies
-      type(rigid_rows_t), intent(in) :: rows
+      type(mechanisms_t), intent(in) :: bodies
+      type(mechanism_rows_t), intent(in) :: rows
       integer, intent(in) :: list(:)                     !! rows between the same bodies in a row
       integer, intent(in) :: member(:)                   !! bodies of the assembly, ascending
       real(dp), allocatable, intent(out) :: z(:, :)      !! (3*members, n) orthonormal columns
@@ -107,8 +107,8 @@ contains
 
    !> Rows over the motions of the bodies that they join.
    subroutine find_entries(bodies, rows, list, member, a, motion, noise)
-      type(rigid_bodies_t), intent(in) :: bodies
-      type(rigid_rows_t), intent(in) :: rows
+      type(mechanisms_t), intent(in) :: bodies
+      type(mechanism_rows_t), intent(in) :: rows
       integer, intent(in) :: list(:)
       integer, intent(in) :: member(:)
       real(dp), allocatable, intent(out) :: a(:, :)      !! (rows, motions)
@@ -121,7 +121,7 @@ contains
       allocate(joined_body(sum(rows%start(list + 1) - rows%start(list))))
       do i = 1, size(list)
          do s = rows%start(list(i)) + 1, rows%start(list(i) + 1)
-            b = rigid_body_free(bodies, rows%dof(s))
+            b = mechanism_free(bodies, rows%dof(s))
             if (b == 0) cycle
             n = n + 1
             joined_body(n) = b
@@ -135,7 +135,7 @@ contains
       allocate(a(size(list), size(motion)), source=0.0_dp)
       do i = 1, size(list)
          do s = rows%start(list(i)) + 1, rows%start(list(i) + 1)
-            b = rigid_body_free(bodies, rows%dof(s))
+            b = mechanism_free(bodies, rows%dof(s))
             if (b == 0) cycle
             k = 3*find_sorted(joined_body, b)
             a(i, k - 2:k) = a(i, k - 2:k) &

@@ -70,8 +70,9 @@ contains
             end if
             call adjust_pair(scene, pair, contact, notes)
             ! Bodies of one surface may cross each other where their overlap is to be resolved.
-            if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) &
-               call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
+            if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) then
+              call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
+            end if
             if (is_meant .and. .not. allocated(error)) cycle
             if (allocated(error)) return
             call check_penetration(scene, pair, contact, error)

@@ -165,8 +165,9 @@ contains
          call add_option(text, "integration", options%integration)
          if (options%n_point > 0) text = text // " with " // to_text(options%n_point) // " points"
       end if
-      if (any(formulation == [formulation_mortar, formulation_segment])) &
-         call add_option(text, "multiplier", options%multiplier)
+      if (any(formulation == [formulation_mortar, formulation_segment])) then
+        call add_option(text, "multiplier", options%multiplier)
+      end if
       if (formulation == formulation_mortar) then
          call add_option(text, "normal", options%normal)
          if (options%normal == normal_nodal) call add_corner(text, options%normal_angle)

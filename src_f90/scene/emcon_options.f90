@@ -98,8 +98,9 @@ contains
       do i = 1, n_option_row
          row = option_row(i)
          if (row%kind /= kind) cycle
-         if (without_blanks(row%word) == word .or. index(row%also, "," // word // ",") > 0) &
-            code = row%code
+         if (without_blanks(row%word) == word .or. index(row%also, "," // word // ",") > 0) then
+           code = row%code
+         end if
       end do
    end function option_code
 

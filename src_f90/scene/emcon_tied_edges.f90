@@ -23,8 +23,9 @@ contains
             if (tie%slave == 0) cycle                  ! known by its rows alone
             call surface_edges(scene, scene%surface(tie%slave), slave)
             follower(slave(1, :)) = slave(2, :)
-            if (allocated(tie%rows%covered)) &
-               follower(tie%rows%covered(1, :)) = tie%rows%covered(2, :)
+            if (allocated(tie%rows%covered)) then
+              follower(tie%rows%covered(1, :)) = tie%rows%covered(2, :)
+            end if
          end associate
       end do
       is_tied = follower(edge(1, :)) == edge(2, :)

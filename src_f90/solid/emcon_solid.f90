@@ -3,8 +3,8 @@ module emcon_solid
    use emcon_element, only : element_add_point, element_clear, element_geometry_t, &
       element_motion_t, element_point, element_response_t, point_is_regular, point_motion_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given_law, only : given_law_t, given_law_take, given_points_make_room, &
-      given_response_t, given_rest_stiffness, given_state
+   use emcon_host_law, only : host_law_t, host_law_take, host_points_make_room, &
+      host_response_t, host_rest_stiffness, host_state
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create, law_given
@@ -32,7 +32,7 @@ module emcon_solid
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
       type(law_box_t), allocatable :: law(:)             !! one per material
-      type(given_law_t), allocatable :: given(:)         !! one per material, or one in its place
+      type(host_law_t), allocatable :: given(:)         !! one per material, or one in its place
       logical :: has_given = .false.                     !! some law is a given one
       integer, allocatable :: n_point(:)                 !! quadrature points, of each given law
       integer, allocatable :: first_point(:)             !! (n_element) among these; 0: law of ours
@@ -50,7 +50,7 @@ contains
       type(solid_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
       type(shape_table_t) :: stiffness(size(scene%kind)), mass(size(scene%kind))
       real(wp) :: at_rest(size(scene%material))
       integer :: e, k, n, n_most
@@ -122,7 +122,7 @@ contains
       type(scene_t), intent(in) :: scene
       real(wp), intent(out) :: at_rest(:)                !! (n_material) [M/(L T^2)]
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given(:)
+      type(host_law_t), intent(in), optional :: given(:)
       real(wp), parameter :: rest(3) = 0.0_wp
       type(law_response_t) :: state
       integer :: k
@@ -134,10 +134,10 @@ contains
          case (0)
             cycle
          case (law_given)
-            call given_law_take(scene, scene%material(k), self%given(k), error, given)
+            call host_law_take(scene, scene%material(k), self%given(k), error, given)
             if (allocated(error)) return
             call move_alloc(self%given(k)%law, self%law(k)%law)
-            if (allocated(self%given(k)%energy)) call given_rest_stiffness(self%given(k), &
+            if (allocated(self%given(k)%energy)) call host_rest_stiffness(self%given(k), &
                at_rest(k), error)
          case default
             call law_create(scene%material(k)%law, scene%material(k)%constant, self%law(k)%law, &
@@ -251,7 +251,7 @@ contains
       type(solid_t), intent(in) :: self
       integer, intent(in) :: e                   !! 1 to n_element
       type(element_motion_t), intent(in) :: motion
-      type(given_response_t), intent(in) :: given
+      type(host_response_t), intent(in) :: given
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(element_response_t), intent(inout) :: part
       type(point_motion_t) :: point
@@ -262,7 +262,7 @@ contains
       do k = 1, self%geometry(e)%n_gp
          call element_point(self%geometry(e), k, motion, point)
          if (self%first_point(e) > 0) then
-            state = given_state(given%points(self%law_of(e)), self%first_point(e) - 1 + k)
+            state = host_state(given%points(self%law_of(e)), self%first_point(e) - 1 + k)
          else
             associate (law => self%law(self%law_of(e))%law)
                part%is_inverted = .not. point_is_regular(point, law%has_volume)
@@ -280,7 +280,7 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom              !! .false.: small strains
       logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(given_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: given
       integer :: k
 
       given%material = 0
@@ -305,14 +305,14 @@ contains
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
-      type(given_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: given
       type(element_motion_t) :: local
       type(point_motion_t) :: point
       integer :: e, i, k
 
       if (.not. allocated(given%points)) allocate(given%points(size(self%given)))
       do k = 1, size(self%given)
-         call given_points_make_room(given%points(k), self%n_point(k))
+         call host_points_make_room(given%points(k), self%n_point(k))
       end do
       given%inverted_element = 0
       local%nlgeom = nlgeom

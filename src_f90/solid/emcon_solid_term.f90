@@ -6,7 +6,7 @@ module emcon_solid_term
    use emcon_element, only : element_motion_t, element_response_t
    use emcon_element_lists, only : element_lists
    use emcon_errors, only : err_analysis, error_t, raise
-   use emcon_given_law, only : given_law_t, given_response_t
+   use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
    use emcon_law_registry, only : law_linear
    use emcon_motion, only : motion_t
@@ -27,7 +27,7 @@ module emcon_solid_term
       logical :: nlgeom = .true.                 !! .false.: small strains
       logical :: has_linear_laws = .false.       !! all materials are
       integer, allocatable, private :: slot(:)   !! element matrices by columns
-      type(given_response_t), private :: given   !! what given laws answer
+      type(host_response_t), private :: given   !! what given laws answer
    contains
       procedure :: lay_out
       procedure :: begin_step
@@ -44,7 +44,7 @@ contains
       type(solid_term_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
 
       self%role = role_internal
       call solid_init(self%solid, scene, error, given)

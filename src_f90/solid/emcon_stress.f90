@@ -7,7 +7,7 @@
 module emcon_stress
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_element, only : element_motion_t, element_point, point_motion_t
-   use emcon_given_law, only : given_response_t, given_state
+   use emcon_host_law, only : host_response_t, host_state
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_solid, only : solid_evaluate_given, solid_t
@@ -23,7 +23,7 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)            !! (2, n_node)
       logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
-      type(given_response_t) :: given
+      type(host_response_t) :: given
       type(element_motion_t) :: motion
       integer :: count_at(solid%n_node), e, i, k, node
       real(wp) :: at_gp(6), strain(3)
@@ -56,7 +56,7 @@ contains
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)
       logical, intent(in) :: nlgeom
-      type(given_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: given
       real(wp), allocatable :: zero(:, :)
 
       if (.not. solid%has_given) return
@@ -82,7 +82,7 @@ contains
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e, k
       type(element_motion_t), intent(in) :: motion       !! of no size
-      type(given_response_t), intent(in) :: given
+      type(host_response_t), intent(in) :: given
       real(wp), intent(out) :: stress(6), strain(3)
       type(law_response_t) :: state
       type(point_motion_t) :: point
@@ -93,7 +93,7 @@ contains
       if (solid%first_point(e) == 0) then
          call law_response_plane(solid%law(solid%law_of(e))%law, strain, point%dstrain, state)
       else if (given%inverted_element == 0) then
-         state = given_state(given%points(solid%law_of(e)), solid%first_point(e) - 1 + k)
+         state = host_state(given%points(solid%law_of(e)), solid%first_point(e) - 1 + k)
       else
          state%stress = ieee_value(strain, ieee_quiet_nan)
       end if
@@ -113,7 +113,7 @@ contains
       real(wp), intent(out) :: stress(:, :)      !! (6, n_element)
       real(wp), intent(out) :: strain(:, :)      !! (3, n_element) E11, E22, 2 E12
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
-      type(given_response_t) :: given
+      type(host_response_t) :: given
       type(element_motion_t) :: motion
       real(wp) :: stress_k(6), strain_k(3), weight
       integer :: e, k

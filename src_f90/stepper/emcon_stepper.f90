@@ -7,8 +7,8 @@ module emcon_stepper
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, err_interrupt, error_t, raise
-   use emcon_given, only : given_count, given_count_conditions, given_t
-   use emcon_given_check, only : given_check_scene
+   use emcon_host, only : host_count, host_count_conditions, host_t
+   use emcon_host_check, only : host_check_scene
    use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
@@ -33,7 +33,7 @@ module emcon_stepper
    type :: stepper_t
       type(scene_t) :: scene
       type(march_t) :: march
-      type(given_t) :: given                     !! laws, forces and mass from outside
+      type(host_t) :: given                     !! laws, forces and mass from outside
       type(deck_source_t) :: source              !! the deck as read, for restart files
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.
@@ -139,7 +139,7 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      if (.not. self%scene%is_hosted) call given_check_scene(self%given, self%scene, error)
+      if (.not. self%scene%is_hosted) call host_check_scene(self%given, self%scene, error)
       if (allocated(error)) return
       call ties_prepare(self%scene, self%notes, error)
       if (.not. (allocated(error) .or. self%scene%is_hosted)) call prepare_contact(self, error)
@@ -280,9 +280,9 @@ contains
       end associate
       call save_pairs(self, restart)
       call verdict_save(self%verdict, restart)
-      n = given_count(self%given)
+      n = host_count(self%given)
       if (any(n > 0)) call restart_put(restart, "given", n)
-      n(1) = given_count_conditions(self%given)
+      n(1) = host_count_conditions(self%given)
       if (n(1) > 0) call restart_put(restart, "given_conditions", n(:1))
    end subroutine stepper_save
 
@@ -380,7 +380,7 @@ contains
       if (restart_size(restart, "given_conditions") > 0) call restart_get(restart, &
          "given_conditions", n(3:), error)
       if (allocated(error)) return
-      present = [given_count(self%given), given_count_conditions(self%given)]
+      present = [host_count(self%given), host_count_conditions(self%given)]
       if (all(n == present)) return
       call count_text(n, stored)
       call count_text(present, own)

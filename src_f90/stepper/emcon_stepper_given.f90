@@ -10,11 +10,11 @@ module emcon_stepper_given
    use emcon_element_kind, only : find_element_kind
    use emcon_element_registry, only : element_rows
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given, only : given_add_constraint, given_add_force, given_add_law, &
-      given_add_solver, given_copy_solvers, given_find_solver
-   use emcon_given_check, only : given_check_force, given_check_mass
-   use emcon_given_force, only : given_force_t
-   use emcon_given_scheme, only : given_scheme_add, given_scheme_check, given_scheme_find
+   use emcon_host, only : host_add_constraint, host_add_force, host_add_law, &
+      host_add_solver, host_copy_solvers, host_find_solver
+   use emcon_host_check, only : host_check_force, host_check_mass
+   use emcon_host_force, only : host_force_t
+   use emcon_host_scheme, only : host_scheme_add, host_scheme_check, host_scheme_find
    use emcon_law, only : law_t
    use emcon_law_registry, only : law_given
    use emcon_node_potential, only : node_potential_init, node_potential_t
@@ -51,7 +51,7 @@ contains
       material = to_upper(trim(adjustl(name)))
       call check_stage(self, error)
       if (.not. allocated(error)) call check_material(self, material, error)
-      if (.not. allocated(error)) call given_add_law(self%given, material, energy=energy)
+      if (.not. allocated(error)) call host_add_law(self%given, material, energy=energy)
    end subroutine give_energy
 
    !> Give a law for the *USER MATERIAL called `name`. It takes the constants of that card.
@@ -65,7 +65,7 @@ contains
       material = to_upper(trim(adjustl(name)))
       call check_stage(self, error)
       if (.not. allocated(error)) call check_material(self, material, error)
-      if (.not. allocated(error)) call given_add_law(self%given, material, law=law)
+      if (.not. allocated(error)) call host_add_law(self%given, material, law=law)
    end subroutine give_law
 
    !> Can a law be given for the material `name`?
@@ -132,16 +132,16 @@ contains
       type(scheme_row_t) :: own
 
       call check_stage(self, error)
-      if (.not. allocated(error)) call given_scheme_check(squeezed(name), scheme, error)
+      if (.not. allocated(error)) call host_scheme_check(squeezed(name), scheme, error)
       if (allocated(error)) return
       own = scheme_row("DYNAMIC", squeezed(name))
       if (own%code /= 0) then
          call raise(error, err_input, "a scheme cannot be given as " // trim(own%word) // &
             ": EMCON has its own")
-      else if (given_scheme_find(self%march%given_scheme, squeezed(name)) > 0) then
+      else if (host_scheme_find(self%march%given_scheme, squeezed(name)) > 0) then
          call raise(error, err_input, "the scheme " // squeezed(name) // " is given already")
       else
-         call given_scheme_add(self%march%given_scheme, squeezed(name), scheme)
+         call host_scheme_add(self%march%given_scheme, squeezed(name), scheme)
       end if
    end subroutine stepper_give_scheme
 
@@ -157,18 +157,18 @@ contains
       call check_stage(self, error)
       if (.not. allocated(error)) call node_potential_init(force, name, node, &
          size(self%scene%x, 2), potential, error)
-      if (.not. allocated(error)) call given_add_force(self%given, force)
+      if (.not. allocated(error)) call host_add_force(self%given, force)
    end subroutine stepper_give_potential
 
    !> Give forces between nodes. Those of several calls add up.
    subroutine stepper_give_force(self, force, error)
       type(stepper_t), intent(inout) :: self
-      class(given_force_t), intent(in) :: force
+      class(host_force_t), intent(in) :: force
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
 
       call check_stage(self, error)
-      if (.not. allocated(error)) call given_check_force(force, size(self%scene%x, 2), error)
-      if (.not. allocated(error)) call given_add_force(self%given, force)
+      if (.not. allocated(error)) call host_check_force(force, size(self%scene%x, 2), error)
+      if (.not. allocated(error)) call host_add_force(self%given, force)
    end subroutine stepper_give_force
 
    !> Give a mass beside that of the elements, the same in both directions: symmetric, and no mass
@@ -182,7 +182,7 @@ contains
       if (allocated(error)) return
       if (self%given%mass%n_row > 0) call raise(error, err_input, &
          "a mass was given already; give one matrix with all of it")
-      if (.not. allocated(error)) call given_check_mass(mass, self%scene, error)
+      if (.not. allocated(error)) call host_check_mass(mass, self%scene, error)
       if (.not. allocated(error)) self%given%mass = mass
    end subroutine stepper_give_mass
 
@@ -197,7 +197,7 @@ contains
       if (allocated(error)) return
       if (constraint%n_constraint < 1) call raise(error, err_input, "a constraint was given " // &
          "that has no conditions: n_constraint is to be their number")
-      if (.not. allocated(error)) call given_add_constraint(self%given, constraint)
+      if (.not. allocated(error)) call host_add_constraint(self%given, constraint)
    end subroutine stepper_give_constraint
 
    !> Give a direct solver, which steps with SOLVER=`name` factorise their matrices by.
@@ -212,7 +212,7 @@ contains
       word = to_upper(trim(adjustl(name)))
       call check_stage(self, error)
       if (allocated(error)) return
-      call given_copy_solvers(self%given, present)
+      call host_copy_solvers(self%given, present)
       if (any(solvers%word == word)) then
          call solver_names(known)
          call raise(error, err_input, "a solver cannot be given as " // word // &
@@ -220,10 +220,10 @@ contains
       else if (is_foreign_solver(word) .or. index(word, " ") > 0) then
          call raise(error, err_input, "a solver cannot be given as " // word // &
             ": the name has to be one without blanks that no other program has for its own")
-      else if (given_find_solver(present, word) > 0) then
+      else if (host_find_solver(present, word) > 0) then
          call raise(error, err_input, "the solver " // word // " is given already")
       end if
-      if (.not. allocated(error)) call given_add_solver(self%given, word, solver)
+      if (.not. allocated(error)) call host_add_solver(self%given, word, solver)
    end subroutine stepper_give_solver
 
    !> The deck is read, the model is not built.

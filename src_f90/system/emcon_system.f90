@@ -9,7 +9,7 @@ module emcon_system
    use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
-   use emcon_given, only : given_t
+   use emcon_host, only : host_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
@@ -56,7 +56,7 @@ contains
       type(system_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(given_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: given
       type(lists_t) :: lists
 
       call terms_create(scene, self%term, error, given)
@@ -76,7 +76,7 @@ contains
    subroutine init_held(self, scene, given)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      type(given_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: given
       integer :: i, n
 
       self%n_constraint = self%linear%n

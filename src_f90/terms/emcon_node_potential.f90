@@ -5,7 +5,7 @@
 module emcon_node_potential
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok
+   use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok
    use emcon_kinds, only : dp, wp
    use emcon_point_function, only : point_function_t, point_gradient, point_response_t
    use emcon_text, only : to_text
@@ -13,7 +13,7 @@ module emcon_node_potential
    private
    public :: node_potential_t, node_potential_init
 
-   type, extends(given_force_t) :: node_potential_t
+   type, extends(host_force_t) :: node_potential_t
       integer, allocatable :: node(:)                !! (n)
       class(point_function_t), allocatable :: potential  !! of x, y [L]: V [M L^2/T^2]
       real(wp), allocatable, private :: x(:, :)      !! (2, n) reference positions [L]
@@ -99,7 +99,7 @@ contains
       self%x = x(:, self%node)
    end subroutine place
 
-   !> As `given_force_t` has it.
+   !> As `host_force_t` has it.
    subroutine respond(self, u0, du, wants_tangent, response)
       class(node_potential_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
@@ -114,8 +114,8 @@ contains
       end do
       call point_gradient(self%potential, self%z, self%dz, wants_tangent, self%response, &
          response%status)
-      if (response%status == given_failed) self%reason = "its function failed"
-      if (response%status /= given_ok) return
+      if (response%status == host_failed) self%reason = "its function failed"
+      if (response%status /= host_ok) return
       response%energy = sum(self%response%energy(:n))
       do i = 1, n
          response%force(:, self%node(i)) = self%response%gradient(:, i)

@@ -2,9 +2,9 @@
 module emcon_term_registry
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
-   use emcon_given, only : given_count, given_t
-   use emcon_given_check, only : given_check_mass
-   use emcon_given_term, only : given_term_init, given_term_t
+   use emcon_host, only : host_count, host_t
+   use emcon_host_check, only : host_check_mass
+   use emcon_host_term, only : host_term_init, host_term_t
    use emcon_inertia, only : inertia_init, inertia_t, inertia_times
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : loads_init, loads_t
@@ -26,11 +26,11 @@ contains
       type(scene_t), intent(in) :: scene
       type(term_box_t), allocatable, intent(out) :: term(:)   !! (n_term)
       type(error_t), allocatable, intent(out) :: error
-      type(given_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: given
       integer :: n(2), i
 
       n = 0
-      if (present(given)) n = given_count(given)
+      if (present(given)) n = host_count(given)
       allocate(term(n_own + n(1)))
       allocate(inertia_t :: term(of_inertia)%term)
       allocate(solid_term_t :: term(of_solid)%term)
@@ -38,10 +38,10 @@ contains
       call create_own(scene, term, error, given)
       do i = 1, n(1)
          if (allocated(error)) return
-         allocate(given_term_t :: term(n_own + i)%term)
+         allocate(host_term_t :: term(n_own + i)%term)
          select type (part => term(n_own + i)%term)
-         type is (given_term_t)
-            call given_term_init(part, given%force(i)%force, scene, error)
+         type is (host_term_t)
+            call host_term_init(part, given%force(i)%force, scene, error)
          end select
       end do
    end subroutine terms_create
@@ -51,7 +51,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(term_box_t), intent(inout), target :: term(:)
       type(error_t), allocatable, intent(out) :: error
-      type(given_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: given
       type(csr_t) :: extra
       type(solid_t), pointer :: solid
 
@@ -64,7 +64,7 @@ contains
             call solid_term_init(part, scene, error)
          end if
       end select
-      if (.not. allocated(error) .and. extra%n_row > 0) call given_check_mass(extra, scene, error)
+      if (.not. allocated(error) .and. extra%n_row > 0) call host_check_mass(extra, scene, error)
       if (allocated(error)) return
       solid => terms_solid(term)
       select type (part => term(of_inertia)%term)

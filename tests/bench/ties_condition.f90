@@ -78,7 +78,8 @@ contains
             end do
             a = dense(march%newton%correction%saddle_point%full)
             a(n + 1:, :) = -a(n + 1:, :)
-            call print_line("saddle point", a, length, march%newton%correction%saddle_point%scale, n)
+            call print_line("saddle point", a, length, &
+               march%newton%correction%saddle_point%scale, n)
          else
             a = dense(march%newton%correction%null_space%reduced)
             call print_line("null space", a, [(1.0_dp, k = 1, size(a, 1))], 1.0_dp)

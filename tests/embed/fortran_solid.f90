@@ -3,8 +3,8 @@
 !> Triangles that the library does not know stand on a bed of springs, and a block of the library's
 !> elements, of a law that is given too, falls on them. The host gives mass, forces and tangent.
 module triangle_host
-   use emcon_api, only : csr_from_elements, csr_t, dp, error_t, force_response_t, given_force_t, &
-      given_ok, given_outside, point_function_t, point_ok, point_outside, wp
+   use emcon_api, only : csr_from_elements, csr_t, dp, error_t, force_response_t, host_force_t, &
+      host_ok, host_outside, point_function_t, point_ok, point_outside, wp
    implicit none
    private
    public :: triangles_t, springs_t, foam_t, triangles_init, density
@@ -12,7 +12,7 @@ module triangle_host
    real(wp), parameter :: modulus = 200.0_wp, shear = 100.0_wp, density = 1.0_wp
 
    !> Triangles of St. Venant and Kirchhoff's law, of constant strain.
-   type, extends(given_force_t) :: triangles_t
+   type, extends(host_force_t) :: triangles_t
       real(wp), allocatable :: x(:, :)           !! (2, n_node)
       integer, allocatable :: node(:, :)         !! (3, n_triangle)
       integer, allocatable :: slot(:)            !! (36 n_triangle) of the tangent, in its pattern
@@ -125,7 +125,7 @@ contains
       real(wp) :: gradient(2, 3), area, f0(2, 2), f1(2, 2), e0(3), e1(3), stress(3), rows(3, 6)
       integer :: t
 
-      response%status = given_outside
+      response%status = host_outside
       do t = 1, size(self%node, 2)
          associate (node => self%node(:, t))
             call shape_of(self, t, gradient, area)
@@ -142,7 +142,7 @@ contains
             if (wants_tangent) call add_tangent()
          end associate
       end do
-      response%status = given_ok
+      response%status = host_ok
 
    contains
 

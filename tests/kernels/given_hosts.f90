@@ -3,8 +3,8 @@ module given_hosts
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_csr, only : csr_find, csr_from_elements
    use emcon_errors, only : error_t
-   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok, &
-      given_outside
+   use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok, &
+      host_outside
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_function_t, point_ok
@@ -18,7 +18,7 @@ module given_hosts
    public :: solid_host_t, chain_host_t, well_t, solid_host_init, chain_host_init
 
    !> The elements of a scene as those of a host code.
-   type, extends(given_force_t) :: solid_host_t
+   type, extends(host_force_t) :: solid_host_t
       type(solid_term_t) :: solid
       type(response_t) :: response
       logical :: tells_magnitude = .true.
@@ -27,13 +27,13 @@ module given_hosts
    end type solid_host_t
 
    !> Springs along x from node to node, of the energy k e^2/2 + c e^4/4 in their elongation e.
-   type, extends(given_force_t) :: chain_host_t
+   type, extends(host_force_t) :: chain_host_t
       integer, allocatable :: node(:)
       real(wp) :: k = 1.0_wp, c = 0.0_wp
       logical :: tells_magnitude = .false.
       real(wp) :: longest = huge(1.0_wp)         !! springs longer than this are outside
       integer :: ends_at = huge(1)               !! the call that fails
-      integer :: status_then = given_failed
+      integer :: status_then = host_failed
       logical :: gives_nan = .false.             !! instead of failing
       integer :: n_call = 0
    contains
@@ -86,8 +86,8 @@ contains
       else
          call self%solid%respond(motion, self%response)
       end if
-      if (allocated(self%response%refusal)) response%status = given_outside
-      if (response%status /= given_ok) return
+      if (allocated(self%response%refusal)) response%status = host_outside
+      if (response%status /= host_ok) return
       associate (total => self%response%part(role_internal))
          response%force = total%force
          if (self%tells_magnitude) response%magnitude = total%magnitude
@@ -118,7 +118,7 @@ contains
       real(wp) :: e0, e1, f, slope
       integer :: i, a, b
 
-      response%status = given_ok
+      response%status = host_ok
       self%n_call = self%n_call + 1
       if (self%n_call >= self%ends_at) then
          if (self%gives_nan) response%force = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -131,7 +131,7 @@ contains
          b = self%node(i + 1)
          e0 = u0(1, b) - u0(1, a)
          e1 = e0 + (du(1, b) - du(1, a))
-         if (abs(e1) > self%longest) response%status = given_outside
+         if (abs(e1) > self%longest) response%status = host_outside
          f = (0.5_wp*self%k + 0.25_wp*self%c*(e0**2 + e1**2))*(e0 + e1)
          slope = 0.5_wp*self%k + 0.25_wp*self%c*((e0**2 + e1**2) + (e0 + e1)*2.0_wp*e1)
          response%energy = response%energy + 0.5_wp*self%k*e1**2 + 0.25_wp*self%c*e1**4

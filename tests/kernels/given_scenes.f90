@@ -3,7 +3,7 @@ module given_scenes
    use check, only : check_near
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
-   use emcon_given_force, only : given_force_t
+   use emcon_host_force, only : host_force_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t
    use emcon_scene, only : scene_t
@@ -119,7 +119,7 @@ contains
    subroutine open_given(stepper, scene, force, mass, error)
       type(stepper_t), intent(inout) :: stepper
       type(scene_t), intent(in) :: scene
-      class(given_force_t), intent(in) :: force
+      class(host_force_t), intent(in) :: force
       real(wp), intent(in) :: mass               !! of each node; 0: none
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: matrix

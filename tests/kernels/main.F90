@@ -23,10 +23,10 @@ program main
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
    use test_gauss, only : collect_gauss
-   use test_given_check, only : collect_given_check
-   use test_given_deck, only : collect_given_deck
-   use test_given_force, only : collect_given_force
-   use test_given_law, only : collect_given_law
+   use test_host_check, only : collect_host_check
+   use test_host_deck, only : collect_host_deck
+   use test_host_force, only : collect_host_force
+   use test_host_law, only : collect_host_law
    use test_guards, only : collect_guards
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
@@ -126,9 +126,9 @@ program main
    call run("nts", collect_nts)
    call run("interface", collect_interface)
    call run("joints", collect_joints)
-   call run("given_check", collect_given_check)
-   call run("given_deck", collect_given_deck)
-   call run("given_force", collect_given_force)
+   call run("host_check", collect_host_check)
+   call run("host_deck", collect_host_deck)
+   call run("host_force", collect_host_force)
    call run("node_potential", collect_node_potential)
    call run("guards", collect_guards)
    call run("hermite_gap", collect_hermite_gap)
@@ -164,7 +164,7 @@ program main
    call run("deck_ties", collect_deck_ties)
    call run("stepper_free", collect_stepper_free)
    call run("stepper_query", collect_stepper_query)
-   call run("given_law", collect_given_law)
+   call run("host_law", collect_host_law)
    call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then

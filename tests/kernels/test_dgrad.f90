@@ -462,10 +462,12 @@ contains
             image = operate(which, [-x0(1), x0(2:)], [-dx(1), dx(2:)])
             call check_near(error, [s%f1 - image%f1, s%df - image%df, s%g(1) + image%g(1)], &
                [at(j), dx(1), 1.0_wp], 4.0_wp*eps, 4.0_wp, "a, from both parts")
-            if (max(at(i), at(j)) < -width) &
-               call check_near(error, [s%f1, s%df], [at(j), dx(1)], 0.0_wp, 1.0_wp, "exact below")
-            if (min(at(i), at(j)) > width) &
-               call check_near(error, [s%f1, s%df], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "exact above")
+            if (max(at(i), at(j)) < -width) then
+              call check_near(error, [s%f1, s%df], [at(j), dx(1)], 0.0_wp, 1.0_wp, "exact below")
+            end if
+            if (min(at(i), at(j)) > width) then
+              call check_near(error, [s%f1, s%df], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "exact above")
+            end if
          end do
       end do
    end subroutine check_corner

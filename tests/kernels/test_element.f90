@@ -4,7 +4,7 @@ module test_element
    use emcon_element, only : element_geometry_t, element_motion_t, element_response_t, &
       point_motion_t, point_strain
    use emcon_errors, only : error_t
-   use emcon_given_law, only : given_response_t
+   use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
@@ -79,7 +79,7 @@ contains
       logical, intent(in) :: with_tangent
       type(element_response_t), intent(inout) :: response
       type(element_motion_t) :: motion
-      type(given_response_t) :: none
+      type(host_response_t) :: none
 
       motion%nlgeom = sample%nlgeom
       response = element_response_t()

@@ -5,8 +5,8 @@ module test_rigid_bodies
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_rank
-   use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t
-   use emcon_rigid_rows, only : rigid_rows_t
+   use emcon_mechanisms, only : mechanisms_find, mechanisms_t
+   use emcon_mechanism_rows, only : mechanism_rows_t
    use emcon_scene, only : scene_t
    use emcon_system, only : system_init, system_t
    use small_scenes, only : add_block, block_t, make_block
@@ -25,7 +25,7 @@ contains
 
    !> Append the row: sum of weight times displacement = 0.
    subroutine add_row(rows, dof, weight)
-      type(rigid_rows_t), intent(inout) :: rows
+      type(mechanism_rows_t), intent(inout) :: rows
       integer, intent(in) :: dof(:)
       real(wp), intent(in) :: weight(:)
 
@@ -48,7 +48,7 @@ contains
       type(scene_t) :: scene
       type(block_t) :: block
       type(system_t) :: system
-      type(rigid_rows_t) :: rows
+      type(mechanism_rows_t) :: rows
       real(wp) :: r(8, n_row), a(2*n_row, 3*n)
       integer :: dof(4, n_row), i, k, m, rank
 
@@ -98,18 +98,18 @@ contains
 
    !> Dimension of all that rows leave.
    integer function count_motions(rows, system, scene)
-      type(rigid_rows_t), intent(in) :: rows
+      type(mechanism_rows_t), intent(in) :: rows
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
-      type(rigid_bodies_t) :: bodies
-      type(rigid_rows_t) :: sorted
+      type(mechanisms_t) :: bodies
+      type(mechanism_rows_t) :: sorted
       integer, allocatable :: assembly(:), order(:)
       real(dp), allocatable :: z(:, :)
       real(dp) :: noise
       integer :: i, k, n_assembly
 
       sorted = rows
-      call rigid_bodies_find(system, scene, scene%x, rows, .true., .true., bodies)
+      call mechanisms_find(system, scene, scene%x, rows, .true., .true., bodies)
       call find_assemblies(bodies, sorted, assembly, n_assembly, order)
       count_motions = 0
       do i = 1, n_assembly

@@ -4,7 +4,7 @@ module test_rigid_motion
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_t
-   use emcon_rigid_motion, only : free_motion_text
+   use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_system, only : system_init, system_t
    use small_scenes, only : add_block, add_step, block_node, block_t, clamp, make_block, &

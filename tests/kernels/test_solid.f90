@@ -2,7 +2,7 @@
 module test_solid
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_element, only : element_motion_t, element_response_t
-   use emcon_given_law, only : given_response_t
+   use emcon_host_law, only : host_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_of
@@ -100,7 +100,7 @@ contains
       type(response_t) :: response
       type(element_response_t) :: part
       type(element_motion_t) :: motion
-      type(given_response_t) :: nothing
+      type(host_response_t) :: nothing
       real(wp), allocatable :: u0(:, :), du(:, :), force(:, :)
       integer :: e, n
 

@@ -100,7 +100,7 @@ def outcome(program, deck, options):
         for path in sorted(pathlib.Path(folder).iterdir()):
             if path.suffix in READ:
                 held = READ[path.suffix](path).replace(folder.encode(), b"")
-                result[path.suffix] = digest(held)
+                result["".join(path.suffixes)] = digest(held)
     return result
 
 

@@ -3,17 +3,17 @@
 !>
 !> What is given is the discrete gradient of an energy, so the scheme keeps it as it keeps the
 !> strain energy. Source: docs/theory.md, section 12.
-module emcon_given_force
+module emcon_host_force
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
-   use emcon_point_function, only : given_failed => point_failed, given_ok => point_ok, &
-      given_outside => point_outside
+   use emcon_point_function, only : host_failed => point_failed, host_ok => point_ok, &
+      host_outside => point_outside
    implicit none
    private
-   public :: given_force_t, given_force_box_t, force_response_t
+   public :: host_force_t, host_force_box_t, force_response_t
    !> How a response ended. Outside: there is none at these displacements, as for an inverted
    !> element; the step is cut. Failed: there is no use in going on.
-   public :: given_ok, given_outside, given_failed
+   public :: host_ok, host_outside, host_failed
 
    !> What a given force is over a motion.
    type :: force_response_t
@@ -24,10 +24,10 @@ module emcon_given_force
       !> Derivative of `force` by u0 + du, in the slots of `pattern`. Where du = 0, half of the
       !> second derivatives of E
       real(dp), allocatable :: tangent(:)
-      integer :: status = given_ok               !! one of the `given_` codes
+      integer :: status = host_ok               !! one of the `given_` codes
    end type force_response_t
 
-   type, abstract :: given_force_t
+   type, abstract :: host_force_t
       character(len=:), allocatable :: name      !! for messages
       !> (2 n_node x 2 n_node) which freedoms depend on which; freedom a of node i is 2(i - 1) + a.
       !> The values are not used.
@@ -40,31 +40,31 @@ module emcon_given_force
    contains
       procedure :: place
       procedure(respond_interface), deferred :: respond
-   end type given_force_t
+   end type host_force_t
 
    abstract interface
       !> Forces of a motion from `u0` to `u0 + du`: a discrete gradient of the energy E, with
       !> force.du = E(u0 + du) - E(u0); where du = 0, the gradient of E.
       subroutine respond_interface(self, u0, du, wants_tangent, response)
-         import :: force_response_t, given_force_t, wp
-         class(given_force_t), intent(inout) :: self
+         import :: force_response_t, host_force_t, wp
+         class(host_force_t), intent(inout) :: self
          real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
          logical, intent(in) :: wants_tangent                     !! else leave `tangent` alone
          type(force_response_t), intent(inout) :: response        !! sized, 0 on entry
       end subroutine respond_interface
    end interface
 
-   type :: given_force_box_t
-      class(given_force_t), allocatable :: force
-   end type given_force_box_t
+   type :: host_force_box_t
+      class(host_force_t), allocatable :: force
+   end type host_force_box_t
 
 contains
 
    !> Told once, before the first response: the reference positions `x` of the nodes, which ties and
    !> adjusted contact may have moved. To be overridden where they matter.
    subroutine place(self, x)
-      class(given_force_t), intent(inout) :: self
+      class(host_force_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)        !! (2, n_node) [L]
    end subroutine place
 
-end module emcon_given_force
+end module emcon_host_force

@@ -2,13 +2,13 @@
 !> what they answer.
 !>
 !> Source: docs/theory.md, section 12.
-module emcon_given_term
+module emcon_host_term
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
-   use emcon_given_check, only : given_check_force, given_name
-   use emcon_given_force, only : force_response_t, given_failed, given_force_t, given_ok, &
-      given_outside
+   use emcon_host_check, only : host_check_force, host_name
+   use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok, &
+      host_outside
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_reduction, only : freedom_numbers, reduction_slot
@@ -18,10 +18,10 @@ module emcon_given_term
    use emcon_text, only : to_text
    implicit none
    private
-   public :: given_term_t, given_term_init
+   public :: host_term_t, host_term_init
 
-   type, extends(term_t) :: given_term_t
-      class(given_force_t), allocatable :: force
+   type, extends(term_t) :: host_term_t
+      class(host_force_t), allocatable :: force
       type(force_response_t) :: answer           !! the last one
       integer, allocatable, private :: slot(:)   !! of the pattern, as `reduction_slot`
       integer, allocatable, private :: label(:)  !! (n_node)
@@ -32,14 +32,14 @@ module emcon_given_term
       procedure :: respond
       procedure :: tangent_times
       procedure :: is_symmetric
-   end type given_term_t
+   end type host_term_t
 
 contains
 
    !> Take over a copy of `force`, if it fits `scene`.
-   subroutine given_term_init(self, force, scene, error)
-      type(given_term_t), intent(out) :: self
-      class(given_force_t), intent(in) :: force
+   subroutine host_term_init(self, force, scene, error)
+      type(host_term_t), intent(out) :: self
+      class(host_force_t), intent(in) :: force
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       integer :: i, k, n, n_dim
@@ -47,7 +47,7 @@ contains
       self%role = role_internal
       n_dim = size(scene%x, 1)
       n = size(scene%x, 2)
-      call given_check_force(force, n, error)
+      call host_check_force(force, n, error)
       if (allocated(error)) return
       allocate(self%force, source=force)
       call self%force%place(scene%x)
@@ -63,11 +63,11 @@ contains
          allocate(self%answer%tangent(size(pattern%column)), source=0.0_dp)
       end associate
       allocate(self%answer%force, self%answer%magnitude, self%position, source=0.0_wp*scene%x)
-   end subroutine given_term_init
+   end subroutine host_term_init
 
    !> The freedoms of the pattern, two by two.
    pure subroutine lay_out(self, lists)
-      class(given_term_t), intent(in) :: self
+      class(host_term_t), intent(in) :: self
       type(lists_t), intent(inout) :: lists
       integer, allocatable :: length(:), freedom(:)
       integer :: i, j, k, m, n
@@ -95,7 +95,7 @@ contains
 
    !> Find the places of the tangent in the matrix.
    subroutine begin_step(self, scene, i_step, space, matrix, slot)
-      class(given_term_t), intent(inout) :: self
+      class(host_term_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_step              !! from 1
       type(space_t), intent(in) :: space
@@ -117,7 +117,7 @@ contains
 
    !> Forces of a motion, or why there are none.
    subroutine respond(self, motion, response, value, side)
-      class(given_term_t), intent(inout) :: self
+      class(host_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
@@ -145,14 +145,14 @@ contains
 
    !> The answer of the force to a motion; its tangent is the last one asked for.
    subroutine ask(self, motion, wants_tangent)
-      class(given_term_t), intent(inout) :: self
+      class(host_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion       !! placed
       logical, intent(in) :: wants_tangent
 
       self%answer%force = 0.0_wp
       self%answer%magnitude = 0.0_wp
       self%answer%energy = 0.0_wp
-      self%answer%status = given_ok
+      self%answer%status = host_ok
       if (wants_tangent) self%answer%tangent = 0.0_dp
       call self%force%respond(motion%from, motion%by, wants_tangent, self%answer)
       if (wants_tangent) self%answer%tangent = real(motion%weight, dp)*self%answer%tangent
@@ -160,15 +160,15 @@ contains
 
    !> Turn what the force reports, or what is not finite, into a refusal or a failure.
    subroutine judge(self, response)
-      type(given_term_t), intent(in) :: self
+      type(host_term_t), intent(in) :: self
       type(response_t), intent(inout) :: response
       character(len=:), allocatable :: name
       integer :: k
 
-      name = given_name(self%force)
+      name = host_name(self%force)
       associate (answer => self%answer)
          select case (answer%status)
-         case (given_ok)
+         case (host_ok)
             if (ieee_is_finite(answer%energy) .and. all(ieee_is_finite(answer%force)) &
                .and. all(ieee_is_finite(answer%tangent))) return
             do k = 1, size(answer%force, 2)
@@ -180,9 +180,9 @@ contains
             if (ieee_is_finite(answer%energy)) name = "tangent of " // name
             if (.not. ieee_is_finite(answer%energy)) name = "energy of " // name
             response%refusal = "the " // name // " is made infinite or NaN"
-         case (given_outside)
+         case (host_outside)
             response%refusal = name // " is put out of its range"
-         case (given_failed)
+         case (host_failed)
             name = name // " failed"
             if (allocated(self%force%reason)) name = name // ": " // self%force%reason
             call raise(response%failure, err_analysis, name)
@@ -252,7 +252,7 @@ contains
 
    !> Add the tangent of a motion times `direction` to `product`, where there is one.
    subroutine tangent_times(self, motion, direction, product)
-      class(given_term_t), intent(inout) :: self
+      class(host_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion                             !! placed
       real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
       real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
@@ -276,7 +276,7 @@ contains
 
    !> As the giver says.
    pure logical function is_symmetric(self, motion)
-      class(given_term_t), intent(in) :: self
+      class(host_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
       if (motion%pose%is_gradient) then
@@ -286,4 +286,4 @@ contains
       end if
    end function is_symmetric
 
-end module emcon_given_term
+end module emcon_host_term

@@ -3,20 +3,20 @@
 !> Every body has three motions: along x, along y, and a rotation about its centre in which its
 !> farthest node moves by one, so that what they do to a degree of freedom is of order one. A node
 !> without element that stands in an equation is a body that does not rotate.
-module emcon_rigid_bodies
+module emcon_mechanisms
    use emcon_kinds, only : dp, wp
-   use emcon_rigid_rows, only : rigid_rows_t
+   use emcon_mechanism_rows, only : mechanism_rows_t
    use emcon_scene, only : scene_t
    use emcon_surface_edges, only : surface_edges
    use emcon_system, only : system_may_hold, system_t
    implicit none
    private
-   public :: rigid_bodies_t, rigid_bodies_find, rigid_body_free, rigid_motions_at
-   public :: rigid_motions_as_one, rigid_force, rigid_field
+   public :: mechanisms_t, mechanisms_find, mechanism_free, rigid_motions_at
+   public :: rigid_motions_as_one, mechanism_force, mechanism_field
 
    !> The bodies: first those of elements and given forces, as numbered in `system_t`, then single
    !> nodes of equations.
-   type :: rigid_bodies_t
+   type :: mechanisms_t
       integer :: n = 0
       integer :: n_mesh = 0                          !! those of `system_t`
       integer, allocatable :: of_node(:)             !! (n_node) 0: none
@@ -25,19 +25,19 @@ module emcon_rigid_bodies
       real(wp), allocatable :: size(:)               !! (n) largest distance from there, 0: a node
       real(wp), allocatable :: reach(:)              !! (n) largest coordinate over `size`
       logical, allocatable :: is_free(:, :)          !! (3, n) motions that rows may prevent
-   end type rigid_bodies_t
+   end type mechanisms_t
 
 contains
 
    !> Bodies at `x`, and which of their motions need to be prevented. Those of bodies that contact
-   !> (`contact_holds`) or a given force (`given_holds`) may hold need not.
-   subroutine rigid_bodies_find(system, scene, x, rows, contact_holds, given_holds, bodies)
+   !> (`contact_holds`) or a given force (`host_holds`) may hold need not.
+   subroutine mechanisms_find(system, scene, x, rows, contact_holds, host_holds, bodies)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: x(:, :)                !! (2, n_node) [L]
-      type(rigid_rows_t), intent(in) :: rows
-      logical, intent(in) :: contact_holds, given_holds
-      type(rigid_bodies_t), intent(out) :: bodies
+      type(mechanism_rows_t), intent(in) :: rows
+      logical, intent(in) :: contact_holds, host_holds
+      type(mechanisms_t), intent(out) :: bodies
       logical :: is_in_row(2, size(scene%x, 2)), touches(system%space%n_body)
       logical :: may_hold(size(scene%x, 2))
       integer :: i, k, b
@@ -61,7 +61,7 @@ contains
             call mark_contact_bodies(system, scene, k, touches)
          end do
       end if
-      if (given_holds) then
+      if (host_holds) then
          call system_may_hold(system, may_hold)
          touches(pack(system%space%body, may_hold)) = .true.
       end if
@@ -75,7 +75,7 @@ contains
       end do
       call measure_bodies(bodies)
       bodies%is_free(3, :) = bodies%is_free(3, :) .and. bodies%size > 0.0_wp
-   end subroutine rigid_bodies_find
+   end subroutine mechanisms_find
 
    subroutine mark_contact_bodies(system, scene, pair, touches)
       type(system_t), intent(in) :: system
@@ -101,7 +101,7 @@ contains
 
    !> Centres and sizes.
    pure subroutine measure_bodies(bodies)
-      type(rigid_bodies_t), intent(inout) :: bodies
+      type(mechanisms_t), intent(inout) :: bodies
       integer :: n_node(bodies%n), i, b
 
       n_node = 0
@@ -131,18 +131,18 @@ contains
    end subroutine measure_bodies
 
    !> The body of a degree of freedom, 0 if none or if it is held.
-   pure integer function rigid_body_free(bodies, dof)
-      type(rigid_bodies_t), intent(in) :: bodies
+   pure integer function mechanism_free(bodies, dof)
+      type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: dof
 
-      rigid_body_free = bodies%of_node((dof + 1)/2)
-      if (rigid_body_free == 0) return
-      if (.not. any(bodies%is_free(:, rigid_body_free))) rigid_body_free = 0
-   end function rigid_body_free
+      mechanism_free = bodies%of_node((dof + 1)/2)
+      if (mechanism_free == 0) return
+      if (.not. any(bodies%is_free(:, mechanism_free))) mechanism_free = 0
+   end function mechanism_free
 
    !> What the three motions of body `b` do to a degree of freedom.
    pure function rigid_motions_at(bodies, b, dof) result(motion)
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: b, dof
       real(wp) :: motion(3), arm(2)
       integer :: a
@@ -157,7 +157,7 @@ contains
 
    !> Motions of all bodies as one: along x, along y, and a rotation. A node does not rotate.
    pure function rigid_motions_as_one(bodies, member) result(g)
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
       real(dp) :: g(3*size(member), 3)
       real(wp) :: center(2), extent
@@ -182,8 +182,8 @@ contains
    end function rigid_motions_as_one
 
    !> What forces on the nodes do over the motions of an assembly, and the sum of their sizes.
-   pure subroutine rigid_force(bodies, member, force, total, magnitude)
-      type(rigid_bodies_t), intent(in) :: bodies
+   pure subroutine mechanism_force(bodies, member, force, total, magnitude)
+      type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
       real(wp), intent(in) :: force(:, :)                !! (2, n_node)
       real(dp), intent(out) :: total(:)                  !! (3*members)
@@ -202,11 +202,11 @@ contains
          end do
          magnitude = magnitude + real(sum(abs(force(:, i))), dp)
       end do
-   end subroutine rigid_force
+   end subroutine mechanism_force
 
    !> How the motion `z` of an assembly moves the nodes; those of others stay.
-   pure subroutine rigid_field(bodies, member, z, field)
-      type(rigid_bodies_t), intent(in) :: bodies
+   pure subroutine mechanism_field(bodies, member, z, field)
+      type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
       real(dp), intent(in) :: z(:)                       !! (3*members)
       real(wp), intent(out) :: field(:, :)               !! (2, n_node)
@@ -222,6 +222,6 @@ contains
                real(z(3*m - 2:3*m), wp))
          end do
       end do
-   end subroutine rigid_field
+   end subroutine mechanism_field
 
-end module emcon_rigid_bodies
+end module emcon_mechanisms

@@ -1,34 +1,34 @@
 !> What a model is given from outside between reading its deck and building it.
-module emcon_given
+module emcon_host
    use emcon_constraint, only : constraint_box_t, constraint_t
    use emcon_csr, only : csr_t
-   use emcon_given_force, only : given_force_box_t, given_force_t
-   use emcon_given_law, only : given_law_t
+   use emcon_host_force, only : host_force_box_t, host_force_t
+   use emcon_host_law, only : host_law_t
    use emcon_law, only : law_t
    use emcon_point_function, only : point_function_t
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    implicit none
    private
-   public :: given_t, given_add_constraint, given_add_force, given_add_law, given_add_solver, &
-      given_copy_solvers, given_count, given_count_conditions, given_find_solver
+   public :: host_t, host_add_constraint, host_add_force, host_add_law, host_add_solver, &
+      host_copy_solvers, host_count, host_count_conditions, host_find_solver
 
    !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
    !> by what decks call them, constraints that always hold.
-   type :: given_t
-      type(given_law_t), allocatable :: law(:)
-      type(given_force_box_t), allocatable :: force(:)
+   type :: host_t
+      type(host_law_t), allocatable :: law(:)
+      type(host_force_box_t), allocatable :: force(:)
       type(csr_t) :: mass                        !! (n_node x n_node) [M]; without rows: none
       type(solver_box_t), allocatable :: solver(:)
       type(constraint_box_t), allocatable :: constraint(:)
-   end type given_t
+   end type host_t
 
 contains
 
    !> Append a copy of `force`.
-   subroutine given_add_force(self, force)
-      type(given_t), intent(inout) :: self
-      class(given_force_t), intent(in) :: force
-      type(given_force_box_t), allocatable :: longer(:)
+   subroutine host_add_force(self, force)
+      type(host_t), intent(inout) :: self
+      class(host_force_t), intent(in) :: force
+      type(host_force_box_t), allocatable :: longer(:)
       integer :: i, n
 
       n = 0
@@ -39,11 +39,11 @@ contains
       end do
       allocate(longer(n + 1)%force, source=force)
       call move_alloc(longer, self%force)
-   end subroutine given_add_force
+   end subroutine host_add_force
 
    !> Append a copy of `constraint`, whose conditions hold at the end of every step.
-   subroutine given_add_constraint(self, constraint)
-      type(given_t), intent(inout) :: self
+   subroutine host_add_constraint(self, constraint)
+      type(host_t), intent(inout) :: self
       class(constraint_t), intent(in) :: constraint
       type(constraint_box_t), allocatable :: longer(:)
       integer :: i, n
@@ -56,20 +56,20 @@ contains
       end do
       allocate(longer(n + 1)%constraint, source=constraint)
       call move_alloc(longer, self%constraint)
-   end subroutine given_add_constraint
+   end subroutine host_add_constraint
 
    !> Number of forces, and of masses.
-   pure function given_count(self) result(n)
-      type(given_t), intent(in) :: self
+   pure function host_count(self) result(n)
+      type(host_t), intent(in) :: self
       integer :: n(2)
 
       n = [0, merge(1, 0, self%mass%n_row > 0)]
       if (allocated(self%force)) n(1) = size(self%force)
-   end function given_count
+   end function host_count
 
    !> Number of conditions of all constraints.
-   pure integer function given_count_conditions(self) result(n)
-      type(given_t), intent(in) :: self
+   pure integer function host_count_conditions(self) result(n)
+      type(host_t), intent(in) :: self
       integer :: i
 
       n = 0
@@ -77,15 +77,15 @@ contains
       do i = 1, size(self%constraint)
          n = n + self%constraint(i)%constraint%n_constraint
       end do
-   end function given_count_conditions
+   end function host_count_conditions
 
    !> Append a copy of the strain energy, or of the law, of the material `name`.
-   subroutine given_add_law(self, name, energy, law)
-      type(given_t), intent(inout) :: self
+   subroutine host_add_law(self, name, energy, law)
+      type(host_t), intent(inout) :: self
       character(len=*), intent(in) :: name       !! as in `material_t`
       class(point_function_t), intent(in), optional :: energy
       class(law_t), intent(in), optional :: law   !! one of the two is there
-      type(given_law_t), allocatable :: longer(:)
+      type(host_law_t), allocatable :: longer(:)
       integer :: i, n
 
       n = 0
@@ -100,11 +100,11 @@ contains
       if (present(energy)) allocate(longer(n + 1)%energy, source=energy)
       if (present(law)) allocate(longer(n + 1)%law, source=law)
       call move_alloc(longer, self%law)
-   end subroutine given_add_law
+   end subroutine host_add_law
 
    !> Append a copy of a solver that has not been used.
-   subroutine given_add_solver(self, name, solver)
-      type(given_t), intent(inout) :: self
+   subroutine host_add_solver(self, name, solver)
+      type(host_t), intent(inout) :: self
       character(len=*), intent(in) :: name       !! upper case, without blanks
       class(sparse_solver_t), intent(in) :: solver   !! it has analysed nothing yet
       type(solver_box_t), allocatable :: longer(:)
@@ -120,21 +120,21 @@ contains
       longer(n + 1)%name = name
       allocate(longer(n + 1)%solver, source=solver)
       call move_alloc(longer, self%solver)
-   end subroutine given_add_solver
+   end subroutine host_add_solver
 
    !> Place of the solver `name` in a list; 0: it is not there.
-   pure integer function given_find_solver(solver, name) result(i)
+   pure integer function host_find_solver(solver, name) result(i)
       type(solver_box_t), intent(in) :: solver(:)   !! each with its name
       character(len=*), intent(in) :: name       !! upper case, without blanks
 
       do i = size(solver), 1, -1
          if (solver(i)%name == name) return
       end do
-   end function given_find_solver
+   end function host_find_solver
 
    !> The solvers of `self`, independent of it; none: of no size.
-   subroutine given_copy_solvers(self, copy)
-      type(given_t), intent(in), optional :: self
+   subroutine host_copy_solvers(self, copy)
+      type(host_t), intent(in), optional :: self
       type(solver_box_t), allocatable, intent(out) :: copy(:)   !! each with its name
       integer :: i, n
 
@@ -147,6 +147,6 @@ contains
          copy(i)%name = self%solver(i)%name
          allocate(copy(i)%solver, source=self%solver(i)%solver)
       end do
-   end subroutine given_copy_solvers
+   end subroutine host_copy_solvers
 
-end module emcon_given
+end module emcon_host

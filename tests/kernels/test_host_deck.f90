@@ -1,5 +1,5 @@
 !> Decks that are given forces: what their cards mean for the model, and restart files.
-module test_given_deck
+module test_host_deck
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_deck_source, only : passage_t
@@ -17,18 +17,18 @@ module test_given_deck
    use stepper_scenes, only : check_same_state
    implicit none
    private
-   public :: collect_given_deck
+   public :: collect_host_deck
 
 contains
 
-   subroutine collect_given_deck(tests)
+   subroutine collect_host_deck(tests)
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
       tests = [ &
          test_case_t("nodes and surfaces of a host", test_cards), &
          test_case_t("all that is given, and a restart", test_restart), &
          test_case_t("nodes that were not given anything", test_left_out)]
-   end subroutine collect_given_deck
+   end subroutine collect_host_deck
 
    !> A chain of three nodes along x, the last one thrown at an element of a given law. The chain
    !> can only push it where it ends in a surface: an edge across x = 2.
@@ -197,4 +197,4 @@ contains
       call stepper_close(stepper)
    end subroutine test_left_out
 
-end module test_given_deck
+end module test_host_deck

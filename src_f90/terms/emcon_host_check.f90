@@ -1,10 +1,10 @@
 !> Whether what is given to a model fits it.
-module emcon_given_check
+module emcon_host_check
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_given, only : given_copy_solvers, given_count, given_find_solver, given_t
-   use emcon_given_force, only : given_force_t
+   use emcon_host, only : host_copy_solvers, host_count, host_find_solver, host_t
+   use emcon_host_force, only : host_force_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t, where_text
    use emcon_solver_registry, only : solver_given, solver_names
@@ -12,7 +12,7 @@ module emcon_given_check
    use emcon_text, only : to_text
    implicit none
    private
-   public :: given_check_force, given_check_mass, given_check_scene, given_name
+   public :: host_check_force, host_check_mass, host_check_scene, host_name
 
    !> Entries of an assembled mass are rounded by less than this part of what they are sums of.
    real(dp), parameter :: noise = 64.0_dp*epsilon(1.0_dp)
@@ -20,33 +20,33 @@ module emcon_given_check
 contains
 
    !> "the given force NAME"
-   pure function given_name(force) result(text)
-      class(given_force_t), intent(in) :: force
-      character(len=given_length(force)) :: text
+   pure function host_name(force) result(text)
+      class(host_force_t), intent(in) :: force
+      character(len=host_length(force)) :: text
 
       text = "the given force"
       if (allocated(force%name)) text = "the given force " // force%name
-   end function given_name
+   end function host_name
 
-   pure integer function given_length(force)
-      class(given_force_t), intent(in) :: force
+   pure integer function host_length(force)
+      class(host_force_t), intent(in) :: force
 
-      given_length = len("the given force")
-      if (allocated(force%name)) given_length = given_length + 1 + len(force%name)
-   end function given_length
+      host_length = len("the given force")
+      if (allocated(force%name)) host_length = host_length + 1 + len(force%name)
+   end function host_length
 
    !> The pattern of `force` is one over the freedoms of `n_node` nodes.
-   subroutine given_check_force(force, n_node, error)
-      class(given_force_t), intent(in) :: force
+   subroutine host_check_force(force, n_node, error)
+      class(host_force_t), intent(in) :: force
       integer, intent(in) :: n_node              !! of the model
       type(error_t), allocatable, intent(out) :: error
 
-      call check_pattern(force%pattern, 2*n_node, given_name(force) // ": its pattern", &
+      call check_pattern(force%pattern, 2*n_node, host_name(force) // ": its pattern", &
          "2 freedoms for each of " // to_text(n_node) // " nodes", error)
-   end subroutine given_check_force
+   end subroutine host_check_force
 
    !> `mass` is a matrix between `n_node` nodes that can be one: finite, symmetric, not negative.
-   subroutine given_check_mass(mass, scene, error)
+   subroutine host_check_mass(mass, scene, error)
       type(csr_t), intent(in) :: mass
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
@@ -105,7 +105,7 @@ contains
             to_text(scene%node_label(i)) // " and " // to_text(scene%node_label(j)) // " " // text)
       end subroutine refuse
 
-   end subroutine given_check_mass
+   end subroutine host_check_mass
 
    !> A square matrix of `n` rows in the form that `csr_t` promises.
    subroutine check_pattern(pattern, n, title, extent, error)
@@ -153,15 +153,15 @@ contains
 
    !> There is something to compute, each node that the deck says is given has forces or mass, and
    !> solvers that it names are there.
-   subroutine given_check_scene(given, scene, error)
-      type(given_t), intent(in) :: given
+   subroutine host_check_scene(given, scene, error)
+      type(host_t), intent(in) :: given
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       integer :: i, n
 
       call check_solvers(given, scene, error)
       if (allocated(error)) return
-      if (all(given_count(given) == 0)) then
+      if (all(host_count(given) == 0)) then
          if (allocated(scene%given_node)) then
             call raise(error, err_input, where_text(scene, scene%given_origin) // ": error: " // &
                "*GIVEN FORCES: no forces were given; they come from a program that calls the " // &
@@ -196,22 +196,22 @@ contains
          end do
       end function has_force
 
-   end subroutine given_check_scene
+   end subroutine host_check_scene
 
    !> Each solver that a step names and that is not of EMCON was given.
    subroutine check_solvers(given, scene, error)
-      type(given_t), intent(in) :: given
+      type(host_t), intent(in) :: given
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(solver_box_t), allocatable :: solver(:)
       character(len=:), allocatable :: known
       integer :: i
 
-      call given_copy_solvers(given, solver)
+      call host_copy_solvers(given, solver)
       do i = 1, size(scene%step)
          associate (step => scene%step(i))
             if (step%solver /= solver_given) cycle
-            if (given_find_solver(solver, step%solver_name) > 0) cycle
+            if (host_find_solver(solver, step%solver_name) > 0) cycle
             call solver_names(known)
             call raise(error, err_input, where_text(scene, step%solver_origin) // ": error: " // &
                "SOLVER=" // step%solver_name // ": no program has given this solver, see " // &
@@ -229,4 +229,4 @@ contains
       if (has_row) has_row = matrix%row_start(i + 1) > matrix%row_start(i)
    end function has_row
 
-end module emcon_given_check
+end module emcon_host_check

@@ -2,7 +2,7 @@
 !> or a type of its own that extends `law_t`.
 !>
 !> Source: docs/theory.md, section 2 (functions given at points).
-module emcon_given_law
+module emcon_host_law
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_t, law_t
@@ -13,40 +13,40 @@ module emcon_given_law
    use emcon_text, only : to_text
    implicit none
    private
-   public :: given_law_t, given_points_t, given_response_t
-   public :: given_law_take, given_points_make_room, given_rest_stiffness, given_state
+   public :: host_law_t, host_points_t, host_response_t
+   public :: host_law_take, host_points_make_room, host_rest_stiffness, host_state
 
    !> One of two: the energy W(E11, E22, 2 E12) per reference volume [M/(L T^2)] of a material, or
    !> `law`, which takes the constants of its card. Without NLGEOM the strain is the small one.
-   type :: given_law_t
+   type :: host_law_t
       character(len=:), allocatable :: material  !! its name
       class(point_function_t), allocatable :: energy
       class(law_t), allocatable :: law
-   end type given_law_t
+   end type host_law_t
 
    !> All quadrature points of the elements of one law.
-   type :: given_points_t
+   type :: host_points_t
       real(wp), allocatable :: strain(:, :), dstrain(:, :)   !! (3, n)
       type(point_response_t) :: response
-   end type given_points_t
+   end type host_points_t
 
    !> What the given laws answer to a step.
-   type :: given_response_t
-      type(given_points_t), allocatable :: points(:)         !! one per material
+   type :: host_response_t
+      type(host_points_t), allocatable :: points(:)         !! one per material
       integer :: inverted_element = 0            !! first one that cannot be answered for, or 0
       integer :: material = 0                    !! that has no value there, or 0: det F <= 0
       integer :: status = point_ok               !! what the law of `material` said
-   end type given_response_t
+   end type host_response_t
 
 contains
 
    !> Take the law of `material` from those that are `given`.
-   subroutine given_law_take(scene, material, law, error, given)
+   subroutine host_law_take(scene, material, law, error, given)
       type(scene_t), intent(in) :: scene
       type(material_t), intent(in) :: material
-      type(given_law_t), intent(inout) :: law
+      type(host_law_t), intent(inout) :: law
       type(error_t), allocatable, intent(out) :: error
-      type(given_law_t), intent(in), optional :: given(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
       character(len=:), allocatable :: fault
       integer :: i
 
@@ -75,31 +75,31 @@ contains
       end if
       if (allocated(error)) return
       law%energy%weight = [1.0_wp, 1.0_wp, 0.5_wp]   ! |E|^2: axes do not matter
-   end subroutine given_law_take
+   end subroutine host_law_take
 
    !> Room for `n` points.
-   pure subroutine given_points_make_room(self, n)
-      type(given_points_t), intent(inout) :: self
+   pure subroutine host_points_make_room(self, n)
+      type(host_points_t), intent(inout) :: self
       integer, intent(in) :: n                   !! >= 0
 
       if (allocated(self%strain)) return
       allocate(self%strain(3, n), self%dstrain(3, n), source=0.0_wp)
-   end subroutine given_points_make_room
+   end subroutine host_points_make_room
 
    !> The response at point `i`. The stress normal to the plane is not known, and given as 0.
-   pure function given_state(self, i) result(state)
-      type(given_points_t), intent(in) :: self
+   pure function host_state(self, i) result(state)
+      type(host_points_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1 to the number of points
       type(law_response_t) :: state
 
       state%energy = self%response%energy(i)
       state%stress = self%response%gradient(:, i)
       state%tangent = self%response%tangent(:, :, i)
-   end function given_state
+   end function host_state
 
    !> Largest second derivative at rest, as half of it: what a step of no size has as its tangent.
-   subroutine given_rest_stiffness(law, stiffness, error)
-      type(given_law_t), intent(in) :: law
+   subroutine host_rest_stiffness(law, stiffness, error)
+      type(host_law_t), intent(in) :: law
       real(wp), intent(out) :: stiffness         !! [M/(L T^2)]; 0 after an error
       type(error_t), allocatable, intent(out) :: error
       type(point_response_t) :: response
@@ -117,6 +117,6 @@ contains
          call raise(error, err_input, "the law given for material " // law%material // &
             " has no finite value at zero strain")
       end if
-   end subroutine given_rest_stiffness
+   end subroutine host_rest_stiffness
 
-end module emcon_given_law
+end module emcon_host_law

@@ -1,5 +1,5 @@
 !> What is given and does not fit: patterns, mass, and the order of calls.
-module test_given_check
+module test_host_check
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : check_error, check_true, test_case_t
    use emcon_csr, only : csr_from_elements, csr_t
@@ -12,18 +12,18 @@ module test_given_check
    use given_scenes, only : lump, make_line, open_given
    implicit none
    private
-   public :: collect_given_check
+   public :: collect_host_check
 
 contains
 
-   subroutine collect_given_check(tests)
+   subroutine collect_host_check(tests)
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
       tests = [ &
          test_case_t("wrong patterns", test_patterns), &
          test_case_t("wrong mass", test_mass), &
          test_case_t("wrong order of calls", test_order_of_calls)]
-   end subroutine collect_given_check
+   end subroutine collect_host_check
 
    subroutine test_patterns(error)
       type(error_t), allocatable, intent(out) :: error
@@ -150,4 +150,4 @@ contains
       call stepper_close(stepper)
    end subroutine test_order_of_calls
 
-end module test_given_check
+end module test_host_check

@@ -1,12 +1,12 @@
 !> Rigid motions that nothing prevents: what makes a static problem singular.
-module emcon_rigid_motion
+module emcon_mechanism_text
    use emcon_bodies, only : bodies_find
    use emcon_errors, only : error_t
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_null_space
-   use emcon_rigid_bodies, only : rigid_bodies_find, rigid_bodies_t, rigid_motions_as_one
-   use emcon_rigid_rows, only : rigid_rows_find, rigid_rows_t
+   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, rigid_motions_as_one
+   use emcon_mechanism_rows, only : mechanism_rows_find, mechanism_rows_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_t
    use emcon_system, only : system_t
@@ -29,8 +29,8 @@ contains
       type(prescribed_t), intent(in) :: prescribed(:)
       character(len=:), allocatable, intent(out) :: text
       logical, intent(in), optional :: with_contact
-      type(rigid_bodies_t) :: bodies
-      type(rigid_rows_t) :: rows
+      type(mechanisms_t) :: bodies
+      type(mechanism_rows_t) :: rows
       integer, allocatable :: assembly(:), order(:), member(:)
       real(dp), allocatable :: z(:, :)
       real(dp) :: noise
@@ -39,8 +39,8 @@ contains
 
       contact_holds = .true.
       if (present(with_contact)) contact_holds = .not. with_contact
-      call rigid_rows_find(system, prescribed, rows)
-      call rigid_bodies_find(system, scene, scene%x, rows, contact_holds, contact_holds, bodies)
+      call mechanism_rows_find(system, prescribed, rows)
+      call mechanisms_find(system, scene, scene%x, rows, contact_holds, contact_holds, bodies)
       call find_assemblies(bodies, rows, assembly, n_assembly, order)
       text = ""
       last = 0
@@ -62,7 +62,7 @@ contains
    !> "the body of element 3 is free to rotate": of an assembly, the bodies that move together with
    !> the first one that can, and how.
    subroutine describe_motion(bodies, system, scene, noise, member, z, text)
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       real(dp), intent(in) :: noise                      !! size of the round-off in `z`
@@ -113,7 +113,7 @@ contains
    !> "the body of element 3 is", or all bodies and nodes of `member`. A body without elements is
    !> named by its first node.
    subroutine name_text(bodies, system, scene, member, text)
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: member(:)
@@ -176,7 +176,7 @@ contains
    !> How bodies that move together can move: as one, which are combinations g of two translations
    !> and a rotation, or against each other. Nodes follow.
    subroutine motion_text(bodies, member, z, tol, text)
-      type(rigid_bodies_t), intent(in) :: bodies
+      type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
       real(dp), intent(in) :: z(:, :)                    !! (3*members, n) their motions
       real(dp), intent(in) :: tol
@@ -242,4 +242,4 @@ contains
       text = text // more
    end subroutine join
 
-end module emcon_rigid_motion
+end module emcon_mechanism_text

@@ -1,5 +1,5 @@
 !> Schemes of time integration that a program gives, by the names that decks call them.
-module emcon_given_scheme
+module emcon_host_scheme
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
@@ -8,24 +8,24 @@ module emcon_given_scheme
    use emcon_text, only : to_text
    implicit none
    private
-   public :: given_scheme_t, given_scheme_add, given_scheme_find, given_scheme_check
+   public :: host_scheme_t, host_scheme_add, host_scheme_find, host_scheme_check
 
    !> What is the inverse of another number is so but for this.
    real(wp), parameter :: rounding = 4.0_wp*epsilon(1.0_wp)
 
-   type :: given_scheme_t
+   type :: host_scheme_t
       character(len=:), allocatable :: name      !! capital letters, without blanks
       class(scheme_t), allocatable :: scheme
-   end type given_scheme_t
+   end type host_scheme_t
 
 contains
 
    !> Append a copy of `scheme`.
-   subroutine given_scheme_add(list, name, scheme)
-      type(given_scheme_t), allocatable, intent(inout) :: list(:)   !! (any) or not allocated
+   subroutine host_scheme_add(list, name, scheme)
+      type(host_scheme_t), allocatable, intent(inout) :: list(:)   !! (any) or not allocated
       character(len=*), intent(in) :: name       !! capital letters, without blanks
       class(scheme_t), intent(in) :: scheme
-      type(given_scheme_t), allocatable :: longer(:)
+      type(host_scheme_t), allocatable :: longer(:)
       integer :: i, n
 
       n = 0
@@ -38,11 +38,11 @@ contains
       longer(n + 1)%name = name
       allocate(longer(n + 1)%scheme, source=scheme)
       call move_alloc(longer, list)
-   end subroutine given_scheme_add
+   end subroutine host_scheme_add
 
    !> The place of the scheme `name` in `list`; 0: it was not given.
-   pure integer function given_scheme_find(list, name) result(k)
-      type(given_scheme_t), allocatable, intent(in) :: list(:)   !! (any) or not allocated
+   pure integer function host_scheme_find(list, name) result(k)
+      type(host_scheme_t), allocatable, intent(in) :: list(:)   !! (any) or not allocated
       character(len=*), intent(in) :: name       !! capital letters, without blanks
 
       if (allocated(list)) then
@@ -51,10 +51,10 @@ contains
          end do
       end if
       k = 0
-   end function given_scheme_find
+   end function host_scheme_find
 
    !> Are the weights and places of `scheme` ones, as seen for one step of size 1?
-   subroutine given_scheme_check(name, scheme, error)
+   subroutine host_scheme_check(name, scheme, error)
       character(len=*), intent(in) :: name       !! for the message
       class(scheme_t), intent(in) :: scheme
       type(error_t), allocatable, intent(out) :: error
@@ -85,6 +85,6 @@ contains
             to_text(value) // " " // fault // ", in a step of size 1")
       end subroutine refuse
 
-   end subroutine given_scheme_check
+   end subroutine host_scheme_check
 
-end module emcon_given_scheme
+end module emcon_host_scheme

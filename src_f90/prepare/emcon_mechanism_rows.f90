@@ -1,24 +1,24 @@
 !> Conditions on the motions of rigid bodies, as rows over the degrees of freedom of nodes:
 !> prescribed freedoms, linear constraints and the gaps of contact.
-module emcon_rigid_rows
+module emcon_mechanism_rows
    use emcon_constraint, only : condition_t
    use emcon_kinds, only : dp, wp
    use emcon_steps, only : prescribed_t
    use emcon_system, only : system_t
    implicit none
    private
-   public :: rigid_rows_t, rigid_rows_find, rigid_rows_append
+   public :: mechanism_rows_t, mechanism_rows_find, mechanism_rows_append
 
    !> Sum of weight times displacement over some degrees of freedom = 0; the weights' sizes sum
    !> up to 1.
-   type :: rigid_rows_t
+   type :: mechanism_rows_t
       integer :: n = 0
       integer, allocatable :: start(:)               !! (n + 1) entries before each row, from 0
       integer, allocatable :: dof(:)                 !! places in an (n_dim, n_node) array
       real(wp), allocatable :: weight(:)
       integer, allocatable :: low(:), high(:)        !! (n) first and last body; 0: none is free
       real(dp) :: noise = 0.0_dp                     !! what prevents less prevents nothing
-   end type rigid_rows_t
+   end type mechanism_rows_t
 
    !> A normal that prevents less of a motion than this, per unit of it, does not hold it: normals
    !> are as exact as displacements that Newton's method has converged to.
@@ -27,10 +27,10 @@ module emcon_rigid_rows
 contains
 
    !> Prescribed freedoms, then linear constraints.
-   subroutine rigid_rows_find(system, prescribed, rows)
+   subroutine mechanism_rows_find(system, prescribed, rows)
       type(system_t), intent(in) :: system
       type(prescribed_t), intent(in) :: prescribed(:)
-      type(rigid_rows_t), intent(out) :: rows
+      type(mechanism_rows_t), intent(out) :: rows
       real(wp) :: total
       integer :: k, m, n, n_linear
 
@@ -55,11 +55,11 @@ contains
             rows%weight(m + from:m + to) = system%linear%weight(from:to)/total
          end associate
       end do
-   end subroutine rigid_rows_find
+   end subroutine mechanism_rows_find
 
    !> Append the rows of contact: the gradients of gaps at the end.
-   subroutine rigid_rows_append(rows, item)
-      type(rigid_rows_t), intent(inout) :: rows
+   subroutine mechanism_rows_append(rows, item)
+      type(mechanism_rows_t), intent(inout) :: rows
       type(condition_t), intent(in) :: item(:)
       integer :: k, i, a, n
       real(wp) :: total
@@ -82,6 +82,6 @@ contains
             end do
          end do
       end do
-   end subroutine rigid_rows_append
+   end subroutine mechanism_rows_append
 
-end module emcon_rigid_rows
+end module emcon_mechanism_rows

@@ -1,5 +1,5 @@
 !> Forces and mass from outside: a host's solid, chains of springs, and what can go wrong.
-module test_given_force
+module test_host_force
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_couplings, only : equation_t
    use emcon_csr, only : csr_t
@@ -21,11 +21,11 @@ module test_given_force
    use stepper_scenes, only : drop_h, make_drop, make_tied_drop
    implicit none
    private
-   public :: collect_given_force
+   public :: collect_host_force
 
 contains
 
-   subroutine collect_given_force(tests)
+   subroutine collect_host_force(tests)
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
       tests = [ &
@@ -41,7 +41,7 @@ contains
          test_case_t("out of range is cut", test_outside), &
          test_case_t("failures", test_failures), &
          test_case_t("queries have the forces", test_query)]
-   end subroutine collect_given_force
+   end subroutine collect_host_force
 
    !> Both step alike. They solve the same equations, but add tangents in another order, so each
    !> step leaves another residual r. Newton's method polishes it below 4 eps of the inertia's
@@ -360,4 +360,4 @@ contains
       call stepper_close(stepper)
    end subroutine test_query
 
-end module test_given_force
+end module test_host_force

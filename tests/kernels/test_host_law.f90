@@ -1,5 +1,5 @@
 !> Materials whose strain energy a program gives, against laws of ours that are the same.
-module test_given_law
+module test_host_law
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_deck_source, only : deck_source_t
    use emcon_dgrad_series, only : log1p_excess, log1p_of
@@ -27,7 +27,7 @@ module test_given_law
       poisson, prescribe, shake, young
    implicit none
    private
-   public :: collect_given_law
+   public :: collect_host_law
 
    !> The solvers compute in double precision, whatever the state is.
    real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
@@ -44,7 +44,7 @@ module test_given_law
 
 contains
 
-   subroutine collect_given_law(tests)
+   subroutine collect_host_law(tests)
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
       tests = [ &
@@ -59,7 +59,7 @@ contains
          test_case_t("bad laws at rest", test_bad_rest), &
          test_case_t("wrong order of calls, wrong names", test_bad_calls), &
          test_case_t("restart file of a deck with a given law", test_restart)]
-   end subroutine collect_given_law
+   end subroutine collect_host_law
 
    !> With y = det C - 1 and phi(y) = y - ln(1 + y), as in emcon_law_coupled_neo_hooke.
    subroutine elastic_evaluate(self, z, wants_hessian, value, gradient, hessian, status)
@@ -596,4 +596,4 @@ contains
       call stepper_read_source(stepper, diagnostics, error)
    end subroutine read_sample
 
-end module test_given_law
+end module test_host_law
