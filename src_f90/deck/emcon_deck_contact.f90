@@ -255,8 +255,10 @@ contains
          if (master%is_nodal) call data_error(reader, data, "the master surface " &
             // quoted(master%name) // " has TYPE=NODE; only the slave surface may, and " &
             // "only under NODE TO SURFACE; " // advice)
-         if (master%is_nodal .or. ((is_integrated .or. pair%both_sides) .and. slave%is_nodal)) &
+         if (master%is_nodal .or. ((is_integrated .or. pair%both_sides) &
+            .and. slave%is_nodal)) then
             pair%master = 0
+         end if
       end associate
    end subroutine check_nodal
 

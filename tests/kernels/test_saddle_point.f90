@@ -117,8 +117,8 @@ contains
    end subroutine test_singular
 
    !> N + N^T + shift and equal gradients: LDL^T gives the correction of LU. A definite N has as
-   !> many negative pivots as there are constraints, fewer where one is repeated; what is not symmetric
-   !> goes to LU.
+   !> many negative pivots as there are constraints, fewer where one is repeated; what is not
+   !> symmetric goes to LU.
    subroutine test_symmetric(error)
       type(error_t), allocatable, intent(out) :: error
       type(problem_t) :: problem
