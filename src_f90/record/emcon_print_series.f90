@@ -48,6 +48,7 @@ contains
             case (output_element_print)
                new%members = of_elements
             case (output_contact_print)
+               if (size(stepper%scene%pair) == 0) cycle
                new%members = of_constraints
             case default
                cycle
@@ -205,7 +206,7 @@ contains
       associate (scene => stepper%scene, first => stepper%march%system%first_constraint)
          if (series%members == of_constraints .and. .not. series%is_total) then
             call history_set_put(history, set, variable // "_pair", &
-               [(count(first < i), i = 1, size(series%item))], error)
+               [(count(first < series%item(i)), i = 1, size(series%item))], error)
          else if (series%members == of_pairs) then
             do i = 1, size(scene%pair)
                slave(i)%text = scene%surface(scene%pair(i)%slave)%name

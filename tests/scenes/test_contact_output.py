@@ -390,3 +390,67 @@ def test_the_stepper_tells_what_pairs_transmit(case):
             if not stepper.is_done:
                 stepper.step()
         assert stepper.n_pair == 2
+
+
+#: Two blocks, one on the other.
+BLOCKS = """*NODE, NSET=ALL
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+5, 0.1, 1.
+6, 0.9, 1.
+7, 0.9, 1.8
+8, 0.1, 1.8
+*ELEMENT, TYPE=CPE4, ELSET=LOWER
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=CPE4, ELSET=UPPER
+2, 5, 6, 7, 8
+*ELSET, ELSET=BOTH
+LOWER, UPPER
+*MATERIAL, NAME=STUFF
+*ELASTIC
+100., 0.3
+*DENSITY
+1.
+*SOLID SECTION, ELSET=BOTH, MATERIAL=STUFF
+<model>
+*BOUNDARY
+1, 1, 2
+2, 1, 2
+5, 1
+*STEP
+*STATIC
+1., 1.
+*CLOAD
+<loaded>, 2, -1.
+*CONTACT PRINT
+CSTR, CDIS
+*END STEP
+"""
+PAIR = """*SURFACE, NAME=TOP
+LOWER, S3
+*SURFACE, NAME=FOOT
+UPPER, S1
+*SURFACE INTERACTION, NAME=HARD
+*CONTACT PAIR, INTERACTION=HARD
+FOOT, TOP"""
+
+
+def test_pairs_are_counted_behind_linear_constraints(tmp_path):
+    """Conditions of equations come before those of contact; a pair has its number all the same."""
+    model = f"*EQUATION\n2\n7, 1, 1., 8, 1, -1.\n2\n7, 2, 1., 8, 2, -1.\n{PAIR}"
+    run = run_deck(Deck(BLOCKS.replace("<model>", model).replace("<loaded>", "8")), tmp_path)
+    for variable in ("CSTR", "CDIS"):
+        _, node, pair = by_constraint(run, variable)
+        both = sorted(zip(node, pair, strict=True))     # the reverse is a pair of its own
+        assert both == [(2, 2), (3, 2), (4, 1), (5, 1)]
+
+
+def test_contact_output_without_contact(tmp_path):
+    """Nothing is written, as the warning says."""
+    deck = BLOCKS.replace("<model>", "*EQUATION\n2\n5, 2, 1., 6, 2, -1.\n2\n5, 2, 1., 4, 2, -1.")
+    run = run_deck(Deck(deck.replace("<loaded>", "4")), tmp_path)
+    assert "there is no *CONTACT PAIR: nothing will be written" in run.errors
+    with h5py.File(run.file(".h5"), "r") as file:
+        assert "CONTACT" not in file.get("sets", {})
