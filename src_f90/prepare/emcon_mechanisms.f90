@@ -63,7 +63,7 @@ contains
       end if
       if (host_holds) then
          call system_may_hold(system, may_hold)
-         touches(pack(system%space%body, may_hold)) = .true.
+         touches(pack(system%space%body, may_hold .and. system%space%body > 0)) = .true.
       end if
       allocate(bodies%is_free(3, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh
