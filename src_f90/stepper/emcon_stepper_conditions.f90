@@ -28,16 +28,16 @@ contains
    !> Number of the load of this kind in the present step: on degree of freedom `place` of node
    !> `label` (`load_point`), on face `place` of element `label` (`load_pressure`), or on element
    !> `label` (`load_gravity`). Of several the first.
-   subroutine stepper_find_load(self, kind, label, place, i, error)
+   subroutine stepper_find_load(self, kind, label, place, load, error)
       type(stepper_t), intent(in) :: self
       integer, intent(in) :: kind                    !! one of `load_`
       integer, intent(in) :: label                   !! as in the deck
       integer, intent(in) :: place                   !! not looked at for gravity
-      integer, intent(out) :: i
+      integer, intent(out) :: load                   !! 1..number of loads of the step
       type(error_t), allocatable, intent(out) :: error
       integer :: target
 
-      i = 0
+      load = 0
       call stepper_check_open(self, error)
       if (allocated(error)) return
       if (kind == load_point) then
@@ -45,21 +45,21 @@ contains
       else
          target = findloc(self%scene%element_label, label, 1)
       end if
-      associate (load => self%scene%step(self%march%state%i_step)%load)
-         if (target > 0) i = findloc(load%kind == kind .and. load%target == target &
-            .and. (load%place == place .or. kind == load_gravity), .true., 1)
+      associate (list => self%scene%step(self%march%state%i_step)%load)
+         if (target > 0) load = findloc(list%kind == kind .and. list%target == target &
+            .and. (list%place == place .or. kind == load_gravity), .true., 1)
       end associate
-      if (i > 0) return
+      if (load > 0) return
       call raise(error, err_input, "there is no load of this kind on " // &
          trim(merge("node   ", "element", kind == load_point)) // " " // to_text(label) // &
          " in step " // to_text(self%march%state%i_step) // " of the deck; what is to be " // &
          "changed has to stand there, if only with the value 0")
    end subroutine stepper_find_load
 
-   !> Give load `i` of the present step the value `value`.
-   subroutine stepper_set_load(self, i, value, error)
+   !> Give load `load` of the present step the value `value`.
+   subroutine stepper_set_load(self, load, value, error)
       type(stepper_t), intent(inout) :: self
-      integer, intent(in) :: i                       !! 1..number of loads of the step
+      integer, intent(in) :: load                    !! 1..number of loads of the step
       real(wp), intent(in) :: value                  !! force | pressure | acceleration
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: part, present_value
@@ -68,18 +68,18 @@ contains
       if (.not. allocated(error)) call check_number("the value", value, error)
       if (allocated(error)) return
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
-         if (i < 1 .or. i > size(step%load)) then
-            call raise(error, err_input, "there is no load " // to_text(i) // ": step " // &
+         if (load < 1 .or. load > size(step%load)) then
+            call raise(error, err_input, "there is no load " // to_text(load) // ": step " // &
                to_text(state%i_step) // " of the deck has " // to_text(size(step%load)))
             return
          end if
-         associate (load => step%load(i))
+         associate (own => step%load(load))
             part = part_passed(step, state)
             if (step%scheme%loads_ramp .and. part < 1.0_wp) then
-               present_value = load%value_start + (load%value - load%value_start)*part
-               load%value_start = run_start(present_value, value, part)
+               present_value = own%value_start + (own%value - own%value_start)*part
+               own%value_start = run_start(present_value, value, part)
             end if
-            load%value = value
+            own%value = value
          end associate
       end associate
       call system_renew(self%march%system, self%scene)

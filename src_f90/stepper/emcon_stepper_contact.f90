@@ -90,21 +90,21 @@ contains
 
    !> All possible constraints at u0 and u0 + du, by the stencils of the step. Rows of ties and
    !> equations have no gaps.
-   subroutine query_gaps(self, stepper, u0, du, state, error)
+   subroutine query_gaps(self, stepper, u0, du, gap, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
-      type(gap_state_t), allocatable, intent(out) :: state(:)  !! (n_constraint)
+      type(gap_state_t), allocatable, intent(out) :: gap(:)    !! (n_constraint)
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
       call begin_query(self, stepper, u0, du, error)
       if (allocated(error)) return
       associate (system => self%march%system)
-         allocate(state(system%n_constraint))
+         allocate(gap(system%n_constraint))
          do i = 1, size(system%contact)
             call system%contact(i)%contact%measure(stepper%scene%x, u0, du)
-            state(system%first_constraint(i) + 1:system%first_constraint(i + 1)) = &
+            gap(system%first_constraint(i) + 1:system%first_constraint(i + 1)) = &
                system%contact(i)%contact%state
          end do
       end associate
@@ -213,10 +213,10 @@ contains
 
    !> The next active set from a solved step: take in what would penetrate, release what pulls.
    !>
-   !> `is_done`: the set stands, or `status` says why the step cannot be ended: `step_too_far` and
+   !> `is_done`: the set stands, or `outcome` says why the step cannot be ended: `step_too_far` and
    !> `step_stands_off` ask for a smaller one, `step_cycling` for another one. Signs of round-off
    !> are told from tension by `magnitude`; without it by the contact forces themselves.
-   subroutine query_update_active(self, stepper, u0, du, lam, active, is_done, status, error, &
+   subroutine query_update_active(self, stepper, u0, du, lam, active, is_done, outcome, error, &
       magnitude)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
@@ -224,14 +224,14 @@ contains
       real(wp), intent(in) :: lam(:)             !! (n) of the selected constraints [M L/T^2]
       logical, intent(inout) :: active(:)        !! (n_constraint) the selected ones; the next ones
       logical, intent(out) :: is_done
-      integer, intent(out) :: status             !! one of the `step_` codes
+      integer, intent(out) :: outcome            !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: magnitude(:, :)   !! (2, n_node) sum of |contributions| to
                                                           !! the residual [M L/T^2]
       real(wp) :: force(2, size(stepper%scene%x, 2))
 
       is_done = .false.
-      status = step_done
+      outcome = step_done
       call begin_query(self, stepper, u0, du, error)
       call report_check_list(self, "lam", lam, error)
       call check_flags(self, "active", active, error)
@@ -251,7 +251,7 @@ contains
             call constraints_force(own%set, 1, force, march%system%response%magnitude)
          end if
          march%state%u = march%motion%u0
-         call active_set_advance(own, march%system, march%motion, is_done, status)
+         call active_set_advance(own, march%system, march%motion, is_done, outcome)
          active = own%is_active
       end associate
    end subroutine query_update_active

@@ -68,27 +68,27 @@ contains
    end subroutine stepper_new
 
    !> Add a surface: edges in any order, in one or several connected parts, open or closed.
-   subroutine stepper_add_surface(self, name, edge, i_surface, error)
+   subroutine stepper_add_surface(self, name, edge, surface, error)
       type(stepper_t), intent(inout) :: self
       character(len=*), intent(in) :: name                 !! for messages; empty: its number
       integer, intent(in) :: edge(:, :)                    !! (2, n_edge) first and last node
-      integer, intent(out) :: i_surface                    !! its number, from 1
+      integer, intent(out) :: surface                      !! its number, from 1
       type(error_t), allocatable, intent(out) :: error
-      type(surface_t) :: surface
+      type(surface_t) :: new
       type(chain_t) :: chain
 
-      i_surface = 0
+      surface = 0
       call check_stage(self, error)
       if (.not. allocated(error)) call check_edges(edge, self%scene%x, error)
       if (allocated(error)) return
-      surface%name = name
-      if (name == "") surface%name = to_text(size(self%scene%surface) + 1)
-      allocate(surface%element(0), surface%face(0))
-      allocate(surface%edge, source=edge)
-      call chain_init(chain, self%scene, surface, error)
+      new%name = name
+      if (name == "") new%name = to_text(size(self%scene%surface) + 1)
+      allocate(new%element(0), new%face(0))
+      allocate(new%edge, source=edge)
+      call chain_init(chain, self%scene, new, error)
       if (allocated(error)) return
-      self%scene%surface = [self%scene%surface, surface]
-      i_surface = size(self%scene%surface)
+      self%scene%surface = [self%scene%surface, new]
+      surface = size(self%scene%surface)
    end subroutine stepper_add_surface
 
    !> Edges of a surface: existing nodes, and a length.
@@ -254,10 +254,10 @@ contains
       if (is_end) self%scene%step(1)%scheme = scheme_row("STATIC", "")
    end subroutine stepper_set_contact
 
-   !> D and M of tie `t`, over nodes: D x = M x in both directions. A row for each multiplier.
-   subroutine stepper_tie_matrices(self, t, d, m, error)
+   !> D and M of tie `tie`, over nodes: D x = M x in both directions. A row for each multiplier.
+   subroutine stepper_tie_matrices(self, tie, d, m, error)
       type(stepper_t), intent(in) :: self
-      integer, intent(in) :: t                             !! from 1, in the order of the model
+      integer, intent(in) :: tie                           !! from 1, in the order of the model
       type(csr_t), intent(out) :: d, m                     !! (n_row x n_node) [L]
       type(error_t), allocatable, intent(out) :: error
       type(chain_t) :: slave
@@ -266,11 +266,11 @@ contains
       integer :: k, s
 
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) call check_choice("tie", t, 1, size(self%scene%tie), error)
+      if (.not. allocated(error)) call check_choice("tie", tie, 1, size(self%scene%tie), error)
       if (allocated(error)) return
-      call chain_init(slave, self%scene, self%scene%surface(self%scene%tie(t)%slave), error)
+      call chain_init(slave, self%scene, self%scene%surface(self%scene%tie(tie)%slave), error)
       if (allocated(error)) return
-      associate (rows => self%scene%tie(t)%rows)
+      associate (rows => self%scene%tie(tie)%rows)
          allocate(row(size(rows%node)), is_slave(size(rows%node)))
          do k = 1, size(rows%slave)
             row(rows%start(k) + 1:rows%start(k + 1)) = k
@@ -293,8 +293,8 @@ contains
          integer, allocatable :: slot(:)
          integer :: i
 
-         call csr_from_entries(matrix, size(self%scene%tie(t)%rows%slave), size(self%scene%x, 2), &
-            row, column, slot)
+         call csr_from_entries(matrix, size(self%scene%tie(tie)%rows%slave), &
+            size(self%scene%x, 2), row, column, slot)
          do i = 1, size(slot)
             if (slot(i) > 0) matrix%value(slot(i)) = matrix%value(slot(i)) + real(weight(i), dp)
          end do

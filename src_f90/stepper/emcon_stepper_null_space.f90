@@ -27,9 +27,9 @@ contains
    !>
    !> `redundant`: places of constraints that follow from others, for `query_drop`; then there are
    !> no matrices.
-   subroutine query_null_space(self, p, d, redundant, error)
+   subroutine query_null_space(self, p, df, redundant, error)
       type(query_t), intent(inout) :: self
-      type(csr_t), intent(out) :: p, d               !! (2 n_node x independent unknowns)
+      type(csr_t), intent(out) :: p, df              !! (2 n_node x independent unknowns)
       integer, allocatable, intent(out) :: redundant(:)
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: links
@@ -44,7 +44,7 @@ contains
          call links_of(system, links)
          if (set%n == 0) then
             p = links
-            d = links
+            df = links
             self%has_null_space = .true.
             return
          end if
@@ -53,7 +53,7 @@ contains
          select case (null_space%obstacle)
          case (obstacle_none)
             call csr_product(links, null_space%p, p)
-            call csr_product(links, null_space%d, d)
+            call csr_product(links, null_space%d, df)
             self%has_null_space = .true.
          case (obstacle_redundant)
             redundant = null_space%rows%redundant(:null_space%rows%n_redundant)
@@ -130,13 +130,13 @@ contains
 
    !> T: all displacements from the unknowns, u = T q up to prescribed motion. A row of a prescribed
    !> freedom is empty, one of a dependent freedom holds the weights of those that it follows.
-   subroutine query_links(stepper, links, error)
+   subroutine query_links(stepper, matrix, error)
       type(stepper_t), intent(in) :: stepper
-      type(csr_t), intent(out) :: links              !! (2 n_node x n_unknown)
+      type(csr_t), intent(out) :: matrix             !! (2 n_node x n_unknown)
       type(error_t), allocatable, intent(out) :: error
 
       call stepper_check_open(stepper, error)
-      if (.not. allocated(error)) call links_of(stepper%march%system, links)
+      if (.not. allocated(error)) call links_of(stepper%march%system, matrix)
    end subroutine query_links
 
    subroutine links_of(system, links)
