@@ -49,6 +49,14 @@ module emcon_row_elimination
       real(hp), allocatable, private :: pivot_value(:, :)   !! (2, rows)
    end type row_elimination_t
 
+   !> Pivots as sums over other columns, one sum behind the other as they are found.
+   type :: sums_t
+      integer :: n = 0                           !! terms so far
+      integer, allocatable :: first(:), last(:)  !! (rows) terms of each sum
+      integer, allocatable :: column(:)          !! (>= n)
+      real(hp), allocatable :: weight(:)         !! (>= n)
+   end type sums_t
+
 contains
 
    !> Nothing eliminated yet; room for `n_row` rows over `n_col` columns, kept where it fits.
@@ -273,104 +281,111 @@ contains
       integer, allocatable, intent(out) :: start(:)     !! (rows + 1) from 0
       integer, allocatable, intent(out) :: column(:)    !! ascending in each row
       real(hp), allocatable, intent(out) :: weight(:)
-      integer, allocatable :: first(:), last(:)
-      integer :: k, s, n
+      type(sums_t) :: sums
+      integer :: k, s
 
+      call begin_sums(sums, self%n_row, size(self%column))
       ! Later rows first: what earlier rows need of them is there already.
-      allocate(first(self%n_row), last(self%n_row), source=0)
-      allocate(column(size(self%column)), weight(size(self%column)))
-      n = 0
       do k = self%n_row, 1, -1
-         first(k) = n + 1
-         last(k) = n
-         if (self%pivot(k) == 0) cycle
          call clear(self)
-         do s = self%row_start(k) + 1, self%row_start(k + 1)
-            call substitute(self%column(s), -self%value(2, s)/self%pivot_value(2, k))
-         end do
-         call store
+         if (self%pivot(k) > 0) then
+            do s = self%row_start(k) + 1, self%row_start(k + 1)
+               call substitute(self, sums, self%column(s), &
+                  -self%value(2, s)/self%pivot_value(2, k))
+            end do
+         end if
+         call append_sum(self, sums, k)
       end do
       call clear(self)
-      call reorder
-
-   contains
-
-      !> Add `factor` times column `j`, or times what it is a sum of.
-      subroutine substitute(j, factor)
-         integer, intent(in) :: j
-         real(hp), intent(in) :: factor
-         integer :: t, i
-
-         i = self%pivot_row(j)
-         if (i == 0) then
-            call enlist(self, j)
-            self%work(2, j) = self%work(2, j) + factor
-            return
-         end if
-         do t = first(i), last(i)
-            call enlist(self, column(t))
-            self%work(2, column(t)) = self%work(2, column(t)) + factor*weight(t)
-         end do
-      end subroutine substitute
-
-      !> Append the present row, its columns ascending; what cancelled is left out.
-      subroutine store
-         integer :: t, place
-         real(hp) :: largest
-
-         if (n + self%n_list > size(column)) call enlarge(column, weight, 2*(n + self%n_list))
-         largest = maxval([0.0_hp, abs(self%work(2, self%list(:self%n_list)))])
-         do t = 1, self%n_list
-            associate (j => self%list(t))
-               if (abs(self%work(2, j)) <= 4.0_hp*epsilon(1.0_hp)*largest) cycle
-               n = n + 1
-               place = n
-               do while (place > first(k))
-                  if (column(place - 1) < j) exit
-                  column(place) = column(place - 1)
-                  weight(place) = weight(place - 1)
-                  place = place - 1
-               end do
-               column(place) = j
-               weight(place) = self%work(2, j)
-            end associate
-         end do
-         last(k) = n
-      end subroutine store
-
-      !> Rows in ascending order.
-      subroutine reorder
-         integer, allocatable :: held_column(:)
-         real(hp), allocatable :: held_weight(:)
-         integer :: i
-
-         allocate(start(self%n_row + 1), source=0)
-         allocate(held_column(n), held_weight(n))
-         do i = 1, self%n_row
-            associate (to => start(i + 1))
-               to = start(i) + last(i) - first(i) + 1
-               held_column(start(i) + 1:to) = column(first(i):last(i))
-               held_weight(start(i) + 1:to) = weight(first(i):last(i))
-            end associate
-         end do
-         call move_alloc(held_column, column)
-         call move_alloc(held_weight, weight)
-      end subroutine reorder
-
+      call ascending_sums(sums, start, column, weight)
    end subroutine elimination_resolve
 
-   subroutine enlarge(column, weight, n)
-      integer, allocatable, intent(inout) :: column(:)
-      real(hp), allocatable, intent(inout) :: weight(:)
-      integer, intent(in) :: n
-      integer, allocatable :: more(:)
-      real(hp), allocatable :: more_weight(:)
+   !> Add `factor` times column `j` to the present row, or times the sum that `j` is.
+   pure subroutine substitute(self, sums, j, factor)
+      type(row_elimination_t), intent(inout) :: self
+      type(sums_t), intent(in) :: sums
+      integer, intent(in) :: j
+      real(hp), intent(in) :: factor
+      integer :: t, i
 
-      allocate(more(n), more_weight(n))
-      more(:size(column)) = column
-      more_weight(:size(weight)) = weight
-      call move_alloc(more, column)
-      call move_alloc(more_weight, weight)
+      i = self%pivot_row(j)
+      if (i == 0) then
+         call enlist(self, j)
+         self%work(2, j) = self%work(2, j) + factor
+         return
+      end if
+      do t = sums%first(i), sums%last(i)
+         call enlist(self, sums%column(t))
+         self%work(2, sums%column(t)) = self%work(2, sums%column(t)) + factor*sums%weight(t)
+      end do
+   end subroutine substitute
+
+   pure subroutine begin_sums(sums, n_row, n_term)
+      type(sums_t), intent(out) :: sums
+      integer, intent(in) :: n_row, n_term       !! n_term: room to begin with
+
+      allocate(sums%first(n_row), sums%last(n_row), source=0)
+      allocate(sums%column(n_term), sums%weight(n_term))
+   end subroutine begin_sums
+
+   !> The present row is sum `k`, its columns ascending; what cancelled is left out.
+   pure subroutine append_sum(self, sums, k)
+      type(row_elimination_t), intent(in) :: self
+      type(sums_t), intent(inout) :: sums
+      integer, intent(in) :: k
+      integer :: t, place
+      real(hp) :: largest
+
+      sums%first(k) = sums%n + 1
+      if (sums%n + self%n_list > size(sums%column)) call enlarge(sums, 2*(sums%n + self%n_list))
+      largest = maxval([0.0_hp, abs(self%work(2, self%list(:self%n_list)))])
+      do t = 1, self%n_list
+         associate (j => self%list(t), column => sums%column, weight => sums%weight)
+            if (abs(self%work(2, j)) <= 4.0_hp*epsilon(1.0_hp)*largest) cycle
+            sums%n = sums%n + 1
+            place = sums%n
+            do while (place > sums%first(k))
+               if (column(place - 1) < j) exit
+               column(place) = column(place - 1)
+               weight(place) = weight(place - 1)
+               place = place - 1
+            end do
+            column(place) = j
+            weight(place) = self%work(2, j)
+         end associate
+      end do
+      sums%last(k) = sums%n
+   end subroutine append_sum
+
+   pure subroutine enlarge(sums, n)
+      type(sums_t), intent(inout) :: sums
+      integer, intent(in) :: n
+      integer, allocatable :: column(:)
+      real(hp), allocatable :: weight(:)
+
+      allocate(column(n), weight(n))
+      column(:size(sums%column)) = sums%column
+      weight(:size(sums%weight)) = sums%weight
+      call move_alloc(column, sums%column)
+      call move_alloc(weight, sums%weight)
    end subroutine enlarge
+
+   !> The sums in the order of their rows.
+   pure subroutine ascending_sums(sums, start, column, weight)
+      type(sums_t), intent(in) :: sums
+      integer, allocatable, intent(out) :: start(:), column(:)
+      real(hp), allocatable, intent(out) :: weight(:)
+      integer :: i
+
+      allocate(start(size(sums%first) + 1), source=0)
+      allocate(column(sums%n), weight(sums%n))
+      do i = 1, size(sums%first)
+         associate (from => sums%first(i), last => sums%last(i), to => start(i + 1))
+            to = start(i) + last - from + 1
+            column(start(i) + 1:to) = sums%column(from:last)
+            weight(start(i) + 1:to) = sums%weight(from:last)
+         end associate
+      end do
+   end subroutine ascending_sums
 
 end module emcon_row_elimination

@@ -290,8 +290,8 @@ contains
       if (.not. is_covering) return
       do i = 1, n_moment
          associate (part => moment(i))
-            call wide_add_part(self%form(e)%moment(i), 1.0_wp, part%f0, part%f1, part%df, part%g, &
-               part%c, part%h, variable)
+            call wide_add_part(self%form(e)%moment(i), 1.0_wp, [part%f0, part%f1, part%df], &
+               part%g, part%c, part%h, variable)
          end associate
       end do
    end subroutine add_segment2
@@ -345,7 +345,7 @@ contains
       real(wp), intent(in) :: factor
       type(dg17_t), intent(in) :: part
 
-      call wide_add_part(self%form(e)%moment(i), factor, part%f0, part%f1, part%df, part%g, &
+      call wide_add_part(self%form(e)%moment(i), factor, [part%f0, part%f1, part%df], part%g, &
          part%c, part%h, variable)
    end subroutine add_part
 

@@ -90,15 +90,17 @@ contains
 
    !> Add `factor` times a part given by its components over its own variables; its variable i is
    !> number `variable(i)` here, 0: none.
-   pure subroutine wide_add_part(self, factor, f0, f1, df, g, c, h, variable)
+   pure subroutine wide_add_part(self, factor, f, g, c, h, variable)
       type(wide_t), intent(inout) :: self
-      real(wp), intent(in) :: factor, f0, f1, df, g(:), c(:), h(:, :)
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: f(3)               !! f0, f1, df
+      real(wp), intent(in) :: g(:), c(:), h(:, :)
       integer, intent(in) :: variable(:)
       integer :: i, j, row, column
 
-      self%f0 = self%f0 + factor*f0
-      self%f1 = self%f1 + factor*f1
-      self%df = self%df + factor*df
+      self%f0 = self%f0 + factor*f(1)
+      self%f1 = self%f1 + factor*f(2)
+      self%df = self%df + factor*f(3)
       do j = 1, size(variable)
          column = variable(j)
          if (column == 0) cycle

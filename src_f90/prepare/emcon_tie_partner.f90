@@ -19,6 +19,7 @@ module emcon_tie_partner
    type :: tie_partners_t
       type(chain_t) :: slave, master
       real(wp) :: tolerance = -1.0_wp            !! of positions; < 0: by default [L]
+      real(wp), private :: noise = 0.0_wp        !! of positions, by rounding [L]
       logical, allocatable :: is_corner(:)       !! (n_edge) of the slave, at the first node
       integer, allocatable :: start(:)           !! (n_edge + 1) segments of each slave edge
       integer, allocatable :: edge(:)            !! (n_segment) master edge
@@ -60,7 +61,7 @@ contains
       type(front_t), allocatable :: front(:)
       real(wp), allocatable :: still(:, :)
       integer, allocatable :: found(:)
-      real(wp) :: share, reach, noise
+      real(wp) :: share, reach
       integer :: e, n_found, n_front, n
 
       associate (slave => self%slave, master => self%master)
@@ -71,19 +72,20 @@ contains
          allocate(self%ends(2, size(self%edge)))
          allocate(still(size(x, 1), size(x, 2)), source=0.0_wp)
          call chain_corners(slave, x, corner_angle, self%is_corner)
-         noise = rounding*max(maxval(abs(x(:, slave%node))), maxval(abs(x(:, master%node))))
+         self%noise = rounding*max(maxval(abs(x(:, slave%node))), &
+            maxval(abs(x(:, master%node))))
          share = sagitta
          if (self%tolerance < 0.0_wp) share = sagitta + default_tolerance
          call master_tree(master, x, share, tree)
          n = 0
          do e = 1, slave%n_edge
             self%start(e) = n + 1
-            reach = max(0.0_wp, self%tolerance) + share*slave%length(e) + noise
+            reach = max(0.0_wp, self%tolerance) + share*slave%length(e) + self%noise
             n_found = 0
             associate (ends => x(:, slave%edge(:, e)))
                call box_tree_find(tree, minval(ends, 2), maxval(ends, 2), reach, found, n_found)
             end associate
-            call face_edges(self, e, found(:n_found), noise, x, still, front, n_front)
+            call face_edges(self, e, found(:n_found), x, still, front, n_front)
             call cut_edge(self, e, front(:n_front), n)
             if (n < self%start(e)) cycle
             call see_node(self, front(:n_front), slave%edge(1, e), self%start(e), 0.0_wp, x)
@@ -131,10 +133,9 @@ contains
 
    !> Those of the master edges `found` that face slave edge `e` and cover a part of it, in the
    !> order in which their parts begin.
-   pure subroutine face_edges(self, e, found, noise, x, still, front, n)
+   pure subroutine face_edges(self, e, found, x, still, front, n)
       type(tie_partners_t), intent(in) :: self
       integer, intent(in) :: e, found(:)
-      real(wp), intent(in) :: noise              !! of positions [L]
       real(wp), intent(in), contiguous :: x(:, :), still(:, :)
       type(front_t), allocatable, intent(inout) :: front(:)    !! work space, made longer
       integer, intent(out) :: n
@@ -155,7 +156,7 @@ contains
             if (.not. this%high > this%low) cycle
             this%edge = m
             longer = max(self%slave%length(e), self%master%length(m))
-            this%tolerance = noise &
+            this%tolerance = self%noise &
                + merge(default_tolerance*longer, self%tolerance, self%tolerance < 0.0_wp)
             this%reach = this%tolerance + sagitta*longer
          end associate

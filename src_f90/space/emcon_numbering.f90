@@ -37,6 +37,13 @@ module emcon_numbering
       real(wp), allocatable :: weight(:)
    end type unresolved_t
 
+   !> The dependent freedoms as sums: terms of sum k from start(k) + 1 to start(k + 1).
+   type :: sums_t
+      integer, allocatable :: start(:)           !! (sums + 1) from 0
+      integer, allocatable :: term(:)            !! place of an unknown or prescribed freedom
+      real(hp), allocatable :: weight(:)
+   end type sums_t
+
 contains
 
    !> Number all degrees of freedom that are alive and that `prescribed` does not name: what has
@@ -48,9 +55,8 @@ contains
       type(prescribed_t), intent(in) :: prescribed(:)
       type(linear_rows_t), intent(in), optional :: linear
       type(unresolved_t), allocatable, intent(out), optional :: unresolved(:)
-      integer, allocatable :: start(:), term(:)
-      real(hp), allocatable :: weight(:)
       type(unresolved_t), allocatable :: rest(:)
+      type(sums_t) :: sums
       integer :: k
 
       allocate(self%unknown, source=merge(1, 0, is_alive))
@@ -59,101 +65,114 @@ contains
       end do
       allocate(self%dependent(0))
       if (present(linear)) then
-         call eliminate(self, linear, start, term, weight, rest)
+         call eliminate(self, linear, sums, rest)
          if (present(unresolved)) call move_alloc(rest, unresolved)
       else
-         allocate(start(1), term(0), source=0)
-         allocate(weight(0))
+         allocate(sums%start(1), sums%term(0), source=0)
+         allocate(sums%weight(0))
       end if
       call number_unknowns(self)
-      call collect_terms(self, start, term, weight)
+      call collect_terms(self, sums)
    end subroutine numbering_init
 
-   !> Find the dependent freedoms and their terms. Unknowns so far are those marked 1.
-   subroutine eliminate(self, linear, start, term, weight, unresolved)
+   !> Find the dependent freedoms and the sums that they are. Unknowns so far are those marked 1.
+   subroutine eliminate(self, linear, sums, unresolved)
       type(numbering_t), intent(inout) :: self
       type(linear_rows_t), intent(in) :: linear
-      integer, allocatable, intent(out) :: start(:), term(:)    !! by dependent freedom
-      real(hp), allocatable, intent(out) :: weight(:)
+      type(sums_t), intent(out) :: sums
       type(unresolved_t), allocatable, intent(out) :: unresolved(:)
       type(row_elimination_t) :: elimination
-      integer, allocatable :: present_dof(:), place(:), row(:), pivot(:)
-      integer :: k, n, n_free, fate, n_dim
+      integer, allocatable :: dof(:)
 
-      n_dim = size(self%unknown, 1)
-      allocate(place(size(self%unknown)), source=0)
-      present_dof = unique_sorted(linear%dof(:linear%start(linear%n + 1)))
-      present_dof = [pack(present_dof, is_free(present_dof)), &
-         pack(present_dof, .not. is_free(present_dof))]
-      place(present_dof) = [(k, k = 1, size(present_dof))]
-      n_free = count(is_free(present_dof))
+      dof = unique_sorted(linear%dof(:linear%start(linear%n + 1)))
+      dof = [pack(dof, unknown_of(self, dof) > 0), pack(dof, unknown_of(self, dof) == 0)]
+      call eliminate_rows(self, linear, dof, elimination, unresolved)
+      call elimination_resolve(elimination, sums%start, sums%term, sums%weight)
+      sums%term = dof(sums%term)
+      call sort_sums(self, dof, elimination%pivot, sums)
+   end subroutine eliminate
+
+   !> Eliminate the used rows, each in the columns of its freedoms.
+   subroutine eliminate_rows(self, linear, dof, elimination, unresolved)
+      type(numbering_t), intent(in) :: self
+      type(linear_rows_t), intent(in) :: linear
+      integer, intent(in) :: dof(:)                      !! freedom of each column, unknowns first
+      type(row_elimination_t), intent(out) :: elimination
+      type(unresolved_t), allocatable, intent(out) :: unresolved(:)
+      integer :: column(size(self%unknown)), fate, k, n
+      integer, allocatable :: row(:)
+
+      column = 0
+      column(dof) = [(k, k = 1, size(dof))]
       row = pack([(k, k = 1, linear%n)], linear%is_used)
-      call elimination_begin(elimination, size(row), size(present_dof), n_free)
       allocate(unresolved(size(row)))
+      call elimination_begin(elimination, size(row), size(dof), count(unknown_of(self, dof) > 0))
       n = 0
       do k = 1, size(row)
          associate (from => linear%start(row(k)) + 1, to => linear%start(row(k) + 1))
-            call elimination_add(elimination, place(linear%dof(from:to)), &
+            call elimination_add(elimination, column(linear%dof(from:to)), &
                real(linear%weight(from:to), hp), real(linear%weight(from:to), hp), &
-               place([linear%own(row(k))]), fate)
+               column([linear%own(row(k))]), fate)
          end associate
          if (fate /= row_redundant) cycle
          n = n + 1
          unresolved(n)%row = row(k)
-         call note_left(unresolved(n))
+         call note_left(elimination, dof, unresolved(n))
       end do
       unresolved = unresolved(:n)
-      call elimination_resolve(elimination, start, term, weight)
-      term = present_dof(term)
-      pivot = elimination%pivot
-      call sort_rows
+   end subroutine eliminate_rows
 
-   contains
+   !> The prescribed freedoms that a redundant row, the last one, is left with.
+   subroutine note_left(elimination, dof, item)
+      type(row_elimination_t), intent(in) :: elimination
+      integer, intent(in) :: dof(:)              !! freedom of each column
+      type(unresolved_t), intent(inout) :: item
+      integer, allocatable :: column(:)
+      real(hp), allocatable :: value(:)
 
-      elemental logical function is_free(dof)
-         integer, intent(in) :: dof
+      call elimination_left(elimination, column, value)
+      item%dof = dof(column)
+      item%weight = real(value, wp)
+   end subroutine note_left
 
-         is_free = self%unknown(1 + mod(dof - 1, n_dim), 1 + (dof - 1)/n_dim) > 0
-      end function is_free
+   !> From sums in the order of the rows to that of the dependent freedoms, which become known as
+   !> such.
+   subroutine sort_sums(self, dof, pivot, sums)
+      type(numbering_t), intent(inout) :: self
+      integer, intent(in) :: dof(:)              !! freedom of each column
+      integer, intent(in) :: pivot(:)            !! column of each row; 0: none
+      type(sums_t), intent(inout) :: sums
+      integer :: row(size(self%unknown)), from(size(sums%term)), n_dim, d, i, j
+      integer, allocatable :: start(:)
 
-      !> The prescribed freedoms that a redundant row is left with.
-      subroutine note_left(item)
-         type(unresolved_t), intent(inout) :: item
-         integer, allocatable :: column(:)
-         real(hp), allocatable :: value(:)
+      n_dim = size(self%unknown, 1)
+      row = 0
+      do i = 1, size(pivot)
+         if (pivot(i) > 0) row(dof(pivot(i))) = i
+      end do
+      self%dependent = pack([(d, d = 1, size(row))], row > 0)
+      allocate(start(size(self%dependent) + 1), source=0)
+      do i = 1, size(self%dependent)
+         d = self%dependent(i)
+         associate (first => sums%start(row(d)) + 1, last => sums%start(row(d) + 1))
+            start(i + 1) = start(i) + last - first + 1
+            from(start(i) + 1:start(i + 1)) = [(j, j = first, last)]
+         end associate
+         self%unknown(1 + mod(d - 1, n_dim), 1 + (d - 1)/n_dim) = 0
+      end do
+      call move_alloc(start, sums%start)
+      sums%term = sums%term(from)
+      sums%weight = sums%weight(from)
+   end subroutine sort_sums
 
-         call elimination_left(elimination, column, value)
-         item%dof = present_dof(column)
-         item%weight = real(value, wp)
-      end subroutine note_left
+   elemental integer function unknown_of(self, dof)
+      type(numbering_t), intent(in) :: self
+      integer, intent(in) :: dof                 !! place in an (n_dim, n_node) array
 
-      !> Rows in the order of the dependent freedoms, which become known as such.
-      subroutine sort_rows
-         integer, allocatable :: owner(:), first(:), from(:)
-         integer :: d, i, j
-
-         allocate(owner(size(place)), source=0)
-         do i = 1, size(pivot)
-            if (pivot(i) > 0) owner(present_dof(pivot(i))) = i
-         end do
-         deallocate(self%dependent)
-         self%dependent = pack([(d, d = 1, size(owner))], owner > 0)
-         first = start
-         allocate(from(size(term)))
-         deallocate(start)
-         allocate(start(size(self%dependent) + 1), source=0)
-         do d = 1, size(self%dependent)
-            i = owner(self%dependent(d))
-            start(d + 1) = start(d) + first(i + 1) - first(i)
-            from(start(d) + 1:start(d + 1)) = [(j, j = first(i) + 1, first(i + 1))]
-            self%unknown(1 + mod(self%dependent(d) - 1, n_dim), &
-               1 + (self%dependent(d) - 1)/n_dim) = 0
-         end do
-         term = term(from)
-         weight = weight(from)
-      end subroutine sort_rows
-
-   end subroutine eliminate
+      associate (n_dim => size(self%unknown, 1))
+         unknown_of = self%unknown(1 + mod(dof - 1, n_dim), 1 + (dof - 1)/n_dim)
+      end associate
+   end function unknown_of
 
    !> Numbers for the freedoms marked as unknown, node by node.
    pure subroutine number_unknowns(self)
@@ -175,25 +194,23 @@ contains
    end subroutine number_unknowns
 
    !> The terms of all freedoms from those of the dependent ones.
-   pure subroutine collect_terms(self, start, term, weight)
+   pure subroutine collect_terms(self, sums)
       type(numbering_t), intent(inout) :: self
-      integer, intent(in) :: start(:), term(:)       !! by dependent freedom
-      real(hp), intent(in) :: weight(:)
-      integer :: d, k, n, t, n_dim
+      type(sums_t), intent(in) :: sums           !! by dependent freedom
+      integer :: d, k, n, t
 
-      n_dim = size(self%unknown, 1)
       self%n_dependent = size(self%dependent)
-      n = size(self%unknown) - self%n_dependent + size(term)
-      allocate(self%start(size(self%unknown) + 1), self%term(n), self%column(n), source=0)
+      n = size(self%unknown) - self%n_dependent + size(sums%term)
+      allocate(self%start(size(self%unknown) + 1), self%term(n), source=0)
       allocate(self%weight(n), source=1.0_wp)
       k = 1
       n = 0
       do d = 1, size(self%unknown)
          if (is_dependent(d, k)) then
-            do t = start(k) + 1, start(k + 1)
+            do t = sums%start(k) + 1, sums%start(k + 1)
                n = n + 1
-               self%term(n) = term(t)
-               self%weight(n) = real(weight(t), wp)
+               self%term(n) = sums%term(t)
+               self%weight(n) = real(sums%weight(t), wp)
             end do
             k = k + 1
          else
@@ -202,10 +219,7 @@ contains
          end if
          self%start(d + 1) = n
       end do
-      do t = 1, n
-         self%column(t) = self%unknown(1 + mod(self%term(t) - 1, n_dim), &
-            1 + (self%term(t) - 1)/n_dim)
-      end do
+      self%column = unknown_of(self, self%term)
 
    contains
 

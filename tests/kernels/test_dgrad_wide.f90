@@ -58,7 +58,8 @@ contains
       type(dg_t), intent(in) :: part
       integer, intent(in) :: variable(:)
 
-      call wide_add_part(self, factor, part%f0, part%f1, part%df, part%g, part%c, part%h, variable)
+      call wide_add_part(self, factor, [part%f0, part%f1, part%df], part%g, part%c, part%h, &
+         variable)
    end subroutine add
 
    subroutine check_same(error, actual, expected, what)
