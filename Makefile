@@ -67,6 +67,9 @@ ROOMS := $(wildcard src_f90/*/)
 LIB_SRC := $(wildcard $(addsuffix *.f90,$(filter-out %/app/,$(ROOMS))) \
 	$(addsuffix *.F90,$(filter-out %/app/,$(ROOMS))))
 LIB_C := $(wildcard $(addsuffix *.c,$(ROOMS)))
+BORDER := src_f90/border
+MADE := $(if $(wildcard $(BORDER)/emcon.h),$(addprefix $(BUILD)/made/,emcon_c_types.f90 emcon_c.f90))
+LIB_SRC += $(MADE)
 APP_SRC := $(wildcard src_f90/app/*.f90)
 KERNEL_SRC := $(wildcard tests/kernels/*.f90 tests/kernels/*.F90)
 ifeq ($(LICENSE),permissive)
@@ -79,11 +82,18 @@ KERNEL_SRC := $(filter-out $(GPL),$(KERNEL_SRC))
 endif
 SRC := $(LIB_SRC) $(APP_SRC) $(KERNEL_SRC)
 INC := $(wildcard $(addsuffix *.inc,$(ROOMS)))
-vpath %.f90 $(ROOMS) tests/kernels
+vpath %.f90 $(ROOMS) tests/kernels $(BUILD)/made
 vpath %.F90 $(ROOMS) tests/kernels
 vpath %.c $(ROOMS)
 objects = $(addprefix $(O)/,$(addsuffix .o,$(basename $(notdir $(1)))))
 LIB_OBJ := $(call objects,$(LIB_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(LIB_C)))
+
+# The C functions are made from the header and the procedures that they stand for: written only where
+# they differ, so that an edit of a body makes none of them new.
+$(MADE): $(BUILD)/made/stamp ; +@:
+$(BUILD)/made/stamp: $(addprefix $(BORDER)/,make_c.py c_header.py emcon.h) \
+		$(wildcard $(BORDER)/*.f90 src_f90/stepper/*.f90)
+	@mkdir -p $(@D) && $(PYTHON) $< $(@D) $(filter %.f90,$^) && touch $@
 
 # ---- flags --------------------------------------------------------------------------------------
 
@@ -169,7 +179,7 @@ $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 
 # What holds whole models and computes nothing: optimising how those are freed takes half of the
 # time of the library. `private`: what is made on the way keeps its own flags.
-HOLDERS := $(addprefix emcon_,c handle run stepper stepper_query)
+HOLDERS := $(addprefix emcon_,c c_by_hand model run stepper stepper_query)
 $(HOLDERS:%=$(O)/%.o): private FFLAGS_release := -O0 -g1
 
 # The kernel tests are compiled once, with all checks: those of `debug` are these with its library.
@@ -207,13 +217,13 @@ kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/ker
 PY_READY := .venv/run.stamp
 P := $(BUILD)/py
 PACKAGE := pywrap/emcon
-HEADERS := src_f90/border/emcon.h
+HEADER := $(BORDER)/emcon.h
 
-# What C has is what Python calls: the signatures are made from the headers.
-$(P)/_core.pyf: pywrap/make_pyf.py $(HEADERS) $(PY_READY)
-	@echo "  PYF   $(HEADERS)"
+# What C has is what Python calls: the signatures are made from the header.
+$(P)/_core.pyf: pywrap/make_pyf.py $(BORDER)/c_header.py $(HEADER) $(PY_READY)
+	@echo "  PYF   $(HEADER)"
 	$(Q)mkdir -p $(P)
-	$(Q)$(PY) $< $(HEADERS) > $@
+	$(Q)$(PY) $< $(HEADER) > $@
 
 $(P)/_coremodule.c $(P)/fortranobject.c $(P)/include.txt &: $(P)/_core.pyf
 	@echo "  F2PY  $<"
@@ -227,7 +237,7 @@ $(PYTHON_INCLUDE)/Python.h:
 
 $(P)/%.o: $(P)/%.c $(P)/include.txt $(PYTHON_INCLUDE)/Python.h $(BUILD)/flags.txt
 	@echo "  CC    $<"
-	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) -Isrc_f90/border @$(P)/include.txt $(CFLAGS) -c $< -o $@
+	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) -I$(BORDER) @$(P)/include.txt $(CFLAGS) -c $< -o $@
 
 $(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o fortranobject.o) $(BUILD)/$(SHARED)
 	@echo "  LINK  $@"

@@ -1,14 +1,14 @@
-"""Write the signature file of the Python extension, from the headers of the C library.
+"""Write the signature file of the Python extension, from the header of the C library.
 
-    python make_pyf.py HEADER... > _core.pyf
+    python make_pyf.py HEADER > _core.pyf
 
-Each function of the headers becomes one of the extension, with its name. It returns the status, or
+Each function of the header becomes one of the extension, with its name. It returns the status, or
 what else the C function returns, and then what C writes. Handles, functions and texts of the
 library are addresses; counts that an input array tells are left out. The size of an array stands
 behind it in the header: `double *u /* n_node x 2 */`. An input that may be NULL is so where it has
 no entries, one of several output arrays where `no_u=1` is given. Structures are bytes; the constant
 STRUCTURES says what they hold, in JSON for numpy, and enumerations are constants too. The C
-compiler holds all this against the headers.
+compiler holds all this against the header.
 """
 
 from __future__ import annotations
@@ -16,10 +16,13 @@ from __future__ import annotations
 import json
 import re
 import sys
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]/"src_f90/border"))
+
+import c_header  # noqa: E402
 
 NUMBERS = {"int": "integer", "double": "double precision"}
 FORMATS = {"int": "i4", "double": "f8"}
@@ -27,72 +30,36 @@ FORMATS = {"int": "i4", "double": "f8"}
 QUICK = re.compile(r"emcon_(get_(?!gaps)|add_|free|message|is_done|version|close|find_)")
 
 
-@dataclass
-class Headers:
-    """What the headers declare."""
-
-    functions: list[tuple[str, str, str]] = field(default_factory=list)   # result, name, arguments
-    structures: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
-    opaque: set[str] = field(default_factory=set)
-    pointers: set[str] = field(default_factory=set)                       # to functions
-    constants: list[str] = field(default_factory=list)
-
-    def read(self, text: str) -> None:
-        """Add a header. Of its comments those behind arguments stay, in brackets."""
-        text = re.sub(r"/\*((?:(?!\*/).)*)\*/(?=\s*[,)])", r"[\1]", text, flags=re.DOTALL)
-        text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-        self.opaque |= set(re.findall(r"typedef struct (\w+) \1;", text))
-        self.pointers |= set(re.findall(r"typedef \w+ \(\*(\w+)\)", text))
-        self.constants += re.findall(r"\b(EMCON_\w+) = \d", text)
-        for body, name in re.findall(r"typedef struct \w+ \{(.*?)\} (\w+);", text, re.DOTALL):
-            self.structures[name] = [part for line in body.split(";") if line.strip()
-                                     for part in self._components(line.strip())]
-        self.functions += re.findall(r"^((?:const )?\w+ \*?)(emcon_\w+)\(([^;]*)\);", text,
-                                     re.MULTILINE)
-
-    def _components(self, line: str) -> list[tuple[str, str]]:
-        kind, rest = re.fullmatch(r"(?:const )?(\w+)\s+(.*)", line, re.DOTALL).groups()
-        known = {**FORMATS, **{name: name for name in self.structures}}
-        return [(name.strip().lstrip("*"), "u8" if "*" in name else known[kind])
-                for name in rest.split(",")]
-
-    def size(self, name: str) -> int:
-        return dtypes(self.structures)[name].itemsize
+def layouts(header: c_header.Header) -> dict[str, list[tuple[str, str]]]:
+    """What each structure holds: names and formats of numpy, or names of structures."""
+    return {name: [(part.name, "u8" if part.level else FORMATS.get(part.kind, part.kind))
+                   for part in parts] for name, parts in header.structures.items()}
 
 
-def dtypes(structures: dict[str, list[tuple[str, str]]]) -> dict[str, np.dtype]:
+def dtypes(header: c_header.Header) -> dict[str, np.dtype]:
     """Structures as numpy sees them."""
     found: dict[str, np.dtype] = {}
-    for name, parts in structures.items():
+    for name, parts in layouts(header).items():
         found[name] = np.dtype([(part, found.get(kind, kind)) for part, kind in parts], align=True)
     return found
 
 
-class Argument:
+class Argument(c_header.Argument):
     """An argument of C, and what becomes of it."""
 
-    def __init__(self, text: str, headers: Headers) -> None:
-        match = re.fullmatch(r"(const )?(\w+)\s+(\**)(\w+)(?:\s*\[(.*)\])?", text.strip(),
-                             re.DOTALL)
-        if not match:
-            raise SystemExit(f"make_pyf.py: not understood: {text}")
-        const, self.kind, stars, self.name, comment = match.groups()
-        parts = [part.strip() for part in (comment or "").split(",")]
-        self.is_in, self.level = bool(const), len(stars)
-        self.or_null, self.in_out = "or NULL" in parts, "in and out" in parts
-        self.extents = parts[0].split(" x ") if parts[0] else []
-        self.is_structure, self.is_number = self.kind in headers.structures, self.kind in NUMBERS
+    def __init__(self, found: c_header.Argument, header: c_header.Header) -> None:
+        vars(self).update(vars(found))
+        self.is_structure, self.is_number = self.kind in header.structures, self.kind in NUMBERS
         #: The first extent, where it is not fixed.
         self.extent = self.extents[0] if self.extents and (
             self.or_null or not self.extents[0].isdigit()) else ""
         is_input = self.is_in or self.in_out
         self.is_input_array = bool(self.extent) and is_input and self.is_number
         self.is_output_array = bool(self.extents) and not is_input and self.is_number
-        self.ctype = (const or "") + self.kind
         self.before = self.after = ""
-        self.passed, self.declared = self._forms(headers)
+        self.passed, self.declared = self._forms(header)
 
-    def _forms(self, headers: Headers) -> tuple[str, str]:
+    def _forms(self, header: c_header.Header) -> tuple[str, str]:
         """How C gets it, and its declaration."""
         name = self.name
         if self.level == 2:
@@ -104,11 +71,11 @@ class Argument:
         if self.kind == "char":
             return (f"(char *){name}",
                     f"integer*1 dimension({self.extents[0]}),intent(out,c) :: {name}")
-        if self.kind in headers.opaque | headers.pointers | {"void"}:
+        if self.kind in header.opaque | set(header.pointers) | {"void"}:
             stars = "*"*self.level
             return f"({self.ctype} {stars})(npy_intp){name}", f"integer*8 intent(in,c) :: {name}"
         if self.is_structure:
-            size = "*".join([str(headers.size(self.kind)), *self.extents])
+            size = "*".join([str(dtypes(header)[self.kind].itemsize), *self.extents])
             way = "in" if self.is_in else "out"
             return (f"({self.ctype} *){name}",
                     f"integer*1 dimension({size}),intent({way},c) :: {name}")
@@ -134,9 +101,9 @@ class Argument:
 class Function:
     """A function of C, and the block that stands for it."""
 
-    def __init__(self, headers: Headers, result: str, name: str, text: str) -> None:
-        self.name = name
-        self.arguments = [Argument(part, headers) for part in split(text)]
+    def __init__(self, found: c_header.Function, header: c_header.Header) -> None:
+        self.name = name = found.name
+        self.arguments = [Argument(a, header) for a in found.arguments]
         outputs = [a for a in self.arguments if a.is_output_array]
         outputs = outputs if len(outputs) > 1 else []
         for a in outputs:
@@ -144,8 +111,8 @@ class Function:
         self.names = [a.name for a in self.arguments]
         self.lines = [a.declared for a in self.arguments]
         self.call = f"{name}({', '.join(a.passed for a in self.arguments)});"
-        if result.strip() != "void":
-            kind, cast = ("integer*8", "(npy_intp)") if "*" in result else ("integer", "")
+        if found.result != "void":
+            kind, cast = ("integer*8", "(npy_intp)") if "*" in found.result else ("integer", "")
             self.names.insert(0, "status")
             self.lines.insert(0, f"{kind} intent(out) :: status")
             self.call = f"status = {cast}{self.call}"
@@ -195,26 +162,19 @@ class Function:
         return "\n".join(f"    {line}" for line in block)
 
 
-def split(text: str) -> list[str]:
-    """Arguments at the commas that stand in no comment."""
-    return [part for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
-
-
 def main() -> None:
-    headers = Headers()
-    for path in map(Path, sys.argv[1:]):
-        headers.read(path.read_text(encoding="utf-8"))
-    sizes = "\n".join(f"typedef char fits_{name}[sizeof({name}) == {headers.size(name)} ? 1 : -1];"
-                      for name in headers.structures)
-    table = json.dumps(headers.structures).replace('"', '\\"')
+    path = Path(sys.argv[1])
+    header = c_header.Header(path.read_text(encoding="utf-8"))
+    sizes = "\n".join(f"typedef char fits_{name}[sizeof({name}) == {found.itemsize} ? 1 : -1];"
+                      for name, found in dtypes(header).items())
+    table = json.dumps(layouts(header)).replace('"', '\\"')
     constants = "\n".join(f'PyModule_AddIntConstant(m, "{name}", {name});'
-                          for name in headers.constants)
-    includes = "\n".join(f'#include "{Path(path).name}"' for path in sys.argv[1:])
+                          for name in header.constants)
     print(f"""\
 !    -*- f90 -*-
 python module _core
   usercode '''
-{includes}
+#include "{path.name}"
 {sizes}
 '''
   interface
@@ -222,7 +182,7 @@ python module _core
 {constants}
 PyModule_AddStringConstant(m, "STRUCTURES", "{table}");
 '''
-""" + "\n".join(Function(headers, *found).block() for found in headers.functions) + """
+""" + "\n".join(Function(found, header).block() for found in header.functions) + """
   end interface
 end python module _core""")
 

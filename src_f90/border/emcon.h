@@ -177,26 +177,28 @@ void emcon_version(int *major, int *minor, int *patch);
 /* Read a deck, without building its model. `parameters`: NAME=VALUE lines with line ends between
  * them, or NULL. `is_lenient`: unknown keywords are no errors. `*model` has to be closed also after
  * a failure, when it holds the messages of the deck; nothing else can be done with it then. */
-int emcon_read(const char *deck, const char *parameters, int is_lenient, emcon_model **model);
+int emcon_read(const char *deck, const char *parameters /* or NULL */, int is_lenient,
+               emcon_model **model);
 
 /* The same for a deck in memory. `name` stands for the file in messages; what the deck includes is
  * looked for beside it. */
-int emcon_read_text(const char *text, const char *name, const char *parameters, int is_lenient,
-                    emcon_model **model);
+int emcon_read_text(const char *text, const char *name, const char *parameters /* or NULL */,
+                    int is_lenient, emcon_model **model);
 
 /* The same for a text whose lines stand in several files. A passage is four numbers: how many lines
  * it has; which of the files `names`, one per line, it stands in, from 1; at which line there; and
  * 1 if its lines are counted on from that one, 0 if all are told as that one. */
 int emcon_read_passages(const char *text, int n_passage, const int *passage /* n_passage x 4 */,
-                        const char *names, const char *parameters, int is_lenient,
-                        emcon_model **model);
+                        const char *names, const char *parameters /* or NULL */,
+                        int is_lenient, emcon_model **model);
 
 /* Build the model of the deck that was read, and begin its first step. After a failure the model
  * can only be closed. */
 int emcon_build(emcon_model *model);
 
 /* Read a deck and build its model. */
-int emcon_open(const char *deck, const char *parameters, int is_lenient, emcon_model **model);
+int emcon_open(const char *deck, const char *parameters /* or NULL */, int is_lenient,
+               emcon_model **model);
 
 /* Free a model, and all that it has given; harmless for NULL. Snapshots stay. */
 void emcon_close(emcon_model *model);
@@ -234,14 +236,13 @@ typedef int (*emcon_force_function)(void *user, int n_node, const double *u0, co
  * E11, E22, 2*E12. */
 int emcon_give_law(emcon_model *model, const char *name, emcon_point_function law, void *user);
 
-/* A potential of the present position of each of n nodes, numbers from 0. `name`, for messages, may
- * be NULL. */
-int emcon_give_potential(emcon_model *model, const char *name, int n,
+/* A potential of the present position of each of n nodes, numbers from 0. `name` is for messages. */
+int emcon_give_potential(emcon_model *model, const char *name /* or NULL */, int n,
                          const int *node /* n */, emcon_point_function potential, void *user);
 
 /* Forces between nodes: `pattern` (2*n_node x 2*n_node, its values are not looked at) tells which
  * depend on which. Nodes of no element are part of the model where they stand in it. */
-int emcon_give_force(emcon_model *model, const char *name, const emcon_csr *pattern,
+int emcon_give_force(emcon_model *model, const char *name /* or NULL */, const emcon_csr *pattern,
                      emcon_force_function force, void *user);
 
 /* A mass beside that of the elements, n_node x n_node, the same in both directions. */
@@ -261,13 +262,13 @@ int emcon_new(int n_node, const double *x /* n_node x 2 */, emcon_model **model)
 /* Add a surface: first and last node of each edge, 2*n_edge numbers, the body to the left, so that
  * the outward normal is the edge turned by -90 degrees. Edges in any order, connected or in parts,
  * open or closed. `name` is for messages, NULL: its number. `*surface` is its number. */
-int emcon_add_surface(emcon_model *model, const char *name, int n_edge,
+int emcon_add_surface(emcon_model *model, const char *name /* or NULL */, int n_edge,
                       const int *edge /* n_edge x 2 */, int *surface);
 
 /* Add a contact pair; a surface in contact with itself is its own master. `options` NULL: the
  * defaults. Rigid obstacles are masters of held nodes. */
 int emcon_add_pair(emcon_model *model, int slave, int master, int formulation,
-                   const emcon_pair_options *options);
+                   const emcon_pair_options *options /* or NULL */);
 
 /* Tie two surfaces that meet, whatever their meshes. `multiplier`: EMCON_STANDARD or EMCON_DUAL;
  * `tolerance`: how far apart they may be, < 0: a tenth of an edge. emcon_build moves slave nodes
@@ -467,16 +468,18 @@ int emcon_multipliers(emcon_model *model, int n_node,
                       const double *residual /* n_node x 2, or NULL */, int n_constraint,
                       double *lam /* n_constraint */);
 
-/* After emcon_null_space: the motion of dependent unknowns alone that closes the `defect` of the n
- * constraints. Newton's step is this plus DF times that of the others. */
-int emcon_particular(emcon_model *model, int n, const double *defect /* n */, int n_node,
-                     double *du /* n_node x 2 */);
+/* After emcon_null_space: the motion of dependent unknowns alone that closes the `defect` of the
+ * n_selected constraints. Newton's step is this plus DF times that of the others. */
+int emcon_particular(emcon_model *model, int n_selected, const double *defect /* n_selected */,
+                     int n_node, double *du /* n_node x 2 */);
 
-/* Sum over the n constraints of the last evaluation of `factor` times the derivative of the
- * discrete gradient by the end of the step, 2*n_node x 2*n_node, which the tangent gets with a
+/* Sum over the n_selected constraints of the last evaluation of `factor` times the derivative of
+ * the discrete gradient by the end of the step, 2*n_node x 2*n_node, which the tangent gets with a
  * minus sign if the factors are multipliers; and the same times `direction`. */
-int emcon_curvature(emcon_model *model, int n, const double *factor /* n */, emcon_csr *matrix);
-int emcon_curvature_times(emcon_model *model, int n, const double *factor /* n */, int n_node,
+int emcon_curvature(emcon_model *model, int n_selected, const double *factor /* n_selected */,
+                    emcon_csr *matrix);
+int emcon_curvature_times(emcon_model *model, int n_selected,
+                          const double *factor /* n_selected */, int n_node,
                           const double *direction /* n_node x 2 */,
                           double *product /* n_node x 2 */);
 
@@ -517,12 +520,13 @@ int emcon_evaluate_contact(emcon_model *model, int n_node, const double *u0 /* n
                            const double *du /* n_node x 2 */, emcon_constraint_report *report);
 
 /* The next active set from a solved step: takes in what would penetrate, releases what pulls.
- * `lam`: the multipliers of the n selected constraints, forces, > 0 pressing. `active`: those
+ * `lam`: the multipliers of the n_selected constraints, forces, > 0 pressing. `active`: those
  * selected, then the next ones. `*is_done`: the set stands, or `*outcome` is not EMCON_STEP_DONE
  * and the step cannot be ended. `magnitude`: sums of the sizes of the contributions to the
  * residual, which tell signs of round-off from tension; NULL: the contact forces themselves. */
 int emcon_update_active(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                        const double *du /* n_node x 2 */, int n, const double *lam /* n */,
+                        const double *du /* n_node x 2 */, int n_selected,
+                        const double *lam /* n_selected */,
                         const double *magnitude /* n_node x 2, or NULL */, int n_constraint,
                         int *active /* n_constraint, in and out */, int *is_done, int *outcome);
 

@@ -26,7 +26,7 @@
 !>    `node_quantity`, `element_quantity`, `contact_quantity`, `pair_quantity`; put a state in by
 !>    `stepper_set_state`; go back by `stepper_snapshot` and `stepper_restore`; change loads by
 !>    `stepper_find_load`, `stepper_set_load`, and boundary values by `stepper_set_prescribed`,
-!>    `stepper_add_prescribed`, `stepper_remove_prescribed`.
+!>    `stepper_add_prescribed`, `stepper_prescribe`, `stepper_remove_prescribed`.
 !> 4. To a file: `stepper_save`, `conditions_save`, `restart_write`; back into a new stepper:
 !>    `restart_read`, `stepper_load`, `conditions_load`.
 !> 5. `stepper_close`, also after an error, before the stepper goes.
@@ -77,7 +77,8 @@ module emcon_api
       stepper_contact_seconds, stepper_fraction, stepper_is_done, stepper_load, stepper_open, &
       stepper_read, stepper_read_text, stepper_save, stepper_t
    use emcon_stepper_conditions, only : conditions_load, conditions_save, stepper_add_prescribed, &
-      stepper_find_load, stepper_remove_prescribed, stepper_set_load, stepper_set_prescribed
+      stepper_find_load, stepper_prescribe, stepper_remove_prescribed, stepper_set_load, &
+      stepper_set_prescribed
    use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &
       query_contact, query_drop, query_gaps, query_overlap, query_select, query_update_active, &
       step_cycling, step_done, step_stands_off, step_too_far

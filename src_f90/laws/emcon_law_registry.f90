@@ -1,7 +1,7 @@
 !> The registry of constitutive laws: the only module that knows their kinds. A new law is one file,
 !> one row of `law_rows` and one case of `law_create`.
 module emcon_law_registry
-   use emcon_errors, only : err_input, err_internal, error_t, raise
+   use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
    use emcon_law_coupled_neo_hooke, only : law_coupled_neo_hooke_t
@@ -10,7 +10,7 @@ module emcon_law_registry
    use emcon_law_neo_hooke, only : law_neo_hooke_t
    use emcon_law_ogden, only : law_ogden_t
    use emcon_law_yeoh, only : law_yeoh_t
-   use emcon_text, only : to_upper
+   use emcon_text, only : to_text, to_upper
    implicit none
    private
    public :: law_row_t, law_rows, law_titles, law_variants, find_law_row, n_constant, law_create
@@ -123,7 +123,7 @@ contains
       case (law_ogden)
          allocate(law_ogden_t :: law)
       case default
-         call raise(error, err_internal, "law_create: there is no such law")
+         call raise(error, err_input, "there is no law with the code " // to_text(code))
          return
       end select
       if (.not. any(law_rows%code == code .and. count_constants() == size(constant))) then

@@ -20,7 +20,8 @@ module emcon_stepper_conditions
    implicit none
    private
    public :: stepper_find_load, stepper_set_load
-   public :: stepper_set_prescribed, stepper_add_prescribed, stepper_remove_prescribed
+   public :: stepper_set_prescribed, stepper_add_prescribed, stepper_prescribe, &
+      stepper_remove_prescribed
    public :: conditions_save, conditions_load
 
 contains
@@ -147,6 +148,21 @@ contains
       call renumber(self, list, error)
       if (allocated(error)) self%march%state%u_start(dof, node) = u_start
    end subroutine stepper_add_prescribed
+
+   !> Give a boundary condition a value, or prescribe what was free.
+   subroutine stepper_prescribe(self, label, dof, value, error)
+      type(stepper_t), intent(inout) :: self
+      integer, intent(in) :: label                   !! of the node, as in the deck
+      integer, intent(in) :: dof                     !! 1, 2
+      real(wp), intent(in) :: value                  !! [L]
+      type(error_t), allocatable, intent(out) :: error
+      integer :: node, k
+
+      call find_prescribed(self, label, dof, node, k, error)
+      if (allocated(error)) return
+      if (k > 0) call stepper_set_prescribed(self, label, dof, value, error)
+      if (k == 0) call stepper_add_prescribed(self, label, dof, value, error)
+   end subroutine stepper_prescribe
 
    !> Set a prescribed degree of freedom free. The unknowns are numbered anew, the state stays.
    subroutine stepper_remove_prescribed(self, label, dof, error)

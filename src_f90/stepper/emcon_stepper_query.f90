@@ -106,12 +106,10 @@ contains
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
       real(wp), intent(in) :: h                      !! > 0 [T]
-      real(wp), intent(out) :: u1(:, :)              !! (2, n_node) [L]
+      real(wp), allocatable, intent(out) :: u1(:, :)           !! (2, n_node) [L]
       type(error_t), allocatable, intent(out) :: error
 
-      u1 = 0.0_wp
       call query_sync(self, stepper, error)
-      if (.not. allocated(error)) call check_field("u1", u1, stepper%scene, error)
       if (.not. allocated(error)) call check_duration(h, error)
       if (allocated(error)) return
       call march_guess(self%march, stepper%scene, now(self), h, is_at_rest=.false.)

@@ -69,6 +69,7 @@ contains
             return
          end if
       end if
+      if (size(node) == 0) call refuse("names no node")
       allocate(is_in(n_node), source=.false.)
       do i = 1, size(node)
          if (node(i) < 1 .or. node(i) > n_node) then

@@ -128,7 +128,7 @@ static void without_arrays(int n_node, int n_constraint)
    TELL(emcon_restore_snapshot(m, NULL));
    TELL(emcon_evaluate(m, 0.1, n_node, NULL, 0, 0, NULL, NULL));
    TELL(emcon_constraints(m, n_node, NULL, NULL, 0, NULL));
-   TELL(emcon_curvature_times(m, 1, &one, n_node, NULL, NULL));
+   TELL(emcon_curvature_times(m, 0, &one, n_node, NULL, NULL));
    TELL(emcon_save(m, NULL));
 }
 

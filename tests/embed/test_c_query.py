@@ -10,7 +10,7 @@ from embed_tools import API, HERE, ROOT, WARNINGS, build, check_memory, need, ru
 
 DECKS = ROOT/"input_decks"
 HEADER = (API/"emcon.h").read_text(encoding="utf-8")
-TYPES = API/"emcon_c_types.f90"
+TYPES = ROOT/"build/release/made/emcon_c_types.f90"
 EPS = 2.0**-52
 
 # What is told of wrong calls, in the order of bad_calls.c; "" where all is well.

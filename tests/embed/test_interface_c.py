@@ -79,7 +79,7 @@ int main(void)
    active[0] = 1;
    TELL(face, emcon_select(face, 4, u, u, 2, active, &n));
    TELL(face, emcon_null_space(face, &d, &m, &n, NULL));
-   TELL(face, emcon_update_active(face, 4, u, u, 2, lam, NULL, 2, active, &done, &outcome));
+   TELL(face, emcon_update_active(face, 4, u, u, 1, lam, NULL, 2, active, &done, &outcome));
    TELL(face, emcon_drop(face, 2, active, 2, active));
    TELL(face, emcon_constraints(face, 4, u, u, 0, &values));
    TELL(face, emcon_get_gaps(face, 4, u, u, 2, NULL));
@@ -95,7 +95,7 @@ int main(void)
 }
 """
 TOLD = [
-    "2", "2 n_node is not above 0", "2 x is NULL", "2 x is not finite at node 3",
+    "2", "2 n_node is -1, below 0", "2 x is NULL", "2 x is not finite at node 3",
     "there is no scene", "there is no scene", "0",
     "2 slave is 1, but there are none", "2 edge(2, 1) is 10, not in 1..4", "0", "0",
     "2 master is 3, not in 1..2", "formulation is 9, not in 1..3",
@@ -104,7 +104,7 @@ TOLD = [
     "given before the model is built", "its host makes the steps", "its host makes the steps",
     "its host makes the steps", "2 tie is 1, but there are none", "no step of contact was begun",
     "du is not finite at node 3", "n_constraint is 3, but the model has 2", "0",
-    "constraint 1 comes after 2", "n is 2, but the model has 0", "0",
+    "constraint 1 comes after 2", "n_selected is 2, but the model has 0", "0",
     "constraints were selected", "no constraints were evaluated", "redundant is 2, not in 1..1",
     "0", "no step of contact was begun", "0",
     "constraint 1 (slave node 3 of pair 1) has no surface within reach", "0", "2 8 0",

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import re
 import sys
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -13,21 +15,28 @@ from embed_tools import API, ROOT
 sys.path.insert(0, str(ROOT/"pywrap"))
 from emcon import _core  # noqa: E402
 
-_spec = importlib.util.spec_from_file_location("make_pyf", ROOT/"pywrap"/"make_pyf.py")
-assert _spec and _spec.loader
-make_pyf = importlib.util.module_from_spec(_spec)
-sys.modules["make_pyf"] = make_pyf
-_spec.loader.exec_module(make_pyf)
+
+
+def script(path: Path) -> ModuleType:
+    """A script as a module."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+make_pyf = script(ROOT/"pywrap"/"make_pyf.py")
+make_c = script(API/"make_c.py")
 TEXT = (API/"emcon.h").read_text(encoding="utf-8")
 
 
 def block(prototype: str) -> str:
     """The signature of a function, in a header with these types."""
-    headers = make_pyf.Headers()
-    headers.read("typedef struct emcon_face emcon_face;\n"
-                 + prototype)
-    (function,) = headers.functions
-    return str(make_pyf.Function(headers, *function).block())
+    header = make_pyf.c_header.Header("typedef struct emcon_face emcon_face;\n" + prototype)
+    (function,) = header.functions
+    return str(make_pyf.Function(function, header).block())
 
 
 def test_extension_has_each_function_of_the_headers_and_no_other() -> None:
@@ -81,3 +90,53 @@ def test_what_is_not_understood_ends_the_script() -> None:
         block("int emcon_f(emcon_face *face, const double *x /* n_node x 2 */);")
     with pytest.raises(SystemExit, match="not understood"):
         block("int emcon_f(int (*callback)(int, int));")
+
+
+SIZES = "typedef struct emcon_sizes { int n_node; } emcon_sizes;\n"
+
+
+def made(prototype: str, procedure: str, folder: Path) -> str:
+    """The C function of this prototype, made from a procedure of a Fortran source."""
+    source = folder/"emcon_part.f90"
+    source.write_text(procedure)
+    header = make_c.Header("typedef struct emcon_model emcon_model;\n" + SIZES + prototype)
+    return "\n".join(make_c.functions(header, make_c.procedures([source]))[1])
+
+
+def subroutine(dummies: str, *declared: str) -> str:
+    lines = ["type(stepper_t), intent(inout) :: self", *declared]
+    return "\n".join([f"subroutine stepper_f(self, {dummies})", *lines, "end subroutine"])
+
+
+def test_arguments_are_turned_by_what_both_sides_say(tmp_path: Path) -> None:
+    text = made(
+        "int emcon_f(emcon_model *model, int n_node, const double *u /* n_node x 2 */, "
+        "const int *is_in /* n_node */, int load, int label, int *node);",
+        subroutine("u, is_in, load, label, node", "real(wp), intent(in) :: u(:, :)",
+                   "logical, intent(in) :: is_in(:)", "integer, intent(in) :: load, label",
+                   "integer, intent(out) :: node"), tmp_path)
+    assert 'check_count("n_node", n_node, sizes%n_node, u, error)' in text
+    assert "c_f_pointer(u, c_u, [2, max(0, n_node)])" in text
+    assert "source=c_is_in /= 0" in text
+    assert "load=from_1(load), label=int(label)" in text
+    assert "c_node = int(f_node - 1, c_int)" in text
+
+
+@pytest.mark.parametrize(("prototype", "procedure", "told"), [
+    ("int emcon_g(emcon_model *model);", "", "none of model_g, stepper_g"),
+    ("int emcon_f(emcon_model *model, int n);", subroutine("h", "real(wp), intent(in) :: h"),
+     "no argument h"),
+    ("int emcon_f(emcon_model *model, int n);", subroutine("error",
+                                                           "type(error_t), intent(out) :: error"),
+     "no dummy for"),
+    ("int emcon_f(emcon_model *model, int n_node, const double *u /* n_node x 2 */);",
+     subroutine("u", "real(wp), intent(in) :: u(:)"), "u has 2 extents, but its dummy has 1"),
+    ("int emcon_f(emcon_model *model, int n_node, double *u /* n_node */);",
+     subroutine("u", "real(wp), intent(out) :: u(:)"), "u is an output that is not allocatable"),
+    ("int emcon_f(emcon_model *model, int n, const double *u /* n */);",
+     subroutine("u", "real(wp), intent(in), optional :: u(:)"), "left out in Fortran, but not NULL"),
+])
+def test_a_function_that_fits_no_procedure_ends_the_script(
+        prototype: str, procedure: str, told: str, tmp_path: Path) -> None:
+    with pytest.raises(SystemExit, match=told):
+        made(prototype, procedure, tmp_path)

@@ -2,10 +2,11 @@
 !>
 !> Prototypes and what they are to do: emcon.h. A function returns 0, 1 for a state that it has no
 !> value for, or anything else for a failure.
-module emcon_callbacks
+module emcon_model_given
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_procpointer, c_funptr, &
       c_int, c_loc, c_null_funptr, c_null_ptr, c_ptr
+   use emcon_c_types, only : force_function_c, point_function_c
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_host_force, only : force_response_t, host_force_t
@@ -16,7 +17,7 @@ module emcon_callbacks
    implicit none
    private
    public :: point_callback_t, force_callback_t
-   public :: give_law_callback, give_potential_callback, give_force_callback
+   public :: model_give_law, model_give_potential, model_give_force
 
    !> An energy at points: a law, a potential.
    type, extends(point_function_t) :: point_callback_t
@@ -34,89 +35,50 @@ module emcon_callbacks
       procedure :: respond => force_callback_respond
    end type force_callback_t
 
-   abstract interface
-      function point_interface(user, n_point, n_variable, z, wants_hessian, value, gradient, &
-         hessian) result(status) bind(c)
-         import :: c_double, c_int, c_ptr
-         implicit none
-         type(c_ptr), value :: user
-         integer(c_int), value :: n_point, n_variable
-         type(c_ptr), value :: z
-         integer(c_int), value :: wants_hessian
-         type(c_ptr), value :: value, gradient, hessian
-         integer(c_int) :: status
-      end function point_interface
-
-      function force_interface(user, n_node, u0, du, wants_tangent, force, magnitude, energy, &
-         tangent) result(status) bind(c)
-         import :: c_double, c_int, c_ptr
-         implicit none
-         type(c_ptr), value :: user
-         integer(c_int), value :: n_node
-         type(c_ptr), value :: u0, du
-         integer(c_int), value :: wants_tangent
-         type(c_ptr), value :: force, magnitude
-         real(c_double), intent(inout) :: energy
-         type(c_ptr), value :: tangent
-         integer(c_int) :: status
-      end function force_interface
-   end interface
-
 contains
 
-   !> Give the strain energy of the *USER MATERIAL `name`; see `stepper_give_law`.
-   subroutine give_law_callback(stepper, name, function, error, user)
+   subroutine model_give_law(stepper, name, law, user, error)
       type(stepper_t), intent(inout) :: stepper
-      character(len=*), intent(in) :: name
-      type(c_funptr), intent(in) :: function         !! emcon_point_function of emcon.h
+      character(len=*), intent(in) :: name           !! of a *USER MATERIAL
+      type(c_funptr), intent(in) :: law              !! emcon_point_function of emcon.h
+      type(c_ptr), intent(in) :: user                !! handed to the function
       type(error_t), allocatable, intent(out) :: error
-      type(c_ptr), intent(in), optional :: user      !! handed to the function
-      type(point_callback_t) :: energy
 
-      call check(function, error)
-      if (allocated(error)) return
-      energy%n_variable = 3
-      energy%function = function
-      if (present(user)) energy%user = user
-      call stepper_give_law(stepper, name, energy, error)
-   end subroutine give_law_callback
+      call check(law, error)
+      if (.not. allocated(error)) call stepper_give_law(stepper, name, point_callback_t( &
+         n_variable=3, function=law, user=user), error)
+   end subroutine model_give_law
 
-   !> Give a potential of the positions of some nodes.
-   subroutine give_potential_callback(stepper, name, node, function, error, user)
+   subroutine model_give_potential(stepper, name, node, potential, user, error)
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: name           !! for messages
       integer, intent(in) :: node(:)                 !! 1..n_node, each once
-      type(c_funptr), intent(in) :: function         !! emcon_point_function of emcon.h
+      type(c_funptr), intent(in) :: potential        !! emcon_point_function of emcon.h
+      type(c_ptr), intent(in) :: user                !! handed to the function
       type(error_t), allocatable, intent(out) :: error
-      type(c_ptr), intent(in), optional :: user
-      type(point_callback_t) :: energy
 
-      call check(function, error)
-      if (allocated(error)) return
-      energy%n_variable = 2
-      energy%function = function
-      if (present(user)) energy%user = user
-      call stepper_give_potential(stepper, name, node, energy, error)
-   end subroutine give_potential_callback
+      call check(potential, error)
+      if (.not. allocated(error)) call stepper_give_potential(stepper, name, node, &
+         point_callback_t(n_variable=2, function=potential, user=user), error)
+   end subroutine model_give_potential
 
-   !> Give forces over all freedoms; see `stepper_give_force`.
-   subroutine give_force_callback(stepper, name, pattern, function, error, user)
+   subroutine model_give_force(stepper, name, pattern, force, user, error)
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: name           !! for messages
       type(csr_t), intent(in) :: pattern             !! (2 n_node x 2 n_node) of the tangent
-      type(c_funptr), intent(in) :: function         !! emcon_force_function of emcon.h
+      type(c_funptr), intent(in) :: force            !! emcon_force_function of emcon.h
+      type(c_ptr), intent(in) :: user                !! handed to the function
       type(error_t), allocatable, intent(out) :: error
-      type(c_ptr), intent(in), optional :: user
-      type(force_callback_t) :: force
+      type(force_callback_t) :: given
 
-      call check(function, error)
+      call check(force, error)
       if (allocated(error)) return
-      force%name = name
-      force%pattern = pattern
-      force%function = function
-      if (present(user)) force%user = user
-      call stepper_give_force(stepper, force, error)
-   end subroutine give_force_callback
+      given%name = name
+      given%pattern = pattern
+      given%function = force
+      given%user = user
+      call stepper_give_force(stepper, given, error)
+   end subroutine model_give_force
 
    !> There is a function to call.
    subroutine check(function, error)
@@ -134,7 +96,7 @@ contains
       real(wp), intent(inout), contiguous :: gradient(:, :)
       real(wp), intent(inout), contiguous :: hessian(:, :, :)
       integer, intent(out) :: status
-      procedure(point_interface), pointer :: function
+      procedure(point_function_c), pointer :: function
       real(c_double), allocatable, target :: at(:, :), w(:), dw(:, :), ddw(:, :, :)
       type(c_ptr) :: second
       integer :: m, n
@@ -161,9 +123,9 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
       logical, intent(in) :: wants_tangent
       type(force_response_t), intent(inout) :: response
-      procedure(force_interface), pointer :: function
+      procedure(force_function_c), pointer :: function
       real(c_double), allocatable, target :: start(:, :), motion(:, :), f(:, :), size_of(:, :), k(:)
-      real(c_double) :: last
+      real(c_double), target :: last
       type(c_ptr) :: slope
 
       allocate(start, source=real(u0, c_double))
@@ -177,8 +139,8 @@ contains
       if (wants_tangent) slope = c_loc(k)
       call c_f_procpointer(self%function, function)
       response%status = status_of(function(self%user, int(size(u0, 2), c_int), c_loc(start), &
-         c_loc(motion), merge(1_c_int, 0_c_int, wants_tangent), c_loc(f), c_loc(size_of), last, &
-         slope))
+         c_loc(motion), merge(1_c_int, 0_c_int, wants_tangent), c_loc(f), c_loc(size_of), &
+         c_loc(last), slope))
       response%force = real(f, wp)
       response%magnitude = real(size_of, wp)
       response%energy = real(last, wp)
@@ -193,4 +155,4 @@ contains
       if (code == 1) status_of = point_outside
    end function status_of
 
-end module emcon_callbacks
+end module emcon_model_given

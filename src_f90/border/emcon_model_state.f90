@@ -1,0 +1,173 @@
+!> The C functions that tell what a model holds, in Fortran. What each does is said in emcon.h.
+module emcon_model_state
+   use, intrinsic :: iso_c_binding, only : c_double
+   use emcon_c_types, only : ledger_c
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
+   use emcon_model, only : model_t
+   use emcon_quantities, only : contact_quantity
+   use emcon_text, only : to_upper
+   use emcon_verdict_file, only : verdict_so_far
+   implicit none
+   private
+   public :: model_time, model_ledger, model_verdict, model_notes
+   public :: model_find_nodes, model_labels, model_positions
+   public :: model_state, model_get_multipliers, model_contact, model_pressures, model_pairs
+
+contains
+
+   pure subroutine model_time(model, time)
+      type(model_t), intent(in) :: model
+      real(wp), intent(out) :: time
+
+      time = model%stepper%march%state%time
+   end subroutine model_time
+
+   pure subroutine model_ledger(model, ledger)
+      type(model_t), intent(in) :: model
+      type(ledger_c), intent(out) :: ledger
+
+      associate (from => model%stepper%march%ledger)
+         ledger%kinetic = real(from%kinetic, c_double)
+         ledger%strain = real(from%strain, c_double)
+         ledger%potential = real(from%potential, c_double)
+         ledger%external_work = real(from%external_work, c_double)
+         ledger%contact_work = real(from%contact_work, c_double)
+         ledger%total = real(from%total, c_double)
+         ledger%px = real(from%momentum(1), c_double)
+         ledger%py = real(from%momentum(2), c_double)
+         ledger%lz = real(from%angular, c_double)
+         ledger%stabilization = real(from%stabilization, c_double)
+      end associate
+   end subroutine model_ledger
+
+   subroutine model_verdict(model, is_good, json)
+      type(model_t), intent(inout) :: model
+      logical, intent(out) :: is_good
+      character(len=:), allocatable, intent(out) :: json
+
+      call verdict_so_far(model%stepper%verdict, model%stepper%march, json, is_good)
+   end subroutine model_verdict
+
+   pure subroutine model_notes(model, text)
+      type(model_t), intent(in) :: model
+      character(len=:), allocatable, intent(out) :: text     !! a line each
+      integer :: i
+
+      text = ""
+      do i = 1, size(model%stepper%diagnostic)
+         text = text // model%stepper%diagnostic(i)%text // new_line("a")
+      end do
+      do i = 1, model%stepper%notes%n
+         text = text // model%stepper%notes%item(i)%text // new_line("a")
+      end do
+   end subroutine model_notes
+
+   pure subroutine model_find_nodes(model, name, is_in, error)
+      type(model_t), intent(in) :: model
+      character(len=*), intent(in) :: name
+      logical, allocatable, intent(out) :: is_in(:)          !! (n_node)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      associate (scene => model%stepper%scene)
+         allocate(is_in(size(scene%x, 2)), source=.false.)
+         do k = 1, size(scene%node_set)
+            if (scene%node_set(k)%name == to_upper(name)) exit
+         end do
+         if (k > size(scene%node_set)) then
+            call raise(error, err_input, "there is no node set " // name)
+         else
+            is_in(scene%node_set(k)%item) = .true.
+         end if
+      end associate
+   end subroutine model_find_nodes
+
+   pure subroutine model_labels(model, label)
+      type(model_t), intent(in) :: model
+      integer, allocatable, intent(out) :: label(:)          !! (n_node)
+
+      allocate(label, source=model%stepper%scene%node_label)
+   end subroutine model_labels
+
+   pure subroutine model_positions(model, x)
+      type(model_t), intent(in) :: model
+      real(wp), allocatable, intent(out) :: x(:, :)          !! (n_dim, n_node)
+
+      allocate(x, source=model%stepper%scene%x)
+   end subroutine model_positions
+
+   pure subroutine model_state(model, u, v)
+      type(model_t), intent(in) :: model
+      real(wp), allocatable, intent(out) :: u(:, :), v(:, :) !! (n_dim, n_node)
+
+      allocate(u, source=model%stepper%march%state%u)
+      allocate(v, source=model%stepper%march%state%v)
+   end subroutine model_state
+
+   pure subroutine model_get_multipliers(model, lam, is_active)
+      type(model_t), intent(in) :: model
+      real(wp), allocatable, intent(out) :: lam(:)           !! (n_constraint)
+      logical, allocatable, intent(out) :: is_active(:)      !! (n_constraint)
+
+      allocate(lam, source=model%stepper%march%state%lam)
+      allocate(is_active, source=model%stepper%march%state%is_active)
+   end subroutine model_get_multipliers
+
+   pure subroutine model_contact(model, lam, is_active, label, pair)
+      type(model_t), intent(in) :: model
+      real(wp), allocatable, intent(out) :: lam(:)           !! (n_contact)
+      logical, allocatable, intent(out) :: is_active(:)      !! (n_contact)
+      integer, allocatable, intent(out) :: label(:), pair(:) !! (n_contact)
+      integer :: i
+
+      associate (system => model%stepper%march%system, state => model%stepper%march%state)
+         lam = state%lam(system%first_constraint(1) + 1:)
+         is_active = state%is_active(system%first_constraint(1) + 1:)
+         allocate(label(0), pair(0))
+         do i = 1, size(system%contact)
+            associate (node => system%contact(i)%contact%node)
+               label = [label, model%stepper%scene%node_label(node)]
+               pair = [pair, spread(abs(system%contact(i)%of_pair), 1, size(node))]
+            end associate
+         end do
+      end associate
+   end subroutine model_contact
+
+   subroutine model_pressures(model, pressure, gap)
+      type(model_t), intent(inout) :: model
+      real(wp), allocatable, intent(out) :: pressure(:), gap(:)    !! (n_contact)
+
+      call pick("CSTR", pressure)
+      call pick("CDIS", gap)
+
+   contains
+
+      !> The first component of a quantity, of contacts alone.
+      subroutine pick(name, values)
+         character(len=*), intent(in) :: name
+         real(wp), allocatable, intent(out) :: values(:)
+         real(wp), allocatable :: quantity(:, :)
+
+         quantity = contact_quantity(model%stepper, name)
+         values = quantity(1, model%stepper%march%system%first_constraint(1) + 1:)
+      end subroutine pick
+
+   end subroutine model_pressures
+
+   pure subroutine model_pairs(model, total, n_active)
+      type(model_t), intent(in) :: model
+      real(wp), allocatable, intent(out) :: total(:, :)      !! (7, n_pair)
+      integer, allocatable, intent(out) :: n_active(:)       !! (n_pair)
+      integer :: k
+
+      associate (pair => model%stepper%march%state%pairs%total)
+         allocate(total(7, size(pair)), n_active(size(pair)))
+         do k = 1, size(pair)
+            total(:, k) = [pair(k)%slave, pair(k)%master, pair(k)%length]
+            n_active(k) = pair(k)%n_active
+         end do
+      end associate
+   end subroutine model_pairs
+
+end module emcon_model_state
