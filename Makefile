@@ -91,9 +91,9 @@ LIB_OBJ := $(call objects,$(LIB_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(LIB_C)))
 # The C functions are made from the header and the procedures that they stand for: written only where
 # they differ, so that an edit of a body makes none of them new.
 $(MADE): $(BUILD)/made/stamp ; +@:
-$(BUILD)/made/stamp: $(addprefix $(BORDER)/,make_c.py c_header.py emcon.h) \
+$(BUILD)/made/stamp: src_f90/make_c.py src_f90/c_header.py $(BORDER)/emcon.h \
 		$(wildcard $(BORDER)/*.f90 src_f90/stepper/*.f90)
-	@mkdir -p $(@D) && $(PYTHON) $< $(@D) $(filter %.f90,$^) && touch $@
+	@mkdir -p $(@D) && $(PYTHON) $< $(BORDER)/emcon.h $(@D) $(filter %.f90,$^) && touch $@
 
 # ---- flags --------------------------------------------------------------------------------------
 
@@ -220,7 +220,7 @@ PACKAGE := pywrap/emcon
 HEADER := $(BORDER)/emcon.h
 
 # What C has is what Python calls: the signatures are made from the header.
-$(P)/_core.pyf: pywrap/make_pyf.py $(BORDER)/c_header.py $(HEADER) $(PY_READY)
+$(P)/_core.pyf: pywrap/make_pyf.py src_f90/c_header.py $(HEADER) $(PY_READY)
 	@echo "  PYF   $(HEADER)"
 	$(Q)mkdir -p $(P)
 	$(Q)$(PY) $< $(HEADER) > $@

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]/"src_f90/border"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]/"src_f90"))
 
 import c_header  # noqa: E402
 

@@ -28,7 +28,7 @@ def script(path: Path) -> ModuleType:
 
 
 make_pyf = script(ROOT/"pywrap"/"make_pyf.py")
-make_c = script(API/"make_c.py")
+make_c = script(ROOT/"src_f90"/"make_c.py")
 TEXT = (API/"emcon.h").read_text(encoding="utf-8")
 
 

@@ -1,6 +1,6 @@
 """Write the C functions in Fortran, from emcon.h and the procedures that they stand for.
 
-    python make_c.py FOLDER SOURCE...
+    python make_c.py HEADER FOLDER SOURCE...
 
 FOLDER gets emcon_c_types.f90, the structures and kinds of functions of emcon.h, and emcon_c.f90:
 for each function one that is `bind(c)`, turns what C hands over into Fortran, calls the procedure,
@@ -396,15 +396,15 @@ def functions(header: Header, known: dict[str, Procedure]) -> tuple[list[str], l
 
 
 def main() -> None:
-    folder = Path(sys.argv[1])
-    header = Header((Path(__file__).parent/"emcon.h").read_text(encoding="utf-8"))
+    folder = Path(sys.argv[2])
+    header = Header(Path(sys.argv[1]).read_text(encoding="utf-8"))
     kinds = "c_double, c_funptr, c_int, c_null_ptr, c_ptr"
     put(folder/"emcon_c_types.f90", module(
         "emcon_c_types", "The structures of emcon.h, and interfaces of what C hands over.",
         [f"use, intrinsic :: iso_c_binding, only : {kinds}", "implicit none", "public",
          f"private :: {kinds}"],
         indent(types(header))))
-    head, body = functions(header, procedures([Path(p) for p in sys.argv[2:]]))
+    head, body = functions(header, procedures([Path(p) for p in sys.argv[3:]]))
     put(folder/"emcon_c.f90", module(
         "emcon_c", "The C functions; what each of them does is said in emcon.h.",
         ["use, intrinsic :: iso_c_binding", "use emcon_c_border", "use emcon_c_types",
