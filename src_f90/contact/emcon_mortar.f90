@@ -7,7 +7,7 @@ module emcon_mortar
    use emcon_chain, only : chain_corners, chain_distance, chain_shorter
    use emcon_dgrad13, only : dg13_t => dg_t
    use emcon_dgrad17, only : dg17_t => dg_t, operator(*)
-   use emcon_dgrad_wide, only : wide_add_part
+   use emcon_dgrad_wide, only : change_t, wide_add_part
    use emcon_edge_form, only : form_begin
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
@@ -290,8 +290,8 @@ contains
       if (.not. is_covering) return
       do i = 1, n_moment
          associate (part => moment(i))
-            call wide_add_part(self%form(e)%moment(i), 1.0_wp, [part%f0, part%f1, part%df], &
-               part%g, part%c, part%h, variable)
+            call wide_add_part(self%form(e)%moment(i), 1.0_wp, &
+               change_t(part%f0, part%f1, part%df), part%g, part%c, part%h, variable)
          end associate
       end do
    end subroutine add_segment2
@@ -345,8 +345,8 @@ contains
       real(wp), intent(in) :: factor
       type(dg17_t), intent(in) :: part
 
-      call wide_add_part(self%form(e)%moment(i), factor, [part%f0, part%f1, part%df], part%g, &
-         part%c, part%h, variable)
+      call wide_add_part(self%form(e)%moment(i), factor, &
+         change_t(part%f0, part%f1, part%df), part%g, part%c, part%h, variable)
    end subroutine add_part
 
 end module emcon_mortar

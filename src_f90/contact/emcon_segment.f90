@@ -6,7 +6,7 @@
 module emcon_segment
    use emcon_constraint, only : condition_t
    use emcon_dgrad10, only : dg_dot, dg_sqrt, dg_t, difference
-   use emcon_dgrad_wide, only : wide_add, wide_add_part, wide_add_product, wide_clear
+   use emcon_dgrad_wide, only : change_t, wide_add, wide_add_part, wide_add_product, wide_clear
    use emcon_edge_form, only : form_begin
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
@@ -214,8 +214,8 @@ contains
             difference(2, 1, local, du(:, node))))
       end associate
       call wide_clear(self%work(1), 2*self%form(e)%n_node)
-      call wide_add_part(self%work(1), 1.0_wp, [length%f0, length%f1, length%df], &
-         length%g, length%c, length%h, [1, 2, 3, 4])
+      call wide_add_part(self%work(1), 1.0_wp, &
+         change_t(length%f0, length%f1, length%df), length%g, length%c, length%h, [1, 2, 3, 4])
    end subroutine edge_length
 
    !> Gap of the node `k` of edge `e` into the second work space.
@@ -228,7 +228,7 @@ contains
          call wide_clear(self%work(2), 2*form%n_node)
          associate (place => [(findloc(form%node(:form%n_node), gap%node(i), 1), &
                i = 1, gap%n_node)])
-            call wide_add_part(self%work(2), 1.0_wp, [gap%gap0, gap%gap1, gap%dgap], &
+            call wide_add_part(self%work(2), 1.0_wp, change_t(gap%gap0, gap%gap1, gap%dgap), &
                reshape(gap%g(:, :gap%n_node), [2*gap%n_node]), &
                reshape(gap%c(:, :gap%n_node), [2*gap%n_node]), gap%h, &
                [(2*place((i + 1)/2) - mod(i, 2), i = 1, 2*gap%n_node)])

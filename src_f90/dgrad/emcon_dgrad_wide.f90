@@ -6,7 +6,12 @@ module emcon_dgrad_wide
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: wide_t, wide_clear, wide_constant, wide_add, wide_add_product, wide_add_part
+   public :: wide_t, change_t, wide_clear, wide_constant, wide_add, wide_add_product, wide_add_part
+
+   !> Values at both ends and their difference, as dg_t of emcon_dgrad.inc has them.
+   type :: change_t
+      real(wp) :: f0, f1, df
+   end type change_t
 
    !> As dg_t of emcon_dgrad.inc, with room for more variables than are used.
    type :: wide_t
@@ -90,17 +95,17 @@ contains
 
    !> Add `factor` times a part given by its components over its own variables; its variable i is
    !> number `variable(i)` here, 0: none.
-   pure subroutine wide_add_part(self, factor, f, g, c, h, variable)
+   pure subroutine wide_add_part(self, factor, change, g, c, h, variable)
       type(wide_t), intent(inout) :: self
       real(wp), intent(in) :: factor
-      real(wp), intent(in) :: f(3)               !! f0, f1, df
+      type(change_t), intent(in) :: change
       real(wp), intent(in) :: g(:), c(:), h(:, :)
       integer, intent(in) :: variable(:)
       integer :: i, j, row, column
 
-      self%f0 = self%f0 + factor*f(1)
-      self%f1 = self%f1 + factor*f(2)
-      self%df = self%df + factor*f(3)
+      self%f0 = self%f0 + factor*change%f0
+      self%f1 = self%f1 + factor*change%f1
+      self%df = self%df + factor*change%df
       do j = 1, size(variable)
          column = variable(j)
          if (column == 0) cycle

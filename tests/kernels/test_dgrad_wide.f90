@@ -3,7 +3,7 @@ module test_dgrad_wide
    use check, only : check_near, check_true, test_case_t
    use emcon_dgrad10, only : dg_constant, dg_sqrt, dg_t, dg_variable, operator(*), operator(+), &
       operator(/)
-   use emcon_dgrad_wide, only : wide_add, wide_add_part, wide_add_product, wide_clear, &
+   use emcon_dgrad_wide, only : change_t, wide_add, wide_add_part, wide_add_product, wide_clear, &
       wide_constant, wide_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -58,8 +58,8 @@ contains
       type(dg_t), intent(in) :: part
       integer, intent(in) :: variable(:)
 
-      call wide_add_part(self, factor, [part%f0, part%f1, part%df], part%g, part%c, part%h, &
-         variable)
+      call wide_add_part(self, factor, change_t(part%f0, part%f1, part%df), part%g, part%c, &
+         part%h, variable)
    end subroutine add
 
    subroutine check_same(error, actual, expected, what)
