@@ -146,8 +146,10 @@ contains
       type(motion_t), intent(in) :: motion
       integer :: pair
 
-      self%is_active(:system%linear%n) = system%linear%is_used .and. .not. system%space%is_reduced
-      self%is_active(system%linear%n + 1:system%first_constraint(1)) = .true.
+      associate (linear => system%space%linear)
+         self%is_active(:linear%n) = linear%is_used .and. .not. system%space%is_reduced
+         self%is_active(linear%n + 1:system%first_constraint(1)) = .true.
+      end associate
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
@@ -180,7 +182,7 @@ contains
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
          call constraint_place(system, self%set%id(k), pair, i)
-         self%set%is_kept(k) = self%set%id(k) <= system%linear%n
+         self%set%is_kept(k) = self%set%id(k) <= system%space%linear%n
          if (pair == 0) cycle
          self%set%is_firm(k) = .not. self%puts_off .or. self%only_adds &
             .or. self%is_put_off(self%set%id(k))

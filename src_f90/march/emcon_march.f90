@@ -155,7 +155,7 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
 
-      if (.not. any(self%system%linear%is_used)) return
+      if (.not. any(self%system%space%linear%is_used)) return
       call follow(self%state%u, "displacement")
       call follow(self%state%v, "velocity")
 

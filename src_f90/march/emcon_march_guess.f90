@@ -61,7 +61,7 @@ contains
       type(system_t), intent(in) :: system
       real(wp), intent(inout), contiguous :: field(:, :)     !! (n_dim, n_node)
 
-      if (system%linear%n > 0) call spread_dependent(system%space%linked, field)
+      if (system%space%linear%n > 0) call spread_dependent(system%space%linked, field)
    end subroutine follow_links
 
 end module emcon_march_guess

@@ -128,7 +128,7 @@ contains
    pure logical function keeps_links(system)
       type(system_t), intent(in) :: system
 
-      keeps_links = system%linear%n > 0 .and. .not. system%space%is_reduced
+      keeps_links = system%space%linear%n > 0 .and. .not. system%space%is_reduced
    end function keeps_links
 
    !> Sum of w_k grad gap_k at the end of the step.

@@ -36,9 +36,9 @@ contains
 
       m = size(prescribed)
       n_linear = 0
-      if (allocated(system%linear%start)) n_linear = system%linear%n
+      if (allocated(system%space%linear%start)) n_linear = system%space%linear%n
       n = m
-      if (n_linear > 0) n = m + system%linear%start(n_linear + 1)
+      if (n_linear > 0) n = m + system%space%linear%start(n_linear + 1)
       rows%n = m + n_linear
       allocate(rows%start(rows%n + 1), rows%dof(n), rows%weight(n))
       rows%start(:m + 1) = [(k, k = 0, m)]
@@ -47,12 +47,13 @@ contains
          rows%weight(k) = 1.0_wp
       end do
       do k = 1, n_linear
-         associate (from => system%linear%start(k) + 1, to => system%linear%start(k + 1))
-            total = sum(abs(system%linear%weight(from:to)))
+         associate (linear => system%space%linear, from => system%space%linear%start(k) + 1, &
+               to => system%space%linear%start(k + 1))
+            total = sum(abs(linear%weight(from:to)))
             if (.not. total > 0.0_wp) total = 1.0_wp
             rows%start(m + k + 1) = m + to
-            rows%dof(m + from:m + to) = system%linear%dof(from:to)
-            rows%weight(m + from:m + to) = system%linear%weight(from:to)/total
+            rows%dof(m + from:m + to) = linear%dof(from:to)
+            rows%weight(m + from:m + to) = linear%weight(from:to)/total
          end associate
       end do
    end subroutine mechanism_rows_find

@@ -22,7 +22,7 @@ contains
 
    !> Names the first body that can move as a rigid one, and how, or the first assembly of bodies
    !> tied to each other; empty if none can. Bodies in a contact pair are looked at only
-   !> `with_contact`: contact may hold them. `system%linear` holds the rows of the step.
+   !> `with_contact`: contact may hold them. `system%space%linear` holds the rows of the step.
    subroutine free_motion_text(system, scene, prescribed, text, with_contact)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene

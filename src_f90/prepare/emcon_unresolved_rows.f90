@@ -31,7 +31,7 @@ contains
       character(len=:), allocatable :: text
       integer :: k, t
 
-      associate (unresolved => system%space%unresolved, linear => system%linear)
+      associate (unresolved => system%space%unresolved, linear => system%space%linear)
          do k = 1, size(unresolved)
             if (is_met(scene, system%i_step, u, unresolved(k))) cycle
             call contradiction_text(scene, linear, unresolved(k), text)

@@ -26,7 +26,7 @@ contains
       character(len=:), allocatable :: text
       integer :: k, n_place
 
-      if (system%linear%n == 0) return
+      if (system%space%linear%n == 0) return
       call find_crosspoints(scene, node, place, n_place)
       call elimination_text(system, text)
       call note_add(notes, to_text(system%space%n_body) // " subdomains, " // &
@@ -54,7 +54,7 @@ contains
                " unknowns before, " // to_text(numbering%n_unknown) // " after elimination"
          else
             text = to_text(numbering%n_unknown) // " unknowns and " // &
-               to_text(count(system%linear%is_used)) // " multipliers"
+               to_text(count(system%space%linear%is_used)) // " multipliers"
          end if
       end associate
    end subroutine elimination_text

@@ -3,16 +3,14 @@
 !> Row k: the sum of weight times displacement over its entries is zero. There are two rows, in x
 !> and y, for each row of each tie, then the equations. Source: docs/theory.md, section 11.
 module emcon_linear_rows
-   use emcon_constraint, only : condition_t, constraint_t
    use emcon_kinds, only : wp
-   use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
    implicit none
    private
    public :: linear_rows_t, linear_rows_init
 
-   type, extends(constraint_t) :: linear_rows_t
+   type :: linear_rows_t
       integer :: n = 0
       logical, allocatable :: is_used(:)         !! (n) else it follows from others in this step
       integer, allocatable :: tie(:)             !! (n) that it is of; 0: an equation
@@ -23,8 +21,6 @@ module emcon_linear_rows
       integer, allocatable :: start(:)           !! (n + 1) entries before each row, from 0
       integer, allocatable :: dof(:)             !! places in an (n_dim, n_node) array, ascending
       real(wp), allocatable :: weight(:)         !! of order 1
-   contains
-      procedure :: linearise
    end type linear_rows_t
 
 contains
@@ -78,57 +74,6 @@ contains
          end associate
       end do
    end subroutine linear_rows_init
-
-   !> As `constraint_t` has it; the values to hold are 0.
-   pure subroutine linearise(self, wanted, motion, target, item)
-      class(linear_rows_t), intent(inout) :: self
-      integer, intent(in) :: wanted(:)
-      type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: target(:)
-      type(condition_t), intent(inout) :: item(:)
-      integer :: k
-
-      do k = 1, size(wanted)
-         call linearise_row(self, wanted(k), motion%u0, motion%du, item(k))
-      end do
-   end subroutine linearise
-
-   !> The condition of row `id`: its gradient is the same everywhere.
-   pure subroutine linearise_row(linear, id, u0, du, item)
-      class(linear_rows_t), intent(in) :: linear
-      integer, intent(in) :: id
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
-      type(condition_t), intent(inout) :: item
-      integer :: n_dim, s, a, i, node
-
-      associate (from => linear%start(id) + 1, to => linear%start(id + 1))
-         n_dim = size(u0, 1)
-         if (.not. allocated(item%node)) allocate(item%node(1 + to - from), &
-            item%g(n_dim, 1 + to - from), item%c(n_dim, 1 + to - from), item%h(0, 0))
-         item%n_node = 1
-         item%n_slave = 1
-         item%node(1) = (linear%own(id) - 1)/n_dim + 1
-         item%g = 0.0_wp
-         item%gap0 = 0.0_wp
-         item%dgap = 0.0_wp
-         do s = from, to
-            node = (linear%dof(s) - 1)/n_dim + 1
-            a = linear%dof(s) - n_dim*(node - 1)
-            i = findloc(item%node(:item%n_node), node, 1)
-            if (i == 0) then
-               item%n_node = item%n_node + 1
-               i = item%n_node
-               item%node(i) = node
-            end if
-            item%g(a, i) = item%g(a, i) + linear%weight(s)
-            item%gap0 = item%gap0 + linear%weight(s)*u0(a, node)
-            item%dgap = item%dgap + linear%weight(s)*du(a, node)
-         end do
-      end associate
-      item%c = item%g
-      item%gap1 = item%gap0 + item%dgap
-      item%size = linear%size(id)
-   end subroutine linearise_row
 
    !> Append row `n`: degrees of freedom ascending, equal ones as one.
    pure subroutine add_row(self, n, dof, weight)

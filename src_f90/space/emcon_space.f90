@@ -2,12 +2,12 @@
 !> these is laid out.
 module emcon_space
    use emcon_bodies, only : bodies_find_lists
-   use emcon_couplings, only : equation_t
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
-   use emcon_linear_rows, only : linear_rows_t
+   use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
+   use emcon_scene, only : scene_t
    use emcon_steps, only : method_null_space, step_t
    implicit none
    private
@@ -25,6 +25,7 @@ module emcon_space
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
       logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term or an equation
+      type(linear_rows_t) :: linear              !! rows of ties and equations
       type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
       type(unresolved_t), allocatable :: unresolved(:)   !! those of them that follow from others
       logical :: is_reduced = .true.             !! `numbering` is that one, else without them
@@ -62,21 +63,25 @@ contains
       self%freedom = [self%freedom, freedom]
    end subroutine lists_append
 
-   !> Bodies, and which freedoms are part of the model: those of `lists` and of equations.
-   pure subroutine space_init(self, n_node, lists, equation)
+   !> Bodies, linear rows, and which freedoms are part of the model: those of `lists` and of
+   !> equations.
+   pure subroutine space_init(self, scene, lists)
       type(space_t), intent(out) :: self
-      integer, intent(in) :: n_node
+      type(scene_t), intent(in) :: scene
       type(lists_t), intent(in) :: lists         !! of all terms
-      type(equation_t), intent(in) :: equation(:)   !! (any) of the scene
       logical, allocatable :: is_alive(:)
-      integer :: i
+      integer :: i, n_node
 
+      n_node = size(scene%x, 2)
+      call linear_rows_init(self%linear, scene)
       call bodies_find_lists(lists%start, (lists%freedom - 1)/lists%n_dim + 1, n_node, self%body, &
          self%n_body)
       allocate(is_alive(lists%n_dim*n_node), source=.false.)
       is_alive(lists%freedom) = .true.
-      do i = 1, size(equation)
-         is_alive(lists%n_dim*(equation(i)%node - 1) + equation(i)%dof) = .true.
+      do i = 1, size(scene%equation)
+         associate (equation => scene%equation(i))
+            is_alive(lists%n_dim*(equation%node - 1) + equation%dof) = .true.
+         end associate
       end do
       self%is_alive = reshape(is_alive, [lists%n_dim, n_node])
       allocate(self%unresolved(0))
@@ -85,23 +90,23 @@ contains
    !> Number the unknowns of `step` and lay out the matrix between them. Linear constraints are
    !> eliminated, less those that follow from others, unless the step asks for multipliers or their
    !> rows are too long: `is_reduced` tells.
-   subroutine space_begin_step(self, step, linear, lists, matrix, slot, error)
+   subroutine space_begin_step(self, step, lists, matrix, slot, error)
       type(space_t), intent(inout) :: self
       type(step_t), intent(in) :: step
-      type(linear_rows_t), intent(inout) :: linear
       type(lists_t), intent(in) :: lists                 !! of all terms
       type(csr_t), intent(out) :: matrix                 !! values are zero
       integer, allocatable, intent(out) :: slot(:)       !! places of the lists in it
       type(error_t), allocatable, intent(out) :: error
       logical :: is_too_full
 
-      linear%is_used = .true.
-      if (linear%n > 0) then
-         call numbering_init(self%linked, self%is_alive, step%prescribed, linear, self%unresolved)
-         linear%is_used(self%unresolved%row) = .false.
+      self%linear%is_used = .true.
+      if (self%linear%n > 0) then
+         call numbering_init(self%linked, self%is_alive, step%prescribed, self%linear, &
+            self%unresolved)
+         self%linear%is_used(self%unresolved%row) = .false.
       end if
       self%is_reduced = step%constraint_method == method_null_space
-      if (self%is_reduced .and. linear%n > 0) then
+      if (self%is_reduced .and. self%linear%n > 0) then
          self%numbering = self%linked
          call lay_out(self, lists, matrix, slot, is_too_full, error)
          self%is_reduced = .not. is_too_full

@@ -166,8 +166,10 @@ contains
 
       call stepper_check_open(stepper, error)
       call check_field("field", field, stepper%scene, error)
-      if (.not. allocated(error) .and. stepper%march%system%linear%n > 0) call gather_dependent( &
-         stepper%march%system%space%linked, field)
+      if (allocated(error)) return
+      associate (space => stepper%march%system%space)
+         if (space%linear%n > 0) call gather_dependent(space%linked, field)
+      end associate
    end subroutine query_gather_links
 
 end module emcon_stepper_null_space

@@ -230,9 +230,9 @@ contains
 
       associate (march => self%march, system => self%march%system, state => self%march%state, &
             active => self%march%active)
-         active%is_active(:system%linear%n) = system%linear%is_used &
+         active%is_active(:system%space%linear%n) = system%space%linear%is_used &
             .and. .not. system%space%is_reduced
-         active%is_active(system%linear%n + 1:system%first_constraint(1)) = .true.
+         active%is_active(system%space%linear%n + 1:system%first_constraint(1)) = .true.
          do pair = 1, size(system%contact)
             associate (contact => system%contact(pair)%contact, &
                   first => system%first_constraint(pair) + 1, &

@@ -81,16 +81,15 @@ contains
       integer :: k, last, before
 
       if (self%n == 0) return
-      self%n_linear = count(self%id <= system%linear%n)
+      self%n_linear = count(self%id <= system%space%linear%n)
       self%n_held = count(self%id <= system%first_constraint(1))
       last = 0
       before = 0
-      call linearise(system%linear, system%linear%n)
       do k = 1, size(system%held)
-         call linearise(system%held(k)%constraint, system%held(k)%constraint%n_constraint)
+         call linearise(system%held(k)%constraint)
       end do
       do k = 1, size(system%contact)
-         call linearise(system%contact(k)%contact, system%contact(k)%contact%n_constraint)
+         call linearise(system%contact(k)%contact)
       end do
       do k = 1, self%n
          self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
@@ -98,16 +97,15 @@ contains
 
    contains
 
-      !> The conditions of the next constraint, which has `n`.
-      subroutine linearise(constraint, n)
+      !> The conditions of the next constraint.
+      subroutine linearise(constraint)
          class(constraint_t), intent(inout) :: constraint
-         integer, intent(in) :: n
          integer :: to
 
-         to = count(self%id <= before + n)
+         to = count(self%id <= before + constraint%n_constraint)
          if (to > last) call constraint%linearise(self%id(last + 1:to) - before, motion, &
             self%target(last + 1:to), self%item(last + 1:to))
-         before = before + n
+         before = before + constraint%n_constraint
          last = to
       end subroutine linearise
 

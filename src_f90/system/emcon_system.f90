@@ -5,6 +5,7 @@
 !> eqs. (2) and (16), which are sums over the terms.
 module emcon_system
    use emcon_constraint, only : constraint_box_t
+   use emcon_constraint_registry, only : constraints_create
    use emcon_contact, only : contact_box_t
    use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_find, csr_t
@@ -12,7 +13,6 @@ module emcon_system
    use emcon_host, only : host_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
-   use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_motion, only : motion_t
    use emcon_reduction, only : reduction_add
    use emcon_scene, only : scene_t
@@ -32,11 +32,11 @@ module emcon_system
 
    type :: system_t
       type(term_box_t), allocatable :: term(:)
-      type(linear_rows_t) :: linear              !! rows of ties and equations
-      type(constraint_box_t), allocatable :: held(:)   !! that hold at the end of every step
+      !> That hold at the end of every step: linear ones, then others
+      type(constraint_box_t), allocatable :: held(:)
       type(contact_box_t), allocatable :: contact(:)
       integer :: n_pair = 0                      !! of the scene; guards come after them
-      !> Conditions are numbered: linear ones, those of `held`, those of `contact`
+      !> Conditions are numbered: those of `held`, those of `contact`
       integer :: n_constraint = 0
       integer, allocatable :: first_constraint(:)   !! (n_contact + 1) conditions before each
       integer :: i_step = 0                      !! step of the deck the rest belongs to
@@ -61,38 +61,17 @@ contains
 
       call terms_create(scene, self%term, error, given)
       if (allocated(error)) return
-      call linear_rows_init(self%linear, scene)
-      call init_held(self, scene, given)
+      call lay_out(self, scene, lists)
+      call space_init(self%space, scene, lists)
+      if (scene%is_hosted) self%space%is_alive = .true.
+      call constraints_create(scene, self%space%linear, self%held, given)
       call init_contact(self, scene, error)
       if (allocated(error)) return
-      call lay_out(self, scene, lists)
-      call space_init(self%space, size(scene%x, 2), lists, scene%equation)
-      if (scene%is_hosted) self%space%is_alive = .true.
       call response_init(self%response, size(scene%x, 1), size(scene%x, 2), &
          size(scene%element_kind))
    end subroutine system_init
 
-   !> Copies of the constraints that are given, placed; their numbers come after the linear ones.
-   subroutine init_held(self, scene, given)
-      type(system_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      type(host_t), intent(in), optional :: given
-      integer :: i, n
-
-      self%n_constraint = self%linear%n
-      n = 0
-      if (present(given)) then
-         if (allocated(given%constraint)) n = size(given%constraint)
-      end if
-      allocate(self%held(n))
-      do i = 1, n
-         allocate(self%held(i)%constraint, source=given%constraint(i)%constraint)
-         call self%held(i)%constraint%take_positions(scene%x)
-         self%n_constraint = self%n_constraint + self%held(i)%constraint%n_constraint
-      end do
-   end subroutine init_held
-
-   !> The contact of pairs and guards, and the numbers of their conditions, the last ones.
+   !> The contact of pairs and guards, and the numbers of conditions: those of `held`, then theirs.
    subroutine init_contact(self, scene, error)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -100,6 +79,9 @@ contains
       type(contact_pair_t), allocatable :: pair(:)
       integer :: i
 
+      do i = 1, size(self%held)
+         self%n_constraint = self%n_constraint + self%held(i)%constraint%n_constraint
+      end do
       self%n_pair = size(scene%pair)
       if (allocated(scene%guard)) then
          allocate(pair, source=[scene%pair, scene%guard])
@@ -158,8 +140,7 @@ contains
       self%notes = notes_t()
       self%stiffening = stiffening_t()
       call lay_out(self, scene, lists, first)
-      call space_begin_step(self%space, scene%step(i_step), self%linear, lists, self%matrix, &
-         slot, error)
+      call space_begin_step(self%space, scene%step(i_step), lists, self%matrix, slot, error)
       if (allocated(error)) return
       if (scene%step(i_step)%constraint_method == method_null_space &
          .and. .not. self%space%is_reduced) call note_add(self%notes, &

@@ -80,7 +80,7 @@ contains
 
       in_u = 0.0_wp
       in_v = 0.0_wp
-      associate (linear => march%system%linear)
+      associate (linear => march%system%space%linear)
          do k = 1, linear%n
             if (.not. linear%is_used(k)) cycle
             total = 0.0_wp

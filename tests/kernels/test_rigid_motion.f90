@@ -202,7 +202,7 @@ contains
       end do
       call add_step(scene, .true., 1.0_wp, 1)
       call system_init(system, scene, error)
-      system%linear = linear
+      system%space%linear = linear
    end subroutine make_chain
 
    !> Tie the left or right side of `slave`, of three cells, to the side of `master`, of two.
@@ -290,10 +290,10 @@ contains
       call make_chain(scene, system, 2, block, error)
       if (allocated(error)) return
       scene%x(2, block_node(block(1), 1, 1)) = sqrt(epsilon(1.0_wp))
-      call drop_rows(system%linear)
-      call tie_node(scene, system%linear, block_node(block(2), 0, 0), &
+      call drop_rows(system%space%linear)
+      call tie_node(scene, system%space%linear, block_node(block(2), 0, 0), &
          [block_node(block(1), 1, 0), block_node(block(1), 1, 1)], 0.0_wp)
-      call tie_node(scene, system%linear, block_node(block(2), 0, 1), &
+      call tie_node(scene, system%space%linear, block_node(block(2), 0, 1), &
          [block_node(block(1), 1, 0), block_node(block(1), 1, 1)], 1.0_wp)
       call clamp(scene%step(1), [1, 2])
       call check_text(error, system, scene, "", "held")
@@ -311,15 +311,15 @@ contains
 
       call make_chain(scene, system, 3, block, error)
       if (allocated(error)) return
-      call drop_rows(system%linear)
+      call drop_rows(system%space%linear)
       side = [block_node(block(1), 1, 0), block_node(block(1), 1, 1)]
       scene%x(2, side) = 0.7_wp + [0.0_wp, sqrt(epsilon(1.0_wp))]
-      call tie_node(scene, system%linear, block_node(block(2), 0, 0), side, 0.3_wp)
-      call tie_node(scene, system%linear, block_node(block(2), 0, 1), side, 0.9_wp)
+      call tie_node(scene, system%space%linear, block_node(block(2), 0, 0), side, 0.3_wp)
+      call tie_node(scene, system%space%linear, block_node(block(2), 0, 1), side, 0.9_wp)
       do k = 1, 2
          side = [block_node(block(k), 0, 2), block_node(block(k), 1, 2)]
-         call tie_node(scene, system%linear, block_node(block(3), k - 1, 0), side, 0.3_wp)
-         call tie_node(scene, system%linear, block_node(block(3), k - 1, 1), side, 0.9_wp)
+         call tie_node(scene, system%space%linear, block_node(block(3), k - 1, 0), side, 0.3_wp)
+         call tie_node(scene, system%space%linear, block_node(block(3), k - 1, 1), side, 0.9_wp)
       end do
       call check_text(error, system, scene, &
          "the bodies of elements 1, 3, 6, tied to each other, are", "move in x, move in y, rotate")
@@ -364,10 +364,10 @@ contains
             scene%x(:, i) = r*[cos(phi), sin(phi)]
          end associate
       end do
-      call drop_rows(system%linear)
+      call drop_rows(system%space%linear)
       do i = 2, n, 2
-         call tie_facing(scene, system%linear, block(i), block(i - 1), .false.)
-         call tie_facing(scene, system%linear, block(i), block(1 + mod(i, n)), .true.)
+         call tie_facing(scene, system%space%linear, block(i), block(i - 1), .false.)
+         call tie_facing(scene, system%space%linear, block(i), block(1 + mod(i, n)), .true.)
       end do
       call free_motion_text(system, scene, scene%step(1)%prescribed, text)
       call check_true(error, index(text, "free to move in x, move in y, rotate;") > 0, text)
@@ -390,12 +390,12 @@ contains
       call system_init(system, scene, error)
       if (allocated(error)) return
       hinge = [block_node(block, 2, 0), block_node(other, 0, 0)]
-      call add_row(system%linear, hinge, [1, 1], [1.0_wp, -1.0_wp])
+      call add_row(system%space%linear, hinge, [1, 1], [1.0_wp, -1.0_wp])
       call check_text(error, system, scene, both, &
          "move in x, move in y, rotate, move against each other")
       call clamp(scene%step(1), [1, 2])
       call check_text(error, system, scene, "the body of element 5 is", "move in y, rotate")
-      call add_row(system%linear, hinge, [2, 2], [1.0_wp, -1.0_wp])
+      call add_row(system%space%linear, hinge, [2, 2], [1.0_wp, -1.0_wp])
       call check_text(error, system, scene, "the body of element 5 is", "rotate")
       call prescribe(scene%step(1), block_node(other, 2, 1), 2, 0.0_wp)
       call check_text(error, system, scene, "", "held")
@@ -417,8 +417,8 @@ contains
       call add_step(scene, .true., 1.0_wp, 1)
       call system_init(system, scene, error)
       if (allocated(error)) return
-      call add_row(system%linear, [1, 1], [1, 2], [1.0_wp, 2.0_wp])
-      call add_row(system%linear, [3, 3], [1, 2], [-1.0_wp, -2.0_wp])
+      call add_row(system%space%linear, [1, 1], [1, 2], [1.0_wp, 2.0_wp])
+      call add_row(system%space%linear, [3, 3], [1, 2], [-1.0_wp, -2.0_wp])
       call check_text(error, system, scene, "the body of element 1 is", "move along (1, -0.5)")
       call prescribe(scene%step(1), 5, 1, 0.0_wp)
       call check_text(error, system, scene, "", "held")
@@ -438,7 +438,7 @@ contains
       call system_init(system, scene, error)
       if (allocated(error)) return
       do i = 1, 3
-         call add_row(system%linear, [3*i, 11], [1, 1], [1.0_wp, -1.0_wp])
+         call add_row(system%space%linear, [3*i, 11], [1, 1], [1.0_wp, -1.0_wp])
       end do
       call check_text(error, system, scene, &
          "the body of element 1 and node 11, tied to each other, are", "move in x, move in y")
@@ -447,7 +447,7 @@ contains
          "the body of element 1 and node 11, tied to each other, are", "move in x")
       call prescribe(scene%step(1), 11, 1, 0.5_wp)
       call check_text(error, system, scene, "", "held by the node")
-      call add_row(system%linear, [10, 11, 10], [1, 1, 2], [1.0_wp, -1.0_wp, 1.0_wp])
+      call add_row(system%space%linear, [10, 11, 10], [1, 1, 2], [1.0_wp, -1.0_wp, 1.0_wp])
       call check_text(error, system, scene, "node 10 is", "move along (1, -1)")
    end subroutine test_reference_node
 
@@ -484,16 +484,17 @@ contains
       if (allocated(error)) return
       do i = 1, 3
          do a = 1, 2
-            call add_row(system%linear, [3*i, 3*i - 2], [a, a], [1.0_wp, -1.0_wp])
+            call add_row(system%space%linear, [3*i, 3*i - 2], [a, a], [1.0_wp, -1.0_wp])
          end do
       end do
       call check_text(error, system, scene, "the body of element 1 is", "move in x, move in y")
       call clamp(scene%step(1), [5])
       call check_text(error, system, scene, "", "rotation is not periodic")
-      call drop_rows(system%linear)
+      call drop_rows(system%space%linear)
       do i = 1, 3
          do a = 1, 2
-            call add_row(system%linear, [3*i, 3*i - 2, 10], [a, a, a], [1.0_wp, -1.0_wp, -1.0_wp])
+            call add_row(system%space%linear, [3*i, 3*i - 2, 10], [a, a, a], &
+               [1.0_wp, -1.0_wp, -1.0_wp])
          end do
       end do
       call check_text(error, system, scene, &
@@ -515,9 +516,9 @@ contains
       call add_step(scene, .true., 1.0_wp, 1)
       call system_init(system, scene, error)
       if (allocated(error)) return
-      call tie_node(scene, system%linear, block_node(third, 0, 0), [5, 10], 0.0_wp)
+      call tie_node(scene, system%space%linear, block_node(third, 0, 0), [5, 10], 0.0_wp)
       call check_text(error, system, scene, "the body of element 7 is", "rotate")
-      call tie_node(scene, system%linear, block_node(third, 0, 1), [5, 10], 1.0_wp)
+      call tie_node(scene, system%space%linear, block_node(third, 0, 1), [5, 10], 1.0_wp)
       call check_text(error, system, scene, "", "before contact is known")
       call free_motion_text(system, scene, scene%step(1)%prescribed, text, with_contact=.true.)
       call check_equal(error, text, "the bodies of elements 1, 7, tied to each other, are free " &
@@ -538,7 +539,7 @@ contains
          call make_chain(scene, system, 4, block, error)
          if (allocated(error)) return
          scene%x = scale(scene%x, power)
-         system%linear%weight = scale(system%linear%weight, power/2)
+         system%space%linear%weight = scale(system%space%linear%weight, power/2)
          call check_text(error, system, scene, who, "move in x, move in y, rotate")
          call clamp(scene%step(1), [block_node(block(4), 1, 1)])
          call check_text(error, system, scene, who, "rotate")
