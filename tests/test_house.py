@@ -26,6 +26,20 @@ ONLY = {"app": {"app", "record", "stepper", "base"}}
 TOP = set("Makefile src_f90 pywrap input_decks tests docs".split())
 TOP |= set("README.md LICENSE CHANGELOG.md CITATION.cff".split())
 
+#: Where the kinds of each abstract type are made: nobody else knows one of them by name.
+REGISTRY = {
+    "sparse_solver_t": {"emcon_solver_registry"},
+    "law_t": {"emcon_law_registry"},
+    "shape_t": {"emcon_element_registry"},
+    "scheme_t": {"emcon_scheme_registry"},
+    "contact_t": {"emcon_contact_registry"},
+    "term_t": {"emcon_term_registry"},
+    "constraint_t": {"emcon_constraint_registry"},
+    "host_force_t": {"emcon_stepper_given", "emcon_c_given"},
+}
+#: What is made of another kind of its room: gaps of nodes, interpolated or looked at.
+MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps", "emcon_nts")}
+
 COLUMNS = 100
 
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
@@ -94,6 +108,39 @@ def cycles(root):
         graphlib.TopologicalSorter({n: m[2] for n, m in modules(root).items()}).prepare()
     except graphlib.CycleError as error:
         yield " -> ".join(error.args[1])
+
+
+EXTENDS = re.compile(
+    r"^\s*type\b([^!\n]*)\bextends\s*\(\s*(\w+)\s*\)[^!\n]*::\s*(\w+)", re.I | re.M
+)
+
+
+def kinds(root):
+    """Module -> abstract types that its own types are kinds of; those again abstract left out."""
+    parent, concrete = {}, {}
+    for path in sources(root):
+        for words, base, name in EXTENDS.findall(path.read_text()):
+            parent[name.lower()] = base.lower()
+            if "abstract" not in words.lower():
+                concrete.setdefault(path.stem, set()).add(name.lower())
+    found = {}
+    for module, types in concrete.items():
+        for kind in types:
+            while kind not in REGISTRY and kind in parent:
+                kind = parent[kind]
+            if kind in REGISTRY:
+                found.setdefault(module, set()).add(kind)
+    return found
+
+
+def named_kinds(root):
+    """Uses of a kind of law, term, constraint, ... outside its registry."""
+    found, concrete = modules(root), kinds(root)
+    for name, (_, _, used) in sorted(found.items()):
+        for other in sorted(used & set(concrete)):
+            allowed = set().union(*(REGISTRY[base] for base in concrete[other]))
+            if name not in allowed and (name, other) not in MADE_OF:
+                yield f"{name} uses {other}, a kind of {' and '.join(sorted(concrete[other]))}"
 
 
 def statements(root, pattern, rooms_free):
@@ -168,6 +215,7 @@ CHECKS = {
     "names": names,
     "arrows up": arrows_up,
     "cycles": cycles,
+    "kinds": named_kinds,
     "stop": lambda root: statements(root, STOP, {"app"}),
     "print": lambda root: statements(root, PRINT, {"app", "results"}),
     "long lines": long_lines,
@@ -212,6 +260,9 @@ GOOD = {
     "stepper/emcon_stepper.f90": "module emcon_stepper\n   use :: emcon_text\n"
     "   use, intrinsic :: iso_c_binding\nend module emcon_stepper\n",
     "app/emcon.f90": "program emcon\n   use emcon_stepper\n   print *, 1\n   stop 1\nend program\n",
+    "laws/emcon_law_y.f90": "module emcon_law_y\n   type, extends(law_t) :: law_y_t\n"
+    "   end type\nend module\n",
+    "laws/emcon_law_registry.f90": "module emcon_law_registry\n   use emcon_law_y\nend module\n",
     "order.py": "def f():\n    pass\n\n\nclass A:\n    def f(self):\n        pass\n",
 }
 BAD = {
@@ -241,6 +292,18 @@ BAD = {
         "base/emcon_b.f90": "module emcon_b\n   use emcon_a\nend module emcon_b\n",
     },
     "long lines": {"base/emcon_a.f90": f"module emcon_a ! {'a'*100}\nend module emcon_a\n"},
+    "kinds": {
+        "laws/emcon_law_x.f90": "module emcon_law_x\n   type, extends(law_t) :: law_x_t\n"
+        "   end type\nend module\n",
+        "march/emcon_a.f90": "module emcon_a\n   use emcon_law_x, only : law_x_t\nend module\n",
+    },
+    "kinds, by a parent": {
+        "contact/emcon_b.f90": "module emcon_b\n   type, abstract, extends(contact_t) :: b_t\n"
+        "   end type\nend module\n",
+        "contact/emcon_c.f90": "module emcon_c\n   use emcon_b\n"
+        "   TYPE, EXTENDS(b_t), public :: c_t\n   end type\nend module\n",
+        "prepare/emcon_a.f90": "module emcon_a\n   use emcon_c\nend module\n",
+    },
     "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
     "stop, exit": {"stepper/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},
     "print": {"deck/emcon_a.f90": "module emcon_a\n   write (*, *) x\nend module emcon_a\n"},

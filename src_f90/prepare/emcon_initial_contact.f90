@@ -3,17 +3,17 @@
 !> All formulations are judged by the gaps of nodes over edges.
 module emcon_initial_contact
    use emcon_chain, only : chain_corners, chain_crossing, chain_t
-   use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_guards, only : guard_slack
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
-   use emcon_nts, only : nts_init, nts_nearest, nts_t
    use emcon_scene, only : scene_t, where_text
    use emcon_self_contact, only : chain_faces
    use emcon_sort, only : find_sorted
+   use emcon_start_gaps, only : start_gaps_init, start_gaps_measure, start_gaps_nearest, &
+      start_gaps_t, start_gaps_way
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none
    private
@@ -44,7 +44,7 @@ contains
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
       type(contact_options_t) :: options
-      type(nts_t) :: contact
+      type(start_gaps_t) :: contact
       logical :: is_checked(size(scene%surface))
       logical :: is_meant                        !! overclosure is
       integer :: i
@@ -57,9 +57,8 @@ contains
       is_checked = .false.
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
-            call init_check(contact, scene, pair, error)
+            call start_gaps_init(contact, scene, pair, error, options)
             if (allocated(error)) return
-            call contact%configure(scene%x, options)
             if (.not. contact%is_self) then
                call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
                if (.not. allocated(error)) call check_crossing(scene, pair%master, &
@@ -138,17 +137,6 @@ contains
          to_text(scene%node_label(chain%edge(2, e))) // ")"
    end subroutine face_text
 
-   !> Contact of a pair in which every face counts: what is behind at first has no way in.
-   subroutine init_check(contact, scene, pair, error)
-      type(nts_t), intent(out) :: contact
-      type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(in) :: pair
-      type(error_t), allocatable, intent(out) :: error
-
-      call nts_init(contact, scene, pair, error)
-      contact%every_face = .true.
-   end subroutine init_check
-
    !> The same pair with slave and master exchanged.
    pure function reversed(pair) result(other)
       type(contact_pair_t), intent(in) :: pair
@@ -164,10 +152,10 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
-      type(nts_t) :: contact
+      type(start_gaps_t) :: contact
 
       if (scene%surface(pair%slave)%is_nodal) return
-      call init_check(contact, scene, reversed(pair), error)
+      call start_gaps_init(contact, scene, reversed(pair), error)
       if (allocated(error)) return
       call check_sides(scene, reversed(pair), contact, "slave", error)
    end subroutine check_slave_sides
@@ -176,18 +164,18 @@ contains
    subroutine check_sides(scene, pair, contact, title, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(nts_t), intent(inout) :: contact
+      type(start_gaps_t), intent(inout) :: contact
       character(len=*), intent(in) :: title      !! what the deck calls the master of `pair`
       type(error_t), allocatable, intent(out) :: error
       integer :: i, stride, n_over, n_behind
       real(wp) :: gap
       logical :: is_over
 
-      stride = max(1, contact%n_constraint/most_samples)
+      stride = max(1, contact%n/most_samples)
       n_over = 0
       n_behind = 0
-      do i = 1, contact%n_constraint, stride
-         call nts_nearest(contact, i, scene%x, scene%u0, gap, is_over)
+      do i = 1, contact%n, stride
+         call start_gaps_nearest(contact, i, scene, gap, is_over)
          if (.not. is_over) cycle
          n_over = n_over + 1
          if (is_behind(scene, contact, i, gap)) n_behind = n_behind + 1
@@ -202,7 +190,7 @@ contains
    !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
    pure logical function is_behind(scene, contact, i, gap)
       type(scene_t), intent(in) :: scene
-      type(nts_t), intent(in) :: contact
+      type(start_gaps_t), intent(in) :: contact
       integer, intent(in) :: i
       real(wp), intent(in) :: gap                !! over contact%edge(i) [L]
 
@@ -226,20 +214,18 @@ contains
    subroutine adjust_pair(scene, pair, contact, notes)
       type(scene_t), intent(inout) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(nts_t), intent(inout) :: contact
+      type(start_gaps_t), intent(inout) :: contact
       type(notes_t), intent(inout) :: notes
       type(gap_state_t) :: state
-      type(condition_t) :: constraint(1)
-      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2)), way(2), largest
-      logical :: is_meant
+      real(wp) :: way(size(scene%x, 1)), largest
+      logical :: is_meant, is_last
       integer :: i, k, n_moved
 
       if (pair%adjust_distance < 0.0_wp .and. pair%adjust_set == 0) return
-      zero = 0.0_wp
-      call measure_start(scene, contact)
+      call start_gaps_measure(contact, scene)
       largest = 0.0_wp
       n_moved = 0
-      do i = 1, contact%n_constraint
+      do i = 1, contact%n
          if (contact%edge(i) == 0) cycle
          state = contact%state(i)
          is_meant = state%gap0 <= pair%adjust_distance
@@ -249,14 +235,12 @@ contains
          largest = max(largest, abs(state%gap0))
          n_moved = n_moved + 1
          do k = 1, most_moves
-            call contact%evaluate([i], scene%x, scene%u0, zero, [0.0_wp], constraint)
-            associate (normal => constraint(1)%c(:, 1), node => contact%node(i), &
-                  twin => contact%twin(i))
-               way = constraint(1)%gap1*normal/dot_product(normal, normal)
+            call start_gaps_way(contact, i, scene, way, is_last)
+            associate (node => contact%node(i), twin => contact%twin(i))
                scene%x(:, node) = scene%x(:, node) - way
                if (twin > 0) scene%x(:, twin) = scene%x(:, twin) - way
             end associate
-            if (abs(constraint(1)%gap1) <= epsilon(1.0_wp)*constraint(1)%size) exit
+            if (is_last) exit
          end do
       end do
       call note_add(notes, where_text(scene, pair%origin) // ": ADJUST moves " // &
@@ -267,17 +251,17 @@ contains
    subroutine check_penetration(scene, pair, contact, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(nts_t), intent(inout) :: contact
+      type(start_gaps_t), intent(inout) :: contact
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: limit(contact%n_constraint)
+      real(wp) :: limit(contact%n)
       integer :: i, n, own
       character(len=:), allocatable :: found
 
-      call measure_start(scene, contact)
+      call start_gaps_measure(contact, scene)
       limit = noise(scene)
       if (contact%is_self) then
          associate (chain => contact%slave, state => contact%state)
-            do i = 1, contact%n_constraint
+            do i = 1, contact%n
                own = maxval(chain%node_edge(:, contact%chain_node(i)))
                if (contact%edge(i) == 0) cycle
                if (chain%part(own) /= chain%part(contact%edge(i))) cycle
@@ -301,7 +285,7 @@ contains
       type(contact_pair_t), intent(in) :: pair
       type(contact_options_t), intent(in) :: options
       type(error_t), allocatable, intent(out) :: error
-      type(nts_t) :: contact
+      type(start_gaps_t) :: contact
       logical, allocatable :: is_corner(:)
       real(wp), allocatable :: limit(:)
       character(len=:), allocatable :: found
@@ -311,13 +295,13 @@ contains
       if (pair%formulation == formulation_nts) then
          if (.not. (pair%both_sides .and. pair%may_choose)) return
       end if
-      call init_check(contact, scene, reversed(pair), error)
+      call start_gaps_init(contact, scene, reversed(pair), error)
       if (allocated(error)) return
-      call measure_start(scene, contact)
+      call start_gaps_measure(contact, scene)
       allocate(is_corner(contact%slave%n_edge))
-      allocate(limit(contact%n_constraint), source=noise(scene))
+      allocate(limit(contact%n), source=noise(scene))
       call chain_corners(contact%slave, scene%x, options%smoothing_angle, is_corner)
-      do k = 1, contact%n_constraint
+      do k = 1, contact%n
          if (contact%edge(k) == 0) cycle
          associate (here => contact%slave%node_edge(2, k))
             if (here > 0) then
@@ -335,34 +319,22 @@ contains
          "; move them, or refine the slave surface and let *CONTACT PAIR, ADJUST= move its nodes")
    end subroutine check_corners
 
-   !> Gaps at the start, of nodes that are near.
-   pure subroutine measure_start(scene, contact)
-      type(scene_t), intent(in) :: scene
-      type(nts_t), intent(inout) :: contact
-      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2))
-
-      zero = 0.0_wp
-      contact%reach = 0.0_wp
-      call contact%begin_step(scene%x, scene%u0, zero)
-      call contact%measure(scene%x, scene%u0, zero)
-   end subroutine measure_start
-
    !> How many of the nodes measured are behind the surface by more than `limit`, and a text with
    !> their labels and depths.
    subroutine find_behind(scene, contact, limit, n, text)
       type(scene_t), intent(in) :: scene
-      type(nts_t), intent(in) :: contact
-      real(wp), intent(in) :: limit(:)           !! (n_constraint) [L]
+      type(start_gaps_t), intent(in) :: contact
+      real(wp), intent(in) :: limit(:)           !! (n) [L]
       integer, intent(out) :: n
       character(len=:), allocatable, intent(out) :: text
-      type(string_t) :: found(contact%n_constraint)
+      type(string_t) :: found(contact%n)
       type(gap_state_t) :: state
       real(wp) :: deepest
       integer :: i
 
       n = 0
       deepest = 0.0_wp
-      do i = 1, contact%n_constraint
+      do i = 1, contact%n
          if (contact%edge(i) == 0) cycle
          state = contact%state(i)
          if (.not. state%is_over .or. state%gap0 >= -limit(i)) cycle
