@@ -34,6 +34,7 @@ COUNTED = set("i load surface slave master tie node id redundant edge unknown pa
 #: Owners: the type of the dummy, and where a model has it.
 OWNERS = {"model_t": "self", "stepper_t": "self%stepper", "query_t": "self%query"}
 NUMBERS = {"int": "integer(c_int)", "double": "real(c_double)"}
+KINDS = {"int": ("integer", "logical"), "double": ("real",)}
 
 
 @dataclass
@@ -43,6 +44,7 @@ class Dummy:
     name: str
     kind: str          # integer, real, logical, character, or the name of a derived type
     rank: int
+    intent: str        # in, out or inout
     is_optional: bool
     is_allocatable: bool
 
@@ -78,9 +80,10 @@ def dummies(names: str, body: str) -> list[Dummy]:
             body, re.MULTILINE):
         derived = re.match(r"(?:type|class)\((\w+)\)", kind)
         for name, shape in re.findall(r"(\w+)\s*(\([^)]*\))?", rest):
+            intent = re.search(r"intent\((\w+)\)", attributes)
             declared[name] = Dummy(name, derived[1] if derived else kind.split("(")[0],
-                                   shape.count(":"), "optional" in attributes,
-                                   "allocatable" in attributes)
+                                   shape.count(":"), intent[1] if intent else "",
+                                   "optional" in attributes, "allocatable" in attributes)
     return [declared[name.strip()] for name in names.split(",")]
 
 
@@ -115,6 +118,10 @@ class Wrapper:
         a = self.of_c.pop(dummy.name, None)
         if a is None:
             self.fail(f"emcon.h has no argument {dummy.name}")
+        if dummy.intent != self.intent(a):
+            self.fail(f"{a.name} is intent({self.intent(a)}) in C, not intent({dummy.intent})")
+        if dummy.kind not in KINDS.get(a.kind, (dummy.kind,)):
+            self.fail(f"{a.name} is {a.kind} in C, but {dummy.kind} in Fortran")
         if a.level == 0:
             return self.scalar(a, dummy)
         if a.kind == "char":
@@ -124,8 +131,15 @@ class Wrapper:
         if a.kind in self.header.opaque:
             return self.object(a)
         if a.kind in self.header.structures:
-            return self.structure(a, dummy)
+            return self.structure(a)
         return self.numbers(a, dummy)
+
+    def intent(self, a: Argument) -> str:
+        """What the header says of who writes an argument."""
+        if a.in_out:
+            return "inout"
+        is_address = a.kind in ("void", *self.header.pointers)
+        return "in" if a.level == 0 or is_address or (a.is_in and a.level == 1) else "out"
 
     def scalar(self, a: Argument, dummy: Dummy) -> str:
         if a.kind in self.header.pointers:
@@ -171,7 +185,8 @@ class Wrapper:
                             f"call c_f_pointer({a.name}, f_{a.name})"]
         return f"f_{a.name}"
 
-    def structure(self, a: Argument, dummy: Dummy) -> str:
+    def structure(self, a: Argument) -> str:
+        """A structure, an array of them, or a matrix."""
         kind = a.kind.removeprefix("emcon_") + "_c"
         if a.kind == "emcon_csr" and a.is_in:
             self.locals.append(f"type(csr_t) :: f_{a.name}")

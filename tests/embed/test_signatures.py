@@ -135,6 +135,10 @@ def test_arguments_are_turned_by_what_both_sides_say(tmp_path: Path) -> None:
      subroutine("u", "real(wp), intent(out) :: u(:)"), "u is an output that is not allocatable"),
     ("int emcon_f(emcon_model *model, int n, const double *u /* n */);",
      subroutine("u", "real(wp), intent(in), optional :: u(:)"), "left out in Fortran, but not NULL"),
+    ("int emcon_f(emcon_model *model, int n);", subroutine("n", "real(wp), intent(in) :: n"),
+     "n is int in C, but real in Fortran"),
+    ("int emcon_f(emcon_model *model, int *n);", subroutine("n", "integer, intent(in) :: n"),
+     r"n is intent\(out\) in C, not intent\(in\)"),
 ])
 def test_a_function_that_fits_no_procedure_ends_the_script(
         prototype: str, procedure: str, told: str, tmp_path: Path) -> None:
