@@ -149,7 +149,7 @@ contains
          real(wp), allocatable, intent(out) :: values(:)
          real(wp), allocatable :: quantity(:, :)
 
-         quantity = contact_quantity(model%stepper, name)
+         allocate(quantity, source=contact_quantity(model%stepper, name))
          values = quantity(1, model%stepper%march%system%first_constraint(1) + 1:)
       end subroutine pick
 
