@@ -27,8 +27,8 @@
 !>    `stepper_set_state`; go back by `stepper_snapshot` and `stepper_restore`; change loads by
 !>    `stepper_find_load`, `stepper_set_load`, and boundary values by `stepper_set_prescribed`,
 !>    `stepper_add_prescribed`, `stepper_prescribe`, `stepper_remove_prescribed`.
-!> 4. To a file: `stepper_save`, `conditions_save`, `restart_write`; back into a new stepper:
-!>    `restart_read`, `stepper_load`, `conditions_load`.
+!> 4. To a file: `stepper_save`, `conditions_exchange`, `restart_write`; back into a new stepper:
+!>    `restart_read`, `stepper_load`, `conditions_exchange`.
 !> 5. `stepper_close`, also after an error, before the stepper goes.
 !>
 !> **What the engine computes for a step.** A `query_t` beside the stepper; asking changes nothing.
@@ -74,14 +74,15 @@ module emcon_api
       sparse_solver_t
    use emcon_state, only : state_t
    use emcon_stepper, only : contact_gaps, stepper_advance, stepper_build, stepper_close, &
-      stepper_contact_seconds, stepper_fraction, stepper_is_done, stepper_load, stepper_open, &
-      stepper_read, stepper_read_text, stepper_save, stepper_t
-   use emcon_stepper_conditions, only : conditions_load, conditions_save, stepper_add_prescribed, &
+      stepper_contact_seconds, stepper_fraction, stepper_is_done, stepper_open, stepper_read, &
+      stepper_read_text, stepper_t
+   use emcon_stepper_conditions, only : conditions_exchange, stepper_add_prescribed, &
       stepper_find_load, stepper_prescribe, stepper_remove_prescribed, stepper_set_load, &
       stepper_set_prescribed
    use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &
       query_contact, query_drop, query_gaps, query_overlap, query_select, query_update_active, &
       step_cycling, step_done, step_stands_off, step_too_far
+   use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
    use emcon_stepper_given, only : stepper_give_constraint, stepper_give_element, &

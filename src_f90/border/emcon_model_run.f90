@@ -9,8 +9,9 @@ module emcon_model_run
    use emcon_model, only : model_t
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_check_solids, &
-      stepper_is_done, stepper_load, stepper_read, stepper_read_text, stepper_save
-   use emcon_stepper_conditions, only : conditions_load, conditions_save
+      stepper_is_done, stepper_read, stepper_read_text
+   use emcon_stepper_conditions, only : conditions_exchange
+   use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_free, only : stepper_step
    use emcon_text, only : string_t
    implicit none
@@ -153,7 +154,7 @@ contains
    end function as_increment
 
    subroutine model_save(model, path, error)
-      type(model_t), intent(in) :: model
+      type(model_t), intent(inout) :: model
       character(len=*), intent(in) :: path
       type(error_t), allocatable, intent(out) :: error
       type(restart_t) :: restart
@@ -161,8 +162,8 @@ contains
       call stepper_check_solids(model%stepper, error)
       if (allocated(error)) return
       call stepper_save(model%stepper, restart)
-      call conditions_save(model%stepper, restart)
-      call restart_write(restart, path, error)
+      call conditions_exchange(model%stepper, restart, error)
+      if (.not. allocated(error)) call restart_write(restart, path, error)
    end subroutine model_save
 
    !> Build the model of a restart file, in the state that it holds.
@@ -174,7 +175,7 @@ contains
 
       call restart_read(restart, path, error)
       if (.not. allocated(error)) call stepper_load(model%stepper, restart, error)
-      if (.not. allocated(error)) call conditions_load(model%stepper, restart, error)
+      if (.not. allocated(error)) call conditions_exchange(model%stepper, restart, error)
       if (allocated(error)) model%stepper%is_read = .false.    ! there is nothing to work with
    end subroutine model_load
 

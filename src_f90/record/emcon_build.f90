@@ -16,8 +16,9 @@ contains
 
    !> The present build and machine, one text per subject.
    subroutine build_list(list)
-      type(string_t), intent(out) :: list(size(subject))
+      type(string_t), allocatable, intent(out) :: list(:)
 
+      allocate(list(size(subject)))
       list(1)%text = version
       list(2)%text = compiler_version()
       list(3)%text = compiler_options()
@@ -29,7 +30,7 @@ contains
    subroutine build_differences(before, warnings)
       type(string_t), intent(in) :: before(:)
       type(notes_t), intent(inout) :: warnings
-      type(string_t) :: list(size(subject))
+      type(string_t), allocatable :: list(:)
       integer :: i
 
       call build_list(list)

@@ -12,10 +12,12 @@ module emcon_run
    use emcon_progress, only : progress_end, progress_show, progress_start, progress_t
    use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
       recorder_resume, recorder_t, recorder_write
-   use emcon_restart, only : restart_get, restart_put, restart_read, restart_t, restart_write
+   use emcon_restart, only : restart_read, restart_t, restart_write
+   use emcon_restart_data, only : restart_check, restart_exchange, restart_list
    use emcon_run_log, only : log_increment, log_start, model_lines
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_contact_seconds, &
-      stepper_fraction, stepper_is_done, stepper_load, stepper_open, stepper_save, stepper_t
+      stepper_fraction, stepper_is_done, stepper_open, stepper_t
+   use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_text, only : notes_t, string_t, to_text
    use emcon_timer, only : cpu_seconds, wall_seconds
    use emcon_verdict, only : verdict_balance_lines, verdict_end, verdict_is_failure, &
@@ -128,7 +130,7 @@ contains
       type(run_t), allocatable :: run
       type(restart_t) :: restart
       type(string_t), allocatable :: build(:)
-      integer :: counts(2), i
+      integer :: n_row, n_frame, i
 
       allocate(run)
       run%wall_start = wall_seconds()
@@ -146,16 +148,18 @@ contains
       call log_open(run%log, run%base // ".log", .true., error)
       if (allocated(error)) return
       call restart_read(restart, path, error)
-      if (.not. allocated(error)) call restart_get(restart, "counts", counts, error)
       if (.not. allocated(error)) call stepper_load(run%stepper, restart, error)
-      if (.not. allocated(error)) call restart_get(restart, "build", build, error)
+      if (.not. allocated(error)) then
+         call exchange_files(restart, n_row, n_frame, build)
+         call restart_check(restart, error)
+      end if
       if (allocated(error)) then
          if (error%code /= err_file) error%code = err_input
          return
       end if
       call move_diagnostics(run, report)
       call warn_of_build(run, build, path, report)
-      call recorder_resume(run%recorder, run%stepper, run%base, counts(1), counts(2), error)
+      call recorder_resume(run%recorder, run%stepper, run%base, n_row, n_frame, error)
       if (allocated(error)) return
       call log_line(run%log, "resumed after increment " // &
          to_text(run%stepper%march%state%increment) // ", time " // &
@@ -332,15 +336,25 @@ contains
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(out) :: error
       type(restart_t) :: restart
-      type(string_t) :: build(5)
+      type(string_t), allocatable :: build(:)
 
       call recorder_publish(run%recorder, .true., error)
       if (allocated(error)) return
       call stepper_save(run%stepper, restart)
-      call restart_put(restart, "counts", [run%recorder%n_row, run%recorder%fields%n_frame])
       call build_list(build)
-      call restart_put(restart, "build", build)
+      call exchange_files(restart, run%recorder%n_row, run%recorder%fields%n_frame, build)
       call restart_write(restart, run%base // ".rst.h5", error)
    end subroutine save
+
+   !> What of the result files belongs to the state, and which program wrote them.
+   subroutine exchange_files(restart, n_row, n_frame, build)
+      type(restart_t), intent(inout) :: restart
+      integer, intent(inout) :: n_row, n_frame
+      type(string_t), allocatable, intent(inout) :: build(:)
+
+      call restart_exchange(restart, "counts", n_row)
+      call restart_exchange(restart, "counts", n_frame)
+      call restart_list(restart, "build", build)
+   end subroutine exchange_files
 
 end module emcon_run

@@ -5,13 +5,13 @@ module emcon_verdict_file
    use emcon_files, only : file_close, file_open, file_put, file_remove, file_rename, file_t
    use emcon_kinds, only : wp
    use emcon_march, only : march_t
-   use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
+   use emcon_restart_data, only : restart_exchange, restart_list, restart_offers, restart_t
    use emcon_stand_off, only : stand_off_mean
    use emcon_text, only : notes_t, string_t, to_text
    use emcon_verdict, only : verdict_end, verdict_is_good, verdict_t
    implicit none
    private
-   public :: verdict_so_far, verdict_write, verdict_save, verdict_load
+   public :: verdict_so_far, verdict_write, verdict_exchange
 
    !> Digits that are written of a number.
    integer, parameter :: n_digit = 9
@@ -137,66 +137,52 @@ contains
       line = line // '"'
    end subroutine add_quoted
 
-   !> Put the running figures into `restart`.
-   subroutine verdict_save(self, restart)
-      type(verdict_t), intent(in) :: self
-      type(restart_t), intent(inout) :: restart
-      type(string_t) :: place(1)
-
-      call restart_put(restart, "verdict", [self%total0, self%largest_energy, &
-         self%largest_drift, self%reference, self%dynamic_drift, self%deepest, &
-         self%deepest_time, self%unconverged, self%unconverged_time, self%stand_off%largest, &
-         self%stand_off%impulse, self%stand_off%impulse_gap])
-      call restart_put(restart, "effort", [self%n_newton, self%n_cut, self%n_warning, &
-         merge(1, 0, self%has_dynamics), self%n_guarded, self%n_held, self%most_held])
-      call restart_put(restart, "pair_largest", self%largest_force)
-      if (allocated(self%place)) then
-         place(1)%text = self%place
-         call restart_put(restart, "deepest_place", place)
-      end if
-      if (self%warnings%n > 0) call restart_put(restart, "warnings", &
-         self%warnings%item(:self%warnings%n))
-   end subroutine verdict_save
-
-   !> Go on with the running figures in `restart`.
-   subroutine verdict_load(self, restart, error)
+   !> Put the running figures into `restart`, or go on with those that it has.
+   subroutine verdict_exchange(self, restart)
       type(verdict_t), intent(inout) :: self
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-      type(string_t), allocatable :: text(:)
-      real(wp) :: figure(12)
-      integer :: effort(7)
+      type(restart_t), intent(inout) :: restart
 
-      call restart_get(restart, "verdict", figure, error)
-      if (.not. allocated(error)) call restart_get(restart, "effort", effort, error)
-      if (allocated(error)) return
-      self%total0 = figure(1)
-      self%largest_energy = figure(2)
-      self%largest_drift = figure(3)
-      self%reference = figure(4)
-      self%dynamic_drift = figure(5)
-      self%deepest = figure(6)
-      self%deepest_time = figure(7)
-      self%unconverged = figure(8)
-      self%unconverged_time = figure(9)
-      self%stand_off%largest = figure(10)
-      self%stand_off%impulse = figure(11)
-      self%stand_off%impulse_gap = figure(12)
-      self%n_newton = effort(1)
-      self%n_cut = effort(2)
-      self%n_guarded = effort(5)
-      self%n_held = effort(6)
-      self%most_held = effort(7)
-      self%n_warning = effort(3)
-      self%has_dynamics = effort(4) == 1
-      call restart_get(restart, "pair_largest", self%largest_force, error)
-      if (.not. allocated(error) .and. restart_size(restart, "deepest_place") > 0) then
-         call restart_get(restart, "deepest_place", text, error)
-         if (.not. allocated(error)) self%place = text(1)%text
+      call restart_exchange(restart, "verdict", self%total0)
+      call restart_exchange(restart, "verdict", self%largest_energy)
+      call restart_exchange(restart, "verdict", self%largest_drift)
+      call restart_exchange(restart, "verdict", self%reference)
+      call restart_exchange(restart, "verdict", self%dynamic_drift)
+      call restart_exchange(restart, "verdict", self%deepest)
+      call restart_exchange(restart, "verdict", self%deepest_time)
+      call restart_exchange(restart, "verdict", self%unconverged)
+      call restart_exchange(restart, "verdict", self%unconverged_time)
+      call restart_exchange(restart, "verdict", self%stand_off%largest)
+      call restart_exchange(restart, "verdict", self%stand_off%impulse)
+      call restart_exchange(restart, "verdict", self%stand_off%impulse_gap)
+      call restart_exchange(restart, "effort", self%n_newton)
+      call restart_exchange(restart, "effort", self%n_cut)
+      call restart_exchange(restart, "effort", self%n_warning)
+      call restart_exchange(restart, "effort", self%has_dynamics)
+      call restart_exchange(restart, "effort", self%n_guarded)
+      call restart_exchange(restart, "effort", self%n_held)
+      call restart_exchange(restart, "effort", self%most_held)
+      call restart_exchange(restart, "pair_largest", self%largest_force)
+      call exchange_texts(self, restart)
+   end subroutine verdict_exchange
+
+   !> Place and warnings, which are in the file only if there are some.
+   subroutine exchange_texts(self, restart)
+      type(verdict_t), intent(inout) :: self
+      type(restart_t), intent(inout) :: restart
+      type(string_t), allocatable :: place(:), warning(:)
+
+      allocate(place(merge(1, 0, allocated(self%place))))
+      if (size(place) > 0) place(1)%text = self%place
+      if (restart_offers(restart, "deepest_place", size(place) > 0)) then
+         call restart_list(restart, "deepest_place", place)
+         self%place = place(1)%text
       end if
-      if (allocated(error) .or. restart_size(restart, "warnings") < 0) return
-      call restart_get(restart, "warnings", text, error)
-      if (.not. allocated(error)) self%warnings = notes_t(size(text), text)
-   end subroutine verdict_load
+      allocate(warning(self%warnings%n))
+      if (size(warning) > 0) warning = self%warnings%item(:size(warning))
+      if (restart_offers(restart, "warnings", size(warning) > 0)) then
+         call restart_list(restart, "warnings", warning)
+         self%warnings = notes_t(size(warning), warning)
+      end if
+   end subroutine exchange_texts
 
 end module emcon_verdict_file

@@ -7,28 +7,25 @@ module emcon_stepper
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, err_interrupt, error_t, raise
-   use emcon_host, only : host_count, host_count_conditions, host_t
+   use emcon_host, only : host_t
    use emcon_host_check, only : host_check_scene
    use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : at_rest
-   use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
-      march_is_done, march_resume, march_t
-   use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
+      march_is_done, march_t
    use emcon_scene, only : scene_t
-   use emcon_text, only : notes_append, notes_t, string_t, to_text
+   use emcon_text, only : notes_append, notes_t, string_t
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_ties, only : ties_prepare
    use emcon_verdict, only : verdict_start, verdict_t, verdict_update
-   use emcon_verdict_file, only : verdict_load, verdict_save
    implicit none
    private
    public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &
       stepper_build, stepper_advance, stepper_is_done
-   public :: stepper_check_solids, stepper_close, stepper_fraction, stepper_save, stepper_load, &
-      contact_gaps, stepper_contact_seconds
+   public :: stepper_check_solids, stepper_close, stepper_fraction, contact_gaps, &
+      stepper_contact_seconds
 
    type :: stepper_t
       type(scene_t) :: scene
@@ -247,209 +244,5 @@ contains
       stepper_contact_seconds = self%march%system%contact_clock%seconds &
          + correction_seconds(self%march%newton%correction)
    end function stepper_contact_seconds
-
-   !> Put all that the next increment depends on into `restart`.
-   subroutine stepper_save(self, restart)
-      type(stepper_t), intent(in) :: self
-      type(restart_t), intent(inout) :: restart
-      integer :: n(2)
-
-      call restart_put(restart, "deck_line", self%source%line)
-      call restart_put(restart, "deck_file", self%source%file)
-      call restart_put(restart, "deck_number", self%source%number)
-      call restart_put(restart, "deck_file_name", self%source%file_name)
-      call restart_put(restart, "override", self%override)
-      call restart_put(restart, "is_lenient", [merge(1, 0, self%is_lenient)])
-      associate (state => self%march%state, ledger => self%march%ledger)
-         call restart_put(restart, "progress", [state%i_step, state%n_grid, state%grid_stride, &
-            state%n_easy, state%increment, state%n_before])
-         call restart_put(restart, "time", [state%start_time, state%time])
-         call restart_put(restart, "ledger", [ledger%kinetic, ledger%strain, ledger%potential, &
-            ledger%external_work, ledger%contact_work, ledger%total, ledger%momentum, &
-            ledger%angular, ledger%stabilization])
-         call restart_put(restart, "energy", state%energy)
-         call restart_put(restart, "potential", [state%potential])
-         call restart_put(restart, "u", state%u)
-         call restart_put(restart, "v", state%v)
-         call restart_put(restart, "u_start", state%u_start)
-         call restart_put(restart, "contact", state%contact)
-         call restart_put(restart, "reaction", state%reaction)
-         call restart_put(restart, "internal", state%internal)
-         call restart_put(restart, "lam", state%lam)
-         call restart_put(restart, "is_active", merge(1, 0, state%is_active))
-      end associate
-      call save_pairs(self, restart)
-      call verdict_save(self%verdict, restart)
-      n = host_count(self%given)
-      if (any(n > 0)) call restart_put(restart, "given", n)
-      n(1) = host_count_conditions(self%given)
-      if (n(1) > 0) call restart_put(restart, "given_conditions", n(:1))
-   end subroutine stepper_save
-
-   subroutine save_pairs(self, restart)
-      type(stepper_t), intent(in) :: self
-      type(restart_t), intent(inout) :: restart
-      integer :: k
-
-      associate (pairs => self%march%state%pairs)
-         call restart_put(restart, "pair_force", pairs%force)
-         call restart_put(restart, "pair_area", pairs%area)
-         call restart_put(restart, "pair_total", reshape([(pairs%total(k)%slave, &
-            pairs%total(k)%master, pairs%total(k)%length, k = 1, size(pairs%total))], &
-            [7, size(pairs%total)]))
-         call restart_put(restart, "pair_active", pairs%total%n_active)
-      end associate
-   end subroutine save_pairs
-
-   !> Build the model of a restart file and put it into the state that was saved. Forces and mass
-   !> are not in the file: `self` has to have them, given for the same deck.
-   subroutine stepper_load(self, restart, error)
-      type(stepper_t), intent(inout) :: self
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-      type(diagnostics_t) :: diagnostics
-      integer :: flag(1), progress(6)
-      integer, allocatable :: active(:)
-      real(wp) :: time(2)
-
-      call check_given(self, restart, error)
-      if (.not. allocated(error)) call load_source(self, restart, error)
-      if (allocated(error)) return
-      call restart_get(restart, "is_lenient", flag, error)
-      if (allocated(error)) return
-      self%is_lenient = flag(1) == 1
-      diagnostics%file_name = self%source%file_name
-      call stepper_read_source(self, diagnostics, error)
-      if (.not. allocated(error)) call stepper_build(self, error)
-      if (allocated(error)) return
-      call restart_get(restart, "progress", progress, error)
-      if (.not. allocated(error)) call restart_get(restart, "time", time, error)
-      if (.not. allocated(error)) call load_fields(self, restart, error)
-      if (.not. allocated(error)) call load_pairs(self, restart, error)
-      if (allocated(error)) return
-      allocate(active(size(self%march%state%is_active)))
-      call restart_get(restart, "is_active", active, error)
-      if (allocated(error)) return
-      associate (state => self%march%state)
-         state%is_active = active == 1
-         state%i_step = progress(1)
-         state%n_grid = progress(2)
-         state%grid_stride = progress(3)
-         state%n_easy = progress(4)
-         state%increment = progress(5)
-         state%n_before = progress(6)
-         state%start_time = time(1)
-         state%time = time(2)
-      end associate
-      call march_resume(self%march, self%scene, error)
-      if (.not. allocated(error)) call load_measured(self, restart, error)
-      if (.not. allocated(error)) call verdict_load(self%verdict, restart, error)
-   end subroutine stepper_load
-
-   !> What the last increment has measured: measured anew it would differ by roundings.
-   subroutine load_measured(self, restart, error)
-      type(stepper_t), intent(inout) :: self
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-      real(wp) :: value(10), potential(1)
-
-      associate (state => self%march%state)
-         call restart_get(restart, "internal", state%internal, error)
-         if (.not. allocated(error)) call restart_get(restart, "energy", state%energy, error)
-      end associate
-      if (.not. allocated(error)) call restart_get(restart, "potential", potential, error)
-      if (.not. allocated(error)) call restart_get(restart, "ledger", value, error)
-      if (allocated(error)) return
-      self%march%state%potential = potential(1)
-      self%march%ledger = ledger_t(kinetic=value(1), strain=value(2), potential=value(3), &
-         external_work=value(4), contact_work=value(5), total=value(6), momentum=value(7:8), &
-         angular=value(9), stabilization=value(10))
-   end subroutine load_measured
-
-   !> What the model of the file was given, `self` has been given too.
-   subroutine check_given(self, restart, error)
-      type(stepper_t), intent(in) :: self
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-      character(len=:), allocatable :: stored, own
-      integer :: n(3), present(3)
-
-      n = 0
-      if (restart_size(restart, "given") > 0) call restart_get(restart, "given", n(:2), error)
-      if (allocated(error)) return
-      if (restart_size(restart, "given_conditions") > 0) call restart_get(restart, &
-         "given_conditions", n(3:), error)
-      if (allocated(error)) return
-      present = [host_count(self%given), host_count_conditions(self%given)]
-      if (all(n == present)) return
-      call count_text(n, stored)
-      call count_text(present, own)
-      call raise(error, err_input, "the restart file is of a model with " // stored // &
-         ", not with " // own // ": they are not in the file, read the deck " // &
-         "and give them again before the restart file is loaded")
-   end subroutine check_given
-
-   pure subroutine count_text(n, text)
-      integer, intent(in) :: n(3)                !! forces, masses, conditions
-      character(len=:), allocatable, intent(out) :: text
-
-      text = to_text(n(1)) // " given forces and " // to_text(n(2)) // " masses"
-      if (n(3) > 0) text = text // " and " // to_text(n(3)) // " given conditions"
-   end subroutine count_text
-
-   subroutine load_source(self, restart, error)
-      type(stepper_t), intent(inout) :: self
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-
-      self%source = deck_source_t()
-      call restart_get(restart, "deck_line", self%source%line, error)
-      if (.not. allocated(error)) call restart_get(restart, "deck_file_name", &
-         self%source%file_name, error)
-      if (.not. allocated(error)) call restart_get(restart, "override", self%override, error)
-      if (allocated(error)) return
-      allocate(self%source%file(max(0, restart_size(restart, "deck_file"))))
-      allocate(self%source%number(max(0, restart_size(restart, "deck_number"))))
-      call restart_get(restart, "deck_file", self%source%file, error)
-      if (.not. allocated(error)) call restart_get(restart, "deck_number", self%source%number, &
-         error)
-   end subroutine load_source
-
-   subroutine load_fields(self, restart, error)
-      type(stepper_t), intent(inout) :: self
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-
-      associate (state => self%march%state)
-         call restart_get(restart, "u", state%u, error)
-         if (.not. allocated(error)) call restart_get(restart, "v", state%v, error)
-         if (.not. allocated(error)) call restart_get(restart, "u_start", state%u_start, error)
-         if (.not. allocated(error)) call restart_get(restart, "contact", state%contact, error)
-         if (.not. allocated(error)) call restart_get(restart, "reaction", state%reaction, error)
-         if (.not. allocated(error)) call restart_get(restart, "lam", state%lam, error)
-      end associate
-   end subroutine load_fields
-
-   subroutine load_pairs(self, restart, error)
-      type(stepper_t), intent(inout) :: self
-      type(restart_t), intent(in) :: restart
-      type(error_t), allocatable, intent(out) :: error
-      real(wp) :: total(7, size(self%march%state%pairs%total))
-      integer :: k
-
-      associate (pairs => self%march%state%pairs)
-         call restart_get(restart, "pair_force", pairs%force, error)
-         if (.not. allocated(error)) call restart_get(restart, "pair_area", pairs%area, error)
-         if (.not. allocated(error)) call restart_get(restart, "pair_total", total, error)
-         if (.not. allocated(error)) call restart_get(restart, "pair_active", &
-            pairs%total%n_active, error)
-         if (allocated(error)) return
-         do k = 1, size(pairs%total)
-            pairs%total(k)%slave = total(1:3, k)
-            pairs%total(k)%master = total(4:6, k)
-            pairs%total(k)%length = total(7, k)
-         end do
-      end associate
-   end subroutine load_pairs
 
 end module emcon_stepper

@@ -9,7 +9,8 @@ module emcon_stepper_conditions
    use emcon_prescribed, only : prescribed_motion
    use emcon_march, only : march_renumber
    use emcon_pose, only : instant_t
-   use emcon_restart, only : restart_get, restart_put, restart_size, restart_t
+   use emcon_restart_data, only : restart_check, restart_exchange, restart_offers, restart_size, &
+      restart_t
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
@@ -22,7 +23,7 @@ module emcon_stepper_conditions
    public :: stepper_find_load, stepper_set_load
    public :: stepper_set_prescribed, stepper_add_prescribed, stepper_prescribe, &
       stepper_remove_prescribed
-   public :: conditions_save, conditions_load
+   public :: conditions_exchange
 
 contains
 
@@ -205,61 +206,37 @@ contains
       call march_renumber(self%march, self%scene, ignored)
    end subroutine renumber
 
-   !> Put the conditions of the present step, and where in it the state is, into `restart`: what
-   !> `stepper_save` takes from the deck and its grid.
-   subroutine conditions_save(self, restart)
-      type(stepper_t), intent(in) :: self
-      type(restart_t), intent(inout) :: restart
-
-      if (.not. allocated(self%march%scheme)) return
-      associate (state => self%march%state, list => self%scene%step(self%march%state%i_step) &
-            %prescribed, load => self%scene%step(self%march%state%i_step)%load)
-         call restart_put(restart, "step_time", [state%step_time])
-         call restart_put(restart, "is_off_grid", [merge(1, 0, state%is_off_grid)])
-         call restart_put(restart, "prescribed_place", [list%node, list%dof, list%amplitude, &
-            merge(1, 0, list%is_frozen)])
-         call restart_put(restart, "prescribed_value", list%value)
-         call restart_put(restart, "load_value", [load%value, load%value_start])
-      end associate
-   end subroutine conditions_save
-
-   !> Take over what `conditions_save` has put into `restart`, after `stepper_load`. Nothing is done
-   !> for a restart file of the program, which changes no conditions.
-   subroutine conditions_load(self, restart, error)
+   !> Put the conditions of the present step, and where in it the state is, into `restart`, after
+   !> `stepper_save`; or take them over, after `stepper_load`. A restart file of the program, which
+   !> changes no conditions, has none.
+   subroutine conditions_exchange(self, restart, error)
       type(stepper_t), intent(inout) :: self
-      type(restart_t), intent(in) :: restart
+      type(restart_t), intent(inout) :: restart
       type(error_t), allocatable, intent(out) :: error
       type(prescribed_t), allocatable :: list(:)
-      real(wp), allocatable :: value(:)
-      real(wp) :: step_time(1)
-      integer, allocatable :: place(:, :), flat(:)
-      integer :: off(1), n
 
-      if (restart_size(restart, "step_time") < 0) return
+      if (.not. restart_offers(restart, "step_time", .true.)) return
       call stepper_check_open(self, error)
       if (allocated(error)) return
-      n = max(0, restart_size(restart, "prescribed_value"))
-      associate (step => self%scene%step(self%march%state%i_step), state => self%march%state)
-         allocate(list(n), flat(4*n), value(2*size(step%load)))
-         call restart_get(restart, "step_time", step_time, error)
-         if (.not. allocated(error)) call restart_get(restart, "is_off_grid", off, error)
-         if (.not. allocated(error)) call restart_get(restart, "load_value", value, error)
-         if (.not. allocated(error)) call restart_get(restart, "prescribed_place", flat, error)
-         if (.not. allocated(error)) call restart_get(restart, "prescribed_value", list%value, &
-            error)
-         if (allocated(error)) return
-         state%step_time = step_time(1)
-         state%is_off_grid = off(1) == 1
-         step%load%value = value(:size(step%load))
-         step%load%value_start = value(size(step%load) + 1:)
-         allocate(place, source=reshape(flat, [n, 4]))
-         list%node = place(:, 1)
-         list%dof = place(:, 2)
-         list%amplitude = place(:, 3)
-         list%is_frozen = place(:, 4) == 1
+      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+         if (restart%is_reading) then
+            allocate(list(max(0, restart_size(restart, "prescribed_value"))))
+         else
+            allocate(list, source=step%prescribed)
+         end if
+         call restart_exchange(restart, "step_time", state%step_time)
+         call restart_exchange(restart, "is_off_grid", state%is_off_grid)
+         call restart_exchange(restart, "load_value", step%load%value)
+         call restart_exchange(restart, "load_value", step%load%value_start)
       end associate
-      call renumber(self, list, error)
-   end subroutine conditions_load
+      call restart_exchange(restart, "prescribed_place", list%node)
+      call restart_exchange(restart, "prescribed_place", list%dof)
+      call restart_exchange(restart, "prescribed_place", list%amplitude)
+      call restart_exchange(restart, "prescribed_place", list%is_frozen)
+      call restart_exchange(restart, "prescribed_value", list%value)
+      call restart_check(restart, error)
+      if (restart%is_reading .and. .not. allocated(error)) call renumber(self, list, error)
+   end subroutine conditions_exchange
 
    !> The node of label `label`, and the condition on its degree of freedom `dof`; 0: it is free.
    subroutine find_prescribed(self, label, dof, node, k, error)

@@ -6,9 +6,10 @@ module test_host_deck
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t
-   use emcon_restart, only : restart_t
+   use emcon_restart_data, only : restart_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_is_done, &
-      stepper_load, stepper_read_text, stepper_save, stepper_t
+      stepper_read_text, stepper_t
+   use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_mass, &
       stepper_give_potential
    use emcon_text, only : string_t
@@ -147,7 +148,7 @@ contains
 
       !> Nothing given; then all but a force, all but the mass, all but the law.
       subroutine refuse(restart)
-         type(restart_t), intent(in) :: restart
+         type(restart_t), intent(inout) :: restart
          type(stepper_t) :: bare, part(3)
          type(error_t), allocatable :: raised
          integer :: i

@@ -12,13 +12,14 @@ module test_host_law
    use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_pose, only : pose_t
-   use emcon_restart, only : restart_t
+   use emcon_restart_data, only : restart_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_term, only : response_init, response_t, role_internal
    use emcon_term_registry, only : terms_solid
-   use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_load, &
-      stepper_read_source, stepper_save, stepper_t
+   use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_read_source, &
+      stepper_t
+   use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_given, only : stepper_give_law
    use emcon_stepper_query, only : query_evaluate, query_free, query_t
    use emcon_stress, only : nodal_stress

@@ -13,8 +13,9 @@ module test_results
       history_t
    use emcon_kinds, only : dp, wp
    use emcon_log, only : log_close, log_line, log_open, log_t
-   use emcon_restart, only : restart_get, restart_put, restart_read, restart_size, restart_t, &
-      restart_write
+   use emcon_restart, only : restart_read, restart_t, restart_write
+   use emcon_restart_data, only : restart_check, restart_exchange, restart_list, restart_offers, &
+      restart_rewind, restart_size
    use emcon_text, only : string_t, to_text
    use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
       vtkhdf_end_frame, vtkhdf_publish, vtkhdf_resume, vtkhdf_t, vtkhdf_write
@@ -282,37 +283,58 @@ contains
    subroutine test_restart(error)
       type(error_t), allocatable, intent(out) :: error
       type(restart_t) :: put, got
-      type(string_t), allocatable :: texts(:)
       character(len=:), allocatable :: base
-      real(wp) :: u(2, 3), u_back(2, 3)
-      integer :: numbers(3)
+      type(string_t), allocatable :: texts(:), texts_back(:)
+      real(wp) :: u(2, 3), u_back(2, 3), none(0)
+      integer, allocatable :: numbers(:), numbers_back(:)
+      logical :: flags(2)
 
       call scratch("restart", base)
       call random_number(u)
       u(1, 1) = tiny(1.0_wp)
       u(2, 2) = -huge(1.0_wp)
-      call restart_put(put, "u", u*0.5_wp)
-      call restart_put(put, "u", u)
-      call restart_put(put, "none", u(1, :0))
-      call restart_put(put, "numbers", [3, -1, huge(1)])
+      numbers = [3, -1, huge(1)]
       allocate(texts(2))
       texts(1)%text = " a "
       texts(2)%text = ""
-      call restart_put(put, "texts", texts)
+      flags = [.true., .false.]
+      call exchange(put, u, flags, numbers, texts)
+      call restart_exchange(put, "none", none)
       call restart_write(put, base // ".rst.h5", error)
       if (.not. allocated(error)) call restart_read(got, base // ".rst.h5", error)
-      if (.not. allocated(error)) call restart_get(got, "u", u_back, error)
-      if (.not. allocated(error)) call restart_get(got, "numbers", numbers, error)
-      if (.not. allocated(error)) call restart_get(got, "texts", texts, error)
       call remove_all(base)
       if (allocated(error)) return
+      flags = .not. flags
+      call exchange(got, u_back, flags, numbers_back, texts_back)
+      call restart_check(got, error)
+      if (allocated(error)) return
       call check_true(error, all(u_back == u), "u comes back bit for bit")
-      call check_equal(error, numbers, [3, -1, huge(1)], "numbers")
-      call check_equal(error, texts(1)%text, " a ", "first text")
-      call check_equal(error, texts(2)%text, "", "second text")
+      call check_true(error, flags(1) .and. .not. flags(2), "flags")
+      call check_equal(error, numbers_back, numbers, "numbers")
+      call check_equal(error, texts_back(1)%text, " a ", "first text")
+      call check_equal(error, texts_back(2)%text, "", "second text")
       call check_equal(error, restart_size(got, "none"), 0, "size of the empty list")
       call check_equal(error, restart_size(got, "nobody"), -1, "size of what is not there")
+      call check_true(error, restart_offers(put, "nobody", .true.), "a new one is written")
+      call check_true(error, .not. restart_offers(got, "nobody", .true.), "what is not there")
    end subroutine test_restart
+
+   !> Arrays in one piece, and one in three.
+   subroutine exchange(restart, u, flags, numbers, texts)
+      type(restart_t), intent(inout) :: restart
+      real(wp), intent(inout) :: u(2, 3)
+      logical, intent(inout) :: flags(2)
+      integer, allocatable, intent(inout) :: numbers(:)
+      type(string_t), allocatable, intent(inout) :: texts(:)
+
+      call restart_exchange(restart, "u", u)
+      call restart_exchange(restart, "parts", u(1, 1))
+      call restart_exchange(restart, "parts", u(2, :))
+      call restart_exchange(restart, "parts", u(:, :2))
+      call restart_exchange(restart, "flags", flags)
+      call restart_list(restart, "numbers", numbers)
+      call restart_list(restart, "texts", texts)
+   end subroutine exchange
 
    subroutine test_restart_misfit(error)
       type(error_t), allocatable, intent(out) :: error
@@ -321,12 +343,23 @@ contains
       real(wp) :: u(3)
       integer :: numbers(2)
 
-      call restart_put(restart, "u", [1.0_wp, 2.0_wp])
-      call restart_get(restart, "v", u, raised)
+      u = [1.0_wp, 2.0_wp, 3.0_wp]
+      call restart_exchange(restart, "u", u(:2))
+      call restart_rewind(restart)
+      call restart_exchange(restart, "v", u)
+      call restart_check(restart, raised)
       call check_error(error, raised, err_file, "missing", "unknown name")
-      call restart_get(restart, "u", u, raised)
-      call check_error(error, raised, err_file, "2 values, not 3", "wrong size")
-      call restart_get(restart, "u", numbers, raised)
+      call restart_rewind(restart)
+      call restart_exchange(restart, "u", u)
+      call restart_check(restart, raised)
+      call check_error(error, raised, err_file, "2 values, not 3", "too few values")
+      call restart_rewind(restart)
+      call restart_exchange(restart, "u", u(1))
+      call restart_check(restart, raised)
+      call check_error(error, raised, err_file, "2 values, not 1", "a value that is left")
+      call restart_rewind(restart)
+      call restart_exchange(restart, "u", numbers)
+      call restart_check(restart, raised)
       call check_error(error, raised, err_file, "type", "wrong type")
    end subroutine test_restart_misfit
 

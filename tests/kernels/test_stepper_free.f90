@@ -6,10 +6,10 @@ module test_stepper_free
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t
    use emcon_numbering, only : spread_dependent
-   use emcon_restart, only : restart_t
+   use emcon_restart_data, only : restart_rewind, restart_t
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_is_done, stepper_t
-   use emcon_stepper_conditions, only : conditions_load, conditions_save, &
+   use emcon_stepper_conditions, only : conditions_exchange, &
       stepper_add_prescribed, stepper_find_load, stepper_remove_prescribed, &
       stepper_set_load, stepper_set_prescribed
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
@@ -587,15 +587,18 @@ contains
       if (.not. allocated(error)) call stepper_set_load(stepper, 1, -2.0_wp, error)
       if (.not. allocated(error)) call stepper_step(stepper, 0.3_wp*drop_h, increment, error)
       if (allocated(error)) return
-      call conditions_save(stepper, restart)
+      call conditions_exchange(stepper, restart, error)
+      if (allocated(error)) return
       call stepper_snapshot(stepper, snapshot)
       snapshot%state%is_off_grid = .false.
       snapshot%state%step_time = 0.0_wp
       call stepper_restore(other, snapshot, error)
-      if (.not. allocated(error)) call conditions_load(other, none, error)
+      call restart_rewind(none)
+      if (.not. allocated(error)) call conditions_exchange(other, none, error)
       if (allocated(error)) return
       call check_equal(error, size(other%scene%step(1)%prescribed), 10, "nothing saved")
-      if (.not. allocated(error)) call conditions_load(other, restart, error)
+      call restart_rewind(restart)
+      if (.not. allocated(error)) call conditions_exchange(other, restart, error)
       do k = 1, 8
          if (.not. allocated(error)) call stepper_step(stepper, drop_h, increment, error)
          if (.not. allocated(error)) call stepper_step(other, drop_h, increment, error)

@@ -1,0 +1,190 @@
+!> A stepper in a restart file: the deck, the state, and what its last increment has measured.
+!>
+!> What is exchanged is saved, or loaded; each array is named once, and keeps its bits.
+module emcon_stepper_file
+   use emcon_deck_source, only : deck_source_t
+   use emcon_diagnostics, only : diagnostics_t
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_host, only : host_count, host_count_conditions
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_t
+   use emcon_march, only : march_resume
+   use emcon_pair_record, only : pair_record_t
+   use emcon_restart_data, only : restart_check, restart_exchange, restart_list, restart_offers, &
+      restart_rewind, restart_t
+   use emcon_state, only : state_t
+   use emcon_stepper, only : stepper_build, stepper_read_source, stepper_t
+   use emcon_text, only : to_text
+   use emcon_verdict_file, only : verdict_exchange
+   implicit none
+   private
+   public :: stepper_save, stepper_load
+
+contains
+
+   !> Put all that the next increment depends on into `restart`.
+   subroutine stepper_save(self, restart)
+      type(stepper_t), intent(inout) :: self         !! as it was
+      type(restart_t), intent(out) :: restart
+      integer :: n(3)
+
+      call exchange_source(self, restart)
+      call exchange_state(self, restart)
+      n = given_counts(self)
+      call exchange_given(restart, n)
+   end subroutine stepper_save
+
+   !> Build the model of a restart file and put it into the state that was saved. Forces and mass
+   !> are not in the file: `self` has to have them, given for the same deck.
+   subroutine stepper_load(self, restart, error)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(inout) :: restart      !! as it was
+      type(error_t), allocatable, intent(out) :: error
+      type(diagnostics_t) :: diagnostics
+
+      call restart_rewind(restart)
+      call check_given(self, restart, error)
+      if (allocated(error)) return
+      self%source = deck_source_t()
+      call exchange_source(self, restart)
+      call restart_check(restart, error)
+      if (allocated(error)) return
+      diagnostics%file_name = self%source%file_name
+      call stepper_read_source(self, diagnostics, error)
+      if (.not. allocated(error)) call stepper_build(self, error)
+      if (allocated(error)) return
+      call exchange_state(self, restart)
+      call restart_check(restart, error)
+      if (.not. allocated(error)) call march_resume(self%march, self%scene, error)
+      if (allocated(error)) return
+      ! What the last increment has measured, measured anew, differs by roundings.
+      call restart_rewind(restart)
+      call exchange_state(self, restart)
+   end subroutine stepper_load
+
+   subroutine exchange_source(self, restart)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(inout) :: restart
+
+      call restart_list(restart, "deck_line", self%source%line)
+      call restart_list(restart, "deck_file", self%source%file)
+      call restart_list(restart, "deck_number", self%source%number)
+      call restart_list(restart, "deck_file_name", self%source%file_name)
+      call restart_list(restart, "override", self%override)
+      call restart_exchange(restart, "is_lenient", self%is_lenient)
+   end subroutine exchange_source
+
+   subroutine exchange_state(self, restart)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(inout) :: restart
+
+      call exchange_progress(self%march%state, restart)
+      call exchange_ledger(self%march%ledger, restart)
+      associate (state => self%march%state)
+         call restart_exchange(restart, "energy", state%energy)
+         call restart_exchange(restart, "potential", state%potential)
+         call restart_exchange(restart, "u", state%u)
+         call restart_exchange(restart, "v", state%v)
+         call restart_exchange(restart, "u_start", state%u_start)
+         call restart_exchange(restart, "contact", state%contact)
+         call restart_exchange(restart, "reaction", state%reaction)
+         call restart_exchange(restart, "internal", state%internal)
+         call restart_exchange(restart, "lam", state%lam)
+         call restart_exchange(restart, "is_active", state%is_active)
+      end associate
+      call exchange_pairs(self%march%state%pairs, restart)
+      call verdict_exchange(self%verdict, restart)
+   end subroutine exchange_state
+
+   subroutine exchange_progress(state, restart)
+      type(state_t), intent(inout) :: state
+      type(restart_t), intent(inout) :: restart
+
+      call restart_exchange(restart, "progress", state%i_step)
+      call restart_exchange(restart, "progress", state%n_grid)
+      call restart_exchange(restart, "progress", state%grid_stride)
+      call restart_exchange(restart, "progress", state%n_easy)
+      call restart_exchange(restart, "progress", state%increment)
+      call restart_exchange(restart, "progress", state%n_before)
+      call restart_exchange(restart, "time", state%start_time)
+      call restart_exchange(restart, "time", state%time)
+   end subroutine exchange_progress
+
+   subroutine exchange_ledger(ledger, restart)
+      type(ledger_t), intent(inout) :: ledger
+      type(restart_t), intent(inout) :: restart
+
+      call restart_exchange(restart, "ledger", ledger%kinetic)
+      call restart_exchange(restart, "ledger", ledger%strain)
+      call restart_exchange(restart, "ledger", ledger%potential)
+      call restart_exchange(restart, "ledger", ledger%external_work)
+      call restart_exchange(restart, "ledger", ledger%contact_work)
+      call restart_exchange(restart, "ledger", ledger%total)
+      call restart_exchange(restart, "ledger", ledger%momentum)
+      call restart_exchange(restart, "ledger", ledger%angular)
+      call restart_exchange(restart, "ledger", ledger%stabilization)
+   end subroutine exchange_ledger
+
+   subroutine exchange_pairs(pairs, restart)
+      type(pair_record_t), intent(inout) :: pairs
+      type(restart_t), intent(inout) :: restart
+      real(wp) :: none(0)
+      integer :: k
+
+      call restart_exchange(restart, "pair_force", pairs%force)
+      call restart_exchange(restart, "pair_area", pairs%area)
+      call restart_exchange(restart, "pair_total", none)     ! also where there are no pairs
+      do k = 1, size(pairs%total)
+         call restart_exchange(restart, "pair_total", pairs%total(k)%slave)
+         call restart_exchange(restart, "pair_total", pairs%total(k)%master)
+         call restart_exchange(restart, "pair_total", pairs%total(k)%length)
+      end do
+      call restart_exchange(restart, "pair_active", pairs%total%n_active)
+   end subroutine exchange_pairs
+
+   !> How many forces, masses and conditions a model was given; the file says what is not 0.
+   subroutine exchange_given(restart, n)
+      type(restart_t), intent(inout) :: restart
+      integer, intent(inout) :: n(3)
+
+      if (restart_offers(restart, "given", any(n(:2) > 0))) call restart_exchange(restart, &
+         "given", n(:2))
+      if (restart_offers(restart, "given_conditions", n(3) > 0)) call restart_exchange(restart, &
+         "given_conditions", n(3))
+   end subroutine exchange_given
+
+   pure function given_counts(self) result(n)
+      type(stepper_t), intent(in) :: self
+      integer :: n(3)
+
+      n = [host_count(self%given), host_count_conditions(self%given)]
+   end function given_counts
+
+   !> What the model of the file was given, `self` has been given too.
+   subroutine check_given(self, restart, error)
+      type(stepper_t), intent(in) :: self
+      type(restart_t), intent(inout) :: restart
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: stored, own
+      integer :: n(3)
+
+      n = 0
+      call exchange_given(restart, n)
+      call restart_check(restart, error)
+      if (allocated(error) .or. all(n == given_counts(self))) return
+      call count_text(n, stored)
+      call count_text(given_counts(self), own)
+      call raise(error, err_input, "the restart file is of a model with " // stored // &
+         ", not with " // own // ": they are not in the file, read the deck " // &
+         "and give them again before the restart file is loaded")
+   end subroutine check_given
+
+   pure subroutine count_text(n, text)
+      integer, intent(in) :: n(3)                !! forces, masses, conditions
+      character(len=:), allocatable, intent(out) :: text
+
+      text = to_text(n(1)) // " given forces and " // to_text(n(2)) // " masses"
+      if (n(3) > 0) text = text // " and " // to_text(n(3)) // " given conditions"
+   end subroutine count_text
+
+end module emcon_stepper_file
