@@ -7,7 +7,7 @@
 !> told; with STABILIZE a motion that no load works on may be. Source: docs/theory.md, section 6.
 module emcon_holding
    use emcon_constraints, only : constraint_set_t
-   use emcon_first_touch, only : touch_time
+   use emcon_first_touch_plane, only : touch_time
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_holding_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, gaps_nearest, &
       gaps_next_to_close, gaps_that_can_act, in_the_way

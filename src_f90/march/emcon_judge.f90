@@ -1,14 +1,13 @@
 !> The judge: after each step, is a body inside another, whatever the constraints say?
 !>
-!> All pieces that contact pairs name are looked at both ways: nodes of either against the outline
-!> of the other, and what lies of edges between their crossings with the other, also of a piece with
-!> itself; at the end of the step and, where it moves by much, on the straight way there. While
-!> boxes are apart nothing is done. Source: docs/theory.md, section 4.11.
+!> All pieces that contact pairs name are looked at both ways, at the end of the step and, where
+!> they move by much, on the straight way there. While boxes are apart nothing is done. Source:
+!> docs/theory.md, section 4.11.
 module emcon_judge
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp
-   use emcon_outline, only : outline_init, outline_meets, outline_t
-   use emcon_overlap, only : crossing_find, length_of, nearest_depth, nearest_t, nearest_update
+   use emcon_look_plane, only : look_init, look_longest, look_one_way, look_place, look_t, overlap_t
+   use emcon_outline_plane, only : outline_meets
    use emcon_scene, only : scene_t
    implicit none
    private
@@ -19,44 +18,15 @@ module emcon_judge
    real(wp), parameter :: look_motion = 0.5_wp
    !> Looks at one step at most.
    integer, parameter :: most_looks = 64
-   !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
-   !> element behind it, is the straight way past a corner.
-   real(wp), parameter :: passing = 0.1_wp, passing_thin = 0.2_wp
-   !> Crossings of one edge that are told apart.
-   integer, parameter :: most_crossings = 8
-
-   !> The deepest overlap that was found.
-   type :: overlap_t
-      real(wp) :: depth = 0.0_wp                 !! per length of the edge; 0: none
-      integer :: node = 0                        !! that is behind, or the nearest on its edge
-      integer :: edge(2) = 0                     !! the nodes of the edge that it is behind
-   end type overlap_t
-
-   !> Where a piece is in a step.
-   type :: extent_t
-      real(wp) :: low(2) = 0.0_wp, high(2) = 0.0_wp              !! box over the step [L]
-      real(wp) :: least(2) = 0.0_wp, most(2) = 0.0_wp            !! of the motions of its nodes [L]
-      real(wp) :: thinnest = 0.0_wp                              !! element at the outline [L]
-      real(wp) :: longest = 0.0_wp                               !! edge [L]
-   end type extent_t
-
-   !> Where an edge crosses others, in order: at parts `share` of it, from 0 before the first to 1
-   !> after the last.
-   type :: crossings_t
-      integer :: n = 0
-      real(wp) :: share(0:most_crossings + 1) = 0.0_wp
-      logical :: goes_in(most_crossings) = .false.
-      integer :: edge(most_crossings) = 0        !! that is crossed
-   end type crossings_t
 
    type :: judge_t
-      type(outline_t) :: outline
-      type(extent_t), allocatable :: extent(:)   !! (n_piece) of the step
-      real(wp), allocatable :: u(:, :)           !! (n_dim, n_node) displacement at a look [L]
-      real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges at a look [L]
-      integer, allocatable :: near(:), found(:), around(:)     !! work space for lists of edges
-      integer, allocatable :: other(:)           !! and of pieces
-      logical :: is_passing = .false.            !! at a look on the way
+      type(look_t) :: look
+      ! Where each piece is in a step:
+      real(wp), allocatable :: low(:, :), high(:, :)     !! (n_dim, n_piece) box over the step [L]
+      real(wp), allocatable :: least(:, :), most(:, :)   !! (n_dim, n_piece) motions of nodes [L]
+      real(wp), allocatable :: thinnest(:)       !! (n_piece) element at the outline [L]
+      real(wp), allocatable :: longest(:)        !! (n_piece) edge [L]
+      integer, allocatable :: other(:)           !! (n_piece) work space
    end type judge_t
 
 contains
@@ -65,14 +35,13 @@ contains
    subroutine judge_init(self, scene)
       type(judge_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
-      integer :: n
 
-      call outline_init(self%outline, scene)
-      n = size(self%outline%edge, 2)
-      allocate(self%extent(self%outline%n_piece), self%near(n), self%found(n), self%around(n))
-      allocate(self%other(self%outline%n_piece))
-      allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), source=0.0_wp)
-      allocate(self%u(scene%n_dim, size(scene%x, 2)), source=0.0_wp)
+      call look_init(self%look, scene)
+      associate (n => self%look%outline%n_piece)
+         allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), &
+            self%least(scene%n_dim, n), self%most(scene%n_dim, n))
+         allocate(self%thinnest(n), self%longest(n), self%other(n))
+      end associate
    end subroutine judge_init
 
    !> The deepest overlap in the step from `u0` by `du`.
@@ -83,23 +52,19 @@ contains
       type(box_tree_t) :: tree
       integer :: p, i, n
 
-      do p = 1, self%outline%n_piece
+      do p = 1, self%look%outline%n_piece
          call measure(self, p, x, u0, du)
       end do
-      associate (extent => self%extent)
-         call box_tree_init(tree, reshape([(extent(p)%low, p = 1, size(extent))], &
-            [2, size(extent)]), reshape([(extent(p)%high, p = 1, size(extent))], &
-            [2, size(extent)]))
-         do p = 1, self%outline%n_piece
-            n = 0
-            call box_tree_find(tree, extent(p)%low, extent(p)%high, 0.0_wp, self%other, n)
-            do i = 1, n
-               if (self%other(i) < p) cycle
-               if (.not. outline_meets(self%outline, p, self%other(i))) cycle
-               call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
-            end do
+      call box_tree_init(tree, self%low, self%high)
+      do p = 1, self%look%outline%n_piece
+         n = 0
+         call box_tree_find(tree, self%low(:, p), self%high(:, p), 0.0_wp, self%other, n)
+         do i = 1, n
+            if (self%other(i) < p) cycle
+            if (.not. outline_meets(self%look%outline, p, self%other(i))) cycle
+            call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
          end do
-      end associate
+      end do
    end subroutine judge_step
 
    !> Look at two pieces, or one and itself, as often as the step needs.
@@ -108,15 +73,18 @@ contains
       integer, intent(in) :: p, q
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(overlap_t), intent(inout) :: overlap
+      real(wp) :: reach, share
       integer :: k, n
 
-      n = count_looks(self%extent(p), self%extent(q))
+      reach = max(self%longest(p), self%longest(q))
+      n = count_looks(self, p, q)
       do k = 1, n
-         self%is_passing = k < n
-         call place_edges(self, p, x, u0, du, real(k, wp)/real(n, wp))
-         if (q /= p) call place_edges(self, q, x, u0, du, real(k, wp)/real(n, wp))
-         call look_one_way(self, p, q, x, overlap)
-         if (q /= p) call look_one_way(self, q, p, x, overlap)
+         share = real(k, wp)/real(n, wp)
+         self%look%is_passing = k < n
+         call look_place(self%look, p, x, u0, du, share)
+         if (q /= p) call look_place(self%look, q, x, u0, du, share)
+         call look_one_way(self%look, p, q, x, reach, overlap)
+         if (q /= p) call look_one_way(self%look, q, p, x, reach, overlap)
       end do
    end subroutine judge_pieces
 
@@ -125,319 +93,43 @@ contains
       type(judge_t), intent(inout) :: self
       integer, intent(in) :: p
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp) :: here(2), length, way(2)
+      real(wp) :: here(size(x, 1))
       integer :: e, k
 
-      associate (extent => self%extent(p), edge => self%outline%edge)
-         extent%low = huge(1.0_wp)
-         extent%high = -huge(1.0_wp)
-         extent%least = huge(1.0_wp)
-         extent%most = -huge(1.0_wp)
-         extent%thinnest = huge(1.0_wp)
-         extent%longest = 0.0_wp
-         do e = self%outline%start(p), self%outline%start(p + 1) - 1
-            do k = 1, 2
+      self%low(:, p) = huge(1.0_wp)
+      self%high(:, p) = -huge(1.0_wp)
+      self%least(:, p) = huge(1.0_wp)
+      self%most(:, p) = -huge(1.0_wp)
+      associate (edge => self%look%outline%edge, first => self%look%outline%start(p), &
+            last => self%look%outline%start(p + 1) - 1)
+         do e = first, last
+            do k = 1, size(edge, 1)
                associate (move => du(:, edge(k, e)))
                   here = x(:, edge(k, e)) + u0(:, edge(k, e))
-                  extent%low = min(extent%low, here, here + move)
-                  extent%high = max(extent%high, here, here + move)
-                  extent%least = min(extent%least, move)
-                  extent%most = max(extent%most, move)
+                  self%low(:, p) = min(self%low(:, p), here, here + move)
+                  self%high(:, p) = max(self%high(:, p), here, here + move)
+                  self%least(:, p) = min(self%least(:, p), move)
+                  self%most(:, p) = max(self%most(:, p), move)
                end associate
             end do
-            way = between(x, u0, edge(1, e), edge(2, e))
-            length = dot_product(way, way)
-            extent%thinnest = min(extent%thinnest, self%outline%thickness(e))
-            extent%longest = max(extent%longest, length)
          end do
-         extent%longest = sqrt(extent%longest)
+         self%thinnest(p) = minval(self%look%outline%thickness(first:last))
       end associate
+      self%longest(p) = look_longest(self%look, p, x, u0)
    end subroutine measure
 
-   !> The way from node `i` to node `j` at x + u, differences first.
-   pure function between(x, u, i, j) result(way)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: i, j
-      real(wp) :: way(2)
-
-      way = (x(:, j) - x(:, i)) + (u(:, j) - u(:, i))
-   end function between
-
    !> Looks at the step for two pieces, so that they move by little in between.
-   pure integer function count_looks(one, other) result(n)
-      type(extent_t), intent(in) :: one, other
-      real(wp) :: motion
+   pure integer function count_looks(self, p, q) result(n)
+      type(judge_t), intent(in) :: self
+      integer, intent(in) :: p, q
+      real(wp) :: way(size(self%most, 1)), motion
 
       n = 1
-      motion = length_of(max(one%most - other%least, other%most - one%least))
-      associate (least => look_motion*min(one%thinnest, other%thinnest))
+      way = max(self%most(:, p) - self%least(:, q), self%most(:, q) - self%least(:, p))
+      motion = sqrt(dot_product(way, way))
+      associate (least => look_motion*min(self%thinnest(p), self%thinnest(q)))
          if (motion > least) n = ceiling(min(real(most_looks, wp), motion/least))
       end associate
    end function count_looks
-
-   !> Displacements of the nodes of piece `p`, and the boxes of its edges.
-   pure subroutine place_edges(self, p, x, u0, du, share)
-      type(judge_t), intent(inout) :: self
-      integer, intent(in) :: p
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: share
-      real(wp) :: a(2), b(2)
-      integer :: e
-
-      do e = self%outline%start(p), self%outline%start(p + 1) - 1
-         associate (i => self%outline%edge(1, e), j => self%outline%edge(2, e))
-            self%u(:, i) = u0(:, i) + share*du(:, i)
-            self%u(:, j) = u0(:, j) + share*du(:, j)
-            a = x(:, i) + self%u(:, i)
-            b = x(:, j) + self%u(:, j)
-         end associate
-         self%low(:, e) = min(a, b)
-         self%high(:, e) = max(a, b)
-      end do
-   end subroutine place_edges
-
-   !> Nodes and parts of edges of piece `p` in piece `q`.
-   subroutine look_one_way(self, p, q, x, overlap)
-      type(judge_t), intent(inout) :: self
-      integer, intent(in) :: p, q
-      real(wp), intent(in), contiguous :: x(:, :)
-      type(overlap_t), intent(inout) :: overlap
-      type(box_tree_t) :: tree
-      real(wp) :: low(2, 2), high(2, 2), reach
-      integer :: e, n_near, n_found
-
-      reach = max(self%extent(p)%longest, self%extent(q)%longest)
-      call box_of(self, p, low(:, 1), high(:, 1))
-      call box_of(self, q, low(:, 2), high(:, 2))
-      n_near = 0
-      do e = self%outline%start(q), self%outline%start(q + 1) - 1
-         if (any(self%low(:, e) > high(:, 1) + reach) &
-            .or. any(self%high(:, e) < low(:, 1) - reach)) cycle
-         n_near = n_near + 1
-         self%near(n_near) = e
-      end do
-      if (n_near == 0) return
-      call box_tree_init(tree, self%low(:, self%near(:n_near)), self%high(:, self%near(:n_near)))
-      do e = self%outline%start(p), self%outline%start(p + 1) - 1
-         if (any(self%low(:, e) > high(:, 2)) .or. any(self%high(:, e) < low(:, 2))) cycle
-         n_found = 0
-         call box_tree_find(tree, self%low(:, e), self%high(:, e), merge(0.0_wp, reach, p == q), &
-            self%found, n_found)
-         if (n_found == 0) cycle
-         if (p /= q) then
-            call try_node(self, x, e, 1, self%near(self%found(:n_found)), reach, overlap)
-            if (self%outline%link(2, e) == 0) call try_node(self, x, e, 2, &
-               self%near(self%found(:n_found)), reach, overlap)
-         end if
-         call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, reach, &
-            overlap)
-      end do
-   end subroutine look_one_way
-
-   !> The box of piece `p` at the present look.
-   pure subroutine box_of(self, p, low, high)
-      type(judge_t), intent(in) :: self
-      integer, intent(in) :: p
-      real(wp), intent(out) :: low(2), high(2)
-
-      associate (first => self%outline%start(p), last => self%outline%start(p + 1) - 1)
-         low = minval(self%low(:, first:last), dim=2)
-         high = maxval(self%high(:, first:last), dim=2)
-      end associate
-   end subroutine box_of
-
-   !> Is the node at an end of edge `e` behind the outline of which `other` are the edges within
-   !> `reach`?
-   pure subroutine try_node(self, x, e, side, other, reach, overlap)
-      type(judge_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
-      integer, intent(in) :: e, side             !! 1: first node, 2: last one
-      integer, intent(in) :: other(:)
-      real(wp), intent(in) :: reach              !! [L]
-      type(overlap_t), intent(inout) :: overlap
-      type(nearest_t) :: nearest
-      integer :: k
-
-      associate (edge => self%outline%edge, node => self%outline%edge(side, e))
-         if (any(self%outline%place(:, other) == self%outline%place(side, e))) return
-         if (self%outline%is_buried(node) .or. any(other == self%outline%host(node))) return
-         do k = 1, size(other)
-            call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
-               between(x, self%u, edge(1, other(k)), edge(2, other(k))))
-         end do
-         if (nearest%square <= reach**2) call take_deeper(self, x, nearest, node, overlap)
-      end associate
-   end subroutine try_node
-
-   !> Is a part of edge `e`, between its crossings with `other`, inside? Looked at is its middle,
-   !> and of a piece in itself the node where it ends: the nearest edge is looked for along the
-   !> outline from the crossings, past what lies behind the piece's own surface. Neighbours do not
-   !> cross.
-   pure subroutine try_edge(self, x, e, other, is_own, reach, overlap)
-      type(judge_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
-      integer, intent(in) :: e
-      integer, intent(in) :: other(:)
-      logical, intent(in) :: is_own              !! edges of the same piece
-      real(wp), intent(in) :: reach              !! [L]
-      type(overlap_t), intent(inout) :: overlap
-      type(crossings_t) :: crossings
-      integer :: k, n_around
-
-      call find_crossings(self, x, e, other, crossings)
-      if (crossings%n == 0) return
-      if (is_own) call find_around(self, e, crossings%edge(:crossings%n), reach, n_around)
-      do k = 0, crossings%n
-         if (.not. is_inside(k)) cycle
-         associate (middle => 0.5_wp*(crossings%share(k) + crossings%share(k + 1)))
-            if (.not. is_own) then
-               call try_place(self, x, e, middle, other, overlap)
-               cycle
-            end if
-            associate (around => self%around(:n_around))
-               call try_place(self, x, e, middle, around, overlap)
-               if (k == 0) call try_place(self, x, e, 0.0_wp, around, overlap)
-               if (k == crossings%n) call try_place(self, x, e, 1.0_wp, around, overlap)
-            end associate
-         end associate
-      end do
-
-   contains
-
-      !> Is the part after crossing `k` inside?
-      pure logical function is_inside(k)
-         integer, intent(in) :: k
-
-         is_inside = .false.
-         if (k > 0) is_inside = crossings%goes_in(k)
-         if (k < crossings%n) is_inside = is_inside .or. .not. crossings%goes_in(k + 1)
-      end function is_inside
-
-   end subroutine try_edge
-
-   !> The edges `crossed`, and those along the outline on either side of them within `reach` of edge
-   !> `e`: `self%around`.
-   pure subroutine find_around(self, e, crossed, reach, n)
-      type(judge_t), intent(inout) :: self
-      integer, intent(in) :: e, crossed(:)
-      real(wp), intent(in) :: reach              !! [L]
-      integer, intent(out) :: n
-      integer :: f, k, side
-
-      n = 0
-      do k = 1, size(crossed)
-         do side = 1, 2
-            f = crossed(k)
-            if (side == 2) f = self%outline%link(side, f)
-            do while (f > 0)
-               if (any(self%around(:n) == f) .or. are_neighbours(self, e, f)) exit
-               if (any(self%low(:, f) > self%high(:, e) + reach) &
-                  .or. any(self%high(:, f) < self%low(:, e) - reach)) exit
-               n = n + 1
-               self%around(n) = f
-               f = self%outline%link(side, f)
-            end do
-         end do
-      end do
-   end subroutine find_around
-
-   !> Where edge `e` crosses `other` edges.
-   pure subroutine find_crossings(self, x, e, other, crossings)
-      type(judge_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
-      integer, intent(in) :: e
-      integer, intent(in) :: other(:)
-      type(crossings_t), intent(out) :: crossings
-      real(wp) :: new
-      logical :: crosses, enters
-      integer :: k, i
-
-      do k = 1, size(other)
-         if (are_neighbours(self, e, other(k))) cycle
-         associate (a => self%outline%edge(:, e), b => self%outline%edge(:, other(k)))
-            call crossing_find(between(x, self%u, a(1), a(2)), reshape([ &
-               between(x, self%u, a(1), b(1)), between(x, self%u, a(1), b(2))], [2, 2]), &
-               crosses, new, enters)
-         end associate
-         if (.not. crosses .or. crossings%n == most_crossings) cycle
-         associate (n => crossings%n, share => crossings%share, goes_in => crossings%goes_in, &
-               edge => crossings%edge)
-            i = count(share(1:n) <= new)
-            share(i + 2:n + 1) = share(i + 1:n)
-            goes_in(i + 2:n + 1) = goes_in(i + 1:n)
-            edge(i + 2:n + 1) = edge(i + 1:n)
-            share(i + 1) = new
-            goes_in(i + 1) = enters
-            edge(i + 1) = other(k)
-            n = n + 1
-         end associate
-      end do
-      crossings%share(crossings%n + 1) = 1.0_wp
-   end subroutine find_crossings
-
-   !> Do edges `e` and `f` meet in a node, at a joint, or where a tied piece ends on one of them?
-   pure logical function are_neighbours(self, e, f)
-      type(judge_t), intent(in) :: self
-      integer, intent(in) :: e, f
-
-      associate (a => self%outline%place(:, e), b => self%outline%place(:, f))
-         are_neighbours = any(a == b(1)) .or. any(a == b(2))
-      end associate
-      associate (edge => self%outline%edge, host => self%outline%host)
-         are_neighbours = are_neighbours .or. any(host(edge(:, e)) == f) &
-            .or. any(host(edge(:, f)) == e)
-      end associate
-   end function are_neighbours
-
-   !> How deep is the place `share` along edge `e` in `other` edges, that are not its neighbours?
-   pure subroutine try_place(self, x, e, share, other, overlap)
-      type(judge_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
-      integer, intent(in) :: e
-      real(wp), intent(in) :: share
-      integer, intent(in) :: other(:)
-      type(overlap_t), intent(inout) :: overlap
-      type(nearest_t) :: nearest
-      integer :: k
-
-      associate (a => self%outline%edge(:, e))
-         do k = 1, size(other)
-            if (are_neighbours(self, e, other(k))) cycle
-            associate (b => self%outline%edge(:, other(k)))
-               call nearest_update(nearest, other(k), between(x, self%u, b(1), a(1)) &
-                  + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
-            end associate
-         end do
-         call take_deeper(self, x, nearest, a(merge(1, 2, share < 0.5_wp)), overlap)
-      end associate
-   end subroutine try_place
-
-   !> Keep what is behind the edge `nearest` if it is the deepest so far. At the end of an outline
-   !> that is open there is no behind.
-   pure subroutine take_deeper(self, x, nearest, node, overlap)
-      type(judge_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :)
-      type(nearest_t), intent(in) :: nearest
-      integer, intent(in) :: node
-      type(overlap_t), intent(inout) :: overlap
-      real(wp) :: depth, length, next_along(2)
-      integer :: next
-
-      if (nearest%edge == 0) return
-      associate (edge => self%outline%edge)
-         next_along = nearest%along
-         if (nearest%side > 0) then
-            next = self%outline%link(nearest%side, nearest%edge)
-            if (next == 0) return
-            next_along = between(x, self%u, edge(1, next), edge(2, next))
-         end if
-         depth = nearest_depth(nearest, next_along)
-         length = length_of(nearest%along)
-         if (.not. depth > overlap%depth*length) return
-         if (self%is_passing .and. depth < min(passing*length, &
-            passing_thin*self%outline%thickness(nearest%edge))) return
-         overlap = overlap_t(depth/length, node, edge(:, nearest%edge))
-      end associate
-   end subroutine take_deeper
 
 end module emcon_judge

@@ -1,11 +1,12 @@
 !> The energy and momentum ledger: what the system holds and what was done to it.
 module emcon_ledger
    use emcon_kinds, only : wp
+   use emcon_moment_plane, only : moment_of
    use emcon_state, only : state_t
    use emcon_system, only : mass_times, system_t
    implicit none
    private
-   public :: ledger_t, ledger_measure, body_momenta
+   public :: ledger_t, ledger_init, ledger_measure, body_momenta
 
    !> total = kinetic + strain + potential - external_work stays constant up to the work of contact:
    !> docs/theory.md, eqs. (23) and (24).
@@ -18,11 +19,19 @@ module emcon_ledger
       !> Of what STABILIZE bears: forces that are left on bodies that nothing holds, since the start
       real(wp) :: stabilization = 0.0_wp
       real(wp) :: total = 0.0_wp
-      real(wp) :: momentum(2) = 0.0_wp           !! [M L/T]
+      real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]
       real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]
    end type ledger_t
 
 contains
+
+   !> Nothing is held and nothing was done.
+   pure subroutine ledger_init(self, n_dim)
+      type(ledger_t), intent(out) :: self
+      integer, intent(in) :: n_dim               !! > 0
+
+      allocate(self%momentum(n_dim), source=0.0_wp)
+   end subroutine ledger_init
 
    !> Energies and momenta of `state`; the works stand.
    subroutine ledger_measure(self, system, x, state)
@@ -41,15 +50,9 @@ contains
       self%momentum = sum(momentum, dim=2)
       self%angular = 0.0_wp
       do i = 1, size(x, 2)
-         self%angular = self%angular + moment(x(:, i), state%u(:, i), momentum(:, i))
+         self%angular = self%angular + moment_of(x(:, i) + state%u(:, i), momentum(:, i))
       end do
    end subroutine ledger_measure
-
-   pure real(wp) function moment(x, u, p)
-      real(wp), intent(in) :: x(2), u(2), p(2)
-
-      moment = (x(1) + u(1))*p(2) - (x(2) + u(2))*p(1)
-   end function moment
 
    !> Linear and angular momentum of each body: rows px, py, lz.
    subroutine body_momenta(system, x, state, momenta)
@@ -65,7 +68,7 @@ contains
       do i = 1, size(x, 2)
          if (system%space%body(i) == 0) cycle
          associate (to => momenta(:, system%space%body(i)))
-            to = to + [momentum(:, i), moment(x(:, i), state%u(:, i), momentum(:, i))]
+            to = to + [momentum(:, i), moment_of(x(:, i) + state%u(:, i), momentum(:, i))]
          end associate
       end do
    end subroutine body_momenta

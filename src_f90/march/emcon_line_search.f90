@@ -26,14 +26,14 @@ module emcon_line_search
 
 contains
 
-   !> Begin at the end of a correction, if it went too far; `work`: at its start and its end.
-   pure subroutine line_search_begin(self, work)
+   !> Begin at the end of a correction, if it went too far.
+   pure subroutine line_search_begin(self, at_start, at_end)
       type(line_search_t), intent(out) :: self
-      real(wp), intent(in) :: work(2)            !! c.r [F L]
+      real(wp), intent(in) :: at_start, at_end   !! work c.r there [F L]
 
-      self%is_on = work(1) < 0.0_wp .and. work(2) > small*abs(work(1))
+      self%is_on = at_start < 0.0_wp .and. at_end > small*abs(at_start)
       if (.not. self%is_on) return
-      self%start = work(1)
+      self%start = at_start
       call choose(self)
    end subroutine line_search_begin
 

@@ -11,7 +11,7 @@ module emcon_march
    use emcon_interactions, only : contact_options_t
    use emcon_judge, only : judge_init, judge_step, overlap_t
    use emcon_kinds, only : wp
-   use emcon_ledger, only : ledger_measure, ledger_t
+   use emcon_ledger, only : ledger_init, ledger_measure, ledger_t
    use emcon_march_grid, only : grid_whole, march_count_grid, march_grid_time, march_is_done, &
       march_set_time
    use emcon_march_parts, only : march_in_parts
@@ -68,6 +68,7 @@ contains
       end associate
       call pair_record_init(self%state%pairs, self%system)
       call active_set_init(self%active, self%system)
+      call ledger_init(self%ledger, scene%n_dim)
       call judge_init(self%judge, scene)
    end subroutine march_init
 
@@ -221,7 +222,7 @@ contains
       associate (step => scene%step(self%state%i_step), state => self%state)
          call choose_scheme(self, step)
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
-            shape(scene%x), step%newton_tolerance, step%newton_maximum)
+            scene%x, step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
          self%active%puts_off = .true.

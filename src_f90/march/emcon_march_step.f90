@@ -8,6 +8,7 @@ module emcon_march_step
    use emcon_guards, only : guard_slack
    use emcon_judge, only : judge_step, overlap_t
    use emcon_kinds, only : wp
+   use emcon_look_plane, only : overlap_names
    use emcon_march_commit, only : march_commit
    use emcon_march_guess, only : march_guess
    use emcon_march_types, only : ending_t, increment_t, march_t, part_t
@@ -145,8 +146,7 @@ contains
                is_active => self%active%is_active(self%system%first_constraint(pair) + 1:))
             if (.not. contact%both_sides) cycle
             goes_in = goes_in .or. any(.not. is_active(:contact%n_constraint) .and. &
-               (contact%node == overlap%node .or. contact%node == overlap%edge(1) .or. &
-               contact%node == overlap%edge(2)))
+               overlap_names(overlap, contact%node))
          end associate
       end do
       if (.not. goes_in) return

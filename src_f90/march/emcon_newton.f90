@@ -93,10 +93,10 @@ module emcon_newton
 contains
 
    !> Set up for `n_unknown` unknowns; `correction` stays.
-   subroutine newton_init(self, n_unknown, extent, tolerance, maximum)
+   subroutine newton_init(self, n_unknown, x, tolerance, maximum)
       type(newton_t), intent(inout) :: self
       integer, intent(in) :: n_unknown           !! >= 0
-      integer, intent(in) :: extent(:)           !! of a nodal field: n_dim, n_node
+      real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) a nodal field
       real(wp), intent(in) :: tolerance          !! > 0, of the relative residual
       integer, intent(in) :: maximum             !! iterations at most
 
@@ -107,8 +107,10 @@ contains
          self%contact, self%left, self%driven, self%history)
       allocate(self%residual(n_unknown), self%scale(n_unknown), self%dq(n_unknown), &
          self%way(n_unknown))
-      allocate(self%contact(extent(1), extent(2)), source=0.0_wp)
-      allocate(self%left, self%driven, source=self%contact)
+      allocate(self%contact, self%left, self%driven, mold=x)
+      self%contact = 0.0_wp
+      self%left = 0.0_wp
+      self%driven = 0.0_wp
       allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
       call begin(self, 0)
    end subroutine newton_init
@@ -181,8 +183,7 @@ contains
       if (self%line%is_on) then
          call line_search_take(self%line, dot_product(self%way, self%residual))
       else
-         call line_search_begin(self%line, [self%work, dot_product(self%dq, &
-            self%residual)])
+         call line_search_begin(self%line, self%work, dot_product(self%dq, self%residual))
          if (self%line%is_on) self%way = self%dq
          self%work = 0.0_wp
       end if

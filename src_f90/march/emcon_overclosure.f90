@@ -1,5 +1,6 @@
 !> Overclosure that a step resolves: is it that of the bodies, or of the edges that stand for arcs?
 module emcon_overclosure
+   use emcon_arc_dip_plane, only : arc_dip
    use emcon_interactions, only : formulation_nts, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
@@ -34,7 +35,7 @@ contains
             deepest = -minval(overclosure(first:last))
             if (.not. deepest > 0.0_wp) cycle
             if (is_smooth .and. pair%formulation == formulation_nts) cycle
-            dip = arc_dip(scene, pair%slave) + arc_dip(scene, pair%master)
+            dip = surface_dip(scene, pair%slave) + surface_dip(scene, pair%master)
             if (dip <= small_dip*deepest) cycle
             if (.not. is_smooth .and. .not. any(contact%state%is_near .and. contact%state%is_over &
                .and. abs(contact%state%gap0 + deepest) > small_dip*deepest .and. &
@@ -49,27 +50,16 @@ contains
       end do
    end subroutine overclosure_check
 
-   !> The largest height of the arc over an edge of a surface, l phi/8 for an edge of length l where
-   !> the surface turns by phi, without its corners [L].
-   real(wp) function arc_dip(scene, number)
+   !> How far edges of surface `number` dip into arcs, without its corners [L].
+   real(wp) function surface_dip(scene, number) result(dip)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: number              !! of the surface
       integer, allocatable :: edge(:, :)
-      real(wp) :: one(2), other(2), angle, corner
-      integer :: i, j
 
-      arc_dip = 0.0_wp
+      dip = 0.0_wp
       if (scene%surface(number)%is_nodal) return
-      corner = scene%step(1)%contact%normal_angle*acos(-1.0_wp)/180.0_wp
       call surface_edges(scene, scene%surface(number), edge)
-      do i = 1, size(edge, 2)
-         j = findloc(edge(1, :), edge(2, i), dim=1)
-         if (j == 0) cycle
-         one = scene%x(:, edge(2, i)) - scene%x(:, edge(1, i))
-         other = scene%x(:, edge(2, j)) - scene%x(:, edge(1, j))
-         angle = abs(atan2(one(1)*other(2) - one(2)*other(1), dot_product(one, other)))
-         if (angle < corner) arc_dip = max(arc_dip, angle*max(norm2(one), norm2(other))/8.0_wp)
-      end do
-   end function arc_dip
+      dip = arc_dip(scene%x, edge, scene%step(1)%contact%normal_angle)
+   end function surface_dip
 
 end module emcon_overclosure

@@ -6,6 +6,7 @@ module emcon_pair_record
    use emcon_constraint, only : condition_force, condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_kinds, only : wp
+   use emcon_moment_plane, only : moment_of
    use emcon_system, only : system_t
    implicit none
    private
@@ -78,7 +79,7 @@ contains
       type(condition_t), intent(in) :: item(:)
       real(wp), intent(in) :: lam(:), lag
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)
-      real(wp) :: place(2), force(3)
+      real(wp) :: place(size(x, 1)), force(size(x, 1)), both(size(total%slave))
       integer :: k, i
 
       total%n_active = total%n_active + size(item)
@@ -87,12 +88,12 @@ contains
             associate (node => item(k)%node(i))
                place = x(:, node) + (u(:, node) - lag*du(:, node))
             end associate
-            force(:2) = condition_force(item(k), lam(k), i)
-            force(3) = place(1)*force(2) - place(2)*force(1)
+            force = condition_force(item(k), lam(k), i)
+            both = [force, moment_of(place, force)]
             if (i <= item(k)%n_slave) then
-               total%slave = total%slave + force
+               total%slave = total%slave + both
             else
-               total%master = total%master + force
+               total%master = total%master + both
             end if
          end do
       end do

@@ -4,9 +4,9 @@
 !> within the tolerance. Warnings stand beside that: they do not make a run bad.
 module emcon_verdict
    use emcon_interactions, only : contact_pair_t, formulation_nts
-   use emcon_judge, only : overlap_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
+   use emcon_look_plane, only : overlap_text
    use emcon_march, only : increment_t, march_t
    use emcon_scene, only : scene_t
    use emcon_stand_off, only : stand_off_mean, stand_off_t
@@ -99,7 +99,8 @@ contains
          if (increment%overlap%depth > self%deepest) then
             self%deepest = increment%overlap%depth
             self%deepest_time = state%time
-            call place_text(scene, march, increment%overlap, self%place)
+            call overlap_text(increment%overlap, scene%node_label, march%system%space%body, &
+               self%place)
          end if
          self%stabilization = march%ledger%stabilization
          if (increment%unconverged > self%unconverged) then
@@ -119,22 +120,6 @@ contains
       end do
       call follow_energy(self, march)
    end subroutine verdict_update
-
-   !> The bodies and nodes of an overlap. Bodies count as in the history.
-   subroutine place_text(scene, march, overlap, text)
-      type(scene_t), intent(in) :: scene
-      type(march_t), intent(in) :: march
-      type(overlap_t), intent(in) :: overlap
-      character(len=:), allocatable, intent(out) :: text
-
-      associate (label => scene%node_label, body => march%system%space%body, &
-            edge => overlap%edge)
-         text = "node " // to_text(label(overlap%node)) // " of body " // &
-            to_text(body(overlap%node)) // " behind the edge from node " // &
-            to_text(label(edge(1))) // " to " // to_text(label(edge(2))) // " of body " // &
-            to_text(body(edge(1)))
-      end associate
-   end subroutine place_text
 
    !> The energy balance. Unless the scheme keeps energy the works are sums over increments, exact
    !> only in the limit of small ones: what they are off by is shown, not judged.
@@ -313,7 +298,7 @@ contains
       type(march_t), intent(in) :: march
       type(notes_t), intent(inout) :: lines
 
-      associate (outline => march%judge%outline)
+      associate (outline => march%judge%look%outline)
          if (outline%n_piece == 0) return
          call note_add(lines, "penetration was looked for after every step, both ways, nodes and " &
             // "edges: " // to_text(outline%n_piece) // " bodies with " // &

@@ -31,7 +31,7 @@ contains
       integer :: i
 
       do i = 1, 5
-         call line_search_begin(line, work(:, i))
+         call line_search_begin(line, work(1, i), work(2, i))
          call check_true(error, .not. line%is_on, "case " // to_text(i))
       end do
    end subroutine test_whole
@@ -47,7 +47,7 @@ contains
       do k = 1, size(last)
          do i = 1, 19
             place = 0.05_wp*real(i, wp)
-            call line_search_begin(line, [-1.0_wp, last(k)])
+            call line_search_begin(line, -1.0_wp, last(k))
             at = 1.0_wp
             do while (line%is_on)
                at = at + line%step
@@ -67,7 +67,7 @@ contains
       real(wp) :: at
       integer :: n
 
-      call line_search_begin(line, [-1.0_wp, 1.0_wp])
+      call line_search_begin(line, -1.0_wp, 1.0_wp)
       at = 1.0_wp
       n = 0
       do while (line%is_on)

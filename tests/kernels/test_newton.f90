@@ -61,7 +61,7 @@ contains
       if (allocated(error)) return
       call system_begin_step(trial%system, scene, 1, error)
       if (allocated(error)) return
-      call newton_init(trial%newton, trial%system%space%numbering%n_unknown, shape(scene%x), &
+      call newton_init(trial%newton, trial%system%space%numbering%n_unknown, scene%x, &
          1.0e3_wp*epsilon(1.0_wp), maximum)
       call correction_reset(trial%newton%correction, method, solver_default)
       call constraints_select(trial%set, none)

@@ -1,7 +1,7 @@
 !> Is something behind an outline? Plain distances and crossings of edges, from positions alone.
 !>
 !> Edges run with the body to the left. Nothing here knows of gaps, stencils or constraints.
-module emcon_overlap
+module emcon_overlap_plane
    use emcon_kinds, only : wp
    implicit none
    private
@@ -99,4 +99,4 @@ contains
       cross = a(1)*b(2) - a(2)*b(1)
    end function cross
 
-end module emcon_overlap
+end module emcon_overlap_plane

@@ -3,7 +3,7 @@
 !> A piece is what hangs together by elements; its outline are the faces that one element alone has,
 !> the body to the left. What a tie covers is no outline; where it ends, two pieces meet in one
 !> place, as neighbours do. Surfaces of edges without elements stand for themselves.
-module emcon_outline
+module emcon_outline_plane
    use emcon_bodies, only : bodies_find
    use emcon_chain, only : chain_init, chain_t
    use emcon_errors, only : error_t
@@ -122,7 +122,7 @@ contains
    !> Does a contact pair bring pieces `p` and `q` together?
    pure logical function outline_meets(self, p, q) result(meets)
       type(outline_t), intent(in) :: self
-      integer, intent(in) :: p, q
+      integer, intent(in) :: p, q                !! 1..n_piece
       integer :: k
 
       meets = .true.
@@ -274,4 +274,4 @@ contains
       end do
    end subroutine find_places
 
-end module emcon_outline
+end module emcon_outline_plane

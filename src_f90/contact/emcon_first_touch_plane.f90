@@ -1,5 +1,5 @@
 !> When surfaces that move along a given way touch for the first time, however far apart they are.
-module emcon_first_touch
+module emcon_first_touch_plane
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
@@ -101,4 +101,4 @@ contains
       if (abs(bottom)*sqrt(huge(root)) > abs(top)) root = top/bottom
    end function root
 
-end module emcon_first_touch
+end module emcon_first_touch_plane
