@@ -103,11 +103,11 @@ def silent_arguments(path):
 
 
 # A 2 here counts or names what it says itself: a dimension of an array, a pass, a power,
-# a constant of a law.
+# a constant of a law, a figure of a record.
 OTHER = re.compile(
     r"\b(?:size|sum|spread|minval|maxval|any|all|count|merge|min|max|lbound|ubound|norm2)"
     r"\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\)|\bdo pass = .*|\*\*\s*2\b"
-    r"|\bconstant\(\d\)",
+    r"|\b(?:constant|figure|effort)\(\d+\)",
     re.I,
 )
 PLANAR = re.compile(

@@ -11,8 +11,11 @@ module emcon_row_elimination
    implicit none
    private
    public :: row_elimination_t, elimination_begin, elimination_add, elimination_left
-   public :: elimination_resolve
+   public :: elimination_resolve, n_kind
    public :: row_kept, row_redundant, row_poor, row_near
+
+   !> Rows eliminated at once: those of forces, those of the motion.
+   integer, parameter :: n_kind = 2
 
    !> What became of a row. Poor: no unknown is fit to be a pivot of both; near: it says nearly what
    !> rows before it say.
@@ -36,17 +39,17 @@ module emcon_row_elimination
       integer :: n_row = 0                       !! rows added so far
       integer, allocatable :: pivot(:)           !! (rows) column of the pivot; 0: redundant
       ! The present row, over all columns, both of its kinds:
-      real(hp), allocatable, private :: work(:, :)     !! (2, n_col), 0 outside of the row
+      real(hp), allocatable, private :: work(:, :)     !! (n_kind, n_col), 0 outside of the row
       logical, allocatable, private :: is_listed(:)    !! (n_col)
       integer, allocatable, private :: list(:)         !! (n_col) its columns
       integer, private :: n_list = 0
-      real(hp), private :: largest_term(2) = 0.0_hp    !! that entered the row
+      real(hp), private :: largest_term(n_kind) = 0.0_hp   !! that entered the row
       ! The eliminated rows without their pivots:
       integer, allocatable, private :: pivot_row(:)    !! (n_col) row of the pivot; 0: none
       integer, allocatable, private :: row_start(:)    !! (rows + 1)
       integer, allocatable, private :: column(:)
-      real(hp), allocatable, private :: value(:, :)    !! (2, entries)
-      real(hp), allocatable, private :: pivot_value(:, :)   !! (2, rows)
+      real(hp), allocatable, private :: value(:, :)    !! (n_kind, entries)
+      real(hp), allocatable, private :: pivot_value(:, :)   !! (n_kind, rows)
    end type row_elimination_t
 
    !> Pivots as sums over other columns, one sum behind the other as they are found.
@@ -72,10 +75,10 @@ contains
             self%pivot_row, self%column, self%value)
       end if
       if (.not. allocated(self%list)) then
-         allocate(self%work(2, n_col), source=0.0_hp)
+         allocate(self%work(n_kind, n_col), source=0.0_hp)
          allocate(self%is_listed(n_col), source=.false.)
          allocate(self%list(n_col), self%pivot_row(n_col), source=0)
-         allocate(self%column(0), self%value(2, 0))
+         allocate(self%column(0), self%value(n_kind, 0))
       end if
       if (allocated(self%pivot)) then
          do k = 1, self%n_row
@@ -84,7 +87,7 @@ contains
          if (size(self%pivot) /= n_row) deallocate(self%pivot, self%row_start, self%pivot_value)
       end if
       if (.not. allocated(self%pivot)) allocate(self%pivot(n_row), self%row_start(n_row + 1), &
-         self%pivot_value(2, n_row))
+         self%pivot_value(n_kind, n_row))
       self%n_free = n_free
       self%n_row = 0
       self%pivot = 0
@@ -99,8 +102,8 @@ contains
       real(hp), intent(in) :: first(:), second(:)       !! (entries) both kinds of the row
       integer, intent(in) :: own(:)                     !! columns to take with preference
       integer, intent(out) :: fate                      !! one of `row_`
-      real(hp), intent(in), optional :: made_of(2)      !! largest terms that the entries sum up
-      real(hp) :: left(2), largest(2)
+      real(hp), intent(in), optional :: made_of(n_kind) !! largest terms that the entries sum up
+      real(hp) :: left(n_kind), largest(n_kind)
       integer :: from, k
 
       k = self%n_row + 1
@@ -178,7 +181,7 @@ contains
    pure subroutine reduce(self, from, to)
       type(row_elimination_t), intent(inout) :: self
       integer, intent(in) :: from, to
-      real(hp) :: factor(2), term(2)
+      real(hp) :: factor(n_kind), term(n_kind)
       integer :: i, j, s
 
       do i = from, to
@@ -199,7 +202,7 @@ contains
    !> Largest entries of the present row that may become a pivot.
    pure function largest_left(self) result(left)
       type(row_elimination_t), intent(in) :: self
-      real(hp) :: left(2)
+      real(hp) :: left(n_kind)
       integer :: s
 
       left = 0.0_hp
@@ -214,7 +217,7 @@ contains
       type(row_elimination_t), intent(inout) :: self
       integer, intent(in) :: k
       integer, intent(in) :: own(:)
-      real(hp), intent(in) :: left(:)                   !! (2) largest entries, > 0
+      real(hp), intent(in) :: left(:)                   !! (n_kind) largest entries, > 0
       integer, intent(out) :: fate
       real(hp) :: weight, best
       integer :: s, j
@@ -266,7 +269,7 @@ contains
 
       n_old = size(self%column)
       if (n <= n_old) return
-      allocate(column(2*n), value(2, 2*n))
+      allocate(column(2*n), value(n_kind, 2*n))
       column(:n_old) = self%column
       value(:, :n_old) = self%value
       call move_alloc(column, self%column)

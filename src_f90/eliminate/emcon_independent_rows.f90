@@ -9,8 +9,8 @@ module emcon_independent_rows
    use emcon_csr, only : csr_t
    use emcon_kinds, only : hp
    use emcon_numbering, only : numbering_t
-   use emcon_row_elimination, only : elimination_add, elimination_begin, row_elimination_t, &
-      row_near, row_poor, row_redundant
+   use emcon_row_elimination, only : elimination_add, elimination_begin, n_kind, &
+      row_elimination_t, row_near, row_poor, row_redundant
    implicit none
    private
    public :: independent_rows_t, independent_rows_find
@@ -35,8 +35,8 @@ contains
       type(independent_rows_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
-      real(hp) :: largest(2, set%n)
-      integer :: own(2, set%n), k
+      real(hp) :: largest(n_kind, set%n)
+      integer :: own(size(numbering%unknown, 1), set%n), k
 
       do k = 1, set%n
          associate (item => set%item(k), n => set%item(k)%n_node)
@@ -56,8 +56,8 @@ contains
    subroutine eliminate(self, force, gap, own, largest, is_firm)
       type(independent_rows_t), intent(inout) :: self
       type(csr_t), intent(in) :: force, gap
-      integer, intent(in) :: own(:, :)               !! (2, n) unknowns of the slave nodes
-      real(hp), intent(in) :: largest(:, :)          !! (2, n) of the terms of both, by all freedoms
+      integer, intent(in) :: own(:, :)               !! (n_dim, n) unknowns of the slave nodes
+      real(hp), intent(in) :: largest(:, :)          !! (n_kind, n) of their terms, by all freedoms
       logical, intent(in) :: is_firm(:)              !! (n)
       integer :: order(size(is_firm)), i, k, fate
 

@@ -308,11 +308,11 @@ contains
    subroutine fill_matrices(self, set)
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
-      logical :: is_poor(2)
+      logical :: is_poor, is_poor_too
 
-      call fill(self%elimination, self%force, set%force_rows, self%p, is_poor(1))
-      call fill(self%elimination, self%gap, set%gap_rows, self%d, is_poor(2))
-      if (any(is_poor)) self%obstacle = obstacle_pivot
+      call fill(self%elimination, self%force, set%force_rows, self%p, is_poor)
+      call fill(self%elimination, self%gap, set%gap_rows, self%d, is_poor_too)
+      if (is_poor .or. is_poor_too) self%obstacle = obstacle_pivot
    end subroutine fill_matrices
 
    !> Factorise P^T N DF for the gradients of the last `null_space_update`. Where the choice turns
@@ -410,14 +410,15 @@ contains
       real(wp), intent(out) :: rest(:)                     !! (n)
       real(wp), intent(out) :: relative
       real(wp) :: magnitude(set%n), term
-      integer :: k, i, a, t, l, dof
+      integer :: k, i, a, t, l, dof, n_dim
 
+      n_dim = size(numbering%unknown, 1)
       rest = residual(self%present%dependent)
       magnitude = abs(rest)
       do k = 1, set%n
          do i = 1, set%item(k)%n_node
-            do a = 1, 2
-               dof = 2*(set%item(k)%node(i) - 1) + a
+            do a = 1, n_dim
+               dof = n_dim*(set%item(k)%node(i) - 1) + a
                do t = numbering%start(dof) + 1, numbering%start(dof + 1)
                   if (numbering%column(t) == 0) cycle
                   l = self%owner(numbering%column(t))

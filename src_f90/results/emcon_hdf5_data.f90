@@ -32,6 +32,11 @@ module emcon_hdf5_data
    integer(hsize_t), parameter :: max_chunk = 1048576_hsize_t
    integer, parameter :: deflate_level = 4
 
+   !> How values lie in the file and in memory: numbers of HDF5.
+   type :: layout_t
+      integer(hid_t) :: space, file_type, memory_type
+   end type layout_t
+
 contains
 
    !> How a data set with chunks of shape `chunk` is stored. Close the list after use.
@@ -59,7 +64,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call write_block(self, name, [size(values, kind=hsize_t)], &
-         [H5T_STD_I64LE, H5T_NATIVE_INTEGER], c_loc(values), error)
+         H5T_STD_I64LE, H5T_NATIVE_INTEGER, c_loc(values), error)
    end subroutine hdf5_write_integers
 
    !> Integers of 0..255, stored as bytes.
@@ -70,7 +75,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call write_block(self, name, [size(values, kind=hsize_t)], &
-         [H5T_STD_U8LE, H5T_NATIVE_INTEGER], c_loc(values), error)
+         H5T_STD_U8LE, H5T_NATIVE_INTEGER, c_loc(values), error)
    end subroutine hdf5_write_bytes
 
    subroutine hdf5_write_reals(self, name, values, error)
@@ -80,7 +85,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call write_block(self, name, shape(values, kind=hsize_t), &
-         [H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE], c_loc(values), error)
+         H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, c_loc(values), error)
    end subroutine hdf5_write_reals
 
    !> Reals of the kind of the state, stored bit for bit.
@@ -92,7 +97,7 @@ contains
       integer(hid_t) :: kind_type
 
       kind_type = h5kind_to_type(wp, H5_REAL_KIND)
-      call write_block(self, name, [size(values, kind=hsize_t)], [kind_type, kind_type], &
+      call write_block(self, name, [size(values, kind=hsize_t)], kind_type, kind_type, &
          c_loc(values), error)
    end subroutine hdf5_write_state
 
@@ -117,7 +122,7 @@ contains
          end do
       end do
       call make_text_type(n, text_type)
-      call write_block(self, name, [size(texts, kind=hsize_t)], [text_type, text_type], &
+      call write_block(self, name, [size(texts, kind=hsize_t)], text_type, text_type, &
          c_loc(letter), error)
       call h5tclose_f(text_type, e)
    end subroutine hdf5_write_texts
@@ -134,11 +139,11 @@ contains
    end subroutine make_text_type
 
    !> Write the data set `name` at once from the memory at `address`.
-   subroutine write_block(self, name, dims, types, address, error)
+   subroutine write_block(self, name, dims, file_type, memory_type, address, error)
       type(hdf5_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(hsize_t), intent(in) :: dims(:)        !! in Fortran's order
-      integer(hid_t), intent(in) :: types(2)         !! in the file, in memory
+      integer(hid_t), intent(in) :: file_type, memory_type
       type(c_ptr), intent(in) :: address
       type(error_t), allocatable, intent(out) :: error
       integer(hid_t) :: plan, space, dset
@@ -155,9 +160,9 @@ contains
       end if
       call h5screate_simple_f(size(dims), dims, space, e)
       call clear_system_reason()
-      call h5dcreate_f(self%id, name, types(1), space, dset, e, dcpl_id=plan)
+      call h5dcreate_f(self%id, name, file_type, space, dset, e, dcpl_id=plan)
       if (e >= 0) then
-         if (product(dims) > 0) call h5dwrite_f(dset, types(2), address, e)
+         if (product(dims) > 0) call h5dwrite_f(dset, memory_type, address, e)
          if (e < 0) call hdf5_fail(self, "write", name, error)
          call h5dclose_f(dset, e)
       end if
@@ -177,7 +182,8 @@ contains
 
       call make_text_type(len(text), text_type)
       call h5screate_f(H5S_SCALAR_F, space, e)
-      call write_attribute(self, object, name, [space, text_type, text_type], c_loc(text), error)
+      call write_attribute(self, object, name, layout_t(space, text_type, text_type), &
+         c_loc(text), error)
       call h5sclose_f(space, e)
       call h5tclose_f(text_type, e)
    end subroutine write_attribute_text
@@ -192,8 +198,8 @@ contains
       integer :: e
 
       call h5screate_simple_f(1, [size(values, kind=hsize_t)], space, e)
-      call write_attribute(self, object, name, [space, H5T_STD_I64LE, H5T_NATIVE_INTEGER], &
-         c_loc(values), error)
+      call write_attribute(self, object, name, layout_t(space, H5T_STD_I64LE, &
+         H5T_NATIVE_INTEGER), c_loc(values), error)
       call h5sclose_f(space, e)
    end subroutine write_attribute_list
 
@@ -207,17 +213,17 @@ contains
       integer :: e
 
       call h5screate_f(H5S_SCALAR_F, space, e)
-      call write_attribute(self, object, name, [space, H5T_STD_I64LE, H5T_NATIVE_INTEGER], &
-         c_loc(value), error)
+      call write_attribute(self, object, name, layout_t(space, H5T_STD_I64LE, &
+         H5T_NATIVE_INTEGER), c_loc(value), error)
       call h5sclose_f(space, e)
    end subroutine write_attribute_integer
 
    !> Write the attribute `name` of `object`, anew or over its old value.
-   subroutine write_attribute(self, object, name, ids, address, error)
+   subroutine write_attribute(self, object, name, layout, address, error)
       type(hdf5_file_t), intent(inout) :: self
       character(len=*), intent(in) :: object
       character(len=*), intent(in) :: name
-      integer(hid_t), intent(in) :: ids(3)           !! space, type in the file, type in memory
+      type(layout_t), intent(in) :: layout
       type(c_ptr), intent(in) :: address
       type(error_t), allocatable, intent(out) :: error
       integer(hid_t) :: owner, attribute
@@ -231,10 +237,10 @@ contains
          if (is_there) then
             call h5aopen_f(owner, name, attribute, e)
          else
-            call h5acreate_f(owner, name, ids(2), ids(1), attribute, e)
+            call h5acreate_f(owner, name, layout%file_type, layout%space, attribute, e)
          end if
          if (e >= 0) then
-            call h5awrite_f(attribute, ids(3), address, e)
+            call h5awrite_f(attribute, layout%memory_type, address, e)
             call h5aclose_f(attribute, ignored)
          end if
          call h5oclose_f(owner, ignored)

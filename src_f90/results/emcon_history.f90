@@ -235,7 +235,7 @@ contains
       type(set_series_t), allocatable :: grown(:)
       type(set_series_t) :: new
       character(len=:), allocatable :: path
-      integer :: row_shape(2)
+      integer, allocatable :: row_shape(:)
 
       path = "/sets/" // link_name(set) // "/" // link_name(variable)
       i_set = size(self%set) + 1
@@ -243,11 +243,12 @@ contains
       if (allocated(error)) return
       new%n_value = n_component*size(label)
       row_shape = [n_component, size(label)]
+      if (n_component == 1) row_shape = [size(label)]
       call series_begin(new%time, self%store%file, path // "_time", one_value, chunk_rows, &
          .false., error)
       if (allocated(error)) return
-      call series_begin(new%values, self%store%file, path, &
-         row_shape(merge(2, 1, n_component == 1):), rows_per_chunk(new%n_value), .false., error)
+      call series_begin(new%values, self%store%file, path, row_shape, &
+         rows_per_chunk(new%n_value), .false., error)
       if (allocated(error)) return
       if (self%is_resumed) call drop_later(self, new, path, error)
       if (allocated(error)) return

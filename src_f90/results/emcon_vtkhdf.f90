@@ -71,7 +71,7 @@ contains
          call write_cells(self%store%file, cell_node, vtk_type, error)
       end if
       if (.not. allocated(error)) then
-         call begin_series(self, fields, [size(points, 2), size(vtk_type)], error)
+         call begin_series(self, fields, size(points, 2), size(vtk_type), error)
       end if
       if (allocated(error)) call published_abandon(self%store)
    end subroutine vtkhdf_create
@@ -93,7 +93,7 @@ contains
       if (.not. allocated(error)) then
          call hdf5_read_integers(self%store%file, "/VTKHDF/NumberOfCells", n_cell, error)
       end if
-      if (.not. allocated(error)) call begin_series(self, fields, [n_point, n_cell], error)
+      if (.not. allocated(error)) call begin_series(self, fields, n_point(1), n_cell(1), error)
       if (.not. allocated(error)) call drop_frames(self, n_frame, error)
       if (allocated(error)) call published_abandon(self%store)
    end subroutine vtkhdf_resume
@@ -158,7 +158,7 @@ contains
          call hdf5_make_group(file, trim(group(i)), error)
          if (allocated(error)) return
       end do
-      call hdf5_write_attribute(file, "/VTKHDF", "Version", [2, 0], error)
+      call hdf5_write_attribute(file, "/VTKHDF", "Version", [integer :: 2, 0], error)
       if (.not. allocated(error)) then
          call hdf5_write_attribute(file, "/VTKHDF", "Type", "UnstructuredGrid", error)
       end if
@@ -205,14 +205,14 @@ contains
    end subroutine write_cells
 
    !> Begin with all data sets that grow frame by frame.
-   subroutine begin_series(self, fields, n_item, error)
+   subroutine begin_series(self, fields, n_point, n_cell, error)
       type(vtkhdf_t), intent(inout) :: self
       type(field_t), intent(in) :: fields(:)
-      integer, intent(in) :: n_item(2)               !! points, cells
+      integer, intent(in) :: n_point, n_cell
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
-      allocate(self%stored(size(fields)), self%vector(3, maxval(n_item)))
+      allocate(self%stored(size(fields)), self%vector(3, max(n_point, n_cell)))
       self%vector = 0.0_dp
       call series_begin(self%times, self%store%file, steps // "/Values", one(:0), step_chunk, &
          .false., error)
@@ -223,7 +223,8 @@ contains
       end do
       do i = 1, size(fields)
          if (allocated(error)) return
-         call begin_field(self%stored(i), self%store%file, fields(i), n_item, error)
+         call begin_field(self%stored(i), self%store%file, fields(i), &
+            merge(n_cell, n_point, fields(i)%is_cell), error)
       end do
    end subroutine begin_series
 
@@ -231,7 +232,7 @@ contains
       type(stored_field_t), intent(inout) :: self
       type(hdf5_file_t), intent(inout) :: file
       type(field_t), intent(in) :: field
-      integer, intent(in) :: n_item(2)
+      integer, intent(in) :: n_item                  !! points or cells
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: path
       integer :: row_shape(1)
@@ -241,7 +242,7 @@ contains
          return
       end if
       self%field = field
-      self%n_item = n_item(merge(2, 1, field%is_cell))
+      self%n_item = n_item
       row_shape = stored_components(field)
       call values_path(field, path)
       call series_begin(self%values, file, path, &
@@ -306,7 +307,7 @@ contains
             return
          end if
          if (stored%field%n_component == 2) then
-            self%vector(:2, :n) = values
+            self%vector(:size(values, 1), :n) = values
             call series_append(stored%values, self%store%file, self%vector, n, error)
          else
             call series_append(stored%values, self%store%file, values, n, error)
