@@ -8,7 +8,7 @@ module emcon_march_parts
    use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
-   use emcon_system, only : system_may_hold
+   use emcon_system, only : system_may_hold, system_t
    use emcon_text, only : note_add, notes_append, notes_t, to_text
    implicit none
    private
@@ -108,24 +108,45 @@ contains
       end select
    end subroutine reason_text
 
-   !> Add to the reason why the last step failed, which ends a static analysis, what contact would
-   !> have to hold.
+   !> Add to the reason why the last step failed, which ends a static analysis, what contact and
+   !> what the model is given would have to hold.
    subroutine failure_text(self, scene, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(inout) :: text
-      character(len=:), allocatable :: motion
-      logical :: may_hold(size(scene%x, 2))
+      character(len=:), allocatable :: motion, holders
 
       if (.not. self%scheme%row%masses_resist .and. .not. allocated(self%active%holding%text)) then
          call free_motion_text(self%system, scene, &
             scene%step(self%state%i_step)%prescribed, motion, with_contact=.true.)
          if (len(motion) == 0) return
-         text = text // "; without contact "
-         call system_may_hold(self%system, may_hold)
-         if (any(may_hold)) text = text // "and given forces "
-         text = text // motion
+         call holders_text(self%system, size(scene%x, 2), holders)
+         text = text // "; without " // holders // " " // motion
       end if
    end subroutine failure_text
+
+   !> What may hold bodies beside the conditions of the deck: "contact and given forces".
+   subroutine holders_text(system, n_node, text)
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: n_node
+      character(len=:), allocatable, intent(out) :: text
+      logical :: by_forces(n_node), by_constraints(n_node)
+
+      call system_may_hold(system, by_forces, by_constraints)
+      text = ""
+      if (size(system%contact) > 0) call add("contact")
+      if (any(by_forces)) call add("given forces")
+      if (any(by_constraints)) call add("given constraints")
+
+   contains
+
+      subroutine add(holder)
+         character(len=*), intent(in) :: holder
+
+         if (len(text) > 0) text = text // " and "
+         text = text // holder
+      end subroutine add
+
+   end subroutine holders_text
 
 end module emcon_march_parts

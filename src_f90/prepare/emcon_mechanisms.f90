@@ -30,7 +30,7 @@ module emcon_mechanisms
 contains
 
    !> Bodies at `x`, and which of their motions need to be prevented. Those of bodies that contact
-   !> (`contact_holds`) or a given force (`host_holds`) may hold need not.
+   !> (`contact_holds`) or a given force or constraint (`host_holds`) may hold need not.
    subroutine mechanisms_find(system, scene, x, rows, contact_holds, host_holds, bodies)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
@@ -39,7 +39,7 @@ contains
       logical, intent(in) :: contact_holds, host_holds
       type(mechanisms_t), intent(out) :: bodies
       logical :: is_in_row(2, size(scene%x, 2)), touches(system%space%n_body)
-      logical :: may_hold(size(scene%x, 2))
+      logical, dimension(size(scene%x, 2)) :: by_forces, by_constraints
       integer :: i, k, b
 
       is_in_row = .false.
@@ -62,8 +62,9 @@ contains
          end do
       end if
       if (host_holds) then
-         call system_may_hold(system, may_hold)
-         touches(pack(system%space%body, may_hold .and. system%space%body > 0)) = .true.
+         call system_may_hold(system, by_forces, by_constraints)
+         touches(pack(system%space%body, (by_forces .or. by_constraints) &
+            .and. system%space%body > 0)) = .true.
       end if
       allocate(bodies%is_free(3, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh

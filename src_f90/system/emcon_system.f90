@@ -189,16 +189,17 @@ contains
       end do
    end subroutine terms_may_hold
 
-   !> The nodes whose bodies such forces may hold, or constraints beside those of the deck.
-   pure subroutine system_may_hold(self, may_hold)
+   !> The nodes whose bodies such forces may hold, and constraints beside those of the deck.
+   pure subroutine system_may_hold(self, by_forces, by_constraints)
       type(system_t), intent(in) :: self
-      logical, intent(out) :: may_hold(:)        !! (n_node)
+      logical, intent(out) :: by_forces(:), by_constraints(:)    !! (n_node)
       integer :: k
 
-      call terms_may_hold(self%term, may_hold)
+      call terms_may_hold(self%term, by_forces)
+      by_constraints = .false.
       do k = 1, size(self%held)
          associate (constraint => self%held(k)%constraint)
-            if (allocated(constraint%stands_on)) may_hold(constraint%stands_on) = .true.
+            if (allocated(constraint%stands_on)) by_constraints(constraint%stands_on) = .true.
          end associate
       end do
    end subroutine system_may_hold

@@ -150,6 +150,20 @@ def test_rods_hold_a_body_in_statics(program: tuple[Path, dict[str, str]], tmp_p
     assert 0 < work < 0.1                          # it sags by less than a hundredth
 
 
+def test_a_failure_says_what_rods_would_have_to_hold(program: tuple[Path, dict[str, str]],
+                                                     tmp_path: Path) -> None:
+    """Pushed sideways a block on two rods swings away: they bear nothing yet that turns it back."""
+    deck = tmp_path/"swing.inp"
+    text = HUNG.replace("<method>", "NULL SPACE").replace("*GIVEN FORCES\n", "")
+    text = text.replace("10., 0., -1.", "10., 1., 0.")
+    deck.write_text(text)
+    done = subprocess.run([program[0], deck, *"0 1 5  6 4".split()], env=program[1],
+                          capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "without given constraints the body of element 1 is free to move in x" in done.stdout
+    assert "contact" not in done.stdout            # there is none
+
+
 def test_a_constraint_without_conditions_is_refused(program: tuple[Path, dict[str, str]],
                                                     tmp_path: Path) -> None:
     deck = tmp_path/"rods.inp"
