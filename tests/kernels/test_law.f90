@@ -1,7 +1,7 @@
 !> Constitutive laws against their textbook formulas in quadruple precision.
 module test_law
    use check, only : check_error, check_near, test_case_t
-   use emcon_errors, only : err_input, err_internal, error_t
+   use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : find_law_row, law_coupled_neo_hooke, law_create, law_given, &
@@ -391,7 +391,7 @@ contains
       call check_near(error, real(find_law_row("HYPERELASTIC", "OGDEN", 4), wp), 0.0_wp, 0.0_wp, &
          1.0_wp, "no such order")
       call law_create(law_given, [1.0_wp], created%law, raised)
-      call check_error(error, raised, err_internal, "no such law", "law that is given")
+      call check_error(error, raised, err_input, "no law with the code", "law that is given")
    end subroutine test_registry
 
    !> With alpha = 2, and with 2 and -2, energy and stress are those of laws in I1 and I2.
