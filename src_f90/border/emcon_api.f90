@@ -65,15 +65,16 @@ module emcon_api
    use emcon_motion, only : motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
-   use emcon_quantities, only : contact_field, contact_quantity, element_quantity, &
-      node_quantity, pair_components, pair_quantity, quantity_components
+   use emcon_quantities, only : at_contacts, at_elements, at_nodes, at_pairs, contact_field, &
+      contact_quantity, element_quantity, node_quantity, pair_quantity, quantity_components, &
+      quantity_values
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_scheme, only : scheme_t
    use emcon_shape, only : shape_t
    use emcon_sparse_solver, only : matrix_definite, matrix_general, matrix_symmetric, &
       sparse_solver_t
    use emcon_state, only : state_t
-   use emcon_stepper, only : contact_gaps, stepper_advance, stepper_build, stepper_close, &
+   use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, &
       stepper_contact_seconds, stepper_fraction, stepper_is_done, stepper_open, stepper_read, &
       stepper_read_text, stepper_t
    use emcon_stepper_conditions, only : conditions_exchange, stepper_add_prescribed, &

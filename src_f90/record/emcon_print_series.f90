@@ -4,8 +4,9 @@ module emcon_print_series
    use emcon_errors, only : error_t
    use emcon_history, only : history_set_append, history_set_define, history_set_put, history_t
    use emcon_kinds, only : dp, wp
-   use emcon_quantities, only : contact_quantity, element_quantity, node_quantity, &
-      pair_components, pair_quantity, pair_variables, quantity_components
+   use emcon_mesh, only : named_set_t
+   use emcon_quantities, only : at_contacts, at_elements, at_nodes, at_pairs, pair_variables, &
+      quantity_components, quantity_values
    use emcon_requests, only : output_contact_print, output_element_print, output_node_print, &
       output_t
    use emcon_stepper, only : stepper_t
@@ -14,14 +15,11 @@ module emcon_print_series
    private
    public :: series_t, print_series_define, print_series_write, is_due
 
-   !> What the members of a series are.
-   integer, parameter :: of_nodes = 1, of_elements = 2, of_constraints = 3, of_pairs = 4
-
    !> One requested quantity of one set.
    type :: series_t
       integer :: step = 0                        !! of the deck
       integer :: request = 0                     !! of that step
-      integer :: members = 0                     !! one of the `of_` codes
+      integer :: place = 0                       !! of the members, one of the `at_` codes
       character(len=16) :: variable = ""
       logical :: is_total = .false.              !! the sum over the members
       integer :: i_set = 0                       !! as the history counts
@@ -42,24 +40,25 @@ contains
       allocate(self(0))
       do i = 1, size(stepper%scene%step)
          do j = 1, size(stepper%scene%step(i)%output)
-            select case (stepper%scene%step(i)%output(j)%kind)
-            case (output_node_print)
-               new%members = of_nodes
-            case (output_element_print)
-               new%members = of_elements
-            case (output_contact_print)
-               if (size(stepper%scene%pair) == 0) cycle
-               new%members = of_constraints
-            case default
-               cycle
-            end select
+            new%place = place_of(stepper%scene%step(i)%output(j)%kind)
+            if (new%place == 0) cycle
+            if (new%place == at_contacts .and. size(stepper%scene%pair) == 0) cycle
             new%step = i
             new%request = j
             call define_request(self, history, stepper, new, error)
-            if (allocated(error)) return
          end do
       end do
    end subroutine print_series_define
+
+   !> Where the values of a PRINT request are; 0: it is none of a set.
+   pure integer function place_of(kind)
+      integer, intent(in) :: kind                !! one of the `output_` codes
+
+      place_of = 0
+      if (kind == output_node_print) place_of = at_nodes
+      if (kind == output_element_print) place_of = at_elements
+      if (kind == output_contact_print) place_of = at_contacts
+   end function place_of
 
    !> Declare the series of one request: each variable, its sum, and what pairs transmit.
    subroutine define_request(self, history, stepper, new, error)
@@ -67,7 +66,7 @@ contains
       type(history_t), intent(inout) :: history
       type(stepper_t), intent(in) :: stepper
       type(series_t), intent(inout) :: new
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
       logical :: has_totals, has_sums, has_counts
       integer :: k
 
@@ -78,22 +77,18 @@ contains
             if (new%variable == "CNUM") cycle          ! counts are of pairs
             new%is_total = .false.
             if (.not. output%only_totals) call define(self, history, stepper, output, new, error)
-            if (allocated(error)) return
-            if (.not. has_totals) cycle
             new%is_total = .true.
-            call define(self, history, stepper, output, new, error)
-            if (allocated(error)) return
+            if (has_totals) call define(self, history, stepper, output, new, error)
          end do
-         if (new%members /= of_constraints .or. size(stepper%scene%pair) == 0) return
+         if (new%place /= at_contacts .or. size(stepper%scene%pair) == 0) return
          has_sums = has_totals .and. has(output, "CF")
          has_counts = has_sums .or. has(output, "CNUM")
-         new%members = of_pairs
+         new%place = at_pairs
          new%is_total = .false.
          do k = 1, size(pair_variables)
             new%variable = pair_variables(k)
             if (.not. merge(has_counts, has_sums, new%variable == "CNUM")) cycle
             call define(self, history, stepper, output, new, error)
-            if (allocated(error)) return
          end do
       end associate
    end subroutine define_request
@@ -117,15 +112,15 @@ contains
       type(stepper_t), intent(in) :: stepper
       type(output_t), intent(in) :: output
       type(series_t), intent(inout) :: new
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: set, variable
       integer, allocatable :: label(:)
       integer :: i, n_component
 
-      call find_items(stepper, output, new%members, set, new%item, label)
+      if (allocated(error)) return
+      call find_items(stepper, output, new%place, set, new%item, label)
       variable = trim(new%variable)
-      n_component = quantity_components(variable)
-      if (new%members == of_pairs) n_component = pair_components(variable)
+      n_component = quantity_components(variable, new%place, stepper%scene%n_dim)
       if (new%is_total) then
          variable = "TOTAL_" // variable
          label = [0]
@@ -145,39 +140,27 @@ contains
    pure logical function is_same(a, b)
       type(series_t), intent(in) :: a, b
 
-      is_same = a%members == b%members .and. a%variable == b%variable &
+      is_same = a%place == b%place .and. a%variable == b%variable &
          .and. (a%is_total .eqv. b%is_total) .and. size(a%item) == size(b%item)
       if (is_same) is_same = all(a%item == b%item)
    end function is_same
 
    !> Name, members and labels of the set that `output` is about.
-   subroutine find_items(stepper, output, members, set, item, label)
+   subroutine find_items(stepper, output, place, set, item, label)
       type(stepper_t), intent(in) :: stepper
       type(output_t), intent(in) :: output
-      integer, intent(in) :: members             !! one of the `of_` codes
+      integer, intent(in) :: place               !! one of the `at_` codes
       character(len=:), allocatable, intent(out) :: set
       integer, allocatable, intent(out) :: item(:), label(:)
       integer :: i
 
       associate (scene => stepper%scene, system => stepper%march%system)
-         select case (members)
-         case (of_nodes)
-            set = "ALL_NODES"
-            item = [(i, i = 1, size(scene%node_label))]
-            if (output%set > 0) then
-               set = scene%node_set(output%set)%name
-               item = scene%node_set(output%set)%item
-            end if
-            label = scene%node_label(item)
-         case (of_elements)
-            set = "ALL_ELEMENTS"
-            item = [(i, i = 1, size(scene%element_label))]
-            if (output%set > 0) then
-               set = scene%element_set(output%set)%name
-               item = scene%element_set(output%set)%item
-            end if
-            label = scene%element_label(item)
-         case (of_constraints)
+         select case (place)
+         case (at_nodes)
+            call find_members("ALL_NODES", scene%node_set, scene%node_label)
+         case (at_elements)
+            call find_members("ALL_ELEMENTS", scene%element_set, scene%element_label)
+         case (at_contacts)
             set = "CONTACT"
             item = [(i, i = system%first_constraint(1) + 1, &
                system%first_constraint(system%n_pair + 1))]
@@ -191,6 +174,24 @@ contains
             label = item
          end select
       end associate
+
+   contains
+
+      !> Of the set asked for, or of all nodes or elements, which have the labels `all_labels`.
+      subroutine find_members(all_name, sets, all_labels)
+         character(len=*), intent(in) :: all_name
+         type(named_set_t), intent(in) :: sets(:)
+         integer, intent(in) :: all_labels(:)
+
+         set = all_name
+         item = [(i, i = 1, size(all_labels))]
+         if (output%set > 0) then
+            set = sets(output%set)%name
+            item = sets(output%set)%item
+         end if
+         label = all_labels(item)
+      end subroutine find_members
+
    end subroutine find_items
 
    !> Beside a series of constraints the pair of each; beside series of pairs their surfaces.
@@ -204,10 +205,10 @@ contains
       integer :: i
 
       associate (scene => stepper%scene, first => stepper%march%system%first_constraint)
-         if (series%members == of_constraints .and. .not. series%is_total) then
+         if (series%place == at_contacts .and. .not. series%is_total) then
             call history_set_put(history, set, variable // "_pair", &
                [(count(first < series%item(i)), i = 1, size(series%item))], error)
-         else if (series%members == of_pairs) then
+         else if (series%place == at_pairs) then
             do i = 1, size(scene%pair)
                slave(i)%text = scene%surface(scene%pair(i)%slave)%name
                master(i)%text = scene%surface(scene%pair(i)%master)%name
@@ -259,16 +260,7 @@ contains
                last_time)) cycle
             if (any(is_written .and. self%i_set == series%i_set)) cycle
             is_written(i) = .true.
-            select case (series%members)
-            case (of_nodes)
-               values = node_quantity(stepper, trim(series%variable))
-            case (of_elements)
-               values = element_quantity(stepper, trim(series%variable))
-            case (of_constraints)
-               values = contact_quantity(stepper, trim(series%variable))
-            case default
-               values = pair_quantity(stepper, trim(series%variable))
-            end select
+            values = quantity_values(stepper, trim(series%variable), series%place)
             values = values(:, series%item)
             if (series%is_total) values = reshape(sum(values, dim=2), [size(values, 1), 1])
             call history_set_append(history, series%i_set, real(stepper%march%state%time, dp), &

@@ -1,15 +1,55 @@
-!> The output quantities by their deck names, as arrays: one function per kind of place.
+!> The output quantities by their deck names, as arrays.
 module emcon_quantities
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
+   use emcon_contact, only : gap_state_t
+   use emcon_gaps, only : gaps_search
    use emcon_kinds, only : dp, wp
+   use emcon_motion, only : at_rest, motion_of
+   use emcon_pose, only : pose_at_end
    use emcon_solid, only : solid_t
-   use emcon_stepper, only : contact_gaps, stepper_t
-   use emcon_stress, only : element_means, nodal_stress, von_mises
+   use emcon_stepper, only : stepper_t
+   use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
    use emcon_term_registry, only : terms_solid
    use emcon_vtkhdf, only : field_t
    implicit none
    private
-   public :: node_quantity, element_quantity, contact_quantity, quantity_components, field_names
-   public :: contact_field, pair_quantity, pair_components, pair_variables
+   public :: quantity_values, quantity_components, quantity_fields, quantity_of_field
+   public :: node_quantity, element_quantity, contact_quantity, contact_field, pair_quantity
+   public :: at_nodes, at_elements, at_contacts, at_pairs, pair_variables
+
+   !> Where the values of a quantity are.
+   integer, parameter :: at_nodes = 1, at_elements = 2, at_contacts = 3, at_pairs = 4
+
+   !> Components of a vector, in a row: one for each direction.
+   integer, parameter :: of_vector = 0
+
+   !> A variable of decks at one kind of places.
+   type :: row_t
+      character(len=14) :: variable
+      integer :: place                           !! one of the `at_` codes
+      integer :: n_component = 1
+      character(len=16) :: field = ""            !! in the field file
+      character(len=16) :: last = ""             !! name of a field for the last component
+   end type row_t
+
+   type(row_t), parameter :: rows(17) = [ &
+      row_t("U", at_nodes, of_vector, "displacement"), &
+      row_t("V", at_nodes, of_vector, "velocity"), &
+      row_t("RF", at_nodes, of_vector, "reaction_force"), &
+      row_t("S", at_nodes, 7, "cauchy_stress", "von_mises"), &
+      row_t("S", at_elements, 6), &
+      row_t("E", at_elements, 3, "strain"), &
+      row_t("ENER", at_elements, 1, "strain_energy"), &
+      row_t("ELSE", at_elements, 1, "strain_energy"), &
+      row_t("ELKE", at_elements, 1, "kinetic_energy"), &
+      row_t("EVOL", at_elements, 1, "volume"), &
+      row_t("CDIS", at_contacts, 1, "contact_gap"), &
+      row_t("CSTR", at_contacts, 2, "contact_pressure", "contact_active"), &
+      row_t("CF", at_contacts, of_vector, "contact_force"), &
+      row_t("CF", at_pairs, 3), &
+      row_t("CF_MASTER", at_pairs, 3), &
+      row_t("CONTACT_LENGTH", at_pairs), &
+      row_t("CNUM", at_pairs)]
 
    !> What *CONTACT PRINT, TOTALS= with CF writes of each pair.
    character(len=*), parameter :: pair_variables(4) = [character(len=14) :: "CF", "CF_MASTER", &
@@ -17,65 +57,72 @@ module emcon_quantities
 
 contains
 
-   !> Components of the values that the functions below give.
-   pure integer function quantity_components(variable)
+   !> The values of a variable, (component, place).
+   function quantity_values(stepper, variable, place) result(values)
+      type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
+      integer, intent(in) :: place               !! one of the `at_` codes
+      real(dp), allocatable :: values(:, :)
 
-      select case (variable)
-      case ("U", "V", "RF", "CF", "CSTR")
-         quantity_components = 2
-      case ("S")
-         quantity_components = 6
-      case ("E")
-         quantity_components = 3
+      select case (place)
+      case (at_nodes)
+         values = node_quantity(stepper, variable)
+      case (at_elements)
+         values = element_quantity(stepper, variable)
+      case (at_contacts)
+         values = contact_quantity(stepper, variable)
       case default
-         quantity_components = 1
+         values = pair_quantity(stepper, variable)
       end select
+   end function quantity_values
+
+   !> Their components.
+   pure integer function quantity_components(variable, place, n_dim) result(n)
+      character(len=*), intent(in) :: variable
+      integer, intent(in) :: place               !! one of the `at_` codes
+      integer, intent(in) :: n_dim
+
+      n = rows(findloc(rows%variable == variable .and. rows%place == place, .true., 1))%n_component
+      if (n == of_vector) n = n_dim
    end function quantity_components
 
    !> The fields of the field file that a variable stands for.
-   function field_names(variable) result(fields)
+   pure function quantity_fields(variable, n_dim) result(fields)
       character(len=*), intent(in) :: variable
+      integer, intent(in) :: n_dim
       type(field_t), allocatable :: fields(:)
+      type(row_t) :: row
+      integer :: n
 
-      select case (variable)
-      case ("U")
-         fields = [field_of("displacement", 2)]
-      case ("V")
-         fields = [field_of("velocity", 2)]
-      case ("RF")
-         fields = [field_of("reaction_force", 2)]
-      case ("S")
-         fields = [field_of("cauchy_stress", 6), field_of("von_mises", 1)]
-      case ("CDIS")
-         fields = [field_of("contact_gap", 1)]
-      case ("CSTR")
-         fields = [field_of("contact_pressure", 1), field_of("contact_active", 1)]
-      case ("CF")
-         fields = [field_of("contact_force", 2)]
-      case ("ENER")
-         fields = [field_of("strain_energy", 1)]
-         fields%is_cell = .true.
-      case ("E")
-         fields = [field_of("strain", 3)]
-         fields%is_cell = .true.
-      case ("ELKE")
-         fields = [field_of("kinetic_energy", 1)]
-         fields%is_cell = .true.
-      case default
-         fields = [field_of("volume", 1)]
-         fields%is_cell = .true.
-      end select
-   end function field_names
+      row = field_row(variable)
+      n = merge(2, 1, row%last /= "")
+      allocate(fields(n))
+      fields%is_cell = row%place == at_elements
+      fields(1)%name = row%field
+      fields(1)%n_component = quantity_components(variable, row%place, n_dim) - (n - 1)
+      if (n > 1) fields(n)%name = row%last
+   end function quantity_fields
 
-   pure function field_of(name, n_component) result(field)
-      character(len=*), intent(in) :: name
-      integer, intent(in) :: n_component
-      type(field_t) :: field
+   !> The values of the fields of a variable, one field behind the other.
+   function quantity_of_field(stepper, variable) result(values)
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :)
+      type(row_t) :: row
 
-      field%name = name
-      field%n_component = n_component
-   end function field_of
+      row = field_row(variable)
+      if (row%place == at_contacts) then
+         values = contact_field(stepper, variable)
+      else
+         values = quantity_values(stepper, variable, row%place)
+      end if
+   end function quantity_of_field
+
+   pure type(row_t) function field_row(variable) result(row)
+      character(len=*), intent(in) :: variable
+
+      row = rows(findloc(rows%variable == variable .and. rows%field /= "", .true., 1))
+   end function field_row
 
    !> U, V, RF: (2, n_node); S: Cauchy stress and von Mises stress (7, n_node).
    function node_quantity(stepper, variable) result(values)
@@ -112,7 +159,7 @@ contains
       type(stepper_t), intent(in), target :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
-      real(wp), allocatable :: stress(:, :), strain(:, :), volume(:)
+      real(wp), allocatable :: stress(:, :), strain(:, :), volume(:), energy(:)
       integer :: n
       type(solid_t), pointer :: solid
 
@@ -123,7 +170,9 @@ contains
          case ("ENER", "ELSE")
             values = reshape(real(state%energy, dp), [1, n])
          case ("ELKE")
-            values = reshape(real(kinetic_energies(stepper), dp), [1, n])
+            allocate(energy(n))
+            call element_energies(solid, state%v, energy)
+            values = reshape(real(energy, dp), [1, n])
          case default
             allocate(stress(6, n), strain(3, n), volume(n))
             call element_means(solid, state%u, is_large(stepper), stress, strain, volume)
@@ -145,46 +194,23 @@ contains
       is_large = stepper%scene%step(stepper%march%state%i_step)%nlgeom
    end function is_large
 
-   !> Kinetic energy of each element.
-   function kinetic_energies(stepper) result(energy)
-      type(stepper_t), intent(in), target :: stepper
-      real(wp), allocatable :: energy(:)
-      type(solid_t), pointer :: solid
-      integer :: e, i, j
-
-      solid => terms_solid(stepper%march%system%term)
-      associate (v => stepper%march%state%v)
-         allocate(energy(solid%n_element), source=0.0_wp)
-         do e = 1, solid%n_element
-            do j = 1, solid%geometry(e)%n_node
-               do i = 1, solid%geometry(e)%n_node
-                  energy(e) = energy(e) + 0.5_wp*solid%mass(i, j, e) &
-                     *dot_product(v(:, solid%node(i, e)), v(:, solid%node(j, e)))
-               end do
-            end do
-         end do
-      end associate
-   end function kinetic_energies
-
    !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF force of
    !> the pair on the slave node, or both at a joint (2); second index the possible constraint.
    function contact_quantity(stepper, variable) result(values)
-      use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
-      real(wp), allocatable :: gap(:)
-      logical, allocatable :: is_near(:)
+      type(gap_state_t), allocatable :: gap(:)
       integer :: n
 
       n = stepper%march%system%n_constraint
-      associate (state => stepper%march%state)
+      associate (state => stepper%march%state, u => stepper%march%state%u)
          select case (variable)
          case ("CDIS")
-            allocate(gap(n), is_near(n))
-            call contact_gaps(stepper, gap, is_near)
-            values = reshape(merge(real(gap, dp), ieee_value(1.0_dp, ieee_quiet_nan), is_near), &
-               [1, n])
+            call gaps_search(stepper%march%system, motion_of(pose_at_end, stepper%scene%x, u, &
+               at_rest(u)), gap)
+            values = reshape(merge(real(gap%gap0, dp), ieee_value(1.0_dp, ieee_quiet_nan), &
+               gap%is_near .and. gap%is_over), [1, n])
          case ("CSTR")
             allocate(values(2, n))
             values(1, :) = 0.0_dp
@@ -201,7 +227,6 @@ contains
    !> at a joint of tied pieces have the values of their constraint. CF (2): the contact forces of
    !> all pairs, on both sides.
    function contact_field(stepper, variable) result(values)
-      use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :), at_slave(:, :)
@@ -230,7 +255,6 @@ contains
 
    !> Add to the value of a node that of a constraint there.
    pure subroutine take_over(variable, more, value)
-      use, intrinsic :: ieee_arithmetic, only : ieee_is_nan
       character(len=*), intent(in) :: variable
       real(dp), intent(in) :: more(:)
       real(dp), intent(inout) :: value(:)
@@ -245,14 +269,6 @@ contains
       end if
    end subroutine take_over
 
-   !> Components of what `pair_quantity` gives.
-   pure integer function pair_components(variable)
-      character(len=*), intent(in) :: variable
-
-      pair_components = 1
-      if (variable == "CF" .or. variable == "CF_MASTER") pair_components = 3
-   end function pair_components
-
    !> Of each contact pair (second index): CF, CF_MASTER force and moment about the origin on the
    !> slave and on the master side (3); CONTACT_LENGTH; CNUM active constraints (1).
    function pair_quantity(stepper, variable) result(values)
@@ -262,7 +278,7 @@ contains
       integer :: k
 
       associate (total => stepper%march%state%pairs%total)
-         allocate(values(pair_components(variable), size(total)))
+         allocate(values(quantity_components(variable, at_pairs, stepper%scene%n_dim), size(total)))
          do k = 1, size(total)
             select case (variable)
             case ("CF")

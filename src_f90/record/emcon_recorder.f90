@@ -11,7 +11,7 @@ module emcon_recorder
    use emcon_ledger, only : body_momenta
    use emcon_march, only : increment_t
    use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
-   use emcon_quantities, only : contact_field, element_quantity, field_names, node_quantity
+   use emcon_quantities, only : quantity_fields, quantity_of_field
    use emcon_requests, only : output_contact_file
    use emcon_run_mark, only : run_mark
    use emcon_scene, only : scene_t
@@ -33,6 +33,11 @@ module emcon_recorder
       "h", "kinetic", "strain", "external_work", "contact_work", "stabilization", "total", "px", &
       "py", "lz", "active", "newton", "cuts", "penetration", "stand_off", "cpu"]
 
+   !> What is written if no step asks for fields: of solids, and behind them of contact.
+   character(len=*), parameter :: default_fields(8) = [character(len=4) :: "U", "V", "RF", "S", &
+      "ENER", "CDIS", "CSTR", "CF"]
+   integer, parameter :: n_solid_fields = 5
+
    character(len=*), parameter :: counts(4) = [character(len=9) :: "increment", "active", &
       "newton", "cuts"]
 
@@ -40,7 +45,8 @@ module emcon_recorder
       type(vtkhdf_t) :: fields
       type(history_t) :: history
       logical :: has_fields = .false.
-      type(string_t), allocatable :: variable(:) !! fields that are written
+      type(string_t), allocatable :: variable(:) !! those that are written
+      type(field_t), allocatable :: field(:)     !! of all of them
       type(series_t), allocatable :: series(:)   !! of PRINT requests
       integer :: momentum_set = 0
       integer :: n_row = 0
@@ -63,7 +69,7 @@ contains
       if (self%has_fields) then
          call find_cells(stepper%scene, cell_node, vtk_type)
          call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), &
-            cell_node, vtk_type, fields_of(self), error)
+            cell_node, vtk_type, self%field, error)
          if (allocated(error)) return
          call vtkhdf_put_run(self%fields, run)
       end if
@@ -105,7 +111,7 @@ contains
       call run_mark(stepper, run)
       call choose_fields(self, stepper%scene)
       if (self%has_fields) then
-         call vtkhdf_resume(self%fields, base // ".vtkhdf", run, fields_of(self), n_frame, error)
+         call vtkhdf_resume(self%fields, base // ".vtkhdf", run, self%field, n_frame, error)
          if (allocated(error)) return
       end if
       call history_resume(self%history, base, run, columns(), n_row, error)
@@ -131,7 +137,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer :: i, j, k
 
-      allocate(self%variable(0))
+      allocate(self%variable(0), self%field(0))
       do i = 1, size(scene%step)
          do j = 1, size(scene%step(i)%output)
             associate (output => scene%step(i)%output(j))
@@ -143,16 +149,9 @@ contains
          end do
       end do
       if (size(self%variable) == 0) then
-         call add("U")
-         call add("V")
-         call add("RF")
-         call add("S")
-         call add("ENER")
-         if (size(scene%pair) > 0) then
-            call add("CDIS")
-            call add("CSTR")
-            call add("CF")
-         end if
+         do i = 1, merge(size(default_fields), n_solid_fields, size(scene%pair) > 0)
+            call add(trim(default_fields(i)))
+         end do
       end if
       self%has_fields = .true.
 
@@ -160,30 +159,17 @@ contains
 
       subroutine add(name)
          character(len=*), intent(in) :: name
-         type(string_t) :: new(1)
-         integer :: l
+         type(string_t) :: new
+         type(field_t), allocatable :: fields(:)
 
-         new(1)%text = name
-         if (name == "ELSE") new(1)%text = "ENER"    ! the same, element by element
-         do l = 1, size(self%variable)
-            if (self%variable(l)%text == new(1)%text) return
-         end do
+         new%text = name
+         allocate(fields, source=quantity_fields(name, scene%n_dim))
+         if (any(self%field%name == fields(1)%name)) return
          self%variable = [self%variable, new]
+         self%field = [self%field, fields]
       end subroutine add
 
    end subroutine choose_fields
-
-   !> The fields of all variables, as the field file declares them.
-   function fields_of(self) result(fields)
-      type(recorder_t), intent(in) :: self
-      type(field_t), allocatable :: fields(:)
-      integer :: i
-
-      allocate(fields(0))
-      do i = 1, size(self%variable)
-         fields = [fields, field_names(self%variable(i)%text)]
-      end do
-   end function fields_of
 
    !> Declare what PRINT requests name, and the bodies.
    subroutine define_sets(self, stepper, error)
@@ -307,14 +293,8 @@ contains
       real(dp), allocatable :: values(:, :), spread(:, :)
       integer :: i, first
 
-      allocate(fields, source=field_names(variable))
-      if (fields(1)%is_cell) then
-         values = element_quantity(stepper, variable)
-      else if (any(variable == ["CDIS", "CSTR", "CF  "])) then
-         values = contact_field(stepper, variable)
-      else
-         values = node_quantity(stepper, variable)
-      end if
+      allocate(fields, source=quantity_fields(variable, stepper%scene%n_dim))
+      allocate(values, source=quantity_of_field(stepper, variable))
       first = 1
       do i = 1, size(fields)
          spread = values(first:first + fields(i)%n_component - 1, :)

@@ -1,5 +1,5 @@
-!> Stress and strain for output: at nodes, extrapolated from the quadrature points and averaged, and
-!> as means over elements.
+!> Stress, strain and energy for output: at nodes, extrapolated from the quadrature points and
+!> averaged, and of elements.
 !>
 !> Cauchy stress; without NLGEOM the stress itself. Components xx, yy, zz, xy, yz, xz. Of a law that
 !> a program gives zz is not known: it is 0 here, in von Mises' stress too. Where such a law does
@@ -13,7 +13,7 @@ module emcon_stress
    use emcon_solid, only : solid_evaluate_given, solid_t
    implicit none
    private
-   public :: nodal_stress, element_means, von_mises
+   public :: nodal_stress, element_means, element_energies, von_mises
 
 contains
 
@@ -133,6 +133,24 @@ contains
          end do
       end do
    end subroutine element_means
+
+   !> Kinetic energy of each element.
+   pure subroutine element_energies(solid, v, energy)
+      type(solid_t), intent(in) :: solid
+      real(wp), intent(in) :: v(:, :)            !! (n_dim, n_node) [L/T]
+      real(wp), intent(out) :: energy(:)         !! (n_element) [M L^2/T^2]
+      integer :: e, i, j
+
+      energy = 0.0_wp
+      do e = 1, solid%n_element
+         do j = 1, solid%geometry(e)%n_node
+            do i = 1, solid%geometry(e)%n_node
+               energy(e) = energy(e) + 0.5_wp*solid%mass(i, j, e) &
+                  *dot_product(v(:, solid%node(i, e)), v(:, solid%node(j, e)))
+            end do
+         end do
+      end do
+   end subroutine element_energies
 
    !> Von Mises stress of (xx, yy, zz, xy, yz, xz).
    pure real(wp) function von_mises(s)

@@ -1,7 +1,6 @@
 !> The stepper: open a deck, step, query, save, go on. All state is in the object; any number of
 !> steppers live side by side.
 module emcon_stepper
-   use emcon_contact, only : gap_state_t
    use emcon_correction, only : correction_seconds
    use emcon_deck, only : deck_read
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
@@ -12,7 +11,6 @@ module emcon_stepper
    use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : at_rest
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_t
    use emcon_scene, only : scene_t
@@ -24,8 +22,7 @@ module emcon_stepper
    private
    public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &
       stepper_build, stepper_advance, stepper_is_done
-   public :: stepper_check_solids, stepper_close, stepper_fraction, contact_gaps, &
-      stepper_contact_seconds
+   public :: stepper_check_solids, stepper_close, stepper_fraction, stepper_contact_seconds
 
    type :: stepper_t
       type(scene_t) :: scene
@@ -197,9 +194,9 @@ contains
    !> The model has solids, and steps of its own.
    pure subroutine stepper_check_solids(self, error)
       type(stepper_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
-      if (self%scene%is_hosted) call raise(error, err_input, &
+      if (self%scene%is_hosted .and. .not. allocated(error)) call raise(error, err_input, &
          "the model has no solids and no deck: its host makes the steps")
    end subroutine stepper_check_solids
 
@@ -209,33 +206,6 @@ contains
 
       stepper_fraction = min(1.0_wp, self%march%state%time/sum(self%scene%step%duration))
    end function stepper_fraction
-
-   !> Gap of each possible constraint at the present state, > 0 open; `is_near` false: not measured.
-   subroutine contact_gaps(self, gap, is_near)
-      type(stepper_t), intent(inout) :: self
-      real(wp), intent(out) :: gap(:)            !! (n_constraint)
-      logical, intent(out) :: is_near(:)
-      type(gap_state_t) :: state
-      integer :: pair, i, id
-
-      gap = 0.0_wp
-      is_near = .false.
-      associate (system => self%march%system, u => self%march%state%u)
-         do pair = 1, size(system%contact)
-            associate (contact => system%contact(pair)%contact)
-               contact%reach = 0.0_wp      ! which gaps are measured must not depend on the past
-               call contact%begin_step(self%scene%x, u, at_rest(u))
-               call contact%measure(self%scene%x, u, at_rest(u))
-               do i = 1, contact%n_constraint
-                  id = system%first_constraint(pair) + i
-                  state = contact%state(i)
-                  is_near(id) = state%is_near .and. state%is_over
-                  if (is_near(id)) gap(id) = state%gap0
-               end do
-            end associate
-         end do
-      end associate
-   end subroutine contact_gaps
 
    !> CPU time of search, gaps, constraints and null space since the program began [s].
    pure real(dp) function stepper_contact_seconds(self)

@@ -8,18 +8,28 @@ module emcon_stepper_check
    use emcon_text, only : to_text
    implicit none
    private
-   public :: stepper_check_open, check_field, check_list, check_size, check_choice, check_number
+   public :: stepper_check_open, check_that, check_field, check_list, check_size, check_choice, &
+      check_number
 
 contains
 
    !> There is a model to work with.
    pure subroutine stepper_check_open(self, error)
       type(stepper_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
-      if (.not. allocated(self%march%scheme)) call raise(error, err_input, &
-         "there is no model: none was built, or building it failed")
+      call check_that(allocated(self%march%scheme), &
+         "there is no model: none was built, or building it failed", error)
    end subroutine stepper_check_open
+
+   !> An input error of this text, unless something holds.
+   pure subroutine check_that(holds, text, error)
+      logical, intent(in) :: holds
+      character(len=*), intent(in) :: text
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+
+      if (.not. (holds .or. allocated(error))) call raise(error, err_input, text)
+   end subroutine check_that
 
    !> A nodal field called `name` has the right shape and is finite.
    pure subroutine check_field(name, field, scene, error)

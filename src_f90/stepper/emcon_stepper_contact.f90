@@ -16,16 +16,16 @@ module emcon_stepper_contact
    use emcon_active_set_update, only : active_set_advance
    use emcon_constraints, only : constraint_place, constraints_force, constraints_select
    use emcon_contact, only : gap_state_t
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : error_t
    use emcon_holding, only : holding_t
    use emcon_judge, only : judge_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_pose, only : pose_at_end, pose_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_choice, check_field, check_list, check_size
-   use emcon_stepper_query, only : query_sync, query_t
-   use emcon_stepper_report, only : contact_report_t, report_check_list, report_evaluate, &
-      report_place
+   use emcon_stepper_check, only : check_choice, check_field, check_list, check_size, check_that
+   use emcon_gaps, only : gaps_forget, gaps_measure
+   use emcon_stepper_query, only : query_forget, query_place, query_sync, query_t
+   use emcon_stepper_report, only : contact_report_t, report_check_list, report_evaluate
    use emcon_steps, only : initiation_persistent
    use emcon_text, only : to_text
    implicit none
@@ -45,32 +45,26 @@ contains
       logical, intent(in) :: was_active(:)       !! (n_constraint) at the end of the step before
       logical, allocatable, intent(out) :: active(:)           !! (n_constraint)
       type(error_t), allocatable, intent(out) :: error
-      integer :: pair
 
       call query_sync(self, stepper, error)
-      call check_field("u0", u0, stepper%scene, error)
-      call check_field("du", du, stepper%scene, error)
+      if (.not. allocated(error)) call take_options(self, stepper)
       call check_flags(self, "was_active", was_active, error)
+      call query_place(self, stepper, u0, du, error)
       if (allocated(error)) return
-      self%is_evaluated = .false.
+      call query_forget(self)
+      self%has_begun = .true.
       self%has_set = .true.                      ! an empty one
-      self%has_null_space = .false.
       associate (march => self%march)
-         do pair = 1, size(march%system%contact)
-            march%system%contact(pair)%contact%reach = 0.0_wp   ! nothing depends on the past
-         end do
+         call gaps_forget(march%system)
          march%state%u = u0
          march%state%is_active = was_active
          march%state%lam = 0.0_wp
          march%active%puts_off = .false.
          march%active%holding = holding_t()
-         call take_options(self, stepper)
-         call report_place(self, u0, du)
          call constraints_select(march%active%set, [integer ::])
          call active_set_begin(march%active, march%system, march%motion, march%state)
          active = march%active%is_active
       end associate
-      self%has_begun = .true.
    end subroutine query_begin_contact
 
    !> Take over how contact begins, which may have changed.
@@ -96,18 +90,9 @@ contains
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(gap_state_t), allocatable, intent(out) :: gap(:)    !! (n_constraint)
       type(error_t), allocatable, intent(out) :: error
-      integer :: i
 
       call begin_query(self, stepper, u0, du, error)
-      if (allocated(error)) return
-      associate (system => self%march%system)
-         allocate(gap(system%n_constraint))
-         do i = 1, size(system%contact)
-            call system%contact(i)%contact%measure(stepper%scene%x, u0, du)
-            gap(system%first_constraint(i) + 1:system%first_constraint(i + 1)) = &
-               system%contact(i)%contact%state
-         end do
-      end associate
+      if (.not. allocated(error)) call gaps_measure(self%march%system, self%march%motion, gap)
    end subroutine query_gaps
 
    !> A step was begun for this model, and goes from `u0` by `du`: take it over.
@@ -117,13 +102,10 @@ contains
       real(wp), intent(in) :: u0(:, :), du(:, :)
       type(error_t), allocatable, intent(out) :: error
 
-      if (.not. self%has_begun) call raise(error, err_input, "no step of contact was begun since " &
-         // "the model was made, its unknowns changed, or another question was asked")
-      call check_field("u0", u0, stepper%scene, error)
-      call check_field("du", du, stepper%scene, error)
-      if (allocated(error)) return
-      call take_options(self, stepper)
-      call report_place(self, u0, du)
+      call check_that(self%has_begun, "no step of contact was begun since the model was made, " // &
+         "its unknowns changed, or another question was asked", error)
+      if (.not. allocated(error)) call take_options(self, stepper)
+      call query_place(self, stepper, u0, du, error)
    end subroutine begin_query
 
    !> Select the constraints `active`, with the gaps to hold that the initiation asks for.
@@ -160,9 +142,8 @@ contains
       call check_list("target", target, size(id), error)
       do k = 1, size(id)
          call check_choice("constraint", id(k), 1, self%march%system%n_constraint, error)
-         if (allocated(error)) return
-         if (id(k) <= last) call raise(error, err_input, "constraint " // to_text(id(k)) // &
-            " comes after " // to_text(last) // ": they are to ascend")
+         call check_that(id(k) > last, "constraint " // to_text(id(k)) // " comes after " // &
+            to_text(last) // ": they are to ascend", error)
          last = id(k)
       end do
       call check_near(self, stepper, id, error)
@@ -179,24 +160,20 @@ contains
       type(stepper_t), intent(in) :: stepper
       integer, intent(in) :: id(:)
       type(error_t), allocatable, intent(inout) :: error
+      type(gap_state_t), allocatable :: gap(:)
       integer :: k, pair, i
 
       if (allocated(error)) return
-      associate (system => self%march%system, motion => self%march%motion)
-         do pair = 1, size(system%contact)
-            call system%contact(pair)%contact%measure(motion%x, motion%u0, motion%du)
-         end do
-         do k = 1, size(id)
-            call constraint_place(system, id(k), pair, i)
-            if (pair == 0 .or. allocated(error)) cycle
-            associate (contact => system%contact(pair)%contact)
-               if (.not. contact%state(i)%is_near) call raise(error, err_input, "constraint " // &
-                  to_text(id(k)) // " (slave node " // &
-                  to_text(stepper%scene%node_label(contact%node(i))) // " of pair " // &
-                  to_text(abs(system%contact(pair)%of_pair)) // ") has no surface within reach")
-            end associate
-         end do
-      end associate
+      call gaps_measure(self%march%system, self%march%motion, gap)
+      do k = 1, size(id)
+         call constraint_place(self%march%system, id(k), pair, i)
+         if (pair == 0 .or. gap(id(k))%is_near) cycle
+         associate (contact => self%march%system%contact(pair))
+            call check_that(.false., "constraint " // to_text(id(k)) // " (slave node " // &
+               to_text(stepper%scene%node_label(contact%contact%node(i))) // " of pair " // &
+               to_text(abs(contact%of_pair)) // ") has no surface within reach", error)
+         end associate
+      end do
    end subroutine check_near
 
    !> Values and gradients of the selected constraints for the step u0 to u0 + du.
@@ -236,12 +213,11 @@ contains
       call report_check_list(self, "lam", lam, error)
       call check_flags(self, "active", active, error)
       if (present(magnitude)) call check_field("magnitude", magnitude, stepper%scene, error)
+      if (.not. allocated(error)) call check_that(count(active) == size(lam) .and. &
+         all(active .eqv. self%march%active%is_active), "active is not the set that was selected", &
+         error)
       if (allocated(error)) return
       associate (march => self%march, own => self%march%active)
-         if (any(active .neqv. own%is_active) .or. count(active) /= size(lam)) then
-            call raise(error, err_input, "active is not the set that was selected")
-            return
-         end if
          own%set%lam = lam
          own%lam(own%set%id) = lam
          march%system%response%magnitude = 0.0_wp
@@ -264,7 +240,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: k
 
-      if (.not. self%has_begun) call raise(error, err_input, "no step of contact was begun")
+      call check_that(self%has_begun, "no step of contact was begun", error)
       do k = 1, size(redundant)
          call check_choice("redundant", redundant(k), 1, self%march%active%set%n, error)
       end do
@@ -284,7 +260,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
-      if (.not. self%has_begun) call raise(error, err_input, "no step of contact was begun")
+      call check_that(self%has_begun, "no step of contact was begun", error)
       call check_field("u1", u1, stepper%scene, error)
       if (allocated(error)) return
       associate (system => self%march%system)
@@ -308,8 +284,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call query_sync(self, stepper, error)
-      call check_field("u0", u0, stepper%scene, error)
-      call check_field("du", du, stepper%scene, error)
+      call query_place(self, stepper, u0, du, error)
       if (.not. allocated(error)) call judge_step(self%march%judge, stepper%scene%x, u0, du, &
          overlap)
    end subroutine query_overlap

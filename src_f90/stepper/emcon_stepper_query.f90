@@ -8,6 +8,7 @@ module emcon_stepper_query
    use emcon_active_set, only : active_set_select
    use emcon_constraints, only : constraints_add_curvature, &
       constraints_evaluate, constraints_force, constraints_merge_pattern, constraints_rows
+   use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
@@ -19,13 +20,15 @@ module emcon_stepper_query
    use emcon_numbering, only : pick_unknowns
    use emcon_pose, only : instant_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_field, check_list, check_size, stepper_check_open
+   use emcon_stepper_check, only : check_field, check_list, check_size, check_that, &
+      stepper_check_open
+   use emcon_gaps, only : gaps_search
    use emcon_system, only : system_check_response, system_renew, system_respond
    use emcon_term_registry, only : terms_mass
    use emcon_text, only : to_text
    implicit none
    private
-   public :: query_t, query_free, query_sync, query_follow
+   public :: query_t, query_free, query_sync, query_follow, query_place, query_forget
    public :: query_guess, query_evaluate, query_residual, query_tangent, query_unknowns, &
       query_mass, query_momenta
 
@@ -62,7 +65,7 @@ contains
    subroutine query_sync(self, stepper, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
       call stepper_check_open(stepper, error)
       if (allocated(error)) return
@@ -74,7 +77,7 @@ contains
       end if
       self%march%state = stepper%march%state
       if (self%revision /= stepper%march%revision) then
-         call forget(self)
+         call query_forget(self)
          call march_resume(self%march, stepper%scene, error)
          if (allocated(error)) return
          self%march%state = stepper%march%state
@@ -88,17 +91,18 @@ contains
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
 
-      if (self%revision /= stepper%march%revision) call forget(self)
+      if (self%revision /= stepper%march%revision) call query_forget(self)
    end subroutine query_follow
 
-   pure subroutine forget(self)
+   !> Forget the last evaluation.
+   pure subroutine query_forget(self)
       type(query_t), intent(inout) :: self
 
       self%is_evaluated = .false.
       self%has_set = .false.
       self%has_begun = .false.
       self%has_null_space = .false.
-   end subroutine forget
+   end subroutine query_forget
 
    !> Where a step of size `h` from the present state would start its iteration: prescribed freedoms
    !> at their places at the end, free ones moved on by their velocities.
@@ -110,7 +114,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call query_sync(self, stepper, error)
-      if (.not. allocated(error)) call check_duration(h, error)
+      call check_duration(h, error)
       if (allocated(error)) return
       call march_guess(self%march, stepper%scene, now(self), h, is_at_rest=.false.)
       u1 = self%march%state%u + self%march%motion%du
@@ -118,13 +122,10 @@ contains
 
    subroutine check_duration(h, error)
       real(wp), intent(in) :: h
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. ieee_is_finite(h)) then
-         call raise(error, err_input, "a step needs a size h > 0 that is finite")
-      else if (.not. h > 0.0_wp) then
-         call raise(error, err_input, "a step needs a size h > 0, not " // to_text(h))
-      end if
+      call check_that(ieee_is_finite(h), "a step needs a size h > 0 that is finite", error)
+      call check_that(h > 0.0_wp, "a step needs a size h > 0, not " // to_text(h), error)
    end subroutine check_duration
 
    !> The instant of the present state.
@@ -150,11 +151,11 @@ contains
       logical, intent(in), optional :: is_active(:)  !! (n_constraint)
       logical :: is_finite
 
-      call forget(self)
+      call query_forget(self)
       call query_sync(self, stepper, error)
-      if (.not. allocated(error)) call check_field("u1", u1, stepper%scene, error)
-      if (.not. allocated(error)) call check_duration(h, error)
-      if (.not. allocated(error)) call take_contact(self, error, lam, is_active)
+      call check_field("u1", u1, stepper%scene, error)
+      call check_duration(h, error)
+      call take_contact(self, error, lam, is_active)
       if (allocated(error)) return
       call take_motion(self, stepper, h, u1)
       associate (march => self%march, system => self%march%system)
@@ -180,7 +181,7 @@ contains
    !> Take over the given contact in place of that of the state.
    subroutine take_contact(self, error, lam, is_active)
       type(query_t), intent(inout) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
       real(wp), intent(in), optional :: lam(:)
       logical, intent(in), optional :: is_active(:)
 
@@ -222,40 +223,44 @@ contains
       end associate
    end subroutine take_motion
 
-   !> Choose stencils for the motion, by a search that does not depend on earlier ones, and take the
-   !> wanted constraints that have a surface near.
+   !> Take the wanted constraints that have a surface near, by a search for this motion.
    subroutine begin_contact(self)
       type(query_t), intent(inout) :: self
-      integer :: pair
+      type(gap_state_t), allocatable :: gap(:)
 
-      associate (march => self%march, system => self%march%system, state => self%march%state, &
-            active => self%march%active)
-         active%is_active(:system%space%linear%n) = system%space%linear%is_used &
-            .and. .not. system%space%is_reduced
-         active%is_active(system%space%linear%n + 1:system%first_constraint(1)) = .true.
-         do pair = 1, size(system%contact)
-            associate (contact => system%contact(pair)%contact, &
-                  first => system%first_constraint(pair) + 1, &
-                  last => system%first_constraint(pair + 1))
-               contact%reach = 0.0_wp
-               call contact%begin_step(march%motion%x, march%motion%u0, march%motion%du)
-               call contact%measure(march%motion%x, march%motion%u0, march%motion%du)
-               active%is_active(first:last) = state%is_active(first:last) .and. &
-                  contact%state%is_near
-            end associate
-         end do
+      associate (system => self%march%system, active => self%march%active, &
+            linear => self%march%system%space%linear, state => self%march%state)
+         call gaps_search(system, self%march%motion, gap)
+         active%is_active = state%is_active .and. gap%is_near
+         active%is_active(:linear%n) = linear%is_used .and. .not. system%space%is_reduced
+         active%is_active(linear%n + 1:system%first_constraint(1)) = .true.
          active%lam = state%lam
          active%n_tried = 0
       end associate
    end subroutine begin_contact
 
+   !> Take over a motion from `u0` by `du`.
+   subroutine query_place(self, stepper, u0, du, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: u0(:, :), du(:, :)           !! (n_dim, n_node) [L]
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+
+      call check_field("u0", u0, stepper%scene, error)
+      call check_field("du", du, stepper%scene, error)
+      if (allocated(error)) return
+      self%march%motion%u0 = u0
+      self%march%motion%du = du
+      call motion_place(self%march%motion)
+   end subroutine query_place
+
    !> There is an evaluation to report on.
    subroutine check_evaluated(self, error)
       type(query_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. self%is_evaluated) call raise(error, err_input, &
-         "no step was evaluated since the model was made or its unknowns changed")
+      call check_that(self%is_evaluated, &
+         "no step was evaluated since the model was made or its unknowns changed", error)
    end subroutine check_evaluated
 
    !> Residual of the step: inertia, internal forces less loads, and `with_contact` less contact
@@ -287,8 +292,7 @@ contains
       integer :: k
 
       call check_evaluated(self, error)
-      if (.not. (allocated(error) .or. self%has_tangent)) call raise(error, err_input, &
-         "the last evaluation was one without tangent")
+      call check_that(self%has_tangent, "the last evaluation was one without tangent", error)
       if (allocated(error)) return
       associate (set => self%march%active%set, system => self%march%system)
          if (.not. with_contact .or. set%n == 0) then

@@ -2,20 +2,22 @@
 module emcon_stepper_report
    use emcon_constraints, only : constraint_place, constraints_evaluate, constraints_rows, &
       constraints_select
+   use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_from_entries, csr_t
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : motion_place
+   use emcon_motion, only : at_rest
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_pose, only : pose_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_field, check_list
-   use emcon_stepper_query, only : query_sync, query_t
+   use emcon_stepper_check, only : check_field, check_list, check_that
+   use emcon_gaps, only : gaps_search
+   use emcon_stepper_query, only : query_forget, query_place, query_sync, query_t
    use emcon_steps, only : prescribed_t
    implicit none
    private
    public :: contact_report_t, query_constraints, query_curvature, query_curvature_times
-   public :: report_place, report_evaluate, report_check_list
+   public :: report_evaluate, report_check_list
 
    !> Constraints over a step, ascending by their numbers: f = mean gap - target. Linearised in the
    !> motion at the end: force lam_k times row k of the discrete gradients, defect by the gradients
@@ -48,48 +50,29 @@ contains
       logical, intent(in) :: keeps_gap
       type(contact_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
-      logical, allocatable :: is_near(:)
-      integer :: k, pair, i
+      type(gap_state_t), allocatable :: gap(:)
+      logical, allocatable :: is_wanted(:)
+      integer :: k
 
       call query_sync(self, stepper, error)
       call check_field("u0", u0, stepper%scene, error)
       call check_field("u1", u1, stepper%scene, error)
       if (allocated(error)) return
-      self%is_evaluated = .false.                ! the stencils are others from here on
-      self%has_begun = .false.
+      call query_forget(self)                    ! the stencils are others from here on
       self%march%motion%pose = pose_t()
-      call report_place(self, u0, u1 - u0)
-      associate (system => self%march%system, motion => self%march%motion, &
-            set => self%march%active%set)
-         allocate(is_near(system%n_constraint), source=.false.)
-         do pair = 1, size(system%contact)
-            associate (contact => system%contact(pair)%contact)
-               contact%reach = 0.0_wp            ! not what was found for another motion
-               call contact%begin_step(motion%x, motion%u0, motion%du)
-               call contact%measure(motion%x, motion%u0, motion%du)
-               is_near(system%first_constraint(pair) + 1:system%first_constraint(pair + 1)) = &
-                  contact%state%is_near .and. contact%state%is_over .and. &
-                  (pair <= system%n_pair .or. contact%state%gap1 < contact%state%closed)
-            end associate
-         end do
-         call constraints_select(set, pack([(k, k = 1, size(is_near))], is_near))
-         do k = 1, merge(set%n, 0, keeps_gap)
-            call constraint_place(system, set%id(k), pair, i)
-            set%target(k) = system%contact(pair)%contact%state(i)%gap0
-         end do
+      call query_place(self, stepper, u0, u1 - u0, error)
+      associate (system => self%march%system, set => self%march%active%set)
+         call gaps_search(system, self%march%motion, gap)
+         is_wanted = gap%is_near .and. gap%is_over
+         associate (first_guard => system%first_constraint(system%n_pair + 1) + 1)
+            is_wanted(first_guard:) = is_wanted(first_guard:) .and. &
+               gap(first_guard:)%gap1 < gap(first_guard:)%closed
+         end associate
+         call constraints_select(set, pack([(k, k = 1, size(gap))], is_wanted))
+         if (keeps_gap) set%target = gap(set%id)%gap0
       end associate
       call report_evaluate(self, report)
    end subroutine query_constraints
-
-   !> Take over a motion.
-   subroutine report_place(self, u0, du)
-      type(query_t), intent(inout) :: self
-      real(wp), intent(in) :: u0(:, :), du(:, :)
-
-      self%march%motion%u0 = u0
-      self%march%motion%du = du
-      call motion_place(self%march%motion)
-   end subroutine report_place
 
    !> Evaluate the selected constraints, and report with gradients over all degrees of freedom.
    subroutine report_evaluate(self, report)
@@ -97,7 +80,7 @@ contains
       type(contact_report_t), intent(out) :: report
       type(numbering_t) :: freedoms
       type(prescribed_t) :: none(0)
-      logical :: is_alive(2, size(self%march%system%space%body))
+      logical :: is_alive(size(self%march%motion%x, 1), size(self%march%motion%x, 2))
       integer :: k, i, pair
 
       is_alive = .true.
@@ -154,28 +137,35 @@ contains
 
       call report_check_list(self, "factor", factor, error)
       if (allocated(error)) return
-      associate (item => self%march%active%set%item)
-         n = sum(4*item%n_node**2)
+      associate (item => self%march%active%set%item, n_dim => size(self%march%motion%x, 1))
+         n = sum((n_dim*item%n_node)**2)
          allocate(row(n), column(n), value(n))
          n = 0
          do k = 1, size(item)
-            do j = 1, 2*item(k)%n_node
-               do i = 1, 2*item(k)%n_node
+            do j = 1, n_dim*item(k)%n_node
+               do i = 1, n_dim*item(k)%n_node
                   n = n + 1
-                  row(n) = 2*item(k)%node((i + 1)/2) - mod(i, 2)
-                  column(n) = 2*item(k)%node((j + 1)/2) - mod(j, 2)
+                  row(n) = freedom(item(k)%node, i, n_dim)
+                  column(n) = freedom(item(k)%node, j, n_dim)
                   value(n) = factor(k)*item(k)%h(i, j)
                end do
             end do
          end do
       end associate
-      associate (n_dof => 2*size(self%march%system%space%body))
+      associate (n_dof => size(self%march%motion%x))
          call csr_from_entries(matrix, n_dof, n_dof, row, column, slot)
       end associate
       do i = 1, n
          matrix%value(slot(i)) = matrix%value(slot(i)) + real(value(i), dp)
       end do
    end subroutine query_curvature
+
+   !> Number among all degrees of freedom of number `i` of those of `node`.
+   pure integer function freedom(node, i, n_dim)
+      integer, intent(in) :: node(:), i, n_dim
+
+      freedom = n_dim*(node((i - 1)/n_dim + 1) - 1) + mod(i - 1, n_dim) + 1
+   end function freedom
 
    !> The same times `direction`.
    subroutine query_curvature_times(self, stepper, factor, direction, product, error)
@@ -190,13 +180,14 @@ contains
       call report_check_list(self, "factor", factor, error)
       call check_field("direction", direction, stepper%scene, error)
       if (allocated(error)) return
-      allocate(product(2, size(direction, 2)), source=0.0_wp)
+      allocate(product, source=at_rest(direction))
       do k = 1, self%march%active%set%n
-         associate (item => self%march%active%set%item(k))
+         associate (item => self%march%active%set%item(k), n_dim => size(direction, 1))
             do j = 1, item%n_node
                do i = 1, item%n_node
                   product(:, item%node(i)) = product(:, item%node(i)) + factor(k)*matmul( &
-                     item%h(2*i - 1:2*i, 2*j - 1:2*j), direction(:, item%node(j)))
+                     item%h(n_dim*(i - 1) + 1:n_dim*i, n_dim*(j - 1) + 1:n_dim*j), &
+                     direction(:, item%node(j)))
                end do
             end do
          end associate
@@ -210,8 +201,8 @@ contains
       real(wp), intent(in) :: list(:)
       type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. (self%has_set .or. allocated(error))) call raise(error, err_input, "no " // &
-         "constraints were evaluated since they were selected, or the unknowns changed")
+      call check_that(self%has_set, "no constraints were evaluated since they were selected, " // &
+         "or the unknowns changed", error)
       call check_list(name, list, self%march%active%set%n, error)
    end subroutine report_check_list
 

@@ -15,9 +15,9 @@ EPS = 2.0**-52
 STANDS_FOR = ["emcon_stepper*", "emcon_quantities", "emcon_version"]
 # For the other rooms of the library, not for programs.
 INNER_MODULES = {"emcon_stepper_check"}
-INNER_NAMES = {"stepper_read_source", "stepper_check_solids", "query_sync", "report_place",
-               "report_evaluate", "report_check_list", "field_names",
-               "pair_variables"}
+INNER_NAMES = {"stepper_read_source", "stepper_check_solids", "query_sync", "query_place",
+               "query_forget", "report_evaluate", "report_check_list", "quantity_fields",
+               "quantity_of_field", "pair_variables"}
 
 
 def statements(path: Path) -> list[str]:

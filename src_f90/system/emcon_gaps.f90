@@ -1,0 +1,54 @@
+!> The gaps of all possible contacts, in the order of the constraints: measured for a motion, by
+!> stencils that were chosen before, or by a search that does not depend on earlier ones.
+module emcon_gaps
+   use emcon_contact, only : gap_state_t
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: gaps_measure, gaps_search, gaps_forget
+
+contains
+
+   !> Choose stencils for `motion`, and measure by them.
+   subroutine gaps_search(system, motion, gap)
+      type(system_t), intent(inout) :: system                     !! its contacts
+      type(motion_t), intent(in) :: motion                        !! from `u0` by `du`
+      type(gap_state_t), allocatable, intent(out) :: gap(:)       !! (n_constraint)
+      integer :: i
+
+      call gaps_forget(system)
+      do i = 1, size(system%contact)
+         call system%contact(i)%contact%begin_step(motion%x, motion%u0, motion%du)
+      end do
+      call gaps_measure(system, motion, gap)
+   end subroutine gaps_search
+
+   !> Measure by the present stencils. Other constraints than contacts have no gaps.
+   subroutine gaps_measure(system, motion, gap)
+      type(system_t), intent(inout) :: system                     !! its contacts
+      type(motion_t), intent(in) :: motion                        !! from `u0` by `du`
+      type(gap_state_t), allocatable, intent(out) :: gap(:)       !! (n_constraint)
+      integer :: i
+
+      allocate(gap(system%n_constraint))
+      do i = 1, size(system%contact)
+         associate (contact => system%contact(i)%contact)
+            call contact%measure(motion%x, motion%u0, motion%du)
+            gap(system%first_constraint(i) + 1:system%first_constraint(i + 1)) = contact%state
+         end associate
+      end do
+   end subroutine gaps_measure
+
+   !> Let the next search begin anew.
+   subroutine gaps_forget(system)
+      type(system_t), intent(inout) :: system                     !! its contacts
+      integer :: i
+
+      do i = 1, size(system%contact)
+         system%contact(i)%contact%reach = 0.0_wp
+      end do
+   end subroutine gaps_forget
+
+end module emcon_gaps
