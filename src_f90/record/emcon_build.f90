@@ -26,18 +26,19 @@ contains
       call blas_name(list(5)%text)
    end subroutine build_list
 
-   !> A warning for each subject in which the present build differs from that of `before`.
-   subroutine build_differences(before, warnings)
+   !> A text for each subject in which the present build differs from that of `before`.
+   subroutine build_differences(before, start, warnings)
       type(string_t), intent(in) :: before(:)
-      type(notes_t), intent(inout) :: warnings
+      character(len=*), intent(in) :: start          !! of the texts
+      type(notes_t), intent(out) :: warnings
       type(string_t), allocatable :: list(:)
       integer :: i
 
       call build_list(list)
       do i = 1, min(size(list), size(before))
-         if (before(i)%text /= list(i)%text) call note_add(warnings, "the run began with another " &
-            // trim(subject(i)) // ": '" // before(i)%text // "', now '" // list(i)%text // &
-            "'; its last digits may differ from those of a run in one go")
+         if (before(i)%text /= list(i)%text) call note_add(warnings, start // &
+            "the run began with another " // trim(subject(i)) // ": '" // before(i)%text // &
+            "', now '" // list(i)%text // "'; its last digits may differ from those of a run in one go")
       end do
    end subroutine build_differences
 

@@ -6,7 +6,7 @@ module emcon_run
    use emcon_files, only : file_exists, file_remove, make_directory, survive_file_size_limit
    use emcon_heap, only : heap_keep
    use emcon_kinds, only : dp, wp
-   use emcon_log, only : log_close, log_line, log_open, log_t
+   use emcon_log, only : log_close, log_line, log_lines, log_open, log_t
    use emcon_march, only : increment_t, march_watch
    use emcon_newton, only : interrupt_interface
    use emcon_progress, only : progress_end, progress_show, progress_start, progress_t
@@ -130,6 +130,7 @@ contains
       type(run_t), allocatable :: run
       type(restart_t) :: restart
       type(string_t), allocatable :: build(:)
+      type(notes_t) :: differences
       integer :: n_row, n_frame, i
 
       allocate(run)
@@ -158,7 +159,10 @@ contains
          return
       end if
       call move_diagnostics(run, report)
-      call warn_of_build(run, build, path, report)
+      call build_differences(build, path // ": warning: ", differences)
+      call log_lines(run%log, "", differences)
+      if (differences%n > 0) report%diagnostic = [report%diagnostic, &
+         differences%item(:differences%n)]
       call recorder_resume(run%recorder, run%stepper, run%base, n_row, n_frame, error)
       if (allocated(error)) return
       call log_line(run%log, "resumed after increment " // &
@@ -166,24 +170,6 @@ contains
          to_text(run%stepper%march%state%time, 9))
       call march_on(run, options, is_interrupted, report, error)
    end subroutine run_restart
-
-   !> Tell, also the log, in what this program is not the one that wrote the restart file at `path`.
-   subroutine warn_of_build(run, build, path, report)
-      type(run_t), intent(inout) :: run
-      type(string_t), intent(in) :: build(:)         !! what that program said of itself
-      character(len=*), intent(in) :: path
-      type(run_report_t), intent(inout) :: report
-      type(notes_t) :: differences
-      type(string_t) :: line
-      integer :: i
-
-      call build_differences(build, differences)
-      do i = 1, differences%n
-         line%text = path // ": warning: " // differences%item(i)%text
-         call log_line(run%log, line%text)
-         report%diagnostic = [report%diagnostic, line]
-      end do
-   end subroutine warn_of_build
 
    subroutine move_diagnostics(run, report)
       type(run_t), intent(inout) :: run
@@ -246,7 +232,7 @@ contains
          call log_increment(run%log, run%stepper, increment)
          if (allocated(error)) exit
          call recorder_write(run%recorder, run%stepper, increment, cpu_seconds(), error)
-         if (.not. allocated(error)) call save_if_due(run, error)
+         if (is_save_due(run) .and. .not. allocated(error)) call save(run, error)
          if (.not. allocated(error)) call recorder_publish(run%recorder, .false., error)
          associate (state => run%stepper%march%state)
             call progress_show(run%progress, real(stepper_fraction(run%stepper), dp), &
@@ -271,7 +257,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: second
       type(notes_t) :: lines
-      integer :: i
 
       if (.not. allocated(error)) then
          call recorder_finish(run%recorder, wall_seconds() - run%wall_start, &
@@ -281,9 +266,7 @@ contains
       if (.not. allocated(error)) call move_alloc(second, error)
       if (allocated(error)) call log_line(run%log, error%message)
       call pass_verdict(run, is_strict, report, lines, error)
-      do i = 1, lines%n
-         call log_line(run%log, lines%item(i)%text)
-      end do
+      call log_lines(run%log, "", lines)
       report%closing = lines%item(:lines%n)
       call verdict_write(run%stepper%verdict, run%stepper%march, run%base // ".json", second)
       if (.not. allocated(error)) call move_alloc(second, error)
@@ -299,14 +282,11 @@ contains
       type(run_report_t), intent(inout) :: report
       type(notes_t), intent(out) :: lines
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, failure
 
+      if (allocated(error)) failure = error%message
       associate (verdict => run%stepper%verdict)
-         if (allocated(error)) then
-            call verdict_end(verdict, error%message)
-         else
-            call verdict_end(verdict)
-         end if
+         call verdict_end(verdict, failure)      ! not allocated: absent
          call verdict_balance_lines(verdict, run%stepper%scene, run%stepper%march, lines)
          report%warnings = verdict%warnings
          report%is_bad = .not. verdict_is_good(verdict)
@@ -316,20 +296,17 @@ contains
       end associate
    end subroutine pass_verdict
 
-   !> Write the restart file where *RESTART asks for it.
-   subroutine save_if_due(run, error)
-      type(run_t), intent(inout) :: run
-      type(error_t), allocatable, intent(out) :: error
+   !> Does *RESTART ask for a restart file after this increment?
+   pure logical function is_save_due(run)
+      type(run_t), intent(in) :: run
 
       associate (state => run%stepper%march%state, &
             frequency => run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency)
-         if (frequency == 0) return
-         if (mod(state%increment - state%n_before, frequency) == 0 &
-            .or. stepper_is_done(run%stepper)) then
-            call save(run, error)
-         end if
+         is_save_due = frequency /= 0
+         if (is_save_due) is_save_due = stepper_is_done(run%stepper) &
+            .or. mod(state%increment - state%n_before, frequency) == 0
       end associate
-   end subroutine save_if_due
+   end function is_save_due
 
    !> Publish the results and write the restart file, in this order: it may not be ahead of them.
    subroutine save(run, error)

@@ -5,15 +5,14 @@ module emcon_run_log
       normal_nodal, smoothing_none
    use emcon_kinds, only : wp
    use emcon_link_lines, only : add_link_lines
-   use emcon_log, only : log_line, log_t
+   use emcon_log, only : log_line, log_lines, log_t
    use emcon_march, only : increment_t
    use emcon_options, only : option_text
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_given
    use emcon_solver_registry, only : solver_given
    use emcon_stepper, only : stepper_t
-   use emcon_steps, only : step_t
-   use emcon_text, only : notes_t, string_t, to_text
+   use emcon_text, only : note_add, notes_append, notes_t, string_t, to_text
    use emcon_version, only : version
    implicit none
    private
@@ -30,20 +29,11 @@ contains
       type(stepper_t), intent(in) :: stepper
       type(string_t), intent(in) :: diagnostic(:)    !! of the deck
       character(len=*), intent(in) :: path
-      type(string_t), allocatable :: line(:)
-      integer :: i
 
       call log_line(log, "EMCON " // version // ", deck " // path)
-      do i = 1, size(stepper%override)
-         call log_line(log, "with " // stepper%override(i)%text)
-      end do
-      do i = 1, size(diagnostic)
-         call log_line(log, diagnostic(i)%text)
-      end do
-      allocate(line, source=model_lines(stepper))
-      do i = 1, size(line)
-         call log_line(log, line(i)%text)
-      end do
+      call log_lines(log, "with ", notes_t(size(stepper%override), stepper%override))
+      call log_lines(log, "", notes_t(size(diagnostic), diagnostic))
+      call log_lines(log, "", model_notes(stepper))
       call log_line(log, "")
       call log_line(log, " increment          time             h newton cuts active" // &
          "          kinetic           strain            total  residuals of the last solve")
@@ -53,106 +43,73 @@ contains
    function model_lines(stepper) result(line)
       type(stepper_t), intent(in) :: stepper
       type(string_t), allocatable :: line(:)
-      character(len=:), allocatable :: how
-      type(notes_t) :: links
-      integer :: i, k
+      type(notes_t) :: notes
 
-      allocate(line(0))
+      notes = model_notes(stepper)
+      line = notes%item(:notes%n)
+   end function model_lines
+
+   function model_notes(stepper) result(notes)
+      type(stepper_t), intent(in) :: stepper
+      type(notes_t) :: notes
+      character(len=:), allocatable :: how
+      integer :: k
+
       associate (scene => stepper%scene, system => stepper%march%system)
-         if (len_trim(scene%heading) > 0) call add(trim(scene%heading))
-         call add(to_text(size(scene%x, 2)) // " nodes, " // &
+         if (len_trim(scene%heading) > 0) call note_add(notes, trim(scene%heading))
+         call note_add(notes, to_text(size(scene%x, 2)) // " nodes, " // &
             to_text(system%space%numbering%n_unknown) // " unknowns in step 1, " // &
             to_text(system%space%n_body) // " bodies")
          do k = 1, size(scene%kind)
-            if (any(scene%element_kind == k)) call add(to_text(count(scene%element_kind == k)) // &
-               " elements " // trim(scene%kind(k)%name))
+            if (any(scene%element_kind == k)) call note_add(notes, &
+               to_text(count(scene%element_kind == k)) // " elements " // trim(scene%kind(k)%name))
          end do
-         call add_link_lines(scene, system, links)
-         do k = 1, links%n
-            call add(links%item(k)%text)
-         end do
+         call add_link_lines(scene, system, notes)
          do k = 1, size(scene%pair)
             call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact, how)
-            call add("contact: " // scene%surface(scene%pair(k)%slave)%name // " (slave, " // &
-               to_text(system%contact(k)%contact%n_constraint) // " nodes" // &
+            call note_add(notes, "contact: " // scene%surface(scene%pair(k)%slave)%name // &
+               " (slave, " // to_text(system%contact(k)%contact%n_constraint) // " nodes" // &
                trim(merge(", the rounder one", "                 ", &
                scene%pair(k)%is_exchanged)) // ") on " // &
                scene%surface(scene%pair(k)%master)%name // ", " // how)
          end do
-         if (system%n_pair < size(system%contact)) call add("contact: guards hold nodes that " // &
-            "the pairs do not, deeper than " // to_text(guard_slack) // " of an edge")
+         if (system%n_pair < size(system%contact)) call note_add(notes, "contact: guards hold " // &
+            "nodes that the pairs do not, deeper than " // to_text(guard_slack) // " of an edge")
          do k = 1, size(scene%step)
-            call solver_text(scene%step(k), how)
-            call add("step " // to_text(k) // ": duration " // to_text(scene%step(k)%duration) // &
-               ", h = " // to_text(scene%step(k)%h) // &
-               trim(merge(", NLGEOM", "        ", scene%step(k)%nlgeom)) // ", " // &
-               scheme_text(scene%step(k)) // ", solver " // how)
-            do i = 1, size(scene%pair)
-               if (.not. has_changed(scene, i, k)) cycle
-               call formulation_text(scene%pair(i)%formulation, scene%step(k)%contact, how)
-               call add("   contact " // scene%surface(scene%pair(i)%slave)%name // " on " // &
-                  scene%surface(scene%pair(i)%master)%name // ": " // how)
-            end do
+            call add_step(notes, scene, k)
          end do
       end associate
-      do k = 1, stepper%notes%n
-         call add(stepper%notes%item(k)%text)
-      end do
+      call notes_append(notes, stepper%notes)
+   end function model_notes
 
-   contains
-
-      subroutine add(text)
-         character(len=*), intent(in) :: text
-         type(string_t) :: new(1)
-
-         new(1)%text = trim(text)
-         line = [line, new]
-      end subroutine add
-
-   end function model_lines
-
-   !> How a step goes on in time.
-   pure function scheme_text(step) result(text)
-      type(step_t), intent(in) :: step
-      character(len=scheme_length(step)) :: text
-
-      text = step%scheme%text
-      if (step%scheme%code == scheme_given) text = "scheme " // step%choice%name
-   end function scheme_text
-
-   pure integer function scheme_length(step) result(n)
-      type(step_t), intent(in) :: step
-
-      n = len_trim(step%scheme%text)
-      if (step%scheme%code == scheme_given) n = len("scheme ") + len(step%choice%name)
-   end function scheme_length
-
-   !> What factorises the matrices of a step.
-   pure subroutine solver_text(step, text)
-      type(step_t), intent(in) :: step
-      character(len=:), allocatable, intent(out) :: text
-
-      if (step%solver == solver_given) then
-         text = step%solver_name
-      else
-         call option_text("solver", step%solver, text)
-      end if
-   end subroutine solver_text
-
-   !> Is a pair computed otherwise in step `k` than in the step before?
-   pure logical function has_changed(scene, pair, k)
+   !> What step `k` is, and where contact is computed otherwise than in the step before.
+   subroutine add_step(notes, scene, k)
+      type(notes_t), intent(inout) :: notes
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: pair, k
-      character(len=:), allocatable :: before, after
+      integer, intent(in) :: k
+      character(len=:), allocatable :: scheme, solver, before, how
+      integer :: i
 
-      has_changed = .false.
-      if (k == 1) return
-      associate (formulation => scene%pair(pair)%formulation)
-         call formulation_text(formulation, scene%step(k - 1)%contact, before)
-         call formulation_text(formulation, scene%step(k)%contact, after)
+      associate (step => scene%step(k))
+         call option_text("solver", step%solver, solver)
+         if (step%solver == solver_given) solver = step%solver_name
+         scheme = trim(step%scheme%text)
+         if (step%scheme%code == scheme_given) scheme = "scheme " // step%choice%name
+         call note_add(notes, "step " // to_text(k) // ": duration " // to_text(step%duration) // &
+            ", h = " // to_text(step%h) // trim(merge(", NLGEOM", "        ", step%nlgeom)) // &
+            ", " // scheme // ", solver " // solver)
       end associate
-      has_changed = after /= before
-   end function has_changed
+      if (k == 1) return
+      do i = 1, size(scene%pair)
+         associate (pair => scene%pair(i))
+            call formulation_text(pair%formulation, scene%step(k - 1)%contact, before)
+            call formulation_text(pair%formulation, scene%step(k)%contact, how)
+            if (how /= before) call note_add(notes, "   contact " // &
+               scene%surface(pair%slave)%name // " on " // scene%surface(pair%master)%name // &
+               ": " // how)
+         end associate
+      end do
+   end subroutine add_step
 
    !> How contact is computed: of the options those that the formulation has use for.
    pure subroutine formulation_text(formulation, options, text)
@@ -202,14 +159,10 @@ contains
       type(stepper_t), intent(in) :: stepper
       type(increment_t), intent(in) :: increment
       character(len=320) :: line
-      integer :: i, n
+      integer :: n
 
-      do i = 1, increment%notes%n
-         call log_line(log, "   " // increment%notes%item(i)%text)
-      end do
-      do i = 1, increment%warnings%n
-         call log_line(log, "   warning: " // increment%warnings%item(i)%text)
-      end do
+      call log_lines(log, "   ", increment%notes)
+      call log_lines(log, "   warning: ", increment%warnings)
       associate (state => stepper%march%state, ledger => stepper%march%ledger)
          write(line, "(i10, 2es14.6, i7, i5, i7, 3es17.9)") state%increment, state%time, &
             increment%h, increment%n_newton, increment%n_cut, increment%n_active, &

@@ -4,9 +4,10 @@
 module emcon_log
    use emcon_errors, only : error_t
    use emcon_files, only : file_close, file_lock, file_open, file_put, file_t, file_truncate
+   use emcon_text, only : notes_t
    implicit none
    private
-   public :: log_t, log_open, log_line, log_close
+   public :: log_t, log_open, log_line, log_lines, log_close
 
    !> A log being written. Lines given to a log that is not open go nowhere.
    type :: log_t
@@ -42,6 +43,18 @@ contains
       if (.not. self%is_open .or. allocated(self%failure)) return
       call file_put(self%file, text // achar(10), self%failure)
    end subroutine log_line
+
+   !> Append lines that begin with `start`.
+   subroutine log_lines(self, start, notes)
+      type(log_t), intent(inout) :: self
+      character(len=*), intent(in) :: start
+      type(notes_t), intent(in) :: notes
+      integer :: i
+
+      do i = 1, notes%n
+         call log_line(self, start // notes%item(i)%text)
+      end do
+   end subroutine log_lines
 
    !> Close the log; `error` is the first failure since it was opened. Harmless if it is not open.
    subroutine log_close(self, error)
