@@ -38,7 +38,8 @@ contains
       do i = 1, min(size(list), size(before))
          if (before(i)%text /= list(i)%text) call note_add(warnings, start // &
             "the run began with another " // trim(subject(i)) // ": '" // before(i)%text // &
-            "', now '" // list(i)%text // "'; its last digits may differ from those of a run in one go")
+            "', now '" // list(i)%text // &
+            "'; its last digits may differ from those of a run in one go")
       end do
    end subroutine build_differences
 

@@ -14,7 +14,7 @@ module emcon_stepper_conditions
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_number, stepper_check_open
+   use emcon_stepper_check, only : check_number, check_that, stepper_check_open
    use emcon_steps, only : load_gravity, load_point, prescribed_t, step_t
    use emcon_system, only : system_renew
    use emcon_text, only : to_text
@@ -67,14 +67,13 @@ contains
       real(wp) :: part, present_value
 
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) call check_number("the value", value, error)
+      call check_number("the value", value, error)
       if (allocated(error)) return
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
-         if (load < 1 .or. load > size(step%load)) then
-            call raise(error, err_input, "there is no load " // to_text(load) // ": step " // &
-               to_text(state%i_step) // " of the deck has " // to_text(size(step%load)))
-            return
-         end if
+         call check_that(load >= 1 .and. load <= size(step%load), "there is no load " // &
+            to_text(load) // ": step " // to_text(state%i_step) // " of the deck has " // &
+            to_text(size(step%load)), error)
+         if (allocated(error)) return
          associate (own => step%load(load))
             part = part_passed(step, state)
             if (step%scheme%loads_ramp .and. part < 1.0_wp) then
@@ -100,12 +99,9 @@ contains
       integer :: node, k
 
       call find_prescribed(self, label, dof, node, k, error)
-      if (.not. allocated(error)) call check_number("the value", value, error)
+      call check_freedom(label, dof, "is not prescribed", k > 0, error)
+      call check_number("the value", value, error)
       if (allocated(error)) return
-      if (k == 0) then
-         call refuse_freedom(error, label, dof, "is not prescribed")
-         return
-      end if
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
          now = instant_t(state%step_time, state%time)
          call prescribed_motion(self%scene, step, step%prescribed(k), now, &
@@ -130,21 +126,16 @@ contains
       integer :: node, k
 
       call find_prescribed(self, label, dof, node, k, error)
-      if (.not. allocated(error)) call check_number("the value", value, error)
+      call check_freedom(label, dof, "is prescribed already", k == 0, error)
+      call check_number("the value", value, error)
       if (allocated(error)) return
-      if (k > 0) then
-         call refuse_freedom(error, label, dof, "is prescribed already")
-         return
-      end if
       added%node = node
       added%dof = dof
       added%value = value
       u_start = self%march%state%u_start(dof, node)
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
          call start_run(step, state, added, value, state%u(dof, node))
-         allocate(list(size(step%prescribed) + 1))
-         list(:size(step%prescribed)) = step%prescribed
-         list(size(list)) = added
+         list = [step%prescribed, added]
       end associate
       call renumber(self, list, error)
       if (allocated(error)) self%march%state%u_start(dof, node) = u_start
@@ -175,11 +166,8 @@ contains
       integer :: node, k, i
 
       call find_prescribed(self, label, dof, node, k, error)
+      call check_freedom(label, dof, "is not prescribed", k > 0, error)
       if (allocated(error)) return
-      if (k == 0) then
-         call refuse_freedom(error, label, dof, "is not prescribed")
-         return
-      end if
       associate (all_of => self%scene%step(self%march%state%i_step)%prescribed)
          list = pack(all_of, [(i /= k, i = 1, size(all_of))])
       end associate
@@ -248,18 +236,14 @@ contains
       k = 0
       node = 0
       call stepper_check_open(self, error)
+      if (.not. allocated(error)) node = findloc(self%scene%node_label, label, 1)
+      call check_that(node > 0, "there is no node " // to_text(label), error)
+      call check_that(dof >= 1 .and. dof <= self%scene%n_dim, "a node has the degrees of " // &
+         "freedom 1 to " // to_text(self%scene%n_dim) // ", not " // to_text(dof), error)
       if (allocated(error)) return
-      node = findloc(self%scene%node_label, label, 1)
-      if (node == 0) then
-         call raise(error, err_input, "there is no node " // to_text(label))
-      else if (dof < 1 .or. dof > self%scene%n_dim) then
-         call raise(error, err_input, "a node has the degrees of freedom 1 to " // &
-            to_text(self%scene%n_dim) // ", not " // to_text(dof))
-      else
-         associate (list => self%scene%step(self%march%state%i_step)%prescribed)
-            k = findloc(list%node == node .and. list%dof == dof, .true., 1)
-         end associate
-      end if
+      associate (list => self%scene%step(self%march%state%i_step)%prescribed)
+         k = findloc(list%node == node .and. list%dof == dof, .true., 1)
+      end associate
    end subroutine find_prescribed
 
    !> Let the linear run of a condition in a static step go from `u`, where it is now, to `value`.
@@ -291,14 +275,15 @@ contains
       part_passed = min(1.0_wp, state%step_time/step%duration)
    end function part_passed
 
-   !> An input error: "degree of freedom 1 of node 7 is not prescribed", or what else it is.
-   pure subroutine refuse_freedom(error, label, dof, what)
-      type(error_t), allocatable, intent(out) :: error
+   !> An input error that says what a degree of freedom is, unless `holds`.
+   pure subroutine check_freedom(label, dof, what, holds, error)
       integer, intent(in) :: label, dof
       character(len=*), intent(in) :: what
+      logical, intent(in) :: holds
+      type(error_t), allocatable, intent(inout) :: error
 
-      call raise(error, err_input, "degree of freedom " // to_text(dof) // " of node " &
-         // to_text(label) // " " // what)
-   end subroutine refuse_freedom
+      call check_that(holds, "degree of freedom " // to_text(dof) // " of node " &
+         // to_text(label) // " " // what, error)
+   end subroutine check_freedom
 
 end module emcon_stepper_conditions

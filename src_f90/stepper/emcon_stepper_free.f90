@@ -3,7 +3,8 @@
 !> The state is read from `stepper%march%state`, energies and momenta from `stepper%march%ledger`.
 module emcon_stepper_free
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : error_t
+   use emcon_gaps, only : gaps_forget
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
@@ -15,7 +16,7 @@ module emcon_stepper_free
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_check_solids, stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_number, check_size, &
-      stepper_check_open
+      check_that, stepper_check_open
    use emcon_system, only : system_check_response, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
@@ -51,14 +52,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) call stepper_check_solids(self, error)
+      call stepper_check_solids(self, error)
+      call check_that(ieee_is_finite(h), "a step needs a size h > 0 that is finite", error)
       if (allocated(error)) return
-      if (.not. ieee_is_finite(h)) then
-         call raise(error, err_input, "a step needs a size h > 0 that is finite")
-      else if (.not. h > least_step*self%march%state%step_time) then
-         call raise(error, err_input, "a step needs a size h > 0 that time " // &
-            to_text(self%march%state%time) // " can tell, not " // to_text(h))
-      end if
+      call check_that(h > least_step*self%march%state%step_time, "a step needs a size h > 0 " // &
+         "that time " // to_text(self%march%state%time) // " can tell, not " // to_text(h), error)
       if (allocated(error)) return
       call march_free_increment(self%march, self%scene, h, increment, error)
       if (.not. allocated(error)) call verdict_update(self%verdict, self%scene, self%march, &
@@ -69,24 +67,28 @@ contains
    subroutine stepper_next_step(self, error)
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error   !! the present step goes on
-      type(error_t), allocatable :: ignored
       type(snapshot_t) :: before
 
       call stepper_check_open(self, error)
+      if (.not. allocated(error)) call check_that(self%march%state%i_step < size(self%scene%step), &
+         "step " // to_text(self%march%state%i_step) // " is the last one of the deck", error)
       if (allocated(error)) return
-      if (self%march%state%i_step >= size(self%scene%step)) then
-         call raise(error, err_input, "step " // to_text(self%march%state%i_step) // &
-            " is the last one of the deck")
-         return
-      end if
       call stepper_snapshot(self, before)
       call march_begin_step(self%march, self%scene, self%march%state%i_step + 1, error)
-      if (.not. allocated(error)) return
+      if (allocated(error)) call put_back(self, before)
+   end subroutine stepper_next_step
+
+   !> Go back to `before`, after a step of the deck did not begin.
+   subroutine put_back(self, before)
+      type(stepper_t), intent(inout) :: self
+      type(snapshot_t), intent(in) :: before
+      type(error_t), allocatable :: ignored
+
       self%march%state = before%state
       call march_resume(self%march, self%scene, ignored)
       self%march%state = before%state
       self%march%ledger = before%ledger
-   end subroutine stepper_next_step
+   end subroutine put_back
 
    !> Put the given parts of the state in place of the present ones; on an error nothing changes.
    !> Dependent nodes of ties and equations follow the others. Energies and momenta are measured
@@ -109,17 +111,13 @@ contains
       next = self%march%state
       before = self%march%ledger
       if (present(u)) call take_field(self, u, "u", next%u, error)
-      if (allocated(error)) return
       if (present(v)) call take_field(self, v, "v", next%v, error)
-      if (allocated(error)) return
       call take_contact(next, lam, is_active, error)
-      if (allocated(error)) return
       call check_motion(self, next%v, error, time)
-      if (allocated(error)) return
       if (present(u)) call measure_rest(self, next, error)
       if (allocated(error)) return
       self%march%state = next
-      call forget_searches(self)
+      call gaps_forget(self%march%system)
       if (present(time)) call march_set_time(self%march, self%scene, &
          time - self%march%state%start_time)
       call ledger_measure(self%march%ledger, self%march%system, self%scene%x, self%march%state)
@@ -131,8 +129,8 @@ contains
       type(stepper_t), intent(in) :: self
       real(wp), intent(in) :: given(:, :)
       character(len=*), intent(in) :: name
-      real(wp), intent(inout), contiguous :: field(:, :)     !! (2, n_node)
-      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(inout), contiguous :: field(:, :)     !! (n_dim, n_node)
+      type(error_t), allocatable, intent(inout) :: error
 
       call check_field(name, given, self%scene, error)
       if (allocated(error)) return
@@ -145,7 +143,8 @@ contains
       type(state_t), intent(inout) :: next
       real(wp), intent(in), optional :: lam(:)
       logical, intent(in), optional :: is_active(:)
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: i
 
       if (present(is_active)) then
          call check_size("the active set", size(is_active), size(next%lam), error)
@@ -156,34 +155,29 @@ contains
       if (.not. present(lam)) return
       call check_list("lam", lam, size(next%lam), error)
       if (allocated(error)) return
-      if (any(abs(lam) > 0.0_wp .and. .not. next%is_active)) then
-         call raise(error, err_input, "lam is not 0 at constraint " // &
-            to_text(findloc(abs(lam) > 0.0_wp .and. .not. next%is_active, .true., 1)) // &
-            ", which does not act")
-      else
-         next%lam = lam
-      end if
+      i = findloc(abs(lam) > 0.0_wp .and. .not. next%is_active, .true., 1)
+      call check_that(i == 0, "lam is not 0 at constraint " // to_text(i) // &
+         ", which does not act", error)
+      next%lam = lam
    end subroutine take_contact
 
    !> Velocities and time have to fit the present step of the deck.
    subroutine check_motion(self, v, error, time)
       type(stepper_t), intent(in) :: self
       real(wp), intent(in) :: v(:, :)
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
       real(wp), intent(in), optional :: time
 
-      associate (state => self%march%state)
-         if (.not. self%scene%step(state%i_step)%scheme%masses_resist &
-            .and. any(abs(v) > 0.0_wp)) then
-            call raise(error, err_input, "step " // to_text(state%i_step) // &
-               " of the deck is static: there are no velocities")
-            return
-         end if
+      if (allocated(error)) return
+      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+         call check_that(step%scheme%masses_resist .or. .not. any(abs(v) > 0.0_wp), "step " // &
+            to_text(state%i_step) // " of the deck is static: there are no velocities", error)
          if (.not. present(time)) return
          call check_number("the time", time, error)
-         if (allocated(error) .or. .not. time < state%start_time) return
-         call raise(error, err_input, "time " // to_text(time) // " is before the start of " // &
-            "step " // to_text(state%i_step) // " of the deck, " // to_text(state%start_time))
+         if (allocated(error)) return
+         call check_that(time >= state%start_time, "time " // to_text(time) // " is before the " &
+            // "start of step " // to_text(state%i_step) // " of the deck, " // &
+            to_text(state%start_time), error)
       end associate
    end subroutine check_motion
 
@@ -191,8 +185,9 @@ contains
    subroutine measure_rest(self, next, error)
       type(stepper_t), intent(inout) :: self
       type(state_t), intent(inout) :: next
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
+      if (allocated(error)) return
       associate (system => self%march%system)
          call system_respond(system, motion_of(pose_at_end, self%scene%x, next%u, &
             at_rest(next%u)), .false.)
@@ -206,16 +201,6 @@ contains
          call pair_record_init(next%pairs, system)
       end associate
    end subroutine measure_rest
-
-   !> The next step searches for contact anew.
-   subroutine forget_searches(self)
-      type(stepper_t), intent(inout) :: self
-      integer :: pair
-
-      do pair = 1, size(self%march%system%contact)
-         self%march%system%contact(pair)%contact%reach = 0.0_wp
-      end do
-   end subroutine forget_searches
 
    !> Keep the present state in `snapshot`.
    subroutine stepper_snapshot(self, snapshot)
@@ -234,31 +219,25 @@ contains
       type(stepper_t), intent(inout) :: self
       type(snapshot_t), intent(in) :: snapshot
       type(error_t), allocatable, intent(out) :: error   !! the present state stays
-      type(error_t), allocatable :: ignored
       type(snapshot_t) :: before
 
       call stepper_check_open(self, error)
+      if (.not. allocated(error)) call check_that(fits(self%march%state, snapshot), &
+         "this state was not taken from this model", error)
       if (allocated(error)) return
-      if (.not. fits(self%march%state, snapshot)) then
-         call raise(error, err_input, "this state was not taken from this model")
-         return
-      end if
       call stepper_snapshot(self, before)
       self%march%state = snapshot%state
       if (snapshot%state%i_step /= before%state%i_step) then
          call march_resume(self%march, self%scene, error)
          if (allocated(error)) then
-            self%march%state = before%state
-            call march_resume(self%march, self%scene, ignored)
-            self%march%state = before%state
-            self%march%ledger = before%ledger
+            call put_back(self, before)
             return
          end if
          self%march%state = snapshot%state
       end if
       self%march%ledger = snapshot%ledger
       self%verdict = snapshot%verdict
-      call forget_searches(self)
+      call gaps_forget(self%march%system)
    end subroutine stepper_restore
 
    !> Is the snapshot of a model of the same size as that of `state`?

@@ -9,7 +9,7 @@ module emcon_stepper_given
    use emcon_csr, only : csr_t
    use emcon_element_kind, only : find_element_kind
    use emcon_element_registry, only : element_rows
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : error_t
    use emcon_host, only : host_add_constraint, host_add_force, host_add_law, &
       host_add_solver, host_copy_solvers, host_find_solver
    use emcon_host_check, only : host_check_force, host_check_mass
@@ -26,6 +26,7 @@ module emcon_stepper_given
    use emcon_solver_registry, only : is_foreign_solver, solver_names, solvers
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    use emcon_stepper, only : stepper_t
+   use emcon_stepper_check, only : check_that
    use emcon_text, only : squeezed, to_upper
    implicit none
    private
@@ -46,12 +47,9 @@ contains
       character(len=*), intent(in) :: name           !! small or capital letters
       class(point_function_t), intent(in) :: energy
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
-      character(len=:), allocatable :: material
 
-      material = to_upper(trim(adjustl(name)))
-      call check_stage(self, error)
-      if (.not. allocated(error)) call check_material(self, material, error)
-      if (.not. allocated(error)) call host_add_law(self%given, material, energy=energy)
+      call check_material(self, plain(name), error)
+      if (.not. allocated(error)) call host_add_law(self%given, plain(name), energy=energy)
    end subroutine give_energy
 
    !> Give a law for the *USER MATERIAL called `name`. It takes the constants of that card.
@@ -60,12 +58,9 @@ contains
       character(len=*), intent(in) :: name           !! small or capital letters
       class(law_t), intent(in) :: law
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
-      character(len=:), allocatable :: material
 
-      material = to_upper(trim(adjustl(name)))
-      call check_stage(self, error)
-      if (.not. allocated(error)) call check_material(self, material, error)
-      if (.not. allocated(error)) call host_add_law(self%given, material, law=law)
+      call check_material(self, plain(name), error)
+      if (.not. allocated(error)) call host_add_law(self%given, plain(name), law=law)
    end subroutine give_law
 
    !> Can a law be given for the material `name`?
@@ -73,24 +68,28 @@ contains
       type(stepper_t), intent(in) :: self
       character(len=*), intent(in) :: name
       type(error_t), allocatable, intent(out) :: error
+      logical :: is_given
       integer :: i, k
 
-      k = 0
-      do i = 1, size(self%scene%material)
-         if (self%scene%material(i)%name == name) k = i
+      call check_stage(self, error)
+      if (allocated(error)) return
+      do k = size(self%scene%material), 1, -1
+         if (self%scene%material(k)%name == name) exit
       end do
-      if (k == 0) then
-         call raise(error, err_input, "there is no material " // name // " in the deck")
-      else if (self%scene%material(k)%law /= law_given) then
-         call raise(error, err_input, "material " // name // " (" // where_text(self%scene, &
-            self%scene%material(k)%origin) // ") has a law of its own: to give one, it has to be " &
-            // "a *USER MATERIAL")
-      else if (allocated(self%given%law)) then
+      call check_that(k > 0, "there is no material " // name // " in the deck", error)
+      if (allocated(error)) return
+      associate (material => self%scene%material(k))
+         call check_that(material%law == law_given, "material " // name // " (" // &
+            where_text(self%scene, material%origin) // ") has a law of its own: to give one, it " &
+            // "has to be a *USER MATERIAL", error)
+      end associate
+      is_given = .false.
+      if (allocated(self%given%law)) then
          do i = 1, size(self%given%law)
-            if (self%given%law(i)%material == name) call raise(error, err_input, &
-               "the law of material " // name // " is given already")
+            is_given = is_given .or. self%given%law(i)%material == name
          end do
       end if
+      call check_that(.not. is_given, "the law of material " // name // " is given already", error)
    end subroutine check_material
 
    !> Give the shape of the elements of a *USER ELEMENT.
@@ -99,27 +98,24 @@ contains
       character(len=*), intent(in) :: name           !! TYPE of the card; small or capital letters
       class(shape_t), intent(in) :: shape
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
-      character(len=:), allocatable :: word, fault
+      character(len=:), allocatable :: fault
       integer :: k
 
-      word = to_upper(trim(adjustl(name)))
       call check_stage(self, error)
       if (allocated(error)) return
-      k = find_element_kind(self%scene%kind, word)
-      if (k == 0) then
-         call raise(error, err_input, "there is no element type " // word // " in the deck: to " &
-            // "give its shape, it has to be the TYPE of a *USER ELEMENT")
-      else if (k <= size(element_rows)) then
-         call raise(error, err_input, "a shape cannot be given for " // word &
-            // ": EMCON has its own")
-      else if (allocated(self%scene%kind(k)%shape)) then
-         call raise(error, err_input, "the shape of " // word // " is given already")
-      else
-         call shape_fault(shape, self%scene%kind(k)%n_node, fault)
-         if (fault /= "") call raise(error, err_input, "the shape given for " // word // ": " &
-            // fault)
-         if (fault == "") allocate(self%scene%kind(k)%shape, source=shape)
-      end if
+      k = find_element_kind(self%scene%kind, plain(name))
+      call check_that(k > 0, "there is no element type " // plain(name) // " in the deck: to " // &
+         "give its shape, it has to be the TYPE of a *USER ELEMENT", error)
+      call check_that(k > size(element_rows), "a shape cannot be given for " // plain(name) // &
+         ": EMCON has its own", error)
+      if (allocated(error)) return
+      associate (kind => self%scene%kind(k))
+         call check_that(.not. allocated(kind%shape), "the shape of " // plain(name) // &
+            " is given already", error)
+         call shape_fault(shape, kind%n_node, fault)
+         call check_that(fault == "", "the shape given for " // plain(name) // ": " // fault, error)
+         if (.not. allocated(error)) allocate(kind%shape, source=shape)
+      end associate
    end subroutine stepper_give_element
 
    !> Give the scheme of time integration that the deck calls `name`, by *TIME INTEGRATION,
@@ -135,14 +131,12 @@ contains
       if (.not. allocated(error)) call host_scheme_check(squeezed(name), scheme, error)
       if (allocated(error)) return
       own = scheme_row("DYNAMIC", squeezed(name))
-      if (own%code /= 0) then
-         call raise(error, err_input, "a scheme cannot be given as " // trim(own%word) // &
-            ": EMCON has its own")
-      else if (host_scheme_find(self%march%given_scheme, squeezed(name)) > 0) then
-         call raise(error, err_input, "the scheme " // squeezed(name) // " is given already")
-      else
-         call host_scheme_add(self%march%given_scheme, squeezed(name), scheme)
-      end if
+      call check_that(own%code == 0, "a scheme cannot be given as " // trim(own%word) // &
+         ": EMCON has its own", error)
+      call check_that(host_scheme_find(self%march%given_scheme, squeezed(name)) == 0, &
+         "the scheme " // squeezed(name) // " is given already", error)
+      if (.not. allocated(error)) call host_scheme_add(self%march%given_scheme, squeezed(name), &
+         scheme)
    end subroutine stepper_give_scheme
 
    !> Give a potential V(x, y) [M L^2/T^2] of the present position of each of some nodes.
@@ -179,9 +173,8 @@ contains
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
 
       call check_stage(self, error)
-      if (allocated(error)) return
-      if (self%given%mass%n_row > 0) call raise(error, err_input, &
-         "a mass was given already; give one matrix with all of it")
+      call check_that(self%given%mass%n_row == 0, &
+         "a mass was given already; give one matrix with all of it", error)
       if (.not. allocated(error)) call host_check_mass(mass, self%scene, error)
       if (.not. allocated(error)) self%given%mass = mass
    end subroutine stepper_give_mass
@@ -194,9 +187,8 @@ contains
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
 
       call check_stage(self, error)
-      if (allocated(error)) return
-      if (constraint%n_constraint < 1) call raise(error, err_input, "a constraint was given " // &
-         "that has no conditions: n_constraint is to be their number")
+      call check_that(constraint%n_constraint > 0, "a constraint was given that has no " // &
+         "conditions: n_constraint is to be their number", error)
       if (.not. allocated(error)) call host_add_constraint(self%given, constraint)
    end subroutine stepper_give_constraint
 
@@ -207,37 +199,41 @@ contains
       class(sparse_solver_t), intent(in) :: solver   !! it has analysed nothing yet
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
       type(solver_box_t), allocatable :: present(:)
-      character(len=:), allocatable :: word, known
+      character(len=:), allocatable :: known
 
-      word = to_upper(trim(adjustl(name)))
       call check_stage(self, error)
       if (allocated(error)) return
       call host_copy_solvers(self%given, present)
-      if (any(solvers%word == word)) then
-         call solver_names(known)
-         call raise(error, err_input, "a solver cannot be given as " // word // &
-            ": EMCON has its own " // known)
-      else if (is_foreign_solver(word) .or. index(word, " ") > 0) then
-         call raise(error, err_input, "a solver cannot be given as " // word // &
-            ": the name has to be one without blanks that no other program has for its own")
-      else if (host_find_solver(present, word) > 0) then
-         call raise(error, err_input, "the solver " // word // " is given already")
-      end if
-      if (.not. allocated(error)) call host_add_solver(self%given, word, solver)
+      call solver_names(known)
+      associate (word => plain(name))
+         call check_that(all(solvers%word /= word), "a solver cannot be given as " // word // &
+            ": EMCON has its own " // known, error)
+         call check_that(.not. is_foreign_solver(word) .and. index(word, " ") == 0, "a solver " // &
+            "cannot be given as " // word // ": the name has to be one without blanks that no " // &
+            "other program has for its own", error)
+         call check_that(host_find_solver(present, word) == 0, "the solver " // word // &
+            " is given already", error)
+         if (.not. allocated(error)) call host_add_solver(self%given, word, solver)
+      end associate
    end subroutine stepper_give_solver
 
    !> The deck is read, the model is not built.
    subroutine check_stage(self, error)
       type(stepper_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
-      if (allocated(self%march%scheme)) then
-         call raise(error, err_input, "laws, elements, schemes, forces, mass, constraints and " &
-            // "solvers are given before the model is built")
-      else if (.not. self%is_read) then
-         call raise(error, err_input, "there is no scene to give anything to: no deck was read, " &
-            // "or reading it failed")
-      end if
+      call check_that(.not. allocated(self%march%scheme), "laws, elements, schemes, forces, " // &
+         "mass, constraints and solvers are given before the model is built", error)
+      call check_that(self%is_read, "there is no scene to give anything to: no deck was read, " &
+         // "or reading it failed", error)
    end subroutine check_stage
+
+   !> A name in capital letters, without blanks around it.
+   pure function plain(name)
+      character(len=*), intent(in) :: name
+      character(len=len_trim(adjustl(name))) :: plain
+
+      plain = to_upper(adjustl(name))
+   end function plain
 
 end module emcon_stepper_given

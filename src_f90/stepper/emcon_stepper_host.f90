@@ -10,7 +10,7 @@ module emcon_stepper_host
    use emcon_couplings, only : tie_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_element_registry, only : element_kinds_create
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       formulation_nts, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
@@ -19,7 +19,8 @@ module emcon_stepper_host
    use emcon_scheme_registry, only : scheme_row
    use emcon_sort, only : find_sorted
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_choice, check_field, check_number, stepper_check_open
+   use emcon_stepper_check, only : check_choice, check_field, check_number, check_that, &
+      stepper_check_open
    use emcon_steps, only : initiation_admissible, initiation_persistent, prescribed_t
    use emcon_text, only : to_text
    implicit none
@@ -41,10 +42,8 @@ contains
       integer :: i, n
 
       n = size(x, 2)
-      if (n == 0) then
-         call raise(error, err_input, "x has no nodes")
-         return
-      end if
+      call check_that(n > 0, "x has no nodes", error)
+      if (allocated(error)) return
       associate (scene => self%scene)
          scene%is_hosted = .true.
          scene%heading = ""
@@ -79,7 +78,7 @@ contains
 
       surface = 0
       call check_stage(self, error)
-      if (.not. allocated(error)) call check_edges(edge, self%scene%x, error)
+      call check_edges(edge, self%scene%x, error)
       if (allocated(error)) return
       new%name = name
       if (name == "") new%name = to_text(size(self%scene%surface) + 1)
@@ -95,19 +94,19 @@ contains
    pure subroutine check_edges(edge, x, error)
       integer, intent(in) :: edge(:, :)
       real(wp), intent(in) :: x(:, :)            !! (2, n_node)
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
       integer :: i
 
-      if (size(edge, 1) /= 2 .or. size(edge, 2) == 0) call raise(error, err_input, &
-         "edge has the shape (" // to_text(size(edge, 1)) // ", " // to_text(size(edge, 2)) // &
-         "), not (2, n_edge) with n_edge > 0")
+      call check_that(size(edge, 1) == 2 .and. size(edge, 2) > 0, "edge has the shape (" // &
+         to_text(size(edge, 1)) // ", " // to_text(size(edge, 2)) // &
+         "), not (2, n_edge) with n_edge > 0", error)
       do i = 1, size(edge, 2)
          call check_choice("edge(1, " // to_text(i) // ")", edge(1, i), 1, size(x, 2), error)
          call check_choice("edge(2, " // to_text(i) // ")", edge(2, i), 1, size(x, 2), error)
          if (allocated(error)) return
-         if (any(abs(x(:, edge(1, i)) - x(:, edge(2, i))) > 0.0_wp)) cycle
-         call raise(error, err_input, "edge(:, " // to_text(i) // ") = " // to_text(edge(1, i)) // &
-            ", " // to_text(edge(2, i)) // " has no length")
+         call check_that(any(abs(x(:, edge(1, i)) - x(:, edge(2, i))) > 0.0_wp), "edge(:, " // &
+            to_text(i) // ") = " // to_text(edge(1, i)) // ", " // to_text(edge(2, i)) // &
+            " has no length", error)
       end do
    end subroutine check_edges
 
@@ -123,7 +122,7 @@ contains
       call check_surfaces(self, slave, master, error)
       call check_choice("formulation", formulation, formulation_nts, formulation_mortar, error)
       call check_options(options, error)
-      if (.not. allocated(error)) call check_apart(self, slave, master, error)
+      call check_apart(self, slave, master, error)
       if (allocated(error)) return
       pair%slave = slave
       pair%master = master
@@ -153,19 +152,19 @@ contains
    subroutine check_apart(self, slave, master, error)
       type(stepper_t), intent(in) :: self
       integer, intent(in) :: slave, master
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
       logical, allocatable :: is_slave(:)
       integer :: i, k
 
-      if (slave == master) return
+      if (slave == master .or. allocated(error)) return
       allocate(is_slave(size(self%scene%x, 2)), source=.false.)
       associate (one => self%scene%surface(slave), other => self%scene%surface(master))
          is_slave([one%edge(1, :), one%edge(2, :)]) = .true.
          do i = 1, size(other%edge, 2)
             do k = 1, 2
-               if (.not. is_slave(other%edge(k, i)) .or. allocated(error)) cycle
-               call raise(error, err_input, "slave surface " // one%name // " and master surface " &
-                  // other%name // " of a pair share node " // to_text(other%edge(k, i)))
+               call check_that(.not. is_slave(other%edge(k, i)), "slave surface " // one%name // &
+                  " and master surface " // other%name // " of a pair share node " // &
+                  to_text(other%edge(k, i)), error)
             end do
          end do
       end associate
@@ -184,8 +183,9 @@ contains
       call check_surfaces(self, slave, master, error)
       call check_choice("multiplier", multiplier, multiplier_standard, multiplier_dual, error)
       call check_number("tolerance", tolerance, error)
-      if (.not. allocated(error) .and. slave == master) call raise(error, err_input, &
-         "slave and master are both surface " // self%scene%surface(slave)%name)
+      if (allocated(error)) return
+      call check_that(slave /= master, "slave and master are both surface " // &
+         self%scene%surface(slave)%name, error)
       if (allocated(error)) return
       tie%name = to_text(size(self%scene%tie) + 1) // " (" // &
          self%scene%surface(slave)%name // " on " // self%scene%surface(master)%name // ")"
@@ -200,7 +200,7 @@ contains
    subroutine check_surfaces(self, slave, master, error)
       type(stepper_t), intent(in) :: self
       integer, intent(in) :: slave, master
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
       call check_stage(self, error)
       if (allocated(error)) return
@@ -214,19 +214,17 @@ contains
       logical, intent(in) :: held(:, :)                    !! (2, n_node)
       type(error_t), allocatable, intent(out) :: error
       type(prescribed_t), allocatable :: list(:)
-      integer :: d
+      integer :: d, i
 
       call check_stage(self, error)
       if (allocated(error)) return
-      if (any(shape(held) /= shape(self%scene%x))) then
-         call raise(error, err_input, "held is to have 2 flags at each of " // &
-            to_text(size(self%scene%x, 2)) // " nodes, not " // to_text(size(held, 1)) // " at " &
-            // to_text(size(held, 2)))
-         return
-      end if
+      call check_that(all(shape(held) == shape(self%scene%x)), "held is to have " // &
+         to_text(self%scene%n_dim) // " flags at each of " // to_text(size(self%scene%x, 2)) // &
+         " nodes, not " // to_text(size(held, 1)) // " at " // to_text(size(held, 2)), error)
+      if (allocated(error)) return
       allocate(list(size(held)))
-      list%node = [((d + 1)/2, d = 1, size(held))]
-      list%dof = [(2 - mod(d, 2), d = 1, size(held))]
+      list%node = [((i, d = 1, size(held, 1)), i = 1, size(held, 2))]
+      list%dof = [((d, d = 1, size(held, 1)), i = 1, size(held, 2))]
       self%scene%step(1)%prescribed = pack(list, reshape(held, [size(held)]))
    end subroutine stepper_hold
 
@@ -266,7 +264,8 @@ contains
       integer :: k, s
 
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) call check_choice("tie", tie, 1, size(self%scene%tie), error)
+      if (allocated(error)) return
+      call check_choice("tie", tie, 1, size(self%scene%tie), error)
       if (allocated(error)) return
       call chain_init(slave, self%scene, self%scene%surface(self%scene%tie(tie)%slave), error)
       if (allocated(error)) return
@@ -305,23 +304,21 @@ contains
    !> The model is one of a host, and not built yet.
    subroutine check_stage(self, error)
       type(stepper_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
       call check_hosted(self, error)
-      if (.not. allocated(error) .and. allocated(self%march%scheme)) call raise(error, err_input, &
-         "surfaces, pairs, ties and held freedoms are given before the model is built")
+      call check_that(.not. allocated(self%march%scheme), &
+         "surfaces, pairs, ties and held freedoms are given before the model is built", error)
    end subroutine check_stage
 
    subroutine check_hosted(self, error)
       type(stepper_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. self%is_read) then
-         call raise(error, err_input, "there are no nodes: making the model, or building it, " // &
-            "failed")
-      else if (.not. self%scene%is_hosted) then
-         call raise(error, err_input, "a deck says this itself: it is for models of a host's nodes")
-      end if
+      call check_that(self%is_read, &
+         "there are no nodes: making the model, or building it, failed", error)
+      call check_that(self%scene%is_hosted, &
+         "a deck says this itself: it is for models of a host's nodes", error)
    end subroutine check_hosted
 
 end module emcon_stepper_host

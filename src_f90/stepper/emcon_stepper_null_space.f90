@@ -4,14 +4,15 @@ module emcon_stepper_null_space
    use emcon_constraints, only : constraints_rows
    use emcon_csr, only : csr_multiply, csr_t
    use emcon_csr_product, only : csr_product
-   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_march_guess, only : follow_links
+   use emcon_motion, only : at_rest
    use emcon_null_space, only : null_space_matrices, null_space_multipliers, &
       null_space_particular, obstacle_none, obstacle_redundant
    use emcon_numbering, only : gather_dependent, numbering_matrix, pick_unknowns
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_field, check_list, stepper_check_open
+   use emcon_stepper_check, only : check_field, check_list, check_that, stepper_check_open
    use emcon_stepper_query, only : query_t
    use emcon_system, only : system_t
    implicit none
@@ -36,8 +37,8 @@ contains
 
       self%has_null_space = .false.
       allocate(redundant(0))
-      if (.not. self%has_set) call raise(error, err_input, "no step was evaluated since the " // &
-         "model was made, its unknowns changed, or constraints were selected")
+      call check_that(self%has_set, "no step was evaluated since the model was made, its " // &
+         "unknowns changed, or constraints were selected", error)
       if (allocated(error)) return
       associate (set => self%march%active%set, system => self%march%system, &
             null_space => self%null_space)
@@ -76,11 +77,9 @@ contains
       real(wp), allocatable :: of_unknown(:), active(:)
 
       call check_null_space(self, error)
-      if (present(residual)) then
-         call check_field("residual", residual, stepper%scene, error)
-      else if (.not. (self%is_evaluated .or. allocated(error))) then
-         call raise(error, err_input, "the last evaluation has no residual: give one")
-      end if
+      if (present(residual)) call check_field("residual", residual, stepper%scene, error)
+      call check_that(present(residual) .or. self%is_evaluated, &
+         "the last evaluation has no residual: give one", error)
       if (allocated(error)) return
       associate (set => self%march%active%set, system => self%march%system)
          allocate(lam(system%n_constraint), source=0.0_wp)
@@ -111,7 +110,7 @@ contains
       call check_null_space(self, error)
       call check_list("defect", defect, self%march%active%set%n, error)
       if (allocated(error)) return
-      allocate(du(2, size(stepper%scene%x, 2)), source=0.0_wp)
+      allocate(du, source=at_rest(stepper%scene%x))
       if (size(defect) == 0) return
       allocate(dw(self%march%system%space%numbering%n_unknown), flat(size(du)))
       call null_space_particular(self%null_space%gap, defect, dw)
@@ -122,10 +121,9 @@ contains
 
    subroutine check_null_space(self, error)
       type(query_t), intent(in) :: self
-      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. self%has_null_space) call raise(error, err_input, &
-         "there is no null space of the last evaluation")
+      call check_that(self%has_null_space, "there is no null space of the last evaluation", error)
    end subroutine check_null_space
 
    !> T: all displacements from the unknowns, u = T q up to prescribed motion. A row of a prescribed

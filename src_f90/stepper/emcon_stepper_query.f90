@@ -125,6 +125,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call check_that(ieee_is_finite(h), "a step needs a size h > 0 that is finite", error)
+      if (allocated(error)) return
       call check_that(h > 0.0_wp, "a step needs a size h > 0, not " // to_text(h), error)
    end subroutine check_duration
 
