@@ -44,7 +44,7 @@ def sources(root):
 
 
 HEAD = re.compile(
-    r"^(?!end\b)[^'\"=]*?\b(?:subroutine|function)\s+(\w+)\s*(?:\(([^()]*)\))?", re.I
+    r"^(?!end\b)(?:[^'\"=]|\(len=)*?\b(?:subroutine|function)\s+(\w+)\s*(?:\(([^()]*)\))?", re.I
 )
 DECLARED = re.compile(
     r"^(integer|real|logical|complex|character|procedure|type|class)\b.*?::(.*)", re.I

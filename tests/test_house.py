@@ -41,6 +41,9 @@ REGISTRY = {
 MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps", "emcon_nts")}
 
 COLUMNS = 100
+#: A procedure fits a screen, and its arguments a line; but what C hands over one by one.
+MOST_LINES, MOST_ARGUMENTS = 60, 7
+FROM_C = {"stepper", "border"}
 
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 COMMENT = re.compile(r"!.*")
@@ -161,6 +164,32 @@ def long_lines(root):
                 yield f"{path.relative_to(root)}:{number}: {len(line)} columns"
 
 
+def procedures(path):
+    """(first line, name, lines, arguments) of each procedure; interfaces of others aside."""
+    opened, inside = False, []
+    for number, code, _ in house_counts.statements(path):
+        low = code.lower()
+        if re.match(r"(abstract )?interface\b", low):
+            opened = True
+        elif re.match(r"end\s*interface\b", low):
+            opened = False
+        elif not opened and re.match(r"end\s*(subroutine|function)\b", low):
+            start, name, count = inside.pop()
+            yield start, name, number - start + 1, count
+        elif not opened and (head := house_counts.HEAD.match(low)):
+            inside.append((number, head[1], len(re.findall(r"\w+", head[2] or ""))))
+
+
+def long_procedures(root):
+    """Procedures of too many lines or arguments."""
+    for path in sources(root):
+        if room(root, path) in FROM_C:
+            continue
+        for start, name, lines, count in procedures(path):
+            if lines > MOST_LINES or count > MOST_ARGUMENTS:
+                yield f"{path.relative_to(root)}:{start}: {name}, {lines} lines, {count} arguments"
+
+
 def top_level(root):
     """Entries at the top that the house does not know; ignored files do not count."""
     listed = subprocess.run(
@@ -219,6 +248,7 @@ CHECKS = {
     "stop": lambda root: statements(root, STOP, {"app"}),
     "print": lambda root: statements(root, PRINT, {"app", "results"}),
     "long lines": long_lines,
+    "long procedures": long_procedures,
     "top level": top_level,
     "hidden": hidden,
 }
@@ -303,6 +333,14 @@ BAD = {
         "contact/emcon_c.f90": "module emcon_c\n   use emcon_b\n"
         "   TYPE, EXTENDS(b_t), public :: c_t\n   end type\nend module\n",
         "prepare/emcon_a.f90": "module emcon_a\n   use emcon_c\nend module\n",
+    },
+    "long procedures": {
+        "base/emcon_a.f90": "module emcon_a\ncontains\n   subroutine f\n" + "x = 1\n"*59
+        + "   end subroutine f\nend module\n"
+    },
+    "long procedures, arguments": {
+        "base/emcon_a.f90": "module emcon_a\ncontains\n   pure subroutine f(a, b, c, d, &\n"
+        "         e, f, g, h)\n   end subroutine f\nend module\n"
     },
     "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
     "stop, exit": {"stepper/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},
