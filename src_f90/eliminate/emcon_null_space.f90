@@ -9,7 +9,6 @@
 !> Every decision here depends on the present gradients and the pattern only, so that a run does
 !> not remember how it came to where it is.
 module emcon_null_space
-   use emcon_band_blocks, only : band_blocks_solve
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_multiply, csr_multiply_transposed, csr_t
    use emcon_dependent_block, only : dependent_block_factorise, dependent_block_init, &
@@ -17,6 +16,7 @@ module emcon_null_space
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find, independent_rows_t
    use emcon_kinds, only : dp, int64, wp
+   use emcon_null_basis, only : null_basis_fill, null_basis_init, null_basis_pattern, null_basis_t
    use emcon_numbering, only : numbering_t
    use emcon_solver_registry, only : solver_create, solver_default
    use emcon_sparse_solver, only : matrix_general, sparse_solver_t
@@ -32,22 +32,11 @@ module emcon_null_space
    !> Why the constraints cannot be eliminated.
    integer, parameter :: obstacle_none = 0, obstacle_redundant = 1, obstacle_pivot = 2, &
       obstacle_fill = 3
-   !> The choice of dependent unknowns is poor if an entry of P or DF is larger than this.
-   real(dp), parameter :: most_growth = 100.0_dp
    !> The independent unknowns of coupled constraints all meet in P^T N DF. With more such pairs
    !> than this multiple of the entries of N, the larger system without them is clearly cheaper.
    integer, parameter :: most_fill = 1
    !> Refinements of the multipliers at most: a `dp` solution gains 16 digits or less each time.
    integer, parameter :: most_refinements = merge(4, 1, epsilon(1.0_wp) < epsilon(1.0_dp))
-
-   !> How the rows of P and DF are made for one choice of dependent unknowns.
-   type :: elimination_t
-      integer, allocatable :: dependent(:)       !! (n) the choice
-      integer, allocatable :: n_column(:)        !! (components) independent unknowns
-      integer, allocatable :: place(:)           !! (entries of the rows) in `g_u`; 0: in G_d
-      integer, allocatable :: slot(:)            !! (size(g_u)) in P and DF
-      real(dp), allocatable :: g_u(:)            !! Gb_u or G1_u, component by component
-   end type elimination_t
 
    type :: null_space_t
       integer :: obstacle = obstacle_none
@@ -55,7 +44,7 @@ module emcon_null_space
       integer :: n_entry = 0                     !! of N
       integer :: n_free = 0                      !! independent unknowns
       type(dependent_block_t) :: present         !! Gb_d of the last `null_space_update`
-      type(elimination_t) :: elimination         !! as of the last factorisation, like all below
+      type(null_basis_t) :: basis                !! as of the last factorisation, like all below
       type(dependent_block_t) :: force, gap      !! Gb_d and G1_d
       type(csr_t) :: p                           !! (n_unknown x n_free)
       type(csr_t) :: d                           !! (n_unknown x n_free) DF
@@ -114,7 +103,7 @@ contains
 
       self%n_free = max(0, n_unknown - n)
       if (allocated(self%present%dependent)) deallocate(self%present%dependent)
-      if (allocated(self%elimination%dependent)) deallocate(self%elimination%dependent)
+      if (allocated(self%basis%dependent)) deallocate(self%basis%dependent)
       if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%part, self%image, self%owner)
       allocate(self%rhs(self%n_free), self%x(self%n_free))
       allocate(self%part(n_unknown), self%image(n_unknown))
@@ -194,115 +183,12 @@ contains
       type(null_space_t), intent(inout) :: self
       type(csr_t), intent(in) :: rows
 
-      call lay_out_p(self%present, self%n_free, self%p)
+      call null_basis_pattern(self%present, self%n_free, self%p)
       self%d = self%p
       self%force = self%present
       self%gap = self%present
-      call lay_out_elimination(self%elimination, self%present, rows, self%p)
+      call null_basis_init(self%basis, self%present, rows, self%p)
    end subroutine lay_out_matrices
-
-   !> Pattern of P: the identity, and for each dependent unknown the independent ones of its
-   !> component.
-   pure subroutine lay_out_p(block, n_free, p)
-      type(dependent_block_t), intent(in) :: block
-      integer, intent(in) :: n_free
-      type(csr_t), intent(out) :: p
-      integer, allocatable :: free(:), owner(:)
-      integer :: i, k, n, n_unknown, pass
-
-      n_unknown = n_free + size(block%dependent)
-      allocate(free(n_unknown), owner(n_unknown), source=0)
-      do k = 1, size(block%dependent)
-         owner(block%dependent(k)) = k
-      end do
-      n = 0
-      do i = 1, n_unknown
-         if (owner(i) > 0) cycle
-         n = n + 1
-         free(i) = n
-      end do
-      p%n_row = n_unknown
-      p%n_col = n_free
-      allocate(p%row_start(n_unknown + 1), source=0)
-      do pass = 1, 2
-         n = 0
-         do i = 1, n_unknown
-            if (owner(i) == 0) then
-               n = n + 1
-               if (pass == 2) p%column(n) = free(i) - 1
-            else
-               associate (b => block%component(owner(i)))
-                  do k = block%column_start(b) + 1, block%column_start(b + 1)
-                     n = n + 1
-                     if (pass == 2) p%column(n) = free(block%column(k)) - 1
-                  end do
-               end associate
-            end if
-            p%row_start(i + 1) = n
-         end do
-         if (pass == 1) allocate(p%column(n))
-      end do
-      allocate(p%value(n), source=1.0_dp)
-   end subroutine lay_out_p
-
-   !> Where the entries of the rows go, and where those of G_d^-1 G_u go in P.
-   pure subroutine lay_out_elimination(self, block, rows, p)
-      type(elimination_t), intent(out) :: self
-      type(dependent_block_t), intent(in) :: block
-      type(csr_t), intent(in) :: rows, p
-      integer, allocatable :: place(:)
-      integer :: b, i, j, s, before, n_row
-
-      self%dependent = block%dependent
-      self%n_column = block%column_start(2:) - block%column_start(:block%bands%n_block)
-      associate (start => block%bands%start, column => block%column)
-         allocate(self%place(size(block%slot)), place(rows%n_col), source=0)
-         allocate(self%slot(sum(self%n_column*(start(2:) - start(:block%bands%n_block)))))
-         before = 0
-         do b = 1, block%bands%n_block
-            n_row = start(b + 1) - start(b)
-            do j = 1, self%n_column(b)
-               place(column(block%column_start(b) + j)) = before + n_row*(j - 1)
-            end do
-            do i = 1, n_row
-               associate (k => block%order(start(b) + i))
-                  do s = rows%row_start(k) + 1, rows%row_start(k + 1)
-                     if (block%slot(s) == 0) self%place(s) = place(rows%column(s) + 1) + i
-                  end do
-                  do j = 1, self%n_column(b)
-                     self%slot(before + n_row*(j - 1) + i) = p%row_start(block%dependent(k)) + j
-                  end do
-               end associate
-            end do
-            before = before + n_row*self%n_column(b)
-         end do
-      end associate
-      allocate(self%g_u(size(self%slot)), source=0.0_dp)
-   end subroutine lay_out_elimination
-
-   !> Fill in the rows -G_d^-1 G_u of the dependent unknowns; poor ones are not filled in.
-   subroutine fill(self, block, rows, p, is_poor)
-      type(elimination_t), intent(inout) :: self
-      type(dependent_block_t), intent(inout) :: block
-      type(csr_t), intent(in) :: rows
-      type(csr_t), intent(inout) :: p
-      logical, intent(out) :: is_poor
-      integer :: i
-
-      call dependent_block_factorise(block, rows)
-      is_poor = block%bands%is_singular
-      if (is_poor) return
-      self%g_u = 0.0_dp
-      do i = 1, size(self%place)
-         if (self%place(i) > 0) self%g_u(self%place(i)) = rows%value(i)
-      end do
-      call band_blocks_solve(block%bands, .false., self%n_column, self%g_u)
-      is_poor = .not. all(abs(self%g_u) <= most_growth)
-      if (is_poor) return
-      do i = 1, size(self%slot)
-         p%value(self%slot(i)) = -self%g_u(i)
-      end do
-   end subroutine fill
 
    !> Fill in P and DF for the gradients of the last `null_space_update`.
    subroutine fill_matrices(self, set)
@@ -310,8 +196,8 @@ contains
       type(constraint_set_t), intent(in) :: set
       logical :: is_poor, is_poor_too
 
-      call fill(self%elimination, self%force, set%force_rows, self%p, is_poor)
-      call fill(self%elimination, self%gap, set%gap_rows, self%d, is_poor_too)
+      call null_basis_fill(self%basis, self%force, set%force_rows, self%p, is_poor)
+      call null_basis_fill(self%basis, self%gap, set%gap_rows, self%d, is_poor_too)
       if (is_poor .or. is_poor_too) self%obstacle = obstacle_pivot
    end subroutine fill_matrices
 
@@ -326,7 +212,7 @@ contains
 
       is_singular = .true.
       if (self%obstacle /= obstacle_none) return
-      if (.not. is_same(self%elimination%dependent, self%present%dependent)) then
+      if (.not. is_same(self%basis%dependent, self%present%dependent)) then
          call lay_out(self, set%force_rows, matrix, error)
          if (allocated(error)) return
       end if

@@ -51,7 +51,7 @@ contains
          call newton_solve(newton, system, self%set, motion, status, error)
          if (allocated(error)) return
          self%lam(self%set%id) = self%set%lam
-         self%n_newton = self%n_newton + newton%n_iteration
+         self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (status == newton_redundant) then
             associate (redundant => newton%correction%redundant, is_near => &
                   newton%correction%is_near)

@@ -65,12 +65,14 @@ contains
          call stand_off_add(increment%stand_off, system, set, h)
          increment%is_guarded = increment%is_guarded .or. &
             any(set%id > system%first_constraint(system%n_pair + 1))
-         increment%residual = self%newton%history(:self%newton%n_history)
-         if (self%newton%last > self%newton%tolerance .and. .not. self%newton%is_idle) then
-            increment%unconverged = max(increment%unconverged, self%newton%last)
-            call note_add(increment%notes, "a relative residual of " // &
-               to_text(self%newton%last, 3) // " is accepted as round-off")
-         end if
+         associate (reached => self%newton%convergence)
+            increment%residual = reached%history(:reached%n_history)
+            if (reached%last > reached%tolerance .and. .not. self%newton%is_idle) then
+               increment%unconverged = max(increment%unconverged, reached%last)
+               call note_add(increment%notes, "a relative residual of " // &
+                  to_text(reached%last, 3) // " is accepted as round-off")
+            end if
+         end associate
          state%is_active = .false.
          state%lam = 0.0_wp
          do k = 1, set%n

@@ -84,9 +84,11 @@ contains
       case (step_refused)
          text = self%system%response%refusal
       case (step_diverged)
-         text = "Newton's method does not converge (relative residual " // &
-            to_text(self%newton%history(max(1, self%newton%n_history))) // " after " // &
-            to_text(self%newton%n_iteration) // " iterations)"
+         associate (reached => self%newton%convergence)
+            text = "Newton's method does not converge (relative residual " // &
+               to_text(reached%history(max(1, reached%n_history))) // " after " // &
+               to_text(reached%n_iteration) // " iterations)"
+         end associate
       case (step_singular)
          text = "the system is singular"
       case (step_cycling)

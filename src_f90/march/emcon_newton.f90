@@ -1,12 +1,13 @@
 !> Newton's method for one step with a given set of active constraints.
 !>
 !> Forces are measured against the sum of their contributions before these cancel, docs/theory.md,
-!> eq. (25), so that no unit and no absolute size enters. After the tolerance is met, corrections
-!> with the last factorisation go on down to round-off: energy is lost to what the residual leaves.
+!> eq. (25), so that no unit and no absolute size enters.
 module emcon_newton
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
       constraints_rows
+   use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
+      convergence_t, most_rounding, next_done, next_give_up, next_tangent, round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t
    use emcon_errors, only : err_interrupt, error_t, raise
@@ -29,45 +30,22 @@ module emcon_newton
    integer, parameter :: newton_converged = 0, newton_refused = 1, newton_diverged = 2, &
       newton_singular = 3, newton_redundant = 4
 
-   !> A residual below this multiple of epsilon is round-off: of what its contributions are, and of
-   !> what the forces' own evaluation rounds.
-   real(wp), parameter :: floor = 4.0_wp*epsilon(1.0_wp)
-   !> However much the forces' own evaluation rounds, a residual above this part of them is none.
-   real(wp), parameter :: most_rounding = 1.0e-3_wp
    !> A correction larger than so many diagonals of the scene comes from a pivot of round-off: in
    !> statics, where nothing else moves a body as far.
    real(wp), parameter :: farthest = 1.0e4_wp
-   !> Corrections with an old factorisation at most, and the factor each has to gain.
-   integer, parameter :: most_polish = 3
-   real(wp), parameter :: polish_gain = 0.5_wp
    !> A correction that inverts an element, or that a given force refuses, is halved so often at
    !> most.
    integer, parameter :: most_halvings = 6
-   !> A new best residual is at least this much smaller. After so many iterations without one the
-   !> step has failed; after a few it has converged, if it is below this multiple of epsilon.
-   real(wp), parameter :: stall_gain = 0.9_wp
-   integer, parameter :: most_stalls = 6, few_stalls = 2
-   real(wp), parameter :: stall_floor = 1.0e4_wp*epsilon(1.0_wp)
-   !> Least part of a correction that is taken: at a kink of contact whole ones lead to and fro.
-   real(wp), parameter :: least_damping = 0.125_wp
-
-   !> What follows an evaluation.
-   integer, parameter :: next_done = 0, next_tangent = 1, next_old_tangent = 2, next_give_up = 3
-
    abstract interface
       !> Has the user asked to stop?
       logical function interrupt_interface()
       end function interrupt_interface
    end interface
 
-   !> Settings, work space and report of the solver.
+   !> Work space and report of the solver.
    type :: newton_t
-      real(wp) :: tolerance = 0.0_wp             !! relative
-      integer :: maximum = 0                     !! iterations
-      integer :: n_iteration = 0                 !! tangents factorised in the last solve
+      type(convergence_t) :: convergence         !! how the last solve went
       integer :: n_solve = 0                     !! linear systems solved in the last solve
-      integer :: n_history = 0
-      real(wp), allocatable :: history(:)        !! relative residuals of the last solve
       real(wp), allocatable :: residual(:), scale(:)   !! (n_unknown)
       real(wp), allocatable :: dq(:)             !! (n_unknown) the last correction
       real(wp), allocatable :: dlam(:)           !! (n) and that of the multipliers
@@ -78,15 +56,8 @@ module emcon_newton
       real(wp), allocatable :: driven(:, :)
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
       type(correction_t) :: correction           !! how linear systems are solved
-      ! how the present solve goes:
-      real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far
-      real(wp) :: best = 0.0_wp
-      integer :: n_stall = 0                     !! iterations since the best one
-      real(wp) :: damping = 1.0_wp               !! part of a correction that is taken
       real(wp) :: work = 0.0_wp                  !! of the correction at its start; 0: no search
       type(line_search_t) :: line
-      integer :: n_polish = 0                    !! corrections with the old tangent
-      logical :: is_polish = .false.             !! within tolerance: down to round-off from here
       logical :: is_idle = .false.               !! no load: all forces are round-off
    end type newton_t
 
@@ -100,18 +71,16 @@ contains
       real(wp), intent(in) :: tolerance          !! > 0, of the relative residual
       integer, intent(in) :: maximum             !! iterations at most
 
-      self%tolerance = tolerance
-      self%maximum = maximum
+      call convergence_init(self%convergence, tolerance, maximum)
       self%is_idle = .false.
       if (allocated(self%residual)) deallocate(self%residual, self%scale, self%dq, self%way, &
-         self%contact, self%left, self%driven, self%history)
+         self%contact, self%left, self%driven)
       allocate(self%residual(n_unknown), self%scale(n_unknown), self%dq(n_unknown), &
          self%way(n_unknown))
       allocate(self%contact, self%left, self%driven, mold=x)
       self%contact = 0.0_wp
       self%left = 0.0_wp
       self%driven = 0.0_wp
-      allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
       call begin(self, 0)
    end subroutine newton_init
 
@@ -150,7 +119,7 @@ contains
          end if
          call search(self, system, set, motion, goes_on)
          if (goes_on) cycle
-         call judge(self, max(norm, defect), is_rounding, next)
+         call convergence_judge(self%convergence, max(norm, defect), is_rounding, next)
          select case (next)
          case (next_done)
             return
@@ -222,69 +191,11 @@ contains
 
       if (allocated(self%dlam)) deallocate(self%dlam)
       allocate(self%dlam(n_constraint))
-      self%n_iteration = 0
+      call convergence_begin(self%convergence)
       self%n_solve = 0
-      self%n_history = 0
-      self%n_polish = 0
-      self%n_stall = 0
-      self%damping = 1.0_wp
       self%work = 0.0_wp
       self%line%is_on = .false.
-      self%best = huge(self%best)
-      self%last = huge(self%last)
-      self%is_polish = .false.
    end subroutine begin
-
-   !> What to do next, now that the largest relative residual is `size`: once it is within the
-   !> tolerance, or nothing but round-off, go on with the old tangent as long as that gains.
-   pure subroutine judge(self, size, is_rounding, next)
-      type(newton_t), intent(inout) :: self
-      real(wp), intent(in) :: size
-      logical, intent(in) :: is_rounding
-      integer, intent(out) :: next               !! one of the `next_` codes
-      logical :: has_gained
-
-      self%n_history = self%n_history + 1
-      self%history(self%n_history) = size
-      has_gained = size <= polish_gain*self%last
-      self%last = size
-      next = next_done
-      if (size <= floor) return
-      if (self%is_polish .and. (self%n_polish == most_polish .or. .not. has_gained)) then
-         if (size > max(self%tolerance, most_rounding) .and. .not. is_rounding) next = next_give_up
-         return
-      end if
-      self%is_polish = self%is_polish .or. size <= self%tolerance .or. is_rounding
-      if (self%is_polish) then
-         next = next_tangent                     ! the first guess was good enough
-         if (self%n_iteration > 0) next = next_old_tangent
-         self%n_polish = self%n_polish + 1
-         return
-      end if
-      self%n_stall = self%n_stall + 1
-      if (size < stall_gain*self%best) self%n_stall = 0
-      self%best = min(self%best, size)
-      call choose_damping(self)
-      if (self%n_stall > few_stalls .and. size <= stall_floor) return
-      next = next_tangent
-      if (self%n_stall > most_stalls .or. self%n_iteration == self%maximum &
-         .or. .not. size < huge(size)) next = next_give_up
-   end subroutine judge
-
-   !> Half of what was taken of the last correction if the residual, the last in the history, is no
-   !> smaller than one of the two before it, else twice as much. The first guess may happen to have
-   !> a small one.
-   pure subroutine choose_damping(self)
-      type(newton_t), intent(inout) :: self
-
-      self%damping = min(1.0_wp, 2.0_wp*self%damping)
-      associate (n => self%n_history)
-         if (n < 4) return
-         if (self%last >= stall_gain*minval(self%history(n - 2:n - 1))) then
-            self%damping = max(least_damping, 0.25_wp*self%damping)
-         end if
-      end associate
-   end subroutine choose_damping
 
    !> Factorise for the present tangent.
    subroutine factorise(self, system, set, status, error)
@@ -296,7 +207,7 @@ contains
       logical :: is_singular
 
       call correction_factorise(self%correction, system, set, is_singular, error)
-      self%n_iteration = self%n_iteration + 1
+      self%convergence%n_iteration = self%convergence%n_iteration + 1
       status = merge(newton_singular, newton_converged, is_singular)
    end subroutine factorise
 
@@ -311,9 +222,9 @@ contains
       call correction_solve(self%correction, set, self%residual, self%dq, self%dlam, error)
       if (allocated(error)) return
       self%n_solve = self%n_solve + 1
-      if (set%n > set%n_linear .and. .not. self%is_polish) then
-         self%dq = self%damping*self%dq
-         self%dlam = self%damping*self%dlam
+      if (set%n > set%n_linear .and. .not. self%convergence%is_polish) then
+         self%dq = self%convergence%damping*self%dq
+         self%dlam = self%convergence%damping*self%dlam
          self%work = dot_product(self%dq, self%residual)
       end if
       call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
@@ -357,7 +268,7 @@ contains
       status = newton_refused
       do i = 0, most_halvings
          call motion_place(motion)
-         call system_respond(system, motion, with_tangent=.not. self%is_polish)
+         call system_respond(system, motion, with_tangent=.not. self%convergence%is_polish)
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(error)) return
          if (.not. allocated(system%response%refusal)) exit
@@ -401,7 +312,7 @@ contains
          defect = max(defect, abs(set%defect(k))/set%item(k)%size)
       end do
       call pick_magnitudes(system%space%numbering, system%response%rounding, self%scale)
-      is_rounding = relative_size(self%residual, self%scale) <= floor .and. defect <= floor
+      is_rounding = relative_size(self%residual, self%scale) <= round_off .and. defect <= round_off
       ! A body that moves as a rigid one has no forces to compare its round-off with.
       self%is_idle = is_rounding .and. .not. has_load(system)
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding

@@ -87,8 +87,8 @@ contains
       integer :: k
 
       quadratic_constant = 0.0_wp
-      do k = 2, newton%n_iteration + 1
-         associate (r => newton%history(k - 1:k))
+      do k = 2, newton%convergence%n_iteration + 1
+         associate (r => newton%convergence%history(k - 1:k))
             if (r(1) > 0.1_wp .or. r(2) < 1.0e4_wp*epsilon(1.0_wp)) cycle
             quadratic_constant = max(quadratic_constant, r(2)/r(1)**2)
          end associate
@@ -106,7 +106,7 @@ contains
       call check_equal(error, trial%status, newton_converged, what // ": status")
       call check_true(error, constant > 0.0_wp .and. constant < 5.0_wp, &
          what // ": r1 < 5 r0^2, found " // to_text(constant))
-      associate (r => trial%newton%history(:trial%newton%n_iteration + 1))
+      associate (r => trial%newton%convergence%history(:trial%newton%convergence%n_iteration + 1))
          call check_true(error, count(r < 0.1_wp .and. r > 1.0e4_wp*epsilon(1.0_wp)) >= 3, &
             what // ": three residuals between 0.1 and round-off")
       end associate
@@ -129,8 +129,8 @@ contains
       call solve(trial, error)
       if (allocated(error)) return
       call check_quadratic(error, trial, "large step")
-      call check_true(error, trial%newton%n_iteration <= 8, &
-         "iterations: " // to_text(trial%newton%n_iteration))
+      call check_true(error, trial%newton%convergence%n_iteration <= 8, &
+         "iterations: " // to_text(trial%newton%convergence%n_iteration))
       call correction_free(trial%newton%correction)
    end subroutine test_order
 
@@ -213,7 +213,7 @@ contains
       call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_diverged, "status")
-      call check_equal(error, trial%newton%n_iteration, 2, "iterations")
+      call check_equal(error, trial%newton%convergence%n_iteration, 2, "iterations")
       call correction_free(trial%newton%correction)
    end subroutine test_diverged
 

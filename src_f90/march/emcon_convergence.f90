@@ -1,0 +1,126 @@
+!> How the residual of an iteration comes down, and what is to follow: another tangent, the old one
+!> once more, the end.
+!>
+!> After the tolerance is met, corrections with the last factorisation go on down to round-off:
+!> energy is lost to what the residual leaves. Where residuals go up and down, less of each
+!> correction is taken.
+module emcon_convergence
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: convergence_t, convergence_init, convergence_begin, convergence_judge
+   public :: next_done, next_tangent, next_old_tangent, next_give_up, round_off, most_rounding
+
+   !> What follows an evaluation.
+   integer, parameter :: next_done = 0, next_tangent = 1, next_old_tangent = 2, next_give_up = 3
+
+   !> A residual below this multiple of epsilon is round-off: of what its contributions are, and of
+   !> what the forces' own evaluation rounds.
+   real(wp), parameter :: round_off = 4.0_wp*epsilon(1.0_wp)
+   !> However much the forces' own evaluation rounds, a residual above this part of them is none.
+   real(wp), parameter :: most_rounding = 1.0e-3_wp
+   !> Corrections with an old factorisation at most, and the factor each has to gain.
+   integer, parameter :: most_polish = 3
+   real(wp), parameter :: polish_gain = 0.5_wp
+   !> A new best residual is at least this much smaller. After so many iterations without one the
+   !> step has failed; after a few it has converged, if it is below this multiple of epsilon.
+   real(wp), parameter :: stall_gain = 0.9_wp
+   integer, parameter :: most_stalls = 6, few_stalls = 2
+   real(wp), parameter :: stall_floor = 1.0e4_wp*epsilon(1.0_wp)
+   !> Least part of a correction that is taken: at a kink of contact whole ones lead to and fro.
+   real(wp), parameter :: least_damping = 0.125_wp
+
+   type :: convergence_t
+      real(wp) :: tolerance = 0.0_wp             !! of the relative residual
+      integer :: maximum = 0                     !! iterations
+      integer :: n_iteration = 0                 !! tangents factorised so far
+      integer :: n_history = 0
+      real(wp), allocatable :: history(:)        !! relative residuals so far
+      real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far
+      real(wp) :: best = 0.0_wp
+      integer :: n_stall = 0                     !! iterations since the best one
+      real(wp) :: damping = 1.0_wp               !! part of a correction that is taken
+      integer :: n_polish = 0                    !! corrections with the old tangent
+      logical :: is_polish = .false.             !! within tolerance: down to round-off from here
+   end type convergence_t
+
+contains
+
+   !> Set up for solves to `tolerance`.
+   pure subroutine convergence_init(self, tolerance, maximum)
+      type(convergence_t), intent(out) :: self
+      real(wp), intent(in) :: tolerance          !! > 0, of the relative residual
+      integer, intent(in) :: maximum             !! iterations at most
+
+      self%tolerance = tolerance
+      self%maximum = maximum
+      allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
+      call convergence_begin(self)
+   end subroutine convergence_init
+
+   !> A solve begins: nothing is known of it.
+   pure subroutine convergence_begin(self)
+      type(convergence_t), intent(inout) :: self
+
+      self%n_iteration = 0
+      self%n_history = 0
+      self%n_polish = 0
+      self%n_stall = 0
+      self%damping = 1.0_wp
+      self%best = huge(self%best)
+      self%last = huge(self%last)
+      self%is_polish = .false.
+   end subroutine convergence_begin
+
+   !> What to do next, now that the largest relative residual is `size`: once it is within the
+   !> tolerance, or nothing but round-off, go on with the old tangent as long as that gains.
+   pure subroutine convergence_judge(self, size, is_rounding, next)
+      type(convergence_t), intent(inout) :: self
+      real(wp), intent(in) :: size               !! >= 0
+      logical, intent(in) :: is_rounding         !! nothing else is left
+      integer, intent(out) :: next               !! one of the `next_` codes
+      logical :: has_gained
+
+      self%n_history = self%n_history + 1
+      self%history(self%n_history) = size
+      has_gained = size <= polish_gain*self%last
+      self%last = size
+      next = next_done
+      if (size <= round_off) return
+      if (self%is_polish .and. (self%n_polish == most_polish .or. .not. has_gained)) then
+         if (size > max(self%tolerance, most_rounding) .and. .not. is_rounding) next = next_give_up
+         return
+      end if
+      self%is_polish = self%is_polish .or. size <= self%tolerance .or. is_rounding
+      if (self%is_polish) then
+         next = next_tangent                     ! the first guess was good enough
+         if (self%n_iteration > 0) next = next_old_tangent
+         self%n_polish = self%n_polish + 1
+         return
+      end if
+      self%n_stall = self%n_stall + 1
+      if (size < stall_gain*self%best) self%n_stall = 0
+      self%best = min(self%best, size)
+      call choose_damping(self)
+      if (self%n_stall > few_stalls .and. size <= stall_floor) return
+      next = next_tangent
+      if (self%n_stall > most_stalls .or. self%n_iteration == self%maximum &
+         .or. .not. size < huge(size)) next = next_give_up
+   end subroutine convergence_judge
+
+   !> Half of what was taken of the last correction if the residual, the last in the history, is no
+   !> smaller than one of the two before it, else twice as much. The first guess may happen to have
+   !> a small one.
+   pure subroutine choose_damping(self)
+      type(convergence_t), intent(inout) :: self
+
+      self%damping = min(1.0_wp, 2.0_wp*self%damping)
+      associate (n => self%n_history)
+         if (n < 4) return
+         if (self%last >= stall_gain*minval(self%history(n - 2:n - 1))) then
+            self%damping = max(least_damping, 0.25_wp*self%damping)
+         end if
+      end associate
+   end subroutine choose_damping
+
+end module emcon_convergence
