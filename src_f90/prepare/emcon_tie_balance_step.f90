@@ -14,6 +14,7 @@ module emcon_tie_balance_step
    use emcon_kinds, only : dp, wp
    use emcon_power_scaling, only : power_of_two
    use emcon_tie_balance_data, only : tie_balance_t
+   use emcon_tie_balance_order, only : balance_order
    implicit none
    private
    public :: balance_step_t, balance_step_init, balance_step_do
@@ -343,79 +344,17 @@ contains
       end do
    end subroutine multiply
 
-   !> Number all unknowns and conditions along the chain, a closed one from both sides at once, and
-   !> make the band they need.
+   !> The band that the entries need, with all unknowns and conditions in the order of the chain.
    subroutine find_order(self, tie)
       type(balance_step_t), intent(inout) :: self
       type(tie_balance_t), intent(in) :: tie
-      integer :: position(tie%n_row), first(tie%n_other), last(tie%n_other), i, j, k, n, n_z, p
-      integer :: key(self%n_unknown + self%n_condition), start(0:tie%n_row)
+      integer :: width
 
-      n = tie%n_row
-      n_z = size(tie%column)
-      call number_rows(tie%neighbour, position)
-      first = n
-      last = 1
-      do k = 1, n
-         do i = tie%start(k) + 1, tie%start(k + 1)
-            key(i) = position(k)
-            first(tie%column(i)) = min(first(tie%column(i)), position(k))
-            last(tie%column(i)) = max(last(tie%column(i)), position(k))
-         end do
-      end do
-      do i = 0, 8
-         key(n_z + i*n + 1:n_z + (i + 1)*n) = position
-      end do
-      do i = 0, 1
-         j = self%n_unknown + 5*n + i*tie%n_other
-         key(j + 1:j + tie%n_other) = (first + last)/2
-      end do
-      start = 0
-      do i = 1, size(key)
-         start(key(i)) = start(key(i)) + 1
-      end do
-      do p = 1, n
-         start(p) = start(p) + start(p - 1)
-      end do
-      allocate(self%rank(size(key)))
-      do i = 1, size(key)
-         start(key(i) - 1) = start(key(i) - 1) + 1
-         self%rank(i) = start(key(i) - 1)
-      end do
-      k = maxval(abs(self%rank(self%n_unknown + self%row(:self%n_entry)) &
+      allocate(self%rank(self%n_unknown + self%n_condition))
+      call balance_order(tie, self%n_unknown, self%rank)
+      width = maxval(abs(self%rank(self%n_unknown + self%row(:self%n_entry)) &
          - self%rank(self%column(:self%n_entry))))
-      call band_blocks_init(self%band, [0, size(key)], [k], [k])
+      call band_blocks_init(self%band, [0, size(self%rank)], [width], [width])
    end subroutine find_order
-
-   !> Breadth first from an end, or from the first row of a closed chain.
-   pure subroutine number_rows(neighbour, position)
-      integer, intent(in) :: neighbour(:, :)     !! (2, n_row)
-      integer, intent(out) :: position(:)        !! (n_row)
-      integer :: queue(size(position)), pass, k, i, side, n_found, n_done
-
-      position = 0
-      n_found = 0
-      n_done = 0
-      do pass = 1, 2
-         do k = 1, size(position)
-            if (position(k) > 0) cycle
-            if (pass == 1 .and. all(neighbour(:, k) > 0)) cycle
-            n_found = n_found + 1
-            position(k) = n_found
-            queue(n_found) = k
-            do while (n_done < n_found)
-               n_done = n_done + 1
-               do side = 1, 2
-                  i = neighbour(side, queue(n_done))
-                  if (i == 0) cycle
-                  if (position(i) > 0) cycle
-                  n_found = n_found + 1
-                  position(i) = n_found
-                  queue(n_found) = i
-               end do
-            end do
-         end do
-      end do
-   end subroutine number_rows
 
 end module emcon_tie_balance_step
