@@ -3,7 +3,8 @@ module emcon_element_kind
    use emcon_shape, only : max_element_nodes, shape_t
    implicit none
    private
-   public :: element_row_t, element_kind_t, face_shape, find_element_kind, user_element_row
+   public :: element_row_t, element_kind_t, face_shape, max_face_nodes, find_element_kind, &
+      user_element_row
 
    integer, parameter :: max_faces = max_element_nodes, max_face_nodes = 2
    !> Extents of `face_node`.

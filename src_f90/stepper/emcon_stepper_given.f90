@@ -150,7 +150,7 @@ contains
 
       call check_stage(self, error)
       if (.not. allocated(error)) call node_potential_init(force, name, node, &
-         size(self%scene%x, 2), potential, error)
+         self%scene%n_dim, size(self%scene%x, 2), potential, error)
       if (.not. allocated(error)) call host_add_force(self%given, force)
    end subroutine stepper_give_potential
 
@@ -161,7 +161,8 @@ contains
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
 
       call check_stage(self, error)
-      if (.not. allocated(error)) call host_check_force(force, size(self%scene%x, 2), error)
+      if (.not. allocated(error)) call host_check_force(force, self%scene%n_dim, &
+         size(self%scene%x, 2), error)
       if (.not. allocated(error)) call host_add_force(self%given, force)
    end subroutine stepper_give_force
 

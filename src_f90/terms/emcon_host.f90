@@ -22,6 +22,9 @@ module emcon_host
       type(constraint_box_t), allocatable :: constraint(:)
    end type host_t
 
+   !> What `host_count` counts: forces and masses.
+   integer, parameter :: n_counted = 2
+
 contains
 
    !> Append a copy of `force`.
@@ -61,7 +64,7 @@ contains
    !> Number of forces, and of masses.
    pure function host_count(self) result(n)
       type(host_t), intent(in) :: self
-      integer :: n(2)
+      integer :: n(n_counted)
 
       n = [0, merge(1, 0, self%mass%n_row > 0)]
       if (allocated(self%force)) n(1) = size(self%force)

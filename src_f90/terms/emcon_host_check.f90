@@ -35,14 +35,14 @@ contains
       if (allocated(force%name)) host_length = host_length + 1 + len(force%name)
    end function host_length
 
-   !> The pattern of `force` is one over the freedoms of `n_node` nodes.
-   subroutine host_check_force(force, n_node, error)
+   !> The pattern of `force` is one over the freedoms of the nodes.
+   subroutine host_check_force(force, n_dim, n_node, error)
       class(host_force_t), intent(in) :: force
-      integer, intent(in) :: n_node              !! of the model
+      integer, intent(in) :: n_dim, n_node       !! of the model
       type(error_t), allocatable, intent(out) :: error
 
-      call check_pattern(force%pattern, 2*n_node, host_name(force) // ": its pattern", &
-         "2 freedoms for each of " // to_text(n_node) // " nodes", error)
+      call check_pattern(force%pattern, n_dim*n_node, host_name(force) // ": its pattern", &
+         to_text(n_dim) // " freedoms for each of " // to_text(n_node) // " nodes", error)
    end subroutine host_check_force
 
    !> `mass` is a matrix between `n_node` nodes that can be one: finite, symmetric, not negative.
@@ -185,13 +185,15 @@ contains
 
       pure logical function has_force(node)
          integer, intent(in) :: node
-         integer :: k
+         integer :: k, a
 
          has_force = .false.
          if (.not. allocated(given%force)) return
          do k = 1, size(given%force)
             associate (pattern => given%force(k)%force%pattern)
-               has_force = has_force .or. has_row(pattern, 2*node - 1) .or. has_row(pattern, 2*node)
+               do a = 1, scene%n_dim
+                  has_force = has_force .or. has_row(pattern, scene%n_dim*(node - 1) + a)
+               end do
             end associate
          end do
       end function has_force

@@ -47,7 +47,7 @@ contains
       self%role = role_internal
       n_dim = size(scene%x, 1)
       n = size(scene%x, 2)
-      call host_check_force(force, n, error)
+      call host_check_force(force, n_dim, n, error)
       if (allocated(error)) return
       allocate(self%force, source=force)
       call self%force%place(scene%x)

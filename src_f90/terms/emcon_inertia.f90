@@ -20,7 +20,7 @@ module emcon_inertia
    type, extends(term_t) :: inertia_t
       type(csr_t) :: mass                        !! (n_node x n_node) [M]
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
-      integer, allocatable, private :: pair(:, :)   !! (2, any) nodes between which mass is given
+      integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of given mass
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains
       procedure :: lay_out
@@ -28,6 +28,9 @@ module emcon_inertia
       procedure :: respond
       procedure :: tangent_times
    end type inertia_t
+
+   !> Nodes between which an entry of the mass stands.
+   integer, parameter :: n_end = 2
 
 contains
 
@@ -72,14 +75,14 @@ contains
    !> The pairs of nodes between which there is mass.
    pure subroutine list_pairs(mass, pair)
       type(csr_t), intent(in) :: mass
-      integer, allocatable, intent(out) :: pair(:, :)        !! (2, n)
+      integer, allocatable, intent(out) :: pair(:, :)        !! (n_end, n)
       integer :: i, k
 
       if (mass%n_row == 0) then
-         allocate(pair(2, 0))
+         allocate(pair(n_end, 0))
          return
       end if
-      allocate(pair(2, size(mass%column)))
+      allocate(pair(n_end, size(mass%column)))
       do i = 1, mass%n_row
          do k = mass%row_start(i) + 1, mass%row_start(i + 1)
             pair(:, k) = [i, mass%column(k) + 1]
@@ -91,12 +94,13 @@ contains
    pure subroutine lay_out(self, lists)
       class(inertia_t), intent(in) :: self
       type(lists_t), intent(inout) :: lists
-      integer :: freedom(2, lists%n_dim, size(self%pair, 2)), a
+      integer :: freedom(n_end, lists%n_dim, size(self%pair, 2)), a
 
       do a = 1, lists%n_dim
          freedom(:, a, :) = lists%n_dim*(self%pair - 1) + a
       end do
-      call lists_append(lists, spread(2, 1, size(freedom)/2), reshape(freedom, [size(freedom)]))
+      call lists_append(lists, spread(n_end, 1, size(freedom)/n_end), &
+         reshape(freedom, [size(freedom)]))
    end subroutine lay_out
 
    !> Put the mass into the pattern of the matrix.

@@ -2,10 +2,12 @@
 module emcon_loads
    use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_t
+   use emcon_element_kind, only : max_face_nodes
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : instant_t
    use emcon_prescribed, only : amplitude_at
+   use emcon_pressure_plane, only : add_pressure, add_pressure_stiffness
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -20,15 +22,16 @@ module emcon_loads
    type, extends(term_t) :: loads_t
       type(load_t), allocatable :: load(:)
       type(amplitude_t), allocatable, private :: amplitude(:)   !! of the scene
-      integer, allocatable, private :: edge(:, :)   !! (2, n) nodes of a loaded edge, else 0
-      integer, allocatable, private :: slot(:, :)   !! (16, n) entries of the pressure stiffness
+      integer, allocatable, private :: face(:, :)   !! (n, n_load) nodes of a loaded face, else 0
+      !> (n_dim*n, n_dim*n, n_load) places of the stiffness of pressure on it
+      integer, allocatable, private :: slot(:, :, :)
       logical, private :: is_ramped = .false.    !! static: without amplitude, linear over the step
       logical, private :: nlgeom = .false.
       real(wp), private :: duration = 1.0_wp     !! [T]
       integer, allocatable, private :: node(:, :)        !! (n_most, n_element)
       real(wp), allocatable, private :: volume_mass(:, :)   !! int rho N_i, like `node` [M]
       real(wp), allocatable, private :: thickness(:)     !! (n_element) [L]
-      real(wp), allocatable, private :: force(:, :)      !! (2, n_node) [M L/T^2]
+      real(wp), allocatable, private :: force(:, :)      !! (n_dim, n_node) [M L/T^2]
    contains
       procedure :: begin_step
       procedure :: renew
@@ -62,7 +65,7 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! empty: what meets here meets in elements
       integer, allocatable :: number(:)
-      integer :: i, e, dofs(4), j, k
+      integer :: dof(scene%n_dim, max_face_nodes), i, e, j, k, a
 
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
@@ -70,22 +73,25 @@ contains
          self%nlgeom = step%nlgeom
          self%duration = step%duration
       end associate
-      if (allocated(self%edge)) deallocate(self%edge, self%slot)
-      allocate(self%edge(2, size(self%load)), self%slot(16, size(self%load)), source=0)
+      if (allocated(self%face)) deallocate(self%face, self%slot)
+      allocate(self%face(max_face_nodes, size(self%load)), source=0)
+      allocate(self%slot(size(dof), size(dof), size(self%load)), source=0)
       allocate(number, source=freedom_numbers(space%numbering))
       do i = 1, size(self%load)
          if (self%load(i)%kind /= load_pressure) cycle
          e = self%load(i)%target
-         self%edge(:, i) = scene%element_node( &
+         self%face(:, i) = scene%element_node( &
             scene%kind(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
-         dofs = number([2*self%edge(1, i) - 1, 2*self%edge(1, i), 2*self%edge(2, i) - 1, &
-            2*self%edge(2, i)])
-         do k = 1, 4
-            do j = 1, 4
-               self%slot(j + 4*(k - 1), i) = reduction_slot(space%reduction, matrix, dofs(j), &
-                  dofs(k))
-            end do
+         do a = 1, scene%n_dim
+            dof(a, :) = number(scene%n_dim*(self%face(:, i) - 1) + a)
          end do
+         associate (all => reshape(dof, [size(dof)]))
+            do k = 1, size(all)
+               do j = 1, size(all)
+                  self%slot(j, k, i) = reduction_slot(space%reduction, matrix, all(j), all(k))
+               end do
+            end do
+         end associate
       end do
    end subroutine begin_step
 
@@ -140,13 +146,13 @@ contains
                   node = self%node(j, load%target)
                   if (node == 0) cycle
                   self%force(:, node) = self%force(:, node) &
-                     + p*self%volume_mass(j, load%target)*load%direction(:2)
+                     + p*self%volume_mass(j, load%target)*load%direction(:size(self%force, 1))
                end do
             case (load_pressure)
                p = p*self%thickness(load%target)
-               call add_pressure(self%edge(:, i), p, motion%x, motion%at, self%nlgeom, self%force)
+               call add_pressure(self%face(:, i), p, motion%x, motion%at, self%nlgeom, self%force)
                if (present(value) .and. self%nlgeom) then
-                  call add_pressure_stiffness(p*motion%load_weight, self%slot(:, i), value, side)
+                  call add_pressure_stiffness(p*motion%load_weight, self%slot(:, :, i), value, side)
                end if
             end select
          end associate
@@ -164,44 +170,5 @@ contains
 
       is_symmetric = .not. (self%nlgeom .and. any(self%load%kind == load_pressure))
    end function is_symmetric
-
-   !> Pressure on the edge a-b: half of -p n |b - a| on either node, n outwards.
-   pure subroutine add_pressure(edge, p, x, u, nlgeom, force)
-      integer, intent(in) :: edge(2)
-      real(wp), intent(in) :: p                            !! [M/T^2]: pressure times thickness
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      logical, intent(in) :: nlgeom
-      real(wp), intent(inout) :: force(:, :)
-      real(wp) :: a(2), half(2)
-
-      a = x(:, edge(2)) - x(:, edge(1))
-      if (nlgeom) a = a + (u(:, edge(2)) - u(:, edge(1)))
-      half = 0.5_wp*p*[-a(2), a(1)]
-      force(:, edge(1)) = force(:, edge(1)) + half
-      force(:, edge(2)) = force(:, edge(2)) + half
-   end subroutine add_pressure
-
-   !> The force is linear in the edge: f1 = p (a2 - b2)/2, f2 = p (b1 - a1)/2 on both nodes.
-   pure subroutine add_pressure_stiffness(p, slot, value, side)
-      real(wp), intent(in) :: p
-      integer, intent(in) :: slot(16)
-      real(dp), intent(inout) :: value(:), side(:)
-      real(wp), parameter :: turn(2, 2) = reshape([0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp], [2, 2])
-      integer :: i, j, a, b, k
-      real(wp) :: df
-
-      do j = 1, 2
-         do b = 1, 2
-            do i = 1, 2
-               do a = 1, 2
-                  k = slot(a + 2*(i - 1) + 4*(b - 1 + 2*(j - 1)))
-                  df = 0.5_wp*p*turn(a, b)*merge(1.0_wp, -1.0_wp, j == 2)
-                  if (k > 0) value(k) = value(k) - real(df, dp)
-                  if (k < 0) side(-k) = side(-k) - real(df, dp)
-               end do
-            end do
-         end do
-      end do
-   end subroutine add_pressure_stiffness
 
 end module emcon_loads

@@ -16,8 +16,8 @@ module emcon_node_potential
    type, extends(host_force_t) :: node_potential_t
       integer, allocatable :: node(:)                !! (n)
       class(point_function_t), allocatable :: potential  !! of x, y [L]: V [M L^2/T^2]
-      real(wp), allocatable, private :: x(:, :)      !! (2, n) reference positions [L]
-      real(wp), allocatable, private :: z(:, :), dz(:, :)   !! (2, n) [L]
+      real(wp), allocatable, private :: x(:, :)      !! (n_dim, n) reference positions [L]
+      real(wp), allocatable, private :: z(:, :), dz(:, :)   !! (n_dim, n) [L]
       type(point_response_t), private :: response
    contains
       procedure :: place
@@ -26,46 +26,45 @@ module emcon_node_potential
 
 contains
 
-   !> The potential `potential`, called `name` in messages, on each of the nodes `node` of a model
-   !> of `n_node` nodes.
-   subroutine node_potential_init(self, name, node, n_node, potential, error)
+   !> The potential `potential`, called `name` in messages, on each of the nodes `node` of a model.
+   subroutine node_potential_init(self, name, node, n_dim, n_node, potential, error)
       type(node_potential_t), intent(out) :: self
       character(len=*), intent(in) :: name       !! stands in messages
       integer, intent(in) :: node(:)                 !! 1..n_node, each once
-      integer, intent(in) :: n_node              !! of the model
+      integer, intent(in) :: n_dim, n_node       !! of the model
       class(point_function_t), intent(in) :: potential
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: slot(:)
-      integer :: i, n
+      integer :: i, a, n
 
       n = size(node)
-      call check(name, node, n_node, potential, error)
+      call check(name, node, n_dim, n_node, potential, error)
       if (allocated(error)) return
       self%name = name
       self%node = node
       allocate(self%potential, source=potential)
-      allocate(self%x(2, n), self%z(2, n), self%dz(2, n), source=0.0_wp)
+      allocate(self%x(n_dim, n), self%z(n_dim, n), self%dz(n_dim, n), source=0.0_wp)
       self%is_symmetric_at_end = .true.
-      call csr_from_elements(self%pattern, 2*n_node, [(2*i + 1, i = 0, n)], &
-         [(2*node(i) - 1, 2*node(i), i = 1, n)], slot, error)
+      call csr_from_elements(self%pattern, n_dim*n_node, [(n_dim*i + 1, i = 0, n)], &
+         [((n_dim*(node(i) - 1) + a, a = 1, n_dim), i = 1, n)], slot, error)
    end subroutine node_potential_init
 
-   subroutine check(name, node, n_node, potential, error)
+   subroutine check(name, node, n_dim, n_node, potential, error)
       character(len=*), intent(in) :: name
-      integer, intent(in) :: node(:), n_node
+      integer, intent(in) :: node(:), n_dim, n_node
       class(point_function_t), intent(in) :: potential
       type(error_t), allocatable, intent(out) :: error
       logical, allocatable :: is_in(:)
       integer :: i
 
-      if (potential%n_variable /= 2) then
+      if (potential%n_variable /= n_dim) then
          call refuse("is a function of " // to_text(potential%n_variable) // &
-            " variables, not of the 2 coordinates of a node")
+            " variables, not of the " // to_text(n_dim) // " coordinates of a node")
          return
       end if
       if (allocated(potential%weight)) then
-         if (size(potential%weight) /= 2 .or. .not. all(potential%weight > 0.0_wp)) then
-            call refuse("needs 2 weights above 0, or none")
+         if (size(potential%weight) /= n_dim .or. .not. all(potential%weight > 0.0_wp)) then
+            call refuse("needs " // to_text(n_dim) // " weights above 0, or none")
             return
          end if
       end if
@@ -95,7 +94,7 @@ contains
    !> Take the reference positions of the nodes.
    subroutine place(self, x)
       class(node_potential_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
+      real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
 
       self%x = x(:, self%node)
    end subroutine place
@@ -103,7 +102,7 @@ contains
    !> As `host_force_t` has it.
    subroutine respond(self, u0, du, wants_tangent, response)
       class(node_potential_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       logical, intent(in) :: wants_tangent       !! else no tangent is computed
       type(force_response_t), intent(inout) :: response   !! sized, 0 on entry
       integer :: i, n
@@ -129,12 +128,13 @@ contains
    subroutine put_tangent(self, tangent)
       class(node_potential_t), intent(in) :: self
       real(dp), intent(inout) :: tangent(:)
-      integer :: i, a, k
+      integer :: i, a, k, n_dim
 
+      n_dim = size(self%x, 1)
       do i = 1, size(self%node)
-         do a = 1, 2
-            k = self%pattern%row_start(2*(self%node(i) - 1) + a)
-            tangent(k + 1:k + 2) = real(self%response%tangent(a, :, i), dp)
+         do a = 1, n_dim
+            k = self%pattern%row_start(n_dim*(self%node(i) - 1) + a)
+            tangent(k + 1:k + n_dim) = real(self%response%tangent(a, :, i), dp)
          end do
       end do
    end subroutine put_tangent

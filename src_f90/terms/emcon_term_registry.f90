@@ -2,7 +2,7 @@
 module emcon_term_registry
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
-   use emcon_host, only : host_count, host_t
+   use emcon_host, only : host_t
    use emcon_host_check, only : host_check_mass
    use emcon_host_term, only : host_term_init, host_term_t
    use emcon_inertia, only : inertia_init, inertia_t, inertia_times
@@ -27,16 +27,18 @@ contains
       type(term_box_t), allocatable, intent(out) :: term(:)   !! (n_term)
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given
-      integer :: n(2), i
+      integer :: n, i
 
       n = 0
-      if (present(given)) n = host_count(given)
-      allocate(term(n_own + n(1)))
+      if (present(given)) then
+         if (allocated(given%force)) n = size(given%force)
+      end if
+      allocate(term(n_own + n))
       allocate(inertia_t :: term(of_inertia)%term)
       allocate(solid_term_t :: term(of_solid)%term)
       allocate(loads_t :: term(of_loads)%term)
       call create_own(scene, term, error, given)
-      do i = 1, n(1)
+      do i = 1, n
          if (allocated(error)) return
          allocate(host_term_t :: term(n_own + i)%term)
          select type (part => term(n_own + i)%term)

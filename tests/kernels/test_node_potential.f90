@@ -42,7 +42,7 @@ contains
       scene%v0(2, 1) = v
       well%n_variable = 2
       well%is_harmonic = is_harmonic
-      call node_potential_init(potential, "WELL", [1], 1, well, error)
+      call node_potential_init(potential, "WELL", [1], 2, 1, well, error)
       if (.not. allocated(error)) call open_given(stepper, scene, potential, 1.0_wp, error)
    end subroutine open_well
 
@@ -108,7 +108,7 @@ contains
       call add_step(scene, .false., 0.05_wp, 100)
       scene%v0(1, :) = 1.0_wp
       well%n_variable = 2
-      call node_potential_init(potential, "WELL", [(i, i = 1, 9)], 9, well, error)
+      call node_potential_init(potential, "WELL", [(i, i = 1, 9)], 2, 9, well, error)
       if (.not. allocated(error)) call open_given(stepper, scene, potential, 0.0_wp, error)
       if (.not. allocated(error)) call run_conserving(stepper, stepper%march%ledger%total, error)
       if (allocated(error)) return
@@ -140,7 +140,7 @@ contains
          type(node_potential_t) :: potential
          type(error_t), allocatable :: raised
 
-         call node_potential_init(potential, "WELL", node, 3, well, raised)
+         call node_potential_init(potential, "WELL", node, 2, 3, well, raised)
          call check_error(error, raised, err_input, text, "potential")
       end subroutine refuse
 
