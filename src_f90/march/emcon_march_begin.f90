@@ -1,0 +1,236 @@
+!> The beginning of a step of the deck: unknowns, scheme, solver and contact, and whether all that
+!> moves is held.
+module emcon_march_begin
+   use emcon_active_set, only : active_set_overclosure
+   use emcon_correction, only : correction_reset
+   use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_holding, only : holding_begin, holding_t
+   use emcon_host, only : host_find_solver
+   use emcon_host_scheme, only : host_scheme_find
+   use emcon_interactions, only : contact_options_t
+   use emcon_judge, only : judge_step, overlap_t
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_measure, ledger_t
+   use emcon_march_grid, only : march_count_grid, march_grid_time
+   use emcon_march_types, only : march_t
+   use emcon_mechanism_text, only : free_motion_text
+   use emcon_motion, only : at_rest, motion_of
+   use emcon_newton, only : newton_init
+   use emcon_numbering, only : spread_dependent
+   use emcon_overclosure, only : overclosure_check
+   use emcon_pose, only : pose_at_end
+   use emcon_scene, only : scene_t
+   use emcon_scheme_registry, only : scheme_create, scheme_given
+   use emcon_solver_registry, only : solver_given
+   use emcon_state, only : state_t
+   use emcon_steps, only : initiation_persistent, method_saddle_point, step_t
+   use emcon_system, only : system_begin_step, system_check_response, system_respond
+   use emcon_term, only : role_internal
+   use emcon_text, only : note_add, to_text
+   use emcon_unresolved_rows, only : report_unresolved
+   use emcon_velocity_update, only : velocity_update_reset
+   implicit none
+   private
+   public :: march_begin_step, march_resume, march_renumber
+
+   !> Fields in a deck are rounded by less than this part of their largest value.
+   real(wp), parameter :: deck_rounding = 1.0e-6_wp
+
+contains
+
+   !> Begin step `i_step` of the deck from the present state.
+   subroutine march_begin_step(self, scene, i_step, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! from 1
+      type(error_t), allocatable, intent(out) :: error
+
+      self%state%i_step = i_step
+      self%state%n_grid = 0
+      self%state%is_off_grid = .false.
+      self%state%grid_stride = 1
+      self%state%n_easy = 0
+      self%state%n_before = self%state%increment
+      self%state%start_time = self%state%time
+      if (.not. scene%step(i_step)%scheme%masses_resist) self%state%v = 0.0_wp
+      call system_begin_step(self%system, scene, i_step, error)
+      if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
+         self%system%notes, error)
+      if (allocated(error)) return
+      call follow_links(self, scene)
+      self%state%u_start = self%state%u
+      call check_held(self, scene, error)
+      if (allocated(error)) return
+      call prepare(self, scene, error)
+   end subroutine march_begin_step
+
+   !> Where masses do not resist no body may be free to move.
+   subroutine check_held(self, scene, error)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: text
+
+      associate (step => scene%step(self%state%i_step))
+         if (step%scheme%masses_resist) return
+         call free_motion_text(self%system, scene, step%prescribed, text)
+         if (len(text) > 0) call raise(error, err_analysis, "the static problem is singular: " &
+            // text)
+      end associate
+   end subroutine check_held
+
+   !> Let displacements and velocities of dependent freedoms follow those of the others.
+   subroutine follow_links(self, scene)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+
+      if (.not. any(self%system%space%linear%is_used)) return
+      call follow(self%state%u, "displacement")
+      call follow(self%state%v, "velocity")
+
+   contains
+
+      subroutine follow(field, name)
+         real(wp), intent(inout), contiguous :: field(:, :)      !! (n_dim, n_node)
+         character(len=*), intent(in) :: name
+         real(wp) :: change(size(field, 2)), largest
+         integer :: i
+
+         largest = maxval(abs(field))
+         self%motion%du = field
+         call spread_dependent(self%system%space%linked, field)
+         change = maxval(abs(field - self%motion%du), 1)
+         i = maxloc(change, 1)
+         if (change(i) > deck_rounding*largest) call note_add(self%system%notes, "the " // name // &
+            " at the start does not fit the ties and equations: dependent nodes follow the " // &
+            "others, largest change " // to_text(change(i)) // " at node " // &
+            to_text(scene%node_label(i)))
+      end subroutine follow
+
+   end subroutine follow_links
+
+   !> Set up for the step that the state is in.
+   subroutine march_resume(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+
+      call system_begin_step(self%system, scene, self%state%i_step, error)
+      if (.not. allocated(error)) call prepare(self, scene, error)
+   end subroutine march_resume
+
+   !> Number the unknowns anew, as the boundary conditions of the step that the state is in have
+   !> changed. The state and the ledger stay.
+   subroutine march_renumber(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(state_t) :: before
+      type(ledger_t) :: ledger_before
+
+      before = self%state
+      ledger_before = self%ledger
+      call system_begin_step(self%system, scene, self%state%i_step, error)
+      if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
+         self%system%notes, error)
+      if (.not. allocated(error)) call check_held(self, scene, error)
+      if (.not. allocated(error)) call prepare(self, scene, error)
+      self%state = before
+      self%ledger = ledger_before
+   end subroutine march_renumber
+
+   !> Scheme, solver and contact for the step that the system is in.
+   subroutine prepare(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(overlap_t) :: overlap
+      integer :: i
+
+      associate (step => scene%step(self%state%i_step), state => self%state)
+         call choose_scheme(self, step)
+         call newton_init(self%newton, self%system%space%numbering%n_unknown, &
+            scene%x, step%newton_tolerance, step%newton_maximum)
+         self%newton%is_interrupted => self%is_interrupted
+         call choose_solver(self, step)
+         self%active%puts_off = .true.
+         self%active%holds_gap = step%initiation == initiation_persistent &
+            .and. step%scheme%masses_resist
+         self%active%masses_resist = step%scheme%masses_resist
+         self%active%gap_tolerance = step%gap_tolerance
+         self%active%holding = holding_t()
+         if (.not. step%scheme%masses_resist) call holding_begin(self%active%holding, self%system, &
+            scene, state%u)
+         do i = 1, size(self%system%contact)
+            associate (contact => self%system%contact(i)%contact)
+               call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
+               call contact%configure(scene%x, options_of(i))
+            end associate
+         end do
+         call active_set_overclosure(self%active, self%system, scene%x, state%u_start, &
+            step%resolves_overclosure)
+         self%meant_overlap = 0.0_wp
+         if (step%resolves_overclosure) then
+            call judge_step(self%judge, scene%x, state%u_start, at_rest(state%u), overlap)
+            self%meant_overlap = overlap%depth
+            call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
+         end if
+         call march_count_grid(self, step)
+         if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
+         call system_respond(self%system, motion_of(pose_at_end, scene%x, state%u, &
+            at_rest(state%u)), .false.)
+         call system_check_response(self%system, "at the start of the step", error)
+         if (allocated(error)) return
+         state%internal = self%system%response%part(role_internal)%force
+         state%energy = self%system%response%energy
+         state%potential = self%system%response%potential
+      end associate
+      call ledger_measure(self%ledger, self%system, scene%x, self%state)
+      self%revision = self%revision + 1
+
+   contains
+
+      !> The options of a pair, else those of the step.
+      type(contact_options_t) function options_of(i)
+         integer, intent(in) :: i                !! number of the contact
+
+         options_of = scene%step(self%state%i_step)%contact
+         if (i > size(scene%pair)) return
+         if (scene%pair(i)%has_options) options_of = scene%pair(i)%options
+      end function options_of
+
+   end subroutine prepare
+
+   !> What solves the systems of the step: a solver of EMCON, or one that was given.
+   subroutine choose_solver(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      integer :: i, method
+
+      method = merge(step%constraint_method, method_saddle_point, self%system%space%is_reduced)
+      if (step%solver /= solver_given) then
+         call correction_reset(self%newton%correction, method, step%solver)
+         call velocity_update_reset(self%velocity_update, step%solver)
+      else
+         i = host_find_solver(self%solver, step%solver_name)
+         call correction_reset(self%newton%correction, method, solver_given + i, &
+            self%solver(i)%solver)
+         call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
+      end if
+   end subroutine choose_solver
+
+   !> The scheme of a step: of its row, or one that was given.
+   subroutine choose_scheme(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      integer :: k
+
+      if (step%scheme%code /= scheme_given) then
+         call scheme_create(step%scheme, self%scheme)
+         return
+      end if
+      k = host_scheme_find(self%given_scheme, step%choice%name)
+      call scheme_create(step%scheme, self%scheme, self%given_scheme(k)%scheme)
+   end subroutine choose_scheme
+
+end module emcon_march_begin
