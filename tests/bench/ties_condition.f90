@@ -74,7 +74,9 @@ contains
          else if (march%newton%correction%method == method_saddle_point) then
             allocate(length(n + set%n), source=1.0_dp)
             do k = 1, set%n
-               if (set%id(k) <= march%system%space%linear%n) length(n + k) = real(set%item(k)%size, dp)
+               associate (is_linear => set%id(k) <= march%system%space%linear%n)
+                  if (is_linear) length(n + k) = real(set%item(k)%size, dp)
+               end associate
             end do
             a = dense(march%newton%correction%saddle_point%full)
             a(n + 1:, :) = -a(n + 1:, :)
