@@ -11,7 +11,7 @@ module emcon_csr
    implicit none
    private
    public :: csr_t, csr_from_elements, csr_from_entries, csr_sort_columns
-   public :: csr_find, csr_is_same, csr_copy_pattern
+   public :: csr_find, csr_is_same, csr_copy_pattern, csr_copy_filled
    public :: csr_multiply, csr_multiply_transposed, csr_transpose
 
    type :: csr_t
@@ -264,6 +264,20 @@ contains
       copy%column = self%column
       allocate(copy%value(size(self%column)), source=0.0_dp)
    end subroutine csr_copy_pattern
+
+   !> The matrix without the room that is left behind its last row.
+   pure subroutine csr_copy_filled(self, copy)
+      type(csr_t), intent(in) :: self
+      type(csr_t), intent(out) :: copy
+      integer :: n
+
+      n = self%row_start(self%n_row + 1)
+      copy%n_row = self%n_row
+      copy%n_col = self%n_col
+      allocate(copy%row_start, source=self%row_start)
+      allocate(copy%column, source=self%column(:n))
+      allocate(copy%value, source=self%value(:n))
+   end subroutine csr_copy_filled
 
    !> Both matrices have the same pattern.
    pure logical function csr_is_same(a, b)

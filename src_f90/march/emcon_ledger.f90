@@ -1,12 +1,14 @@
 !> The energy and momentum ledger: what the system holds and what was done to it.
 module emcon_ledger
-   use emcon_kinds, only : wp
+   use emcon_csr, only : csr_t
+   use emcon_kinds, only : dp, wp
    use emcon_moment_plane, only : moment_of
    use emcon_state, only : state_t
    use emcon_system, only : mass_times, system_t
+   use emcon_term_registry, only : terms_mass
    implicit none
    private
-   public :: ledger_t, ledger_init, ledger_measure, body_momenta
+   public :: ledger_t, ledger_init, ledger_measure, body_momenta, body_masses
 
    !> total = kinetic + strain + potential - external_work stays constant up to the work of contact:
    !> docs/theory.md, eqs. (23) and (24).
@@ -72,5 +74,21 @@ contains
          end associate
       end do
    end subroutine body_momenta
+
+   !> Mass of each body.
+   subroutine body_masses(system, mass)
+      type(system_t), intent(in) :: system           !! its terms and bodies
+      real(dp), allocatable, intent(out) :: mass(:)  !! (n_body) [M]
+      type(csr_t) :: between
+      integer :: i, k
+
+      call terms_mass(system%term, between)
+      allocate(mass(system%space%n_body), source=0.0_dp)
+      do i = 1, between%n_row
+         do k = between%row_start(i) + 1, between%row_start(i + 1)
+            mass(system%space%body(i)) = mass(system%space%body(i)) + between%value(k)
+         end do
+      end do
+   end subroutine body_masses
 
 end module emcon_ledger

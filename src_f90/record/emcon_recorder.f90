@@ -2,13 +2,12 @@
 !>
 !> Turns states of the stepper into the plain arrays that results/ writes.
 module emcon_recorder
-   use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_history, only : column_t, history_append, history_close, history_create, &
       history_publish, history_put_run, history_resume, history_set_append, history_set_define, &
-      history_t
+      history_set_once, history_t
    use emcon_kinds, only : dp, wp
-   use emcon_ledger, only : body_momenta
+   use emcon_ledger, only : body_masses, body_momenta
    use emcon_march, only : increment_t
    use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
    use emcon_quantities, only : quantity_fields, quantity_of_field
@@ -16,7 +15,6 @@ module emcon_recorder
    use emcon_run_mark, only : run_mark
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
-   use emcon_term_registry, only : terms_mass
    use emcon_text, only : string_t
    use emcon_version, only : version
    use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
@@ -29,22 +27,20 @@ module emcon_recorder
    !> Frames of a deck that asks for no field output.
    integer, parameter :: default_frames = 100
 
-   character(len=13), parameter :: column_names(18) = [character(len=13) :: "increment", "time", &
-      "h", "kinetic", "strain", "external_work", "contact_work", "stabilization", "total", "px", &
-      "py", "lz", "active", "newton", "cuts", "penetration", "stand_off", "cpu"]
+   type(column_t), parameter :: columns(18) = [column_t("increment", .true.), column_t("time"), &
+      column_t("h"), column_t("kinetic"), column_t("strain"), column_t("external_work"), &
+      column_t("contact_work"), column_t("stabilization"), column_t("total"), column_t("px"), &
+      column_t("py"), column_t("lz"), column_t("active", .true.), column_t("newton", .true.), &
+      column_t("cuts", .true.), column_t("penetration"), column_t("stand_off"), column_t("cpu")]
 
    !> What is written if no step asks for fields: of solids, and behind them of contact.
    character(len=*), parameter :: default_fields(8) = [character(len=4) :: "U", "V", "RF", "S", &
       "ENER", "CDIS", "CSTR", "CF"]
    integer, parameter :: n_solid_fields = 5
 
-   character(len=*), parameter :: counts(4) = [character(len=9) :: "increment", "active", &
-      "newton", "cuts"]
-
    type :: recorder_t
       type(vtkhdf_t) :: fields
       type(history_t) :: history
-      logical :: has_fields = .false.
       type(string_t), allocatable :: variable(:) !! those that are written
       type(field_t), allocatable :: field(:)     !! of all of them
       type(series_t), allocatable :: series(:)   !! of PRINT requests
@@ -63,23 +59,23 @@ contains
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: run
       integer, allocatable :: cell_node(:, :), vtk_type(:)
+      real(dp), allocatable :: mass(:)
+      integer :: k
 
       call run_mark(stepper, run)
       call choose_fields(self, stepper%scene)
-      if (self%has_fields) then
-         call find_cells(stepper%scene, cell_node, vtk_type)
-         call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), &
-            cell_node, vtk_type, self%field, error)
-         if (allocated(error)) return
-         call vtkhdf_put_run(self%fields, run)
-      end if
-      call history_create(self%history, base, columns(), error)
+      call find_cells(stepper%scene, cell_node, vtk_type)
+      call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), cell_node, &
+         vtk_type, self%field, error)
+      if (allocated(error)) return
+      call vtkhdf_put_run(self%fields, run)
+      call history_create(self%history, base, columns, error)
       if (allocated(error)) return
       call history_put_run(self%history, run, stepper%source%line, version, error)
       if (allocated(error)) return
       call define_sets(self, stepper, error)
-      if (allocated(error)) return
-      call write_masses(self, stepper, error)
+      call body_masses(stepper%march%system, mass)
+      call history_set_once(self%history, "BODIES", "MASS", [(k, k = 1, size(mass))], mass, error)
    end subroutine recorder_open
 
    !> The elements as cells of the field file.
@@ -110,26 +106,14 @@ contains
 
       call run_mark(stepper, run)
       call choose_fields(self, stepper%scene)
-      if (self%has_fields) then
-         call vtkhdf_resume(self%fields, base // ".vtkhdf", run, self%field, n_frame, error)
-         if (allocated(error)) return
-      end if
-      call history_resume(self%history, base, run, columns(), n_row, error)
+      call vtkhdf_resume(self%fields, base // ".vtkhdf", run, self%field, n_frame, error)
+      if (allocated(error)) return
+      call history_resume(self%history, base, run, columns, n_row, error)
       if (allocated(error)) return
       self%n_row = n_row
       self%last_time = stepper%march%state%time
       call define_sets(self, stepper, error)
    end subroutine recorder_resume
-
-   pure function columns() result(list)
-      type(column_t) :: list(size(column_names))
-      integer :: i
-
-      list%name = column_names
-      do i = 1, size(list)
-         list(i)%is_integer = any(list(i)%name == counts)
-      end do
-   end function columns
 
    !> The fields that some step asks for; all of them if none asks for any.
    subroutine choose_fields(self, scene)
@@ -153,7 +137,6 @@ contains
             call add(trim(default_fields(i)))
          end do
       end if
-      self%has_fields = .true.
 
    contains
 
@@ -183,30 +166,6 @@ contains
       call history_set_define(self%history, "BODIES", "MOMENTUM", &
          [(k, k = 1, stepper%march%system%space%n_body)], 3, self%momentum_set, error)
    end subroutine define_sets
-
-   !> The masses of the bodies, once.
-   subroutine write_masses(self, stepper, error)
-      type(recorder_t), intent(inout) :: self
-      type(stepper_t), intent(in) :: stepper
-      type(error_t), allocatable, intent(out) :: error
-      real(dp) :: mass(1, stepper%march%system%space%n_body)
-      type(csr_t) :: between
-      integer :: i, k, i_set
-
-      mass = 0.0_dp
-      associate (system => stepper%march%system)
-         call terms_mass(system%term, between)
-         do i = 1, between%n_row
-            do k = between%row_start(i) + 1, between%row_start(i + 1)
-               mass(1, system%space%body(i)) = mass(1, system%space%body(i)) + between%value(k)
-            end do
-         end do
-         call history_set_define(self%history, "BODIES", "MASS", [(k, k = 1, size(mass, 2))], 1, &
-            i_set, error)
-      end associate
-      if (allocated(error)) return
-      call history_set_append(self%history, i_set, 0.0_dp, mass, error)
-   end subroutine write_masses
 
    !> Record the present state after `increment`.
    subroutine recorder_write(self, stepper, increment, cpu, error)
@@ -320,22 +279,9 @@ contains
       real(dp), intent(in) :: wall, contact, judge   !! [s]
       type(error_t), allocatable, intent(out) :: error
 
-      call put("WALL_SECONDS", wall)
-      if (.not. allocated(error)) call put("CONTACT_CPU_SECONDS", contact)
-      if (.not. allocated(error)) call put("JUDGE_CPU_SECONDS", judge)
-
-   contains
-
-      subroutine put(name, seconds)
-         character(len=*), intent(in) :: name
-         real(dp), intent(in) :: seconds
-         integer :: i_set
-
-         call history_set_define(self%history, "RUN", name, [0], 1, i_set, error)
-         if (.not. allocated(error)) call history_set_append(self%history, i_set, 0.0_dp, &
-            reshape([seconds], [1, 1]), error)
-      end subroutine put
-
+      call history_set_once(self%history, "RUN", "WALL_SECONDS", [0], [wall], error)
+      call history_set_once(self%history, "RUN", "CONTACT_CPU_SECONDS", [0], [contact], error)
+      call history_set_once(self%history, "RUN", "JUDGE_CPU_SECONDS", [0], [judge], error)
    end subroutine recorder_finish
 
    !> Complete and close all files; the first failure is told.

@@ -16,7 +16,7 @@ module emcon_history
    implicit none
    private
    public :: column_t, history_t, history_create, history_resume, history_append
-   public :: history_set_define, history_set_append, history_set_put, history_put_run
+   public :: history_set_define, history_set_append, history_set_once, history_set_put, history_put_run
    public :: history_publish, history_close
 
    !> One column of the history.
@@ -358,6 +358,21 @@ contains
       end associate
       self%store%is_changed = .true.
    end subroutine history_set_append
+
+   !> Put one value for each member of a set, of the run as a whole.
+   subroutine history_set_once(self, set, variable, label, values, error)
+      type(history_t), intent(inout) :: self
+      character(len=*), intent(in) :: set, variable
+      integer, intent(in), contiguous :: label(:)    !! (n_item) the user's numbers of its members
+      real(dp), intent(in) :: values(:)              !! (n_item)
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier failure: nothing is done
+      integer :: i_set
+
+      if (allocated(error)) return
+      call history_set_define(self, set, variable, label, 1, i_set, error)
+      if (.not. allocated(error)) call history_set_append(self, i_set, 0.0_dp, &
+         reshape(values, [1, size(values)]), error)
+   end subroutine history_set_once
 
    !> Keep with the results what made them: the text of the deck and the version of the program.
    subroutine history_put_run(self, run, deck, version, error)

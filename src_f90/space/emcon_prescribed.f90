@@ -7,7 +7,7 @@ module emcon_prescribed
    use emcon_steps, only : prescribed_t, step_t
    implicit none
    private
-   public :: amplitude_at, prescribed_motion
+   public :: amplitude_at, prescribed_motion, ramp_at, ramp_turn
 
 contains
 
@@ -44,11 +44,34 @@ contains
          u = prescribed%value*factor
          v = prescribed%value*rate
       else if (step%scheme%loads_ramp) then
-         u = u_start + (prescribed%value - u_start) &
-            *min(1.0_wp, instant%step_time/step%duration)
+         u = ramp_at(step, instant%step_time, u_start, prescribed%value)
       else
          u = prescribed%value
       end if
    end subroutine prescribed_motion
+
+   !> Where the linear run of a step from `start` to `last` is.
+   pure real(wp) function ramp_at(step, step_time, start, last)
+      type(step_t), intent(in) :: step
+      real(wp), intent(in) :: step_time              !! since the start of the step [T]
+      real(wp), intent(in) :: start, last
+
+      ramp_at = start + (last - start)*min(1.0_wp, step_time/step%duration)
+   end function ramp_at
+
+   !> Where the run has to start to be at `now`, and end at `last`. It stays after the step, and
+   !> where nothing runs.
+   pure subroutine ramp_turn(step, step_time, now, last, start)
+      type(step_t), intent(in) :: step
+      real(wp), intent(in) :: step_time              !! since the start of the step [T]
+      real(wp), intent(in) :: now, last
+      real(wp), intent(inout) :: start
+      real(wp) :: part
+
+      part = min(1.0_wp, step_time/step%duration)
+      if (.not. step%scheme%loads_ramp .or. part >= 1.0_wp) return
+      start = now
+      if (part > 0.0_wp) start = (now - last*part)/(1.0_wp - part)
+   end subroutine ramp_turn
 
 end module emcon_prescribed

@@ -6,16 +6,15 @@
 module emcon_stepper_conditions
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_prescribed, only : prescribed_motion
+   use emcon_prescribed, only : prescribed_motion, ramp_at, ramp_turn
    use emcon_march, only : march_renumber
    use emcon_pose, only : instant_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_offers, restart_size, &
       restart_t
    use emcon_scene, only : scene_t
-   use emcon_state, only : state_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_number, check_that, stepper_check_open
-   use emcon_steps, only : load_gravity, load_point, prescribed_t, step_t
+   use emcon_steps, only : load_gravity, load_point, prescribed_t
    use emcon_system, only : system_renew
    use emcon_text, only : to_text
    implicit none
@@ -64,7 +63,7 @@ contains
       integer, intent(in) :: load                    !! 1..number of loads of the step
       real(wp), intent(in) :: value                  !! force | pressure | acceleration
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: part, present_value
+      real(wp) :: now
 
       call stepper_check_open(self, error)
       call check_number("the value", value, error)
@@ -75,11 +74,8 @@ contains
             to_text(size(step%load)), error)
          if (allocated(error)) return
          associate (own => step%load(load))
-            part = part_passed(step, state)
-            if (step%scheme%loads_ramp .and. part < 1.0_wp) then
-               present_value = own%value_start + (own%value - own%value_start)*part
-               own%value_start = run_start(present_value, value, part)
-            end if
+            now = ramp_at(step, state%step_time, own%value_start, own%value)
+            call ramp_turn(step, state%step_time, now, value, own%value_start)
             own%value = value
          end associate
       end associate
@@ -106,7 +102,8 @@ contains
          now = instant_t(state%step_time, state%time)
          call prescribed_motion(self%scene, step, step%prescribed(k), now, &
             state%u_start(dof, node), u, v)
-         call start_run(step, state, step%prescribed(k), value, u)
+         if (step%prescribed(k)%amplitude == 0) call ramp_turn(step, state%step_time, u, value, &
+            state%u_start(dof, node))
          step%prescribed(k)%value = value
          step%prescribed(k)%is_frozen = .false.
       end associate
@@ -134,7 +131,8 @@ contains
       added%value = value
       u_start = self%march%state%u_start(dof, node)
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
-         call start_run(step, state, added, value, state%u(dof, node))
+         call ramp_turn(step, state%step_time, state%u(dof, node), value, &
+            state%u_start(dof, node))
          list = [step%prescribed, added]
       end associate
       call renumber(self, list, error)
@@ -245,35 +243,6 @@ contains
          k = findloc(list%node == node .and. list%dof == dof, .true., 1)
       end associate
    end subroutine find_prescribed
-
-   !> Let the linear run of a condition in a static step go from `u`, where it is now, to `value`.
-   pure subroutine start_run(step, state, prescribed, value, u)
-      type(step_t), intent(in) :: step
-      type(state_t), intent(inout) :: state
-      type(prescribed_t), intent(in) :: prescribed
-      real(wp), intent(in) :: value, u
-      real(wp) :: part
-
-      part = part_passed(step, state)
-      if (.not. step%scheme%loads_ramp .or. prescribed%amplitude > 0) return
-      if (part < 1.0_wp) state%u_start(prescribed%dof, prescribed%node) = run_start(u, value, part)
-   end subroutine start_run
-
-   !> Where a run to `value` begins that has come to `now` after `part` < 1 of the step.
-   pure real(wp) function run_start(now, value, part)
-      real(wp), intent(in) :: now, value, part
-
-      run_start = now
-      if (part > 0.0_wp) run_start = (now - value*part)/(1.0_wp - part)
-   end function run_start
-
-   !> Part of the step of the deck that has passed: 0..1.
-   pure real(wp) function part_passed(step, state)
-      type(step_t), intent(in) :: step
-      type(state_t), intent(in) :: state
-
-      part_passed = min(1.0_wp, state%step_time/step%duration)
-   end function part_passed
 
    !> An input error that says what a degree of freedom is, unless `holds`.
    pure subroutine check_freedom(label, dof, what, holds, error)

@@ -3,10 +3,10 @@ module emcon_stepper_report
    use emcon_constraints, only : constraint_place, constraints_evaluate, constraints_rows, &
       constraints_select
    use emcon_contact, only : gap_state_t
-   use emcon_csr, only : csr_from_entries, csr_t
+   use emcon_csr, only : csr_copy_filled, csr_t
+   use emcon_curvature, only : curvature_matrix, curvature_times
    use emcon_errors, only : error_t
-   use emcon_kinds, only : dp, wp
-   use emcon_motion, only : at_rest
+   use emcon_kinds, only : wp
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_pose, only : pose_t
    use emcon_stepper, only : stepper_t
@@ -103,26 +103,12 @@ contains
          report%dgap = set%item%dgap
          report%size = set%item%size
          report%defect = set%defect
-         call take_filled(set%force_rows, report%discrete_gradient)
-         call take_filled(set%gap_rows, report%end_gradient)
+         call csr_copy_filled(set%force_rows, report%discrete_gradient)
+         call csr_copy_filled(set%gap_rows, report%end_gradient)
       end associate
       self%has_set = .true.
       self%has_null_space = .false.
    end subroutine report_evaluate
-
-   !> The rows without the room that is left after the last one.
-   pure subroutine take_filled(rows, matrix)
-      type(csr_t), intent(in) :: rows
-      type(csr_t), intent(out) :: matrix
-      integer :: n
-
-      n = rows%row_start(rows%n_row + 1)
-      matrix%n_row = rows%n_row
-      matrix%n_col = rows%n_col
-      allocate(matrix%row_start, source=rows%row_start)
-      allocate(matrix%column, source=rows%column(:n))
-      allocate(matrix%value, source=rows%value(:n))
-   end subroutine take_filled
 
    !> Sum over the constraints of the last evaluation of `factor` times the derivative of the
    !> discrete gradient by the end: the tangent of a step gets minus this.
@@ -131,41 +117,11 @@ contains
       real(wp), intent(in) :: factor(:)          !! (n) multipliers [M L/T^2]
       type(csr_t), intent(out) :: matrix         !! (2 n_node x 2 n_node)
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: row(:), column(:), slot(:)
-      real(wp), allocatable :: value(:)
-      integer :: k, i, j, n
 
       call report_check_list(self, "factor", factor, error)
-      if (allocated(error)) return
-      associate (item => self%march%active%set%item, n_dim => size(self%march%motion%x, 1))
-         n = sum((n_dim*item%n_node)**2)
-         allocate(row(n), column(n), value(n))
-         n = 0
-         do k = 1, size(item)
-            do j = 1, n_dim*item(k)%n_node
-               do i = 1, n_dim*item(k)%n_node
-                  n = n + 1
-                  row(n) = freedom(item(k)%node, i, n_dim)
-                  column(n) = freedom(item(k)%node, j, n_dim)
-                  value(n) = factor(k)*item(k)%h(i, j)
-               end do
-            end do
-         end do
-      end associate
-      associate (n_dof => size(self%march%motion%x))
-         call csr_from_entries(matrix, n_dof, n_dof, row, column, slot)
-      end associate
-      do i = 1, n
-         matrix%value(slot(i)) = matrix%value(slot(i)) + real(value(i), dp)
-      end do
+      if (.not. allocated(error)) call curvature_matrix(self%march%active%set, factor, &
+         size(self%march%motion%x), matrix)
    end subroutine query_curvature
-
-   !> Number among all degrees of freedom of number `i` of those of `node`.
-   pure integer function freedom(node, i, n_dim)
-      integer, intent(in) :: node(:), i, n_dim
-
-      freedom = n_dim*(node((i - 1)/n_dim + 1) - 1) + mod(i - 1, n_dim) + 1
-   end function freedom
 
    !> The same times `direction`.
    subroutine query_curvature_times(self, stepper, factor, direction, product, error)
@@ -175,23 +131,12 @@ contains
       real(wp), intent(in) :: direction(:, :)        !! (2, n_node)
       real(wp), allocatable, intent(out) :: product(:, :)      !! (2, n_node)
       type(error_t), allocatable, intent(out) :: error
-      integer :: k, i, j
 
       call report_check_list(self, "factor", factor, error)
       call check_field("direction", direction, stepper%scene, error)
       if (allocated(error)) return
-      allocate(product, source=at_rest(direction))
-      do k = 1, self%march%active%set%n
-         associate (item => self%march%active%set%item(k), n_dim => size(direction, 1))
-            do j = 1, item%n_node
-               do i = 1, item%n_node
-                  product(:, item%node(i)) = product(:, item%node(i)) + factor(k)*matmul( &
-                     item%h(n_dim*(i - 1) + 1:n_dim*i, n_dim*(j - 1) + 1:n_dim*j), &
-                     direction(:, item%node(j)))
-               end do
-            end do
-         end associate
-      end do
+      allocate(product, mold=direction)
+      call curvature_times(self%march%active%set, factor, direction, product)
    end subroutine query_curvature_times
 
    !> There are evaluated constraints, and `list` has a number for each of them.

@@ -15,7 +15,7 @@ module emcon_constraints
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
    public :: constraints_add_curvature, constraints_force, constraints_merge_pattern
-   public :: constraint_place
+   public :: constraint_place, constraint_dof
 
    !> Which constraints act, and the linearised set on the unknowns.
    type :: constraint_set_t
@@ -355,7 +355,7 @@ contains
             if (all(abs(item%h(:n_dim*item%n_node, :n_dim*item%n_node)) <= 0.0_wp)) cycle
             do j = 1, n_dim*item%n_node
                do i = 1, n_dim*item%n_node
-                  call subtract_terms(dof_of(item, i), dof_of(item, j), self%lam(k)*item%h(i, j))
+                  call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), self%lam(k)*item%h(i, j))
                end do
             end do
          end associate
@@ -383,13 +383,13 @@ contains
    end subroutine constraints_add_curvature
 
    !> Degree of freedom of local coordinate `i` of a constraint.
-   pure integer function dof_of(item, i)
+   pure integer function constraint_dof(item, i)
       type(condition_t), intent(in) :: item
-      integer, intent(in) :: i
+      integer, intent(in) :: i                   !! 1..n_dim times its nodes
 
       associate (n_dim => size(item%g, 1))
-         dof_of = n_dim*(item%node((i - 1)/n_dim + 1) - 1) + mod(i - 1, n_dim) + 1
+         constraint_dof = n_dim*(item%node((i - 1)/n_dim + 1) - 1) + mod(i - 1, n_dim) + 1
       end associate
-   end function dof_of
+   end function constraint_dof
 
 end module emcon_constraints
