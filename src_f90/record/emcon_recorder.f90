@@ -62,7 +62,7 @@ contains
       real(dp), allocatable :: mass(:)
       integer :: k
 
-      call run_mark(stepper, run)
+      call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run)
       call choose_fields(self, stepper%scene)
       call find_cells(stepper%scene, cell_node, vtk_type)
       call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), cell_node, &
@@ -104,7 +104,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: run
 
-      call run_mark(stepper, run)
+      call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run)
       call choose_fields(self, stepper%scene)
       call vtkhdf_resume(self%fields, base // ".vtkhdf", run, self%field, n_frame, error)
       if (allocated(error)) return

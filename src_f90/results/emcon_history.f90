@@ -16,8 +16,8 @@ module emcon_history
    implicit none
    private
    public :: column_t, history_t, history_create, history_resume, history_append
-   public :: history_set_define, history_set_append, history_set_once, history_set_put, history_put_run
-   public :: history_publish, history_close
+   public :: history_set_define, history_set_append, history_set_once, history_set_put
+   public :: history_put_run, history_publish, history_close
 
    !> One column of the history.
    type :: column_t

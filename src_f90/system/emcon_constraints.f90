@@ -355,7 +355,8 @@ contains
             if (all(abs(item%h(:n_dim*item%n_node, :n_dim*item%n_node)) <= 0.0_wp)) cycle
             do j = 1, n_dim*item%n_node
                do i = 1, n_dim*item%n_node
-                  call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), self%lam(k)*item%h(i, j))
+                  call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), &
+                     self%lam(k)*item%h(i, j))
                end do
             end do
          end associate

@@ -17,13 +17,16 @@ contains
    !> The present build and machine, one text per subject.
    subroutine build_list(list)
       type(string_t), allocatable, intent(out) :: list(:)
+      type(notes_t) :: notes
+      character(len=:), allocatable :: blas
 
-      allocate(list(size(subject)))
-      list(1)%text = version
-      list(2)%text = compiler_version()
-      list(3)%text = compiler_options()
-      list(4)%text = to_text(storage_size(1.0_wp))
-      call blas_name(list(5)%text)
+      call blas_name(blas)
+      call note_add(notes, version)
+      call note_add(notes, compiler_version())
+      call note_add(notes, compiler_options())
+      call note_add(notes, to_text(storage_size(1.0_wp)))
+      call note_add(notes, blas)
+      list = notes%item(:notes%n)
    end subroutine build_list
 
    !> A text for each subject in which the present build differs from that of `before`.

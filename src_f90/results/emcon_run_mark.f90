@@ -1,7 +1,6 @@
 !> What tells the files of one run from those of others: a checksum of all that the run is made of.
 module emcon_run_mark
    use emcon_checksum, only : checksum_add, checksum_t, checksum_text
-   use emcon_stepper, only : stepper_t
    use emcon_text, only : string_t
    implicit none
    private
@@ -14,15 +13,17 @@ contains
 
    !> One line for the deck, included files and all, and the parameters given beside it: equal for
    !> runs that differ in nothing.
-   pure subroutine run_mark(stepper, mark)
-      type(stepper_t), intent(in) :: stepper
+   pure subroutine run_mark(deck, override, is_lenient, mark)
+      type(string_t), intent(in) :: deck(:)          !! its lines
+      type(string_t), intent(in) :: override(:)      !! NAME=VALUE as given
+      logical, intent(in) :: is_lenient              !! unknown keywords were warnings
       character(len=:), allocatable, intent(out) :: mark
       type(checksum_t) :: sum
       character(len=40) :: digits
 
-      call add_lines(sum, stepper%source%line)
-      call add_lines(sum, stepper%override)
-      if (stepper%is_lenient) call checksum_add(sum, "lenient ")
+      call add_lines(sum, deck)
+      call add_lines(sum, override)
+      if (is_lenient) call checksum_add(sum, "lenient ")
       call checksum_text(sum, digits)
       mark = "run " // trim(digits)
    end subroutine run_mark
