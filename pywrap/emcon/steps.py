@@ -84,7 +84,7 @@ class Step(Cards):
 
     def contact_initiation(self, type: str = "PERSISTENT", *,
                            gap_tolerance: Number | None = None) -> Step:
-        """`*CONTACT INITIATION`: PERSISTENT (default), ADMISSIBLE or VELOCITY UPDATE.
+        """`*CONTACT INITIATION`: PERSISTENT (default), ADMISSIBLE, VELOCITY UPDATE or MASSLESS.
 
         gap_tolerance   largest new stand-off as a fraction of an edge, for PERSISTENT
         """

@@ -5,15 +5,15 @@ module emcon_deck_contact_settings
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_name, &
       option_real, reader_t, refuse_option
    use emcon_deck_tables, only : find_table, table_names
-   use emcon_diagnostics, only : quoted, suggestion
+   use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_options, only : option_default
-   use emcon_steps, only : initiation_persistent, step_t
+   use emcon_steps, only : initiation_massless, initiation_persistent, step_t
    use emcon_text, only : to_text
    implicit none
    private
-   public :: read_initiation, read_interference, read_controls, check_statics
+   public :: read_initiation, read_interference, read_controls, check_statics, check_massless
 
 contains
 
@@ -91,6 +91,25 @@ contains
             "STABILIZE is for *STATIC steps: in dynamics inertia holds bodies")
       end do
    end subroutine check_statics
+
+   !> Mass does not come and go: surfaces are massless in all dynamic steps or in none.
+   subroutine check_massless(reader, step)
+      type(reader_t), intent(inout) :: reader
+      type(step_t), intent(in) :: step(:)
+      integer :: first, k, with
+
+      first = findloc(step%scheme%masses_resist, .true., 1)
+      do k = first + 1, merge(size(step), 0, first > 0)
+         if (.not. step(k)%scheme%masses_resist) cycle
+         if ((step(k)%initiation == initiation_massless) .eqv. &
+            (step(first)%initiation == initiation_massless)) cycle
+         with = merge(k, first, step(k)%initiation == initiation_massless)
+         call add_error(reader%log, step(k)%origin, "step " // to_text(with) // " has *CONTACT " &
+            // "INITIATION, TYPE=MASSLESS, step " // to_text(first + k - with) // " another one: " &
+            // "surfaces are massless in all dynamic steps or in none: mass does not come and go")
+         return
+      end do
+   end subroutine check_massless
 
    !> The part of overclosure that is left: all of it at the start of the step, none at its end.
    subroutine check_left(reader, card, amplitude, duration)

@@ -26,8 +26,10 @@ module emcon_active_set
    integer, parameter :: most_sets = 40
 
    type :: active_set_t
-      logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start
-      logical :: masses_resist = .true.          !! pushing bodies apart makes energy
+      logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
+      logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
+      logical :: masses_resist = .true.          !! nothing arrives at once
+      logical :: pushes_out = .false.            !! also what is closed too far, which makes energy
       logical :: puts_off = .false.              !! what follows from others nearly waits
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
@@ -65,7 +67,9 @@ contains
       type(system_t), intent(in) :: system
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
-         self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure)
+         self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure, &
+         self%closes)
+      allocate(self%closes(system%n_constraint), source=.false.)
       allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%comes_and_goes(system%n_constraint), source=.false.)
@@ -189,7 +193,8 @@ contains
          associate (gap => system%contact(pair)%contact%state(i))
             self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k)) + gap%closed
             ! What is closed too far is never pushed out: that would make energy.
-            self%set%is_kept(k) = self%holds_gap .or. (self%masses_resist .and. &
+            self%set%is_kept(k) = (self%holds_gap .and. .not. self%closes(self%set%id(k))) .or. &
+               (.not. self%pushes_out .and. &
                gap%gap0 < self%set%target(k) - touch_tol*gap%size)
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate

@@ -97,8 +97,9 @@ contains
 
       if (.not. gap%is_covered) status = step_too_far
       ! A new contact may not be held at a larger distance than the deck allows.
-      if (self%holds_gap .and. .not. was_active .and. self%gap_tolerance > 0.0_wp &
-         .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
+      if (self%holds_gap .and. .not. (was_active .or. self%closes(self%set%id(k))) &
+         .and. self%gap_tolerance > 0.0_wp .and. gap%gap0 > self%gap_tolerance*gap%size) &
+         status = step_stands_off
       held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
       self%is_stale = self%is_stale .or. &
          (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
@@ -192,7 +193,8 @@ contains
          self%comes_and_goes = any(cycle, dim=2) .and. .not. all(cycle, dim=2)
          self%is_active = any(cycle, dim=2)
       end associate
-      if (self%only_adds .or. (self%may_cut .and. .not. self%holds_gap)) then
+      if (self%only_adds .or. (self%may_cut .and. (any(self%closes) &
+         .or. .not. self%holds_gap))) then
          status = step_cycling
       else
          self%only_adds = .true.

@@ -9,6 +9,7 @@ module emcon_march
    use emcon_host_scheme, only : host_scheme_find
    use emcon_judge, only : judge_init
    use emcon_kinds, only : wp
+   use emcon_layer, only : layer_free, layer_init
    use emcon_ledger, only : ledger_init, ledger_measure, ledger_t
    use emcon_march_begin, only : march_begin_step, march_renumber, march_resume
    use emcon_march_grid, only : grid_whole, march_grid_time, march_is_done, march_set_time
@@ -22,6 +23,7 @@ module emcon_march
    use emcon_scheme_registry, only : scheme_given
    use emcon_state, only : state_t
    use emcon_system, only : system_init
+   use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
    use emcon_velocity_update, only : velocity_update_free
    implicit none
@@ -40,9 +42,13 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given
+      logical :: is_massless(size(scene%x, 2))
 
       call check_schemes(self, scene, error)
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
+      if (allocated(error)) return
+      call terms_massless(self%system%term, is_massless)
+      call layer_init(self%layer, scene, is_massless, self%system%first_constraint(1), error, given)
       if (allocated(error)) return
       call host_copy_solvers(given, self%solver)
       call motion_init(self%motion, scene%x)
@@ -88,6 +94,7 @@ contains
 
       call correction_free(self%newton%correction)
       call velocity_update_free(self%velocity_update)
+      call layer_free(self%layer)
    end subroutine march_free
 
    !> From now on `is_interrupted` is asked before each iteration of Newton's method.

@@ -1,7 +1,7 @@
 !> The beginning of a step of the deck: unknowns, scheme, solver and contact, and whether all that
 !> moves is held.
 module emcon_march_begin
-   use emcon_active_set, only : active_set_overclosure
+   use emcon_active_set, only : active_set_overclosure, active_set_t
    use emcon_correction, only : correction_reset
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_holding, only : holding_begin, holding_t
@@ -10,6 +10,7 @@ module emcon_march_begin
    use emcon_interactions, only : contact_options_t
    use emcon_judge, only : judge_step, overlap_t
    use emcon_kinds, only : wp
+   use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_grid, only : march_count_grid, march_grid_time
    use emcon_march_types, only : march_t
@@ -23,7 +24,7 @@ module emcon_march_begin
    use emcon_scheme_registry, only : scheme_create, scheme_given
    use emcon_solver_registry, only : solver_given
    use emcon_state, only : state_t
-   use emcon_steps, only : initiation_persistent, method_saddle_point, step_t
+   use emcon_steps, only : initiation_massless, initiation_persistent, method_saddle_point, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : note_add, to_text
@@ -153,12 +154,7 @@ contains
             scene%x, step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
-         self%active%puts_off = .true.
-         self%active%holds_gap = step%initiation == initiation_persistent &
-            .and. step%scheme%masses_resist
-         self%active%masses_resist = step%scheme%masses_resist
-         self%active%gap_tolerance = step%gap_tolerance
-         self%active%holding = holding_t()
+         call begin_active(self%active, step)
          if (.not. step%scheme%masses_resist) call holding_begin(self%active%holding, self%system, &
             scene, state%u)
          do i = 1, size(self%system%contact)
@@ -175,6 +171,9 @@ contains
             self%meant_overlap = overlap%depth
             call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
          end if
+         if (step%initiation == initiation_massless .and. step%scheme%masses_resist) &
+            call begin_massless(self, scene, step, error)
+         if (allocated(error)) return
          call march_count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
          call system_respond(self%system, motion_of(pose_at_end, scene%x, state%u, &
@@ -200,6 +199,45 @@ contains
       end function options_of
 
    end subroutine prepare
+
+   !> How contact begins and ends in a step.
+   subroutine begin_active(active, step)
+      type(active_set_t), intent(inout) :: active
+      type(step_t), intent(in) :: step
+
+      active%puts_off = .true.
+      active%masses_resist = step%scheme%masses_resist
+      active%pushes_out = .not. active%masses_resist
+      active%holds_gap = any(step%initiation == [initiation_persistent, initiation_massless]) &
+         .and. active%masses_resist
+      active%closes = .false.
+      active%gap_tolerance = step%gap_tolerance
+      active%holding = holding_t()
+   end subroutine begin_active
+
+   !> Set up the layer of massless nodes for a dynamic step, and tell how many there are.
+   subroutine begin_massless(self, scene, step, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_slave(size(scene%x, 2))
+      integer :: i, n
+
+      if (self%layer%is_on) then
+         call layer_mark(self%layer, self%system, self%active%closes)
+         call layer_begin_step(self%layer, step, self%system, error)
+      end if
+      if (allocated(error)) return
+      is_slave = .false.
+      do i = 1, self%system%n_pair
+         is_slave(self%system%contact(i)%contact%node) = .true.
+      end do
+      n = count(self%layer%is_massless)
+      call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
+         " nodes; " // to_text(count(is_slave) - n) // " slave nodes keep theirs, as they are " // &
+         "prescribed, tied, or given mass, or as an element has no other nodes")
+   end subroutine begin_massless
 
    !> What solves the systems of the step: a solver of EMCON, or one that was given.
    subroutine choose_solver(self, step)

@@ -15,7 +15,7 @@ module emcon_march_commit
    use emcon_steps, only : initiation_velocity_update
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_velocity_update, only : velocity_update_apply
+   use emcon_velocity_update, only : velocity_update_apply, velocity_update_push
    implicit none
    private
    public :: march_commit
@@ -30,7 +30,7 @@ contains
       type(ending_t), intent(in) :: ending
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, a, k
+      integer :: i, a
 
       associate (state => self%state, system => self%system, set => self%active%set)
          system%response%residual = system%response%residual - self%newton%contact
@@ -51,8 +51,10 @@ contains
          call book_work(self)
          if (scene%step(state%i_step)%initiation == initiation_velocity_update &
             .and. self%scheme%row%masses_resist) call restore_energy(self, increment%notes, error)
+         if (self%layer%is_on .and. self%scheme%row%masses_resist) call end_massless(self, &
+            ending%du/h, increment%notes, error)
          if (allocated(error)) return
-         state%u = state%u + self%motion%du
+         state%u = state%u + ending%du
          state%v = self%v1
          state%contact = self%newton%contact
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
@@ -73,14 +75,58 @@ contains
                   to_text(reached%last, 3) // " is accepted as round-off")
             end if
          end associate
+      end associate
+      call keep_constraints(self)
+   end subroutine march_commit
+
+   !> What acts at the end of the step, with which multipliers: those of the step, or of the balance
+   !> of what has no mass.
+   subroutine keep_constraints(self)
+      type(march_t), intent(inout) :: self
+
+      associate (state => self%state, set => self%active%set, layer => self%layer)
          state%is_active = .false.
          state%lam = 0.0_wp
-         do k = 1, set%n
-            state%is_active(set%id(k)) = .true.
-            state%lam(set%id(k)) = set%lam(k)
-         end do
+         state%is_active(set%id) = .true.
+         state%lam(set%id) = set%lam
+         if (.not. layer%is_settled) return
+         state%is_active(layer%n_before + 1:) = layer%acts
+         state%lam(layer%n_before + 1:) = layer%lam
       end associate
-   end subroutine march_commit
+   end subroutine keep_constraints
+
+   !> What has no mass moves as its displacement says. Where it was balanced anew, what that and
+   !> closing contacts have taken is given back by a jump of the velocities.
+   subroutine end_massless(self, v, notes, error)
+      type(march_t), intent(inout) :: self
+      real(wp), intent(in) :: v(:, :)            !! (n_dim, n_node) mean over the step [L/T]
+      type(notes_t), intent(inout) :: notes      !! for the log
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: lost
+      logical :: has_root
+      integer :: i, k
+
+      associate (layer => self%layer, set => self%active%set)
+         do i = 1, size(self%v1, 2)
+            if (layer%is_massless(i)) self%v1(:, i) = v(:, i)
+         end do
+         if (.not. layer%is_settled) return
+         lost = 0.0_wp
+         do k = set%n_held + 1, set%n
+            lost = lost - set%lam(k)*set%item(k)%dgap
+         end do
+         self%ledger%external_work = self%ledger%external_work + layer%work
+         call velocity_update_push(self%velocity_update, self%system, layer%push, &
+            lost + layer%released, self%v1, has_root, error)
+         if (allocated(error)) return
+         if (has_root) then
+            self%ledger%contact_work = self%ledger%contact_work + lost
+         else
+            call note_add(notes, "the energy " // to_text(lost + layer%released) // &
+               " that contacts took as they opened or closed is not restored: there is no root")
+         end if
+      end associate
+   end subroutine end_massless
 
    !> Give back by a jump of the velocities what closing contacts have taken.
    subroutine restore_energy(self, notes, error)

@@ -12,11 +12,12 @@ module emcon_march_step
    use emcon_march_commit, only : march_commit
    use emcon_march_guess, only : march_guess
    use emcon_march_types, only : ending_t, increment_t, march_t, part_t
-   use emcon_motion, only : at_rest, motion_of
-   use emcon_pose, only : pose_at_end
+   use emcon_motion, only : at_rest, motion_of, motion_t
+   use emcon_layer, only : layer_settle
+   use emcon_pose, only : instant_later, pose_at_end
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
-   use emcon_system, only : system_respond
+   use emcon_system, only : system_loads, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
    use emcon_timer, only : stopwatch_start, stopwatch_stop
@@ -59,7 +60,11 @@ contains
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
-      call judge(self, scene, part, increment, status)
+      call settle(self, scene, part, increment, status, error)
+      if (status /= step_done .or. allocated(error)) return
+      ending%du = self%motion%du
+      if (self%layer%is_settled) ending%du = ending%du + self%layer%du
+      call judge(self, scene, part, ending%du, increment, status)
       if (status == step_done) call find_ending(self, ending, status, error)
       if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
@@ -71,18 +76,41 @@ contains
       call march_commit(self, scene, part%h, ending, increment, error)
    end subroutine march_step
 
+   !> Balance what has no mass, where contacts have opened or closed.
+   subroutine settle(self, scene, part, increment, status, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(part_t), intent(in) :: part
+      type(increment_t), intent(inout) :: increment
+      integer, intent(inout) :: status           !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      type(motion_t) :: ending
+      real(wp) :: load(size(scene%x, 1), size(scene%x, 2))
+
+      self%layer%is_settled = .false.
+      if (.not. (self%layer%is_on .and. self%scheme%row%masses_resist)) return
+      ending = motion_of(pose_at_end, scene%x, self%motion%u0, self%motion%du)
+      ending%pose%load_instant = instant_later(part%start, part%h)
+      call system_loads(self%system, ending, load)
+      call layer_settle(self%layer, self%motion, self%active, load, status, error)
+      if (status == step_done .or. part%may_cut .or. allocated(error)) return
+      status = step_done
+      call note_add(increment%warnings, "nodes without mass find no balance where contacts open " &
+         // "or close: the energy of that is not restored")
+   end subroutine settle
+
    !> Look at the end of the solved step, where the scheme evaluates forces before it.
    subroutine find_ending(self, ending, status, error)
       type(march_t), intent(inout) :: self
-      type(ending_t), intent(out) :: ending
+      type(ending_t), intent(inout) :: ending
       integer, intent(inout) :: status           !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: is_elsewhere
 
-      is_elsewhere = self%motion%pose%place < 1.0_wp
+      is_elsewhere = self%motion%pose%place < 1.0_wp .or. self%layer%is_settled
       associate (system => self%system, motion => self%motion)
          if (is_elsewhere) call system_respond(system, motion_of(pose_at_end, motion%x, motion%u0, &
-            motion%du), .false.)
+            ending%du), .false.)
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(system%response%refusal)) status = step_refused
          if (status /= step_done .or. allocated(error)) return
@@ -110,16 +138,17 @@ contains
    end function overclosure_left
 
    !> Let the judge look at the solved step: cut it, or keep what was found.
-   subroutine judge(self, scene, part, increment, status)
+   subroutine judge(self, scene, part, du, increment, status)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
+      real(wp), intent(in), contiguous :: du(:, :)       !! (n_dim, n_node) over the step [L]
       type(increment_t), intent(inout) :: increment
       integer, intent(inout) :: status
       type(overlap_t) :: overlap
 
       call stopwatch_start(self%judge_clock)
-      call judge_step(self%judge, scene%x, self%state%u, self%motion%du, overlap)
+      call judge_step(self%judge, scene%x, self%state%u, du, overlap)
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
       if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then
          if (goes_in(self, scene, overlap)) status = step_overlaps

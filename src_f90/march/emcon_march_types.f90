@@ -4,6 +4,7 @@ module emcon_march_types
    use emcon_host_scheme, only : host_scheme_t
    use emcon_judge, only : judge_t, overlap_t
    use emcon_kinds, only : wp
+   use emcon_layer, only : layer_t
    use emcon_ledger, only : ledger_t
    use emcon_motion, only : motion_t
    use emcon_newton, only : interrupt_interface, newton_t
@@ -38,8 +39,9 @@ module emcon_march_types
       type(notes_t) :: warnings                  !! for the log, the user and the verdict
    end type increment_t
 
-   !> What the elements and the given forces have come to at the end of a step.
+   !> What a step has come to at its end, and what the elements and the given forces are there.
    type :: ending_t
+      real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) displacement over the step [L]
       real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) internal forces [M L/T^2]
       real(wp), allocatable :: energy(:)         !! (n_element) [M L^2/T^2]
       real(wp) :: potential = 0.0_wp             !! of the given forces [M L^2/T^2]
@@ -61,6 +63,7 @@ module emcon_march_types
       type(newton_t) :: newton
       type(active_set_t) :: active
       type(velocity_update_t) :: velocity_update
+      type(layer_t) :: layer                     !! of massless contact surfaces
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(judge_t) :: judge

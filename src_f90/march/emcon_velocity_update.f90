@@ -6,7 +6,7 @@
 !> eqs. (21) and (22).
 module emcon_velocity_update
    use emcon_constraints, only : constraint_set_t
-   use emcon_csr, only : csr_t
+   use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_numbering, only : add_to_dofs, numbering_matrix, pick_unknowns
@@ -18,7 +18,7 @@ module emcon_velocity_update
    implicit none
    private
    public :: velocity_update_t, velocity_update_reset, velocity_update_apply, &
-      velocity_update_free
+      velocity_update_push, velocity_update_free
 
    !> Contacts that stay closed keep gaps of this size relative to an edge: round-off, no loss.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -75,25 +75,56 @@ contains
       end do
       if (lost <= noise) return
       call push_forces(set, force)
+      call push_along(self, system, force, v, a, b, error)
+      if (allocated(error)) return
+      has_root = a > 0.0_wp
+      if (.not. has_root) return
+      call add_jump(self, system, jump_size(a, b, lost), v)
+      restored = lost
+   end subroutine velocity_update_apply
+
+   !> Add to `v` the jump along M^-1 `force` that gives the energy `gain` to it, the smaller one of
+   !> the two: docs/theory.md, eq. (22).
+   subroutine velocity_update_push(self, system, force, gain, v, has_root, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      real(wp), intent(in), contiguous :: force(:, :)    !! (n_dim, n_node) [M L/T^2]
+      real(wp), intent(in) :: gain               !! [M L^2/T^2]
+      real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
+      logical, intent(out) :: has_root           !! .false.: `v` is left as it is
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: a, b
+
+      has_root = .false.
+      call push_along(self, system, force, v, a, b, error)
+      if (allocated(error)) return
+      has_root = a > 0.0_wp .and. b*b + 2.0_wp*a*gain >= 0.0_wp
+      if (.not. has_root) return
+      call add_jump(self, system, 2.0_wp*gain/(b + sign(sqrt(b*b + 2.0_wp*a*gain), b)), v)
+   end subroutine velocity_update_push
+
+   !> Find the jump M^-1 `force`; along it the kinetic energy changes by s b + s^2 a/2. a = 0: there
+   !> is none.
+   subroutine push_along(self, system, force, v, a, b, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      real(wp), intent(in), contiguous :: force(:, :), v(:, :)
+      real(wp), intent(out) :: a, b
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: momentum(size(v, 1), size(v, 2))
+
+      a = 0.0_wp
+      b = 0.0_wp
       if (.not. self%is_ready) call factorise_mass(self, system, error)
       if (allocated(error)) return
-      has_root = .not. self%mass%is_singular
-      if (.not. has_root) return
+      if (self%mass%is_singular) return
       call pick(force)
       call self%mass%solve(self%push, self%jump, error)
       if (allocated(error)) return
       a = dot_product(self%push, self%jump)
-      call mass_times(system, v, force)
-      call pick(force)
+      call mass_times(system, v, momentum)
+      call pick(momentum)
       b = dot_product(self%push, self%jump)
-      has_root = a > 0.0_wp
-      if (.not. has_root) return
-      if (keeps_links(system)) then
-         call add_to_dofs(system%space%linked, self%jump, jump_size(a, b, lost), v)
-      else
-         call add_to_dofs(system%space%numbering, self%jump, jump_size(a, b, lost), v)
-      end if
-      restored = lost
 
    contains
 
@@ -108,7 +139,21 @@ contains
          end if
       end subroutine pick
 
-   end subroutine velocity_update_apply
+   end subroutine push_along
+
+   !> Add `part` of the jump to `v`.
+   subroutine add_jump(self, system, part, v)
+      type(velocity_update_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      real(wp), intent(in) :: part
+      real(wp), intent(inout), contiguous :: v(:, :)
+
+      if (keeps_links(system)) then
+         call add_to_dofs(system%space%linked, self%jump, part, v)
+      else
+         call add_to_dofs(system%space%numbering, self%jump, part, v)
+      end if
+   end subroutine add_jump
 
    !> The root s > 0 of s b + s^2 a/2 = lost.
    pure real(wp) function jump_size(a, b, lost) result(root)
@@ -161,6 +206,7 @@ contains
       call solver_create(self%choice, matrix_definite, self%mass, self%given)
       n = system%space%numbering%n_unknown
       call terms_mass_values(system%term, value)
+      call fill_massless(system%matrix, value)
       if (keeps_links(system)) then
          n = system%space%linked%n_unknown
          mass = system%matrix
@@ -179,5 +225,19 @@ contains
       allocate(self%push(n), self%jump(n))
       self%is_ready = .not. allocated(error)
    end subroutine factorise_mass
+
+   !> What has no mass gets the largest one: it stands alone, and nothing pushes it.
+   pure subroutine fill_massless(matrix, value)
+      type(csr_t), intent(in) :: matrix          !! its pattern
+      real(dp), intent(inout) :: value(:)
+      integer :: i, k
+
+      do i = 1, matrix%n_row
+         k = csr_find(matrix, i, i)
+         if (k > 0) then
+            if (.not. value(k) > 0.0_dp) value(k) = maxval(value)
+         end if
+      end do
+   end subroutine fill_massless
 
 end module emcon_velocity_update

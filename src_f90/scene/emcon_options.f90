@@ -11,7 +11,7 @@ module emcon_options
       smoothing_none
    use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
    use emcon_solver_registry, only : solvers
-   use emcon_steps, only : initiation_admissible, initiation_persistent, &
+   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
       initiation_velocity_update, method_null_space, method_saddle_point, step_t
    implicit none
    private
@@ -55,6 +55,7 @@ module emcon_options
       option_row_t("initiation", initiation_persistent, "PERSISTENT", "EMCON_PERSISTENT", "", ""), &
       option_row_t("initiation", initiation_admissible, "ADMISSIBLE", "EMCON_ADMISSIBLE", "", ""), &
       option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", "", ""), &
+      option_row_t("initiation", initiation_massless, "MASSLESS", "", "", ""), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &

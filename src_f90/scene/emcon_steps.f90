@@ -10,12 +10,13 @@ module emcon_steps
    private
    public :: prescribed_t, load_t, scheme_choice_t, step_t
    public :: load_point, load_pressure, load_gravity
-   public :: initiation_persistent, initiation_admissible, initiation_velocity_update
+   public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
+      initiation_massless
    public :: method_null_space, method_saddle_point
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
-      initiation_velocity_update = 3
+      initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2
 
    !> One prescribed degree of freedom: u = `value` times the amplitude.

@@ -74,6 +74,7 @@ contains
 
       associate (active => self%march%active, step => stepper%scene%step(self%march%state%i_step))
          active%masses_resist = step%scheme%masses_resist
+         active%pushes_out = .not. active%masses_resist
          active%holds_gap = step%initiation == initiation_persistent .and. active%masses_resist
          active%gap_tolerance = step%gap_tolerance
          active%may_cut = stepper%may_cut

@@ -20,6 +20,7 @@ module emcon_inertia
    type, extends(term_t) :: inertia_t
       type(csr_t) :: mass                        !! (n_node x n_node) [M]
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
+      logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
       integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of given mass
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains

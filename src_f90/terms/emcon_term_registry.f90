@@ -8,13 +8,15 @@ module emcon_term_registry
    use emcon_inertia, only : inertia_init, inertia_t, inertia_times
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : loads_init, loads_t
+   use emcon_massless, only : massless_find, massless_shed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_term, only : term_box_t
    implicit none
    private
-   public :: terms_create, terms_solid, terms_mass, terms_mass_times, terms_mass_values
+   public :: terms_create, terms_solid, terms_mass, terms_mass_times, terms_mass_values, &
+      terms_massless
 
    !> Where the terms that every model has stand; what is given comes after them.
    integer, parameter :: of_inertia = 1, of_solid = 2, of_loads = 3, n_own = 3
@@ -56,6 +58,7 @@ contains
       type(host_t), intent(in), optional :: given
       type(csr_t) :: extra
       type(solid_t), pointer :: solid
+      logical :: is_massless(size(scene%x, 2))
 
       select type (part => term(of_solid)%term)
       type is (solid_term_t)
@@ -69,9 +72,12 @@ contains
       if (.not. allocated(error) .and. extra%n_row > 0) call host_check_mass(extra, scene, error)
       if (allocated(error)) return
       solid => terms_solid(term)
+      call massless_find(scene, solid, extra, is_massless)
+      if (any(is_massless)) call massless_shed(solid, is_massless)
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          call inertia_init(part, solid, size(scene%x, 1), extra, error)
+         part%is_massless = is_massless
       end select
       select type (part => term(of_loads)%term)
       type is (loads_t)
@@ -101,6 +107,18 @@ contains
          mass = part%mass
       end select
    end subroutine terms_mass
+
+   !> The nodes that have given their mass to their neighbours.
+   pure subroutine terms_massless(term, is_massless)
+      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+      logical, intent(out) :: is_massless(:)     !! (n_node)
+
+      is_massless = .false.
+      select type (part => term(of_inertia)%term)
+      type is (inertia_t)
+         is_massless = part%is_massless
+      end select
+   end subroutine terms_massless
 
    !> The mass between unknowns of the step, in the pattern of the matrix.
    pure subroutine terms_mass_values(term, value)

@@ -91,7 +91,7 @@ def test_history_has_the_same_bits(tmp_path, reference, units, method):
     assert_same_bits(run, reference(**parameters), units)
 
 
-@pytest.mark.parametrize("initiation", ["ADMISSIBLE", "VELOCITY UPDATE"])
+@pytest.mark.parametrize("initiation", ["ADMISSIBLE", "VELOCITY UPDATE", "MASSLESS"])
 def test_other_treatments_of_first_contact(tmp_path, reference, initiation):
     units = (-13, 7, 5)
     parameters = {"h": 0.02, "t_end": 0.6, "frame": 0.2, "initiation": initiation}

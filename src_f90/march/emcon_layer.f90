@@ -1,0 +1,433 @@
+!> Equilibrium of massless contact nodes, in increments that open or close contacts.
+!>
+!> The massless freedoms z balance the elements that stand on them, with all others held: a static
+!> problem of contact in z alone, on a scene of these elements with the contact of the whole. Its
+!> energy, and what closing contacts have taken, goes back into the velocities along the forces that
+!> the contacts which open or close exert on the massive freedoms through z. Source: docs/theory.md,
+!> section 6.
+module emcon_layer
+   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done
+   use emcon_active_set_solve, only : active_set_solve
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
+      constraints_rows, constraints_select
+   use emcon_correction, only : correction_factorise, correction_free, correction_lay_out, &
+      correction_reset, correction_solve
+   use emcon_errors, only : error_t
+   use emcon_host, only : host_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_motion, only : at_rest, motion_init, motion_place, motion_t
+   use emcon_newton, only : newton_init, newton_t
+   use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_pose, only : pose_at_end
+   use emcon_scene, only : scene_t
+   use emcon_scheme_registry, only : scheme_row
+   use emcon_state, only : state_t
+   use emcon_steps, only : initiation_admissible, load_point, load_t, method_saddle_point, &
+      prescribed_t, step_t
+   use emcon_surface_edges, only : surface_edges
+   use emcon_system, only : system_begin_step, system_init, system_renew, system_respond, &
+      system_t, system_tangent_times
+   implicit none
+   private
+   public :: layer_t, layer_init, layer_begin_step, layer_mark, layer_settle, layer_free
+
+   type :: layer_t
+      logical :: is_on = .false.                 !! there are massless nodes
+      logical, allocatable :: is_massless(:)     !! (n_node)
+      type(scene_t), private :: scene            !! the elements on these nodes, all contact
+      type(system_t), private :: system
+      type(newton_t), private :: newton
+      type(active_set_t), private :: active
+      type(state_t), private :: state            !! what acts, with which multipliers
+      type(motion_t), private :: motion
+      integer :: n_before = 0                    !! conditions of the model before its contact
+      ! of `layer_settle`:
+      logical :: is_settled = .false.            !! in the last increment
+      real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) how z has moved [L]
+      real(wp) :: released = 0.0_wp              !! energy that z has given up [M L^2/T^2]
+      real(wp) :: work = 0.0_wp                  !! of the loads on z [M L^2/T^2]
+      real(wp), allocatable :: push(:, :)        !! (n_dim, n_node) forces to give energy back along
+      logical, allocatable :: acts(:)            !! (contacts) at the end
+      real(wp), allocatable :: lam(:)            !! (contacts) with these forces [M L/T^2]
+   end type layer_t
+
+contains
+
+   !> The layer of `scene` on its massless nodes, with the laws that the model is given.
+   subroutine layer_init(self, scene, is_massless, n_before, error, given)
+      type(layer_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_massless(:)      !! (n_node)
+      integer, intent(in) :: n_before            !! conditions before those of contact
+      type(error_t), allocatable, intent(out) :: error
+      type(host_t), intent(in), optional :: given
+      type(host_t) :: laws
+      integer :: n
+
+      self%is_massless = is_massless
+      self%is_on = any(is_massless)
+      if (.not. self%is_on) return
+      self%n_before = n_before
+      call cut_scene(self, scene)
+      if (present(given)) then
+         if (allocated(given%law)) allocate(laws%law, source=given%law)
+      end if
+      call system_init(self%system, self%scene, error, laws)
+      if (allocated(error)) return
+      n = self%system%n_constraint
+      allocate(self%acts(n), source=.false.)
+      allocate(self%lam(n), source=0.0_wp)
+      allocate(self%state%is_active, source=self%acts)
+      allocate(self%state%lam, source=self%lam)
+      call motion_init(self%motion, scene%x)
+      allocate(self%du, self%push, source=at_rest(scene%x))
+      call active_set_init(self%active, self%system)
+   end subroutine layer_init
+
+   !> Keep of the scene the elements on massless nodes, and surfaces as edges.
+   subroutine cut_scene(self, scene)
+      type(layer_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: e(:), edge(:, :)
+      logical :: is_in(size(scene%element_kind))
+      integer :: i
+
+      do i = 1, size(is_in)
+         associate (node => scene%element_node(:, i))
+            is_in(i) = any(self%is_massless(pack(node, node > 0)))
+         end associate
+      end do
+      e = pack([(i, i = 1, size(is_in))], is_in)
+      self%scene = scene
+      self%scene%element_label = scene%element_label(e)
+      self%scene%element_origin = scene%element_origin(e)
+      self%scene%element_kind = scene%element_kind(e)
+      self%scene%element_node = scene%element_node(:, e)
+      self%scene%element_section = scene%element_section(e)
+      deallocate(self%scene%tie, self%scene%equation, self%scene%step, self%scene%element_set)
+      allocate(self%scene%tie(0), self%scene%equation(0), self%scene%step(1), &
+         self%scene%element_set(0))
+      do i = 1, size(scene%surface)
+         if (scene%surface(i)%is_nodal) cycle
+         call surface_edges(scene, scene%surface(i), edge)
+         associate (surface => self%scene%surface(i))
+            surface%element = [integer ::]
+            surface%face = [integer ::]
+            surface%edge = edge
+         end associate
+      end do
+   end subroutine cut_scene
+
+   !> Set up for `step` of the deck: statics of z, with the contact of that step.
+   subroutine layer_begin_step(self, step, model, error)
+      type(layer_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      type(system_t), intent(in) :: model        !! set up for the step, and its contact
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      associate (own => self%scene%step(1))
+         own = step
+         own%scheme = scheme_row("STATIC", "")
+         own%initiation = initiation_admissible
+         own%constraint_method = method_saddle_point
+         own%resolves_overclosure = .false.
+         own%stabilizes = .false.
+         call hold_massive(self, model%space%numbering%unknown, own%prescribed)
+         own%load = loads_of(self)
+      end associate
+      call system_begin_step(self%system, self%scene, 1, error)
+      if (allocated(error)) return
+      call newton_init(self%newton, self%system%space%numbering%n_unknown, self%scene%x, &
+         step%newton_tolerance, step%newton_maximum)
+      call correction_reset(self%newton%correction, method_saddle_point, step%solver)
+      call layer_mark(self, self%system, self%active%closes)
+      do i = 1, size(self%system%contact)
+         deallocate(self%system%contact(i)%contact)
+         allocate(self%system%contact(i)%contact, source=model%contact(i)%contact)
+      end do
+      self%active%holds_gap = .true.
+      self%active%masses_resist = .false.
+      self%active%may_cut = .false.
+   end subroutine layer_begin_step
+
+   !> The contacts of `system` whose slave nodes have no mass.
+   pure subroutine layer_mark(self, system, is_of_z)
+      type(layer_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      logical, intent(out) :: is_of_z(:)         !! (n_constraint)
+      integer :: i
+
+      is_of_z = .false.
+      do i = 1, size(system%contact)
+         associate (contact => system%contact(i)%contact, first => system%first_constraint(i))
+            is_of_z(first + 1:first + contact%n_constraint) = self%is_massless(contact%node)
+         end associate
+      end do
+   end subroutine layer_mark
+
+   !> All freedoms of the layer's elements but z are prescribed: what has mass, or is no unknown.
+   pure subroutine hold_massive(self, unknown, prescribed)
+      type(layer_t), intent(in) :: self
+      integer, intent(in) :: unknown(:, :)       !! (n_dim, n_node) of the model; 0: it is none
+      type(prescribed_t), allocatable, intent(out) :: prescribed(:)
+      logical, allocatable :: is_held(:, :)
+      integer :: i, a, k
+
+      allocate(is_held, source=self%system%space%is_alive)
+      do i = 1, size(is_held, 2)
+         if (self%is_massless(i)) is_held(:, i) = is_held(:, i) .and. unknown(:, i) == 0
+      end do
+      allocate(prescribed(count(is_held)))
+      k = 0
+      do i = 1, size(is_held, 2)
+         do a = 1, size(is_held, 1)
+            if (.not. is_held(a, i)) cycle
+            k = k + 1
+            prescribed(k)%node = i
+            prescribed(k)%dof = a
+         end do
+      end do
+   end subroutine hold_massive
+
+   !> A force on each freedom of z, 0 so far.
+   pure function loads_of(self) result(load)
+      type(layer_t), intent(in) :: self
+      type(load_t), allocatable :: load(:)
+      integer :: i, a, k
+
+      associate (n_dim => size(self%scene%x, 1))
+         allocate(load(n_dim*count(self%is_massless)))
+         k = 0
+         do i = 1, size(self%is_massless)
+            if (.not. self%is_massless(i)) cycle
+            do a = 1, n_dim
+               k = k + 1
+               load(k)%kind = load_point
+               load(k)%target = i
+               load(k)%place = a
+            end do
+         end do
+      end associate
+   end function loads_of
+
+   subroutine layer_free(self)
+      type(layer_t), intent(inout) :: self
+
+      call correction_free(self%newton%correction)
+   end subroutine layer_free
+
+   !> Balance z at the end of a solved step, if that has opened or closed contacts. `active` are the
+   !> contacts of the model in the step, `load` its external forces at the end.
+   subroutine layer_settle(self, motion, active, load, status, error)
+      type(layer_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! of the step
+      type(active_set_t), intent(in) :: active
+      real(wp), intent(in) :: load(:, :)         !! (n_dim, n_node) [M L/T^2]
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: stays(size(self%acts)), has_changed(size(self%acts))
+      real(wp) :: weight(size(self%acts)), before
+
+      status = step_done
+      self%is_settled = .false.
+      self%acts = active%is_active(self%n_before + 1:)
+      has_changed = self%acts .neqv. active%was_active(self%n_before + 1:)
+      if (.not. any(has_changed)) return
+      call take_multipliers(self, active)
+      call begin(self, motion, load)
+      before = sum(self%system%response%energy)
+      call find_apart(self, stays)
+      self%state%is_active = self%acts .and. .not. stays
+      self%state%lam = self%lam
+      call active_set_begin(self%active, self%system, self%motion, self%state)
+      self%active%is_dropped = stays
+      self%newton%driven = 0.0_wp
+      call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
+         status, error)
+      if (status /= step_done .or. allocated(error)) return
+      call motion_place(self%motion)
+      call system_respond(self%system, self%motion, .true.)
+      self%du = self%motion%du
+      self%work = sum(load*self%du)
+      self%released = before - sum(self%system%response%energy) + self%work
+      weight = active%lam0(self%n_before + 1:) + self%lam
+      where (.not. stays)
+         has_changed = has_changed .or. (self%acts .neqv. self%active%is_active)
+         self%acts = self%active%is_active
+         self%lam = 0.0_wp
+      end where
+      associate (set => self%active%set)
+         self%lam(set%id) = set%lam
+      end associate
+      call find_push(self, merge(weight + self%lam, 0.0_wp, has_changed .and. .not. stays), error)
+      self%is_settled = .not. allocated(error)
+   end subroutine layer_settle
+
+   !> The contacts that z takes no part in: those between massive nodes alone stay as they are.
+   subroutine find_apart(self, stays)
+      type(layer_t), intent(inout) :: self
+      logical, intent(out) :: stays(:)           !! (contacts)
+      type(constraint_set_t) :: set
+      logical :: is_near(size(stays))
+      integer :: k, pair
+
+      stays = .not. self%active%closes
+      do pair = 1, size(self%system%contact)
+         associate (contact => self%system%contact(pair)%contact, motion => self%motion, &
+               first => self%system%first_constraint(pair))
+            call contact%begin_step(motion%x, motion%u0, motion%du)
+            call contact%measure(motion%x, motion%u0, motion%du)
+            is_near(first + 1:first + contact%n_constraint) = contact%state%is_near
+         end associate
+      end do
+      call constraints_select(set, pack([(k, k = 1, size(stays))], stays .and. is_near))
+      call constraints_evaluate(set, self%system, self%motion)
+      do k = 1, set%n
+         associate (item => set%item(k))
+            stays(set%id(k)) = .not. any(self%is_massless(item%node(:item%n_node)))
+         end associate
+      end do
+   end subroutine find_apart
+
+   !> The mean multipliers of the step.
+   pure subroutine take_multipliers(self, active)
+      type(layer_t), intent(inout) :: self
+      type(active_set_t), intent(in) :: active
+      integer :: k
+
+      self%lam = 0.0_wp
+      do k = active%set%n_held + 1, active%set%n
+         self%lam(active%set%id(k) - self%n_before) = active%set%lam(k)
+      end do
+   end subroutine take_multipliers
+
+   !> Place the layer at the end of the step, under its loads.
+   subroutine begin(self, motion, load)
+      type(layer_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: load(:, :)
+      integer :: k
+
+      do k = 1, size(self%scene%step(1)%load)
+         associate (own => self%scene%step(1)%load(k))
+            own%value = load(own%place, own%target)
+            own%value_start = own%value
+         end associate
+      end do
+      call system_renew(self%system, self%scene)
+      self%motion%pose = pose_at_end
+      self%motion%u0 = motion%u0 + motion%du
+      self%motion%du = 0.0_wp
+      call motion_place(self%motion)
+      do k = 1, size(self%system%contact)
+         self%system%contact(k)%contact%reach = 0.0_wp
+      end do
+      call system_respond(self%system, self%motion, .false.)
+   end subroutine begin
+
+   !> The forces on the massive freedoms of contacts with the multipliers `weight`, condensed: z
+   !> follows them without opening the others. They have neither resultant nor moment.
+   subroutine find_push(self, weight, error)
+      type(layer_t), intent(inout) :: self
+      real(wp), intent(in) :: weight(:)          !! (contacts) [M L/T^2]; 0: it stays as it is
+      type(error_t), allocatable, intent(out) :: error
+      type(constraint_set_t) :: opened
+      real(wp), allocatable :: y(:), mu(:)
+      real(wp) :: field(size(self%du, 1), size(self%du, 2))
+      integer :: k, i
+
+      associate (system => self%system, set => self%active%set)
+         call constraints_select(opened, pack([(k, k = 1, size(weight))], &
+            abs(weight) > 0.0_wp .and. .not. self%acts))
+         opened%lam = weight(opened%id)
+         call constraints_evaluate(opened, system, self%motion)
+         call constraints_force(opened, 1, self%push)
+         allocate(y(system%space%numbering%n_unknown), mu(set%n), source=0.0_wp)
+         call respond_to(self, weight, y, mu, error)
+         if (allocated(error)) return
+         field = 0.0_wp
+         call add_to_dofs(system%space%numbering, y, 1.0_wp, field)
+         call add_tangent(self, field)
+         do k = 1, set%n
+            do i = 1, set%item(k)%n_node
+               associate (node => set%item(k)%node(i))
+                  self%push(:, node) = self%push(:, node) + mu(k)*set%item(k)%c(:, i)
+               end associate
+            end do
+         end do
+      end associate
+   end subroutine find_push
+
+   !> How z moves, and which multipliers of the set that takes: those of contacts that have closed
+   !> are `weight`, the others close no gap and open none.
+   subroutine respond_to(self, weight, y, mu, error)
+      type(layer_t), intent(inout) :: self
+      real(wp), intent(in) :: weight(:)
+      real(wp), intent(out), contiguous :: y(:)  !! (n_unknown) [L]
+      real(wp), intent(out), contiguous :: mu(:)   !! (n) [M L/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: closed(:)
+      real(wp), allocatable :: ways(:, :), forces(:, :), residual(:)
+      real(dp), allocatable :: opening(:, :)     !! of the contacts that have closed
+      logical :: is_singular
+      integer :: i, k, n
+
+      y = 0.0_wp
+      mu = 0.0_wp
+      associate (set => self%active%set, system => self%system, &
+            correction => self%newton%correction)
+         call constraints_evaluate(set, system, self%motion)
+         call constraints_rows(set, system%space%numbering)
+         call correction_lay_out(correction, system, set, error)
+         if (.not. allocated(error)) call correction_factorise(correction, system, set, &
+            is_singular, error)
+         if (allocated(error) .or. is_singular) return
+         closed = pack([(k, k = 1, set%n)], abs(weight(set%id)) > 0.0_wp)
+         n = size(closed)
+         allocate(residual(size(y)), ways(size(y), 0:n), forces(set%n, 0:n))
+         call pick_unknowns(system%space%numbering, self%push, residual)
+         residual = -residual
+         set%defect = 0.0_wp
+         call correction_solve(correction, set, residual, ways(:, 0), forces(:, 0), error)
+         residual = 0.0_wp
+         do i = 1, n
+            if (allocated(error)) return
+            set%defect = 0.0_wp
+            set%defect(closed(i)) = -1.0_wp
+            call correction_solve(correction, set, residual, ways(:, i), forces(:, i), error)
+         end do
+         if (allocated(error)) return
+         allocate(opening(n, 1))
+         call dense_solve(real(forces(closed, 1:), dp), real(reshape( &
+            weight(set%id(closed)) - forces(closed, 0), [n, 1]), dp), opening, is_singular)
+         y = ways(:, 0) + matmul(ways(:, 1:), real(opening(:, 1), wp))
+         mu = forces(:, 0) + matmul(forces(:, 1:), real(opening(:, 1), wp))
+      end associate
+   end subroutine respond_to
+
+   !> Subtract what the forces on all freedoms change by where z moves by `way`.
+   subroutine add_tangent(self, way)
+      type(layer_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: way(:, :)
+      real(wp) :: product(size(way, 1), size(way, 2))
+      integer :: k, i, j, n_dim
+
+      n_dim = size(way, 1)
+      call system_tangent_times(self%system, self%motion, way, product)
+      self%push = self%push - product
+      do k = 1, self%active%set%n
+         associate (item => self%active%set%item(k), lam => self%active%set%lam(k))
+            do j = 1, item%n_node
+               do i = 1, item%n_node
+                  self%push(:, item%node(i)) = self%push(:, item%node(i)) + lam*matmul( &
+                     item%h(n_dim*(i - 1) + 1:n_dim*i, n_dim*(j - 1) + 1:n_dim*j), &
+                     way(:, item%node(j)))
+               end do
+            end do
+         end associate
+      end do
+   end subroutine add_tangent
+
+end module emcon_layer

@@ -1,0 +1,194 @@
+"""Contact surfaces without mass: smooth forces, closed balances, bodies that stay in contact."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy.linalg
+from plain_scenes import AUTO, SCENES, Scene
+from scene_tools import DECKS, Deck, run_deck
+
+from emcon import Stepper
+
+MASSLESS = {"initiation": "MASSLESS"}
+NTS = {"formulation": "NODE TO SURFACE", "sides": "AUTO"}
+MORTAR = {"formulation": "MORTAR", "sides": "ONE"}
+EPS = np.finfo(float).eps
+
+
+def balances(history):
+    """The largest change of the total energy, by the largest energy that there is."""
+    total = history["total"]
+    return np.abs(total - total[0]).max()/(history["kinetic"] + history["strain"]).max()
+
+
+def switches(history):
+    """How often contact as a whole begins or ends."""
+    return int(np.abs(np.diff((history["active"] > 0).astype(int))).sum())
+
+
+# ---- a bar on a floor, whose force is known -----------------------------------------------------
+
+
+def bar(folder, initiation, choice, h):
+    """History and contact force of the elastic bar, past its first contact from 1 to 1 + 2/3."""
+    run = run_deck(DECKS/"bouncing_bar.inp", folder, h=h, t_end=2, frame=1,
+                   initiation=initiation, **choice)
+    time, force = run.series("CONTACT", "TOTAL_CF")
+    return run.history, time, np.abs(force[:, 0, 1])
+
+
+@pytest.mark.parametrize("choice", [NTS, MORTAR], ids=["nts", "mortar"])
+def test_force_of_a_bar_is_that_of_the_wave(choice, tmp_path):
+    """Courant number 0.19: 300 + 300 t in the closed form; held by nodes with mass it is a comb."""
+    history, time, force = bar(tmp_path/"massless", "MASSLESS", choice, 0.00125)
+    rests = (time > 1.15) & (time < 1.517)
+    expected = 300 + 300*(time[rests] - 1)
+    assert (force[rests] - expected).std() < 0.01*400
+    assert force[rests].max() < 1.2*400
+    assert switches(history) == 2
+    assert balances(history) < 1e-12
+    assert history["stand_off"].max() < 1e-12
+    assert history["penetration"].max() < 1e-12
+    history, time, force = bar(tmp_path/"massive", "PERSISTENT", choice, 0.00125)
+    assert (force[rests] - expected).std() > 0.5*400
+    assert switches(history) > 20
+
+
+# ---- free bodies, and bodies that lie on others -------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["two_bodies", "three_bodies", "self_contact"])
+def test_balances_of_free_bodies(name, tmp_path):
+    history = run_deck(DECKS/f"{name}.inp", tmp_path, h=0.01, frame=1, **MASSLESS, **NTS).history
+    assert (history["active"] > 0).any()
+    assert balances(history) < 1e-12
+    scale = math.sqrt(2*history["kinetic"].max())
+    for column in ("px", "py", "lz"):
+        assert np.abs(history[column] - history[column][0]).max() < 1e-12*scale, column
+    assert history["penetration"].max() < 1e-12
+    assert history["stand_off"].max() < 1e-12
+
+
+@pytest.mark.parametrize("name", ["bowl", "wedge"])
+def test_what_lies_on_a_body_does_not_hop(name, tmp_path):
+    run = run_deck(SCENES[name]().deck(AUTO), tmp_path, **MASSLESS,
+                   formulation="NODE TO SURFACE")
+    history = run.history
+    first = np.argmax(history["active"] > 0)
+    assert (history["active"][first:] > 0).all()
+    assert switches(history) == 1
+    assert balances(history) < 1e-12
+    assert history["penetration"].max() < 1e-12
+
+
+def test_a_ring_in_mortar_contact(tmp_path):
+    history = run_deck(DECKS/"ring.inp", tmp_path, h=0.02, t_end=2, frame=1, **MASSLESS,
+                       **MORTAR).history
+    assert (history["active"] > 0).any()
+    assert balances(history) < 1e-12
+    assert history["stand_off"].max() < 1e-12
+
+
+# ---- where the mass goes ------------------------------------------------------------------------
+
+
+def strip(layers, initiation="MASSLESS"):
+    """A strip of length 10, height 1; the nodes on top are slaves of a small block above it."""
+    scene = Scene(0.01, 0.01)
+    scene.block("STRIP", (0, 0), (10, 1), (10*layers, layers))
+    scene.block("BLOCK", (4, 1.5), (1, 1), (1, 1)).hold("BLOCK", lambda x, y: True)
+    scene.side("TOP", "STRIP", lambda x, y: y > 1 - 1e-9)
+    scene.side("BELOW", "BLOCK", lambda x, y: y < 1.5 + 1e-9)
+    scene.pairs = [("TOP", "BELOW")]
+    deck = scene.deck("ONE").text()
+    return deck.replace("<initiation>", initiation).replace("<formulation>", "NODE TO SURFACE")
+
+
+def opened(text, folder):
+    path = folder/"strip.inp"
+    path.write_text(text)
+    return Stepper(path)
+
+
+@pytest.mark.parametrize("layers", [2, 4])
+def test_total_mass_stays_and_slave_nodes_have_none(layers, tmp_path):
+    with opened(strip(layers), tmp_path) as stepper:
+        mass, y = stepper.mass.toarray(), stepper.positions[:, 1]
+        x = stepper.positions[:, 0]
+    top = (np.abs(y - 1) < 1e-9) & (x < 10 + 1e-9)
+    n = (10*layers + 1)*(layers + 1)
+    assert top[:n].sum() == 10*layers + 1
+    assert not mass[:n][top[:n]].any()
+    assert abs(mass[:n, :n].sum() - 10) <= 100*EPS*10
+    assert np.linalg.eigvalsh(mass[:n, :n][np.ix_(~top[:n], ~top[:n])]).min() > 0
+
+
+def frequencies(text, folder, n_dof, count=6):
+    """The first free frequencies of the first `n_dof` freedoms, squared; massless ones condensed."""
+    with opened(text, folder) as stepper:
+        mass = stepper.mass.toarray()
+        h = 1e6                                                  # (16): 2/h^2 M + K/2
+        tangent = stepper.tangent(np.zeros_like(stepper.positions), h).toarray()[:n_dof, :n_dof]
+    m = np.kron(mass, np.eye(2))[:n_dof, :n_dof]
+    stiffness = 2*(tangent - 2/h**2*m)
+    has = np.diag(m) > 0
+    k = stiffness[np.ix_(has, has)] - stiffness[np.ix_(has, ~has)] @ np.linalg.solve(
+        stiffness[np.ix_(~has, ~has)], stiffness[np.ix_(~has, has)]) if (~has).any() else stiffness
+    return scipy.linalg.eigh(k, m[np.ix_(has, has)], eigvals_only=True)[3:3 + count]
+
+
+def test_frequencies_change_by_the_square_of_the_element_size(tmp_path):
+    errors = []
+    for layers in (2, 4):
+        n_dof = 2*(10*layers + 1)*(layers + 1)
+        massive, massless = (frequencies(strip(layers, kind), tmp_path, n_dof)
+                             for kind in ("PERSISTENT", "MASSLESS"))
+        errors.append(np.abs(np.sqrt(massless/massive) - 1).max())
+    assert errors[1] < 0.02
+    assert math.log2(errors[0]/errors[1]) > 1.0, errors
+
+
+def test_elements_without_other_nodes_keep_their_mass(tmp_path):
+    """A strip one element thick whose whole outline is slave: nothing would be left."""
+    scene = Scene(0.01, 0.05)
+    scene.block("STRIP", (0, 1.01), (4, 0.2), (20, 1), velocity=(0, -1))
+    scene.block("FLOOR", (-1, 0), (6, 1), (6, 2)).hold("FLOOR", lambda x, y: y < 1e-9)
+    scene.pairs = [("STRIP", "FLOOR")]
+    runs = [run_deck(scene.deck("ONE"), tmp_path/kind, initiation=kind,
+                     formulation="NODE TO SURFACE") for kind in ("MASSLESS", "PERSISTENT")]
+    assert "without mass: 0 nodes; 42 slave nodes keep theirs" in runs[0].log
+    assert (runs[0].history["kinetic"] == runs[1].history["kinetic"]).all()
+
+
+# ---- decks --------------------------------------------------------------------------------------
+
+
+def test_surfaces_are_massless_in_all_dynamic_steps_or_in_none(tmp_path):
+    deck = Deck.read(DECKS/"two_bodies.inp").text()
+    end = deck.rindex("*END STEP")
+    more = ("*END STEP\n*STEP, NLGEOM\n*DYNAMIC, DIRECT\n<h>, <t_end>\n"
+            "*CONTACT INITIATION, TYPE=ADMISSIBLE\n*END STEP\n")
+    (tmp_path/"two.inp").write_text(deck[:end] + more)
+    with pytest.raises(AssertionError, match="step 1 has .*MASSLESS, step 2 another one"):
+        run_deck(tmp_path/"two.inp", tmp_path, **MASSLESS)
+
+
+def test_restart_goes_on_with_the_same_bits(tmp_path):
+    path = DECKS/"two_bodies.inp"
+    text = Deck.read(path).text().replace("TYPE=<initiation>", "TYPE=MASSLESS").replace(
+        "sides = AUTO", "sides = BOTH").replace("formulation = MORTAR",
+                                                "formulation = NODE TO SURFACE")
+    (tmp_path/"deck.inp").write_text(text)
+    with Stepper(tmp_path/"deck.inp") as whole:
+        for _ in range(30):
+            whole.step()
+        assert whole.active.any()
+        whole.write_restart(tmp_path/"half.rst.h5")
+        for _ in range(30):
+            whole.step()
+        with Stepper.from_restart(tmp_path/"half.rst.h5") as rest:
+            for _ in range(30):
+                rest.step()
+            assert (rest.u == whole.u).all() and (rest.v == whole.v).all()
+            assert rest.ledger == whole.ledger
