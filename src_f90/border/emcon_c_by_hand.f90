@@ -91,6 +91,7 @@ contains
       type(model_t), pointer :: model
       type(increment_t) :: made
       type(increment_c), target :: increment
+      real(c_double) :: done
       type(error_t), allocatable :: error
 
       call find_built(handle, model, status)
@@ -108,8 +109,8 @@ contains
          call handle_pass(model, error, status)
          if (allocated(error)) return
          if (.not. associated(tell)) cycle
-         if (tell(user, c_loc(increment), real(stepper_fraction(model%stepper), c_double)) == 0) &
-            cycle
+         done = real(stepper_fraction(model%stepper), c_double)
+         if (tell(user, c_loc(increment), done) == 0) cycle
          call handle_fail(model, "stopped by the callback", err_interrupt, status)
          return
       end do

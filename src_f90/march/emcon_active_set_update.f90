@@ -94,12 +94,13 @@ contains
       logical, intent(in) :: was_active          !! in the step before
       integer, intent(inout) :: status
       real(wp) :: held
+      logical :: is_new
 
       if (.not. gap%is_covered) status = step_too_far
       ! A new contact may not be held at a larger distance than the deck allows.
-      if (self%holds_gap .and. .not. (was_active .or. self%closes(self%set%id(k))) &
-         .and. self%gap_tolerance > 0.0_wp .and. gap%gap0 > self%gap_tolerance*gap%size) &
-         status = step_stands_off
+      is_new = self%holds_gap .and. .not. (was_active .or. self%closes(self%set%id(k)))
+      if (is_new .and. self%gap_tolerance > 0.0_wp &
+         .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
       held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
       self%is_stale = self%is_stale .or. &
          (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)

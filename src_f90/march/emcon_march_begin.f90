@@ -171,8 +171,7 @@ contains
             self%meant_overlap = overlap%depth
             call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
          end if
-         if (step%initiation == initiation_massless .and. step%scheme%masses_resist) &
-            call begin_massless(self, scene, step, error)
+         call begin_massless(self, scene, step, error)
          if (allocated(error)) return
          call march_count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
@@ -224,6 +223,7 @@ contains
       logical :: is_slave(size(scene%x, 2))
       integer :: i, n
 
+      if (step%initiation /= initiation_massless .or. .not. step%scheme%masses_resist) return
       if (self%layer%is_on) then
          call layer_mark(self%layer, self%system, self%active%closes)
          call layer_begin_step(self%layer, step, self%system, error)

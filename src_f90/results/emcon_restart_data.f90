@@ -262,8 +262,8 @@ contains
 
       do i = 1, self%n_entry
          associate (entry => self%entry(i))
-            if (entry%n_taken >= 0 .and. entry%n_taken /= entry_size(entry)) &
-               call note_misfit(self, entry%name, entry%n_taken)
+            if (entry%n_taken < 0 .or. entry%n_taken == entry_size(entry)) cycle
+            call note_misfit(self, entry%name, entry%n_taken)
          end associate
       end do
       call move_alloc(self%error, error)
