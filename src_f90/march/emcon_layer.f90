@@ -25,7 +25,6 @@ module emcon_layer
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_admissible, load_point, load_t, method_saddle_point, &
       prescribed_t, step_t
-   use emcon_surface_edges, only : surface_edges
    use emcon_system, only : system_begin_step, system_init, system_renew, system_respond, &
       system_t, system_tangent_times
    implicit none
@@ -35,8 +34,8 @@ module emcon_layer
    type :: layer_t
       logical :: is_on = .false.                 !! there are massless nodes
       logical, allocatable :: is_massless(:)     !! (n_node)
-      type(scene_t), private :: scene            !! the elements on these nodes, all contact
-      type(system_t), private :: system
+      type(scene_t), private :: scene            !! the elements on these nodes
+      type(system_t), private :: system          !! and the contact of the whole
       type(newton_t), private :: newton
       type(active_set_t), private :: active
       type(state_t), private :: state            !! what acts, with which multipliers
@@ -55,11 +54,11 @@ module emcon_layer
 contains
 
    !> The layer of `scene` on its massless nodes, with the laws that the model is given.
-   subroutine layer_init(self, scene, is_massless, n_before, error, given)
+   subroutine layer_init(self, scene, is_massless, model, error, given)
       type(layer_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_massless(:)      !! (n_node)
-      integer, intent(in) :: n_before            !! conditions before those of contact
+      type(system_t), intent(in) :: model        !! whose contact it is
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given
       type(host_t) :: laws
@@ -68,14 +67,20 @@ contains
       self%is_massless = is_massless
       self%is_on = any(is_massless)
       if (.not. self%is_on) return
-      self%n_before = n_before
       call cut_scene(self, scene)
       if (present(given)) then
          if (allocated(given%law)) allocate(laws%law, source=given%law)
       end if
       call system_init(self%system, self%scene, error, laws)
       if (allocated(error)) return
-      n = self%system%n_constraint
+      self%n_before = model%first_constraint(1)
+      n = model%n_constraint - self%n_before
+      self%system%n_pair = model%n_pair
+      self%system%n_constraint = n
+      self%system%first_constraint = model%first_constraint - self%n_before
+      deallocate(self%system%contact)
+      allocate(self%system%contact(size(model%contact)))
+      self%system%contact%of_pair = model%contact%of_pair
       allocate(self%acts(n), source=.false.)
       allocate(self%lam(n), source=0.0_wp)
       allocate(self%state%is_active, source=self%acts)
@@ -85,11 +90,11 @@ contains
       call active_set_init(self%active, self%system)
    end subroutine layer_init
 
-   !> Keep of the scene the elements on massless nodes, and surfaces as edges.
+   !> Keep of the scene the elements on massless nodes, and nothing that joins or meets.
    subroutine cut_scene(self, scene)
       type(layer_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      integer, allocatable :: e(:), edge(:, :)
+      integer, allocatable :: e(:)
       logical :: is_in(size(scene%element_kind))
       integer :: i
 
@@ -105,18 +110,12 @@ contains
       self%scene%element_kind = scene%element_kind(e)
       self%scene%element_node = scene%element_node(:, e)
       self%scene%element_section = scene%element_section(e)
-      deallocate(self%scene%tie, self%scene%equation, self%scene%step, self%scene%element_set)
-      allocate(self%scene%tie(0), self%scene%equation(0), self%scene%step(1), &
-         self%scene%element_set(0))
-      do i = 1, size(scene%surface)
-         if (scene%surface(i)%is_nodal) cycle
-         call surface_edges(scene, scene%surface(i), edge)
-         associate (surface => self%scene%surface(i))
-            surface%element = [integer ::]
-            surface%face = [integer ::]
-            surface%edge = edge
-         end associate
-      end do
+      associate (own => self%scene)
+         deallocate(own%tie, own%equation, own%pair, own%surface, own%element_set, own%step)
+         allocate(own%tie(0), own%equation(0), own%pair(0), own%surface(0), own%element_set(0), &
+            own%step(1))
+         if (allocated(own%guard)) deallocate(own%guard)
+      end associate
    end subroutine cut_scene
 
    !> Set up for `step` of the deck: statics of z, with the contact of that step.
@@ -142,11 +141,11 @@ contains
       call newton_init(self%newton, self%system%space%numbering%n_unknown, self%scene%x, &
          step%newton_tolerance, step%newton_maximum)
       call correction_reset(self%newton%correction, method_saddle_point, step%solver)
-      call layer_mark(self, self%system, self%active%closes)
       do i = 1, size(self%system%contact)
-         deallocate(self%system%contact(i)%contact)
+         if (allocated(self%system%contact(i)%contact)) deallocate(self%system%contact(i)%contact)
          allocate(self%system%contact(i)%contact, source=model%contact(i)%contact)
       end do
+      call layer_mark(self, self%system, self%active%closes)
       self%active%holds_gap = .true.
       self%active%masses_resist = .false.
       self%active%may_cut = .false.

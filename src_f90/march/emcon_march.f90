@@ -48,7 +48,7 @@ contains
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
       call terms_massless(self%system%term, is_massless)
-      call layer_init(self%layer, scene, is_massless, self%system%first_constraint(1), error, given)
+      call layer_init(self%layer, scene, is_massless, self%system, error, given)
       if (allocated(error)) return
       call host_copy_solvers(given, self%solver)
       call motion_init(self%motion, scene%x)

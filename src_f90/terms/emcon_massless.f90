@@ -41,8 +41,8 @@ contains
          end associate
       end do
       do i = 1, size(scene%step)
-         if (scene%step(i)%scheme%masses_resist) &
-            is_massless(scene%step(i)%prescribed%node) = .false.
+         if (.not. scene%step(i)%scheme%masses_resist) cycle
+         is_massless(scene%step(i)%prescribed%node) = .false.
       end do
       do i = 1, size(scene%tie)
          is_massless(scene%tie(i)%rows%node) = .false.

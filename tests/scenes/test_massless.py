@@ -192,3 +192,28 @@ def test_restart_goes_on_with_the_same_bits(tmp_path):
                 rest.step()
             assert (rest.u == whole.u).all() and (rest.v == whole.v).all()
             assert rest.ledger == whole.ledger
+
+
+def test_what_statics_has_laid_down_stays_at_rest(tmp_path):
+    """A block under its weight on a floor, then the same as a dynamic step: nothing moves."""
+    scene = Scene(0.01, 0.2, gravity=1.0)
+    scene.block("BLOCK", (0, 0.02), (1, 1), (4, 4))
+    scene.block("FLOOR", (-0.5, -1), (2, 1), (6, 3)).hold("FLOOR", lambda x, y: y < -1 + 1e-9)
+    scene.hold("BLOCK", lambda x, y: abs(x - 0.5) < 1e-9 and y > 0.9, axes="1, 1")
+    text = scene.deck("BOTH").text()
+    first = text.index("*STEP")
+    static = text[first:].replace("*DYNAMIC, DIRECT\n<h>, <t_end>", "*STATIC\n1., 1.")
+    (tmp_path/"rest.inp").write_text(text[:first] + static + text[first:])
+    history = run_deck(tmp_path/"rest.inp", tmp_path, initiation="MASSLESS",
+                       formulation="NODE TO SURFACE").history
+    moves = history["time"] > 1
+    assert moves.sum() == 20 and (history["active"][moves] >= 5).all()
+    assert history["kinetic"][moves].max() < 1e-20*history["strain"].max()
+
+
+def test_a_tied_ring(tmp_path):
+    history = run_deck(DECKS/"tied_ring.inp", tmp_path, h=0.02, t_end=1.5, frame=1, **MASSLESS,
+                       **NTS).history
+    assert (history["active"] > 0).any()
+    assert balances(history) < 1e-12
+    assert history["stand_off"].max() < 1e-12
