@@ -10,7 +10,7 @@ module emcon_csr
    use emcon_text, only : to_text
    implicit none
    private
-   public :: csr_t, csr_from_elements, csr_from_entries, csr_sort_columns
+   public :: csr_t, csr_from_elements, csr_from_entries, csr_from_values, csr_sort_columns
    public :: csr_find, csr_is_same, csr_copy_pattern, csr_copy_filled
    public :: csr_multiply, csr_multiply_transposed, csr_transpose
 
@@ -190,6 +190,21 @@ contains
          if (slot(k) > 0) slot(k) = csr_find(self, row(k), column(k))
       end do
    end subroutine csr_from_entries
+
+   !> The matrix of these entries; equal ones add up.
+   subroutine csr_from_values(self, n_row, n_col, row, column, value)
+      type(csr_t), intent(out) :: self
+      integer, intent(in) :: n_row, n_col
+      integer, intent(in), contiguous :: row(:), column(:)  !! from 1; <= 0: no such entry
+      real(wp), intent(in) :: value(:)
+      integer, allocatable :: slot(:)
+      integer :: k
+
+      call csr_from_entries(self, n_row, n_col, row, column, slot)
+      do k = 1, size(slot)
+         if (slot(k) > 0) self%value(slot(k)) = self%value(slot(k)) + real(value(k), dp)
+      end do
+   end subroutine csr_from_values
 
    !> Bring the columns of each row into ascending order. For new patterns: values are not moved.
    pure subroutine csr_sort_columns(self)

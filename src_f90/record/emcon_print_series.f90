@@ -40,7 +40,8 @@ contains
       allocate(self(0))
       do i = 1, size(stepper%scene%step)
          do j = 1, size(stepper%scene%step(i)%output)
-            new%place = place_of(stepper%scene%step(i)%output(j)%kind)
+            new%place = findloc([output_node_print, output_element_print, output_contact_print], &
+               stepper%scene%step(i)%output(j)%kind, 1)      ! `at_nodes`, ... or none
             if (new%place == 0) cycle
             if (new%place == at_contacts .and. size(stepper%scene%pair) == 0) cycle
             new%step = i
@@ -49,16 +50,6 @@ contains
          end do
       end do
    end subroutine print_series_define
-
-   !> Where the values of a PRINT request are; 0: it is none of a set.
-   pure integer function place_of(kind)
-      integer, intent(in) :: kind                !! one of the `output_` codes
-
-      place_of = 0
-      if (kind == output_node_print) place_of = at_nodes
-      if (kind == output_element_print) place_of = at_elements
-      if (kind == output_contact_print) place_of = at_contacts
-   end function place_of
 
    !> Declare the series of one request: each variable, its sum, and what pairs transmit.
    subroutine define_request(self, history, stepper, new, error)

@@ -100,14 +100,11 @@ contains
       if (allocated(error)) return
       call result_base(path, options, run%base)
       report%base = run%base
-      if (is_result(path, run%base)) then
-         call raise(error, err_input, path // ": the results would overwrite the deck; choose " // &
-            "another folder with --output, or name the deck NAME.inp")
-         return
-      end if
-      if (len(options%folder) > 0) call make_directory(options%folder, error)
-      if (allocated(error)) return
-      call log_open(run%log, run%base // ".log", .false., error)
+      if (is_result(path, run%base)) call raise(error, err_input, path // ": the results would " &
+         // "overwrite the deck; choose another folder with --output, or name the deck NAME.inp")
+      if (len(options%folder) > 0 .and. .not. allocated(error)) call make_directory( &
+         options%folder, error)
+      if (.not. allocated(error)) call log_open(run%log, run%base // ".log", .false., error)
       if (allocated(error)) return
       call recorder_open(run%recorder, run%stepper, run%base, error)
       ! The state of an earlier run does not belong to the results that begin here.
@@ -142,11 +139,8 @@ contains
       end if
       run%base = path(:i - 1)
       report%base = run%base
-      if (.not. file_exists(path)) then
-         call raise(error, err_input, path // ": there is no such file")
-         return
-      end if
-      call log_open(run%log, run%base // ".log", .true., error)
+      if (.not. file_exists(path)) call raise(error, err_input, path // ": there is no such file")
+      if (.not. allocated(error)) call log_open(run%log, run%base // ".log", .true., error)
       if (allocated(error)) return
       call restart_read(restart, path, error)
       if (.not. allocated(error)) call stepper_load(run%stepper, restart, error)

@@ -15,7 +15,7 @@ module emcon_scene
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: scene_t, where_text
+   public :: scene_t, scene_of_nodes, where_text
 
    type :: scene_t
       logical :: is_hosted = .false.                 !! a host code's nodes: it computes its solids
@@ -50,6 +50,25 @@ module emcon_scene
    end type scene_t
 
 contains
+
+   !> Nodes with the labels 1 and on, one step, and nothing else.
+   pure subroutine scene_of_nodes(scene, x)
+      type(scene_t), intent(out) :: scene
+      real(wp), intent(in) :: x(:, :)                !! (n_dim, n_node) reference positions [L]
+      integer :: i
+
+      scene%heading = ""
+      allocate(scene%x, source=x)
+      allocate(scene%u0(size(x, 1), size(x, 2)), scene%v0(size(x, 1), size(x, 2)), source=0.0_wp)
+      allocate(scene%node_label, source=[(i, i = 1, size(x, 2))])
+      allocate(scene%file(0), scene%node_origin(size(x, 2)), scene%element_origin(0))
+      allocate(scene%element_label(0), scene%element_kind(0), scene%element_section(0))
+      allocate(scene%element_node(size(x, 1), 0), scene%kind(0))     ! room for a facet
+      allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
+      allocate(scene%material(0), scene%section(0), scene%pair(0), scene%tie(0))
+      allocate(scene%equation(0), scene%step(1))
+      allocate(scene%step(1)%prescribed(0), scene%step(1)%load(0), scene%step(1)%output(0))
+   end subroutine scene_of_nodes
 
    !> "file:line" of `origin`, for messages.
    pure function where_text(scene, origin) result(text)

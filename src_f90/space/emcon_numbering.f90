@@ -14,7 +14,7 @@ module emcon_numbering
    implicit none
    private
    public :: numbering_t, numbering_init, pick_unknowns, pick_magnitudes, add_to_dofs
-   public :: spread_dependent, gather_dependent, numbering_matrix, unresolved_t
+   public :: spread_dependent, gather_dependent, numbering_matrix, numbering_links, unresolved_t
 
    type :: numbering_t
       integer :: n_unknown = 0
@@ -310,6 +310,15 @@ contains
       matrix%column = matrix%column(:n)
       matrix%value = matrix%value(:n)
    end subroutine numbering_matrix
+
+   !> The same for all degrees of freedom: displacements from unknowns.
+   pure subroutine numbering_links(self, matrix)
+      type(numbering_t), intent(in) :: self
+      type(csr_t), intent(out) :: matrix                     !! (degrees of freedom x n_unknown)
+      integer :: d
+
+      call numbering_matrix(self, [(d, d = 1, size(self%unknown))], matrix)
+   end subroutine numbering_links
 
    !> Dependent entries of a displacement or velocity from those that they follow.
    pure subroutine spread_dependent(self, field)

@@ -11,7 +11,6 @@ module emcon_stepper_conditions
    use emcon_pose, only : instant_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_offers, restart_size, &
       restart_t
-   use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_number, check_that, stepper_check_open
    use emcon_steps, only : load_gravity, load_point, prescribed_t

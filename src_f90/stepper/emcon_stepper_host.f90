@@ -8,14 +8,15 @@
 module emcon_stepper_host
    use emcon_chain, only : chain_init, chain_t
    use emcon_couplings, only : tie_t
-   use emcon_csr, only : csr_from_entries, csr_t
+   use emcon_csr, only : csr_from_values, csr_t
    use emcon_element_registry, only : element_kinds_create
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       formulation_nts, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
+   use emcon_scene, only : scene_of_nodes
    use emcon_scheme_registry, only : scheme_row
    use emcon_sort, only : find_sorted
    use emcon_stepper, only : stepper_t
@@ -39,29 +40,14 @@ contains
       type(stepper_t), intent(out) :: self
       real(wp), intent(in) :: x(:, :)                      !! (2, n_node) reference positions [L]
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, n
 
-      n = size(x, 2)
-      call check_that(n > 0, "x has no nodes", error)
+      call check_that(size(x, 2) > 0, "x has no nodes", error)
+      call scene_of_nodes(self%scene, x)
+      call check_field("x", x, self%scene, error)
       if (allocated(error)) return
-      associate (scene => self%scene)
-         scene%is_hosted = .true.
-         scene%heading = ""
-         allocate(scene%x, source=x)
-         allocate(scene%node_label, source=[(i, i = 1, n)])
-         call check_field("x", x, scene, error)
-         if (allocated(error)) return
-         allocate(scene%u0(2, n), scene%v0(2, n), source=0.0_wp)
-         allocate(scene%file(0), scene%node_origin(n), scene%element_origin(0))
-         allocate(scene%element_label(0), scene%element_kind(0), scene%element_section(0))
-         call element_kinds_create(scene%kind)
-         allocate(scene%element_node(2, 0))      ! room for an edge
-         allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
-         allocate(scene%material(0), scene%section(0), scene%pair(0), scene%tie(0))
-         allocate(scene%equation(0), scene%step(1))
-         scene%step(1)%scheme = scheme_row("DYNAMIC", "")
-         allocate(scene%step(1)%prescribed(0), scene%step(1)%load(0), scene%step(1)%output(0))
-      end associate
+      self%scene%is_hosted = .true.
+      self%scene%step(1)%scheme = scheme_row("DYNAMIC", "")
+      call element_kinds_create(self%scene%kind)
       allocate(self%diagnostic(0))
       self%is_read = .true.
    end subroutine stepper_new
@@ -154,19 +140,17 @@ contains
       integer, intent(in) :: slave, master
       type(error_t), allocatable, intent(inout) :: error
       logical, allocatable :: is_slave(:)
-      integer :: i, k
+      integer, allocatable :: node(:)
+      integer :: i
 
       if (slave == master .or. allocated(error)) return
       allocate(is_slave(size(self%scene%x, 2)), source=.false.)
       associate (one => self%scene%surface(slave), other => self%scene%surface(master))
-         is_slave([one%edge(1, :), one%edge(2, :)]) = .true.
-         do i = 1, size(other%edge, 2)
-            do k = 1, 2
-               call check_that(.not. is_slave(other%edge(k, i)), "slave surface " // one%name // &
-                  " and master surface " // other%name // " of a pair share node " // &
-                  to_text(other%edge(k, i)), error)
-            end do
-         end do
+         is_slave([one%edge]) = .true.
+         allocate(node, source=[other%edge])
+         i = findloc(is_slave(node), .true., 1)
+         if (i > 0) call check_that(.false., "slave surface " // one%name // " and master " // &
+            "surface " // other%name // " of a pair share node " // to_text(node(i)), error)
       end associate
    end subroutine check_apart
 
@@ -269,7 +253,7 @@ contains
       if (allocated(error)) return
       call chain_init(slave, self%scene, self%scene%surface(self%scene%tie(tie)%slave), error)
       if (allocated(error)) return
-      associate (rows => self%scene%tie(tie)%rows)
+      associate (rows => self%scene%tie(tie)%rows, n_node => size(self%scene%x, 2))
          allocate(row(size(rows%node)), is_slave(size(rows%node)))
          do k = 1, size(rows%slave)
             row(rows%start(k) + 1:rows%start(k + 1)) = k
@@ -278,27 +262,10 @@ contains
             is_slave(s) = find_sorted(slave%node, rows%node(s)) > 0
          end do
          column = merge(rows%node, 0, is_slave)
-         call fill(d, row, column, rows%weight)
+         call csr_from_values(d, size(rows%slave), n_node, row, column, rows%weight)
          column = merge(0, rows%node, is_slave)
-         call fill(m, row, column, -rows%weight)
+         call csr_from_values(m, size(rows%slave), n_node, row, column, -rows%weight)
       end associate
-
-   contains
-
-      subroutine fill(matrix, row, column, weight)
-         type(csr_t), intent(out) :: matrix
-         integer, intent(in) :: row(:), column(:)
-         real(wp), intent(in) :: weight(:)
-         integer, allocatable :: slot(:)
-         integer :: i
-
-         call csr_from_entries(matrix, size(self%scene%tie(tie)%rows%slave), &
-            size(self%scene%x, 2), row, column, slot)
-         do i = 1, size(slot)
-            if (slot(i) > 0) matrix%value(slot(i)) = matrix%value(slot(i)) + real(weight(i), dp)
-         end do
-      end subroutine fill
-
    end subroutine stepper_tie_matrices
 
    !> The model is one of a host, and not built yet.

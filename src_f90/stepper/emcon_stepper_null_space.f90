@@ -10,11 +10,10 @@ module emcon_stepper_null_space
    use emcon_motion, only : at_rest
    use emcon_null_space, only : null_space_matrices, null_space_multipliers, &
       null_space_particular, obstacle_none, obstacle_redundant
-   use emcon_numbering, only : gather_dependent, numbering_matrix, pick_unknowns
+   use emcon_numbering, only : gather_dependent, numbering_links, pick_unknowns
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_that, stepper_check_open
    use emcon_stepper_query, only : query_t
-   use emcon_system, only : system_t
    implicit none
    private
    public :: query_null_space, query_multipliers, query_particular
@@ -42,7 +41,7 @@ contains
       if (allocated(error)) return
       associate (set => self%march%active%set, system => self%march%system, &
             null_space => self%null_space)
-         call links_of(system, links)
+         call numbering_links(system%space%numbering, links)
          if (set%n == 0) then
             p = links
             df = links
@@ -114,7 +113,7 @@ contains
       if (size(defect) == 0) return
       allocate(dw(self%march%system%space%numbering%n_unknown), flat(size(du)))
       call null_space_particular(self%null_space%gap, defect, dw)
-      call links_of(self%march%system, links)
+      call numbering_links(self%march%system%space%numbering, links)
       call csr_multiply(links, dw, flat)
       du = reshape(flat, shape(du))
    end subroutine query_particular
@@ -134,16 +133,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call stepper_check_open(stepper, error)
-      if (.not. allocated(error)) call links_of(stepper%march%system, matrix)
+      if (.not. allocated(error)) call numbering_links( &
+         stepper%march%system%space%numbering, matrix)
    end subroutine query_links
-
-   subroutine links_of(system, links)
-      type(system_t), intent(in) :: system
-      type(csr_t), intent(out) :: links
-      integer :: d
-
-      call numbering_matrix(system%space%numbering, [(d, d = 1, 2*size(system%space%body))], links)
-   end subroutine links_of
 
    !> Dependent freedoms of a displacement or velocity from those that they follow.
    subroutine query_follow_links(stepper, field, error)

@@ -10,7 +10,7 @@ module emcon_stepper_query
       constraints_evaluate, constraints_force, constraints_merge_pattern, constraints_rows
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_t
-   use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_ledger, only : body_momenta
    use emcon_motion, only : at_rest, motion_place

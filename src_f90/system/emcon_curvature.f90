@@ -2,8 +2,8 @@
 !> gets less of, over all degrees of freedom.
 module emcon_curvature
    use emcon_constraints, only : constraint_dof, constraint_set_t
-   use emcon_csr, only : csr_from_entries, csr_t
-   use emcon_kinds, only : dp, wp
+   use emcon_csr, only : csr_from_values, csr_t
+   use emcon_kinds, only : wp
    implicit none
    private
    public :: curvature_matrix, curvature_times
@@ -16,7 +16,7 @@ contains
       real(wp), intent(in) :: factor(:)              !! (n) multipliers [M L/T^2]
       integer, intent(in) :: n_dof                   !! n_dim times n_node
       type(csr_t), intent(out) :: matrix             !! (n_dof x n_dof) [M/T^2]
-      integer, allocatable :: row(:), column(:), slot(:)
+      integer, allocatable :: row(:), column(:)
       real(wp), allocatable :: value(:)
       integer :: k, i, j, n
 
@@ -38,10 +38,7 @@ contains
             end do
          end associate
       end do
-      call csr_from_entries(matrix, n_dof, n_dof, row, column, slot)
-      do i = 1, n
-         matrix%value(slot(i)) = matrix%value(slot(i)) + real(value(i), dp)
-      end do
+      call csr_from_values(matrix, n_dof, n_dof, row, column, value)
    end subroutine curvature_matrix
 
    !> The same times `direction`.
