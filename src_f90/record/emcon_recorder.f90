@@ -162,8 +162,7 @@ contains
       integer :: k
 
       call print_series_define(self%series, self%history, stepper, error)
-      if (allocated(error)) return
-      call history_set_define(self%history, "BODIES", "MOMENTUM", &
+      if (.not. allocated(error)) call history_set_define(self%history, "BODIES", "MOMENTUM", &
          [(k, k = 1, stepper%march%system%space%n_body)], 3, self%momentum_set, error)
    end subroutine define_sets
 
