@@ -200,17 +200,18 @@ class Wrapper:
             self.always.append(f"call put_report(self, error, {a.name})")
             return "self%report"
         self.locals.append(f"type({kind}), pointer :: c_{a.name}{shape(len(a.extents))}")
+        if not (a.is_in or a.extents):     # filled in its place, whose padding is the caller's
+            self.locals.append(f"type({kind}), target :: f_{a.name}")
+            self.before += [f"c_{a.name} => f_{a.name}",
+                            f"if (c_associated({a.name})) call c_f_pointer({a.name}, c_{a.name})"]
+            return f"c_{a.name}"
         if a.is_in:
             self.before += [f"c_{a.name} => null()", *self.given(a, [
                 f"call c_f_pointer({a.name}, c_{a.name})"], [])]
             return f"c_{a.name}"
-        if a.extents:
-            self.check_count(a)
-            self.locals.append(f"type({kind}), allocatable :: f_{a.name}(:)")
-            self.after += self.put(a, f"f_{a.name}", 1)
-        else:
-            self.locals.append(f"type({kind}) :: f_{a.name}")
-            self.always += self.put(a, f"f_{a.name}", 0)
+        self.check_count(a)
+        self.locals.append(f"type({kind}), allocatable :: f_{a.name}(:)")
+        self.after += self.put(a, f"f_{a.name}", 1)
         return f"f_{a.name}"
 
     def numbers(self, a: Argument, dummy: Dummy) -> str:

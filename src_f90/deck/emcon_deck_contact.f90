@@ -137,12 +137,12 @@ contains
       formulation = option_code("formulation", option_name(card, "TYPE"))
       if (formulation > 0) return
       call option_words("formulation", known)
-      select case (option_name(card, "TYPE"))
-      case ("MASSLESS")
-         call refuse_option(reader, card, "TYPE", known, "nodes keep their mass")
-      case default
+      if (option_name(card, "TYPE") == "MASSLESS") then
+         call refuse_option(reader, card, "TYPE", known, &
+            "slave nodes without mass are asked for by *CONTACT INITIATION, TYPE=MASSLESS")
+      else
          call refuse_option(reader, card, "TYPE", known // ", SURFACE TO SURFACE", "")
-      end select
+      end if
    end subroutine read_formulation
 
    !> SIDES of a card: are the nodes of both surfaces held, of the first, or is it left to the

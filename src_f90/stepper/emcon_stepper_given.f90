@@ -200,22 +200,21 @@ contains
       class(sparse_solver_t), intent(in) :: solver   !! it has analysed nothing yet
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
       type(solver_box_t), allocatable :: present(:)
-      character(len=:), allocatable :: known
+      character(len=:), allocatable :: known, word
 
       call check_stage(self, error)
       if (allocated(error)) return
       call host_copy_solvers(self%given, present)
       call solver_names(known)
-      associate (word => plain(name))
-         call check_that(all(solvers%word /= word), "a solver cannot be given as " // word // &
-            ": EMCON has its own " // known, error)
-         call check_that(.not. is_foreign_solver(word) .and. index(word, " ") == 0, "a solver " // &
-            "cannot be given as " // word // ": the name has to be one without blanks that no " // &
-            "other program has for its own", error)
-         call check_that(host_find_solver(present, word) == 0, "the solver " // word // &
-            " is given already", error)
-         if (.not. allocated(error)) call host_add_solver(self%given, word, solver)
-      end associate
+      word = plain(name)
+      call check_that(all(solvers%word /= word), "a solver cannot be given as " // word // &
+         ": EMCON has its own " // known, error)
+      call check_that(.not. is_foreign_solver(word) .and. index(word, " ") == 0, "a solver " // &
+         "cannot be given as " // word // ": the name has to be one without blanks that no " // &
+         "other program has for its own", error)
+      call check_that(host_find_solver(present, word) == 0, "the solver " // word // &
+         " is given already", error)
+      if (.not. allocated(error)) call host_add_solver(self%given, word, solver)
    end subroutine stepper_give_solver
 
    !> The deck is read, the model is not built.

@@ -32,7 +32,7 @@ def switches(history):
 
 def bar(folder, initiation, choice, h):
     """History and contact force of the elastic bar, past its first contact from 1 to 1 + 2/3."""
-    run = run_deck(DECKS/"bouncing_bar.inp", folder, h=h, t_end=2, frame=1,
+    run = run_deck(DECKS/"bouncing_bar.inp", folder, h=h, t_end=1.9, frame=1,
                    initiation=initiation, **choice)
     time, force = run.series("CONTACT", "TOTAL_CF")
     return run.history, time, np.abs(force[:, 0, 1])
@@ -40,19 +40,19 @@ def bar(folder, initiation, choice, h):
 
 @pytest.mark.parametrize("choice", [NTS, MORTAR], ids=["nts", "mortar"])
 def test_force_of_a_bar_is_that_of_the_wave(choice, tmp_path):
-    """Courant number 0.19: 300 + 300 t in the closed form; held by nodes with mass it is a comb."""
-    history, time, force = bar(tmp_path/"massless", "MASSLESS", choice, 0.00125)
+    """Courant number 0.38: 300 + 300 t in the closed form; held by nodes with mass it is a comb."""
+    history, time, force = bar(tmp_path/"massless", "MASSLESS", choice, 0.0025)
     rests = (time > 1.15) & (time < 1.517)
     expected = 300 + 300*(time[rests] - 1)
-    assert (force[rests] - expected).std() < 0.01*400
+    scatter = (force[rests] - expected).std()
+    assert scatter < 0.01*400
     assert force[rests].max() < 1.2*400
     assert switches(history) == 2
     assert balances(history) < 1e-12
     assert history["stand_off"].max() < 1e-12
     assert history["penetration"].max() < 1e-12
-    history, time, force = bar(tmp_path/"massive", "PERSISTENT", choice, 0.00125)
-    assert (force[rests] - expected).std() > 0.5*400
-    assert switches(history) > 20
+    _, _, force = bar(tmp_path/"massive", "PERSISTENT", choice, 0.0025)
+    assert (force[rests] - expected).std() > 20*scatter
 
 
 # ---- free bodies, and bodies that lie on others -------------------------------------------------
