@@ -14,11 +14,12 @@ module emcon_active_set
       active_set_restart, active_set_select
    public :: active_set_let_go, active_set_put_off, active_set_drop, touch_tol, most_sets
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
-      step_stands_off, step_not_held, step_overlaps
+      step_stands_off, step_not_held, step_overlaps, step_unbalanced
 
    !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
    integer, parameter :: step_done = 0, step_refused = 1, step_diverged = 2, step_singular = 3, &
-      step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8, step_overlaps = 9
+      step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8, step_overlaps = 9, &
+      step_unbalanced = 10
 
    !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))

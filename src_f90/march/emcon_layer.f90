@@ -6,7 +6,8 @@
 !> the contacts which open or close exert on the massive freedoms through z. Source: docs/theory.md,
 !> section 6.
 module emcon_layer
-   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done
+   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done, &
+      step_singular
    use emcon_active_set_solve, only : active_set_solve
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
       constraints_rows, constraints_select
@@ -29,11 +30,12 @@ module emcon_layer
       system_t, system_tangent_times
    implicit none
    private
-   public :: layer_t, layer_init, layer_begin_step, layer_mark, layer_settle, layer_free
+   public :: layer_t, layer_init, layer_renew, layer_begin_step, layer_mark, layer_settle, layer_free
 
    type :: layer_t
       logical :: is_on = .false.                 !! there are massless nodes
       logical, allocatable :: is_massless(:)     !! (n_node)
+      type(host_t), private :: laws              !! that the model is given
       type(scene_t), private :: scene            !! the elements on these nodes
       type(system_t), private :: system          !! and the contact of the whole
       type(newton_t), private :: newton
@@ -42,6 +44,7 @@ module emcon_layer
       type(motion_t), private :: motion
       integer :: n_before = 0                    !! conditions of the model before its contact
       ! of `layer_settle`:
+      logical, allocatable :: is_troubled(:)     !! (n_node) where it found no balance
       logical :: is_settled = .false.            !! in the last increment
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) how z has moved [L]
       real(wp) :: released = 0.0_wp              !! energy that z has given up [M L^2/T^2]
@@ -61,17 +64,17 @@ contains
       type(system_t), intent(in) :: model        !! whose contact it is
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given
-      type(host_t) :: laws
       integer :: n
 
       self%is_massless = is_massless
+      allocate(self%is_troubled(size(is_massless)), source=.false.)
       self%is_on = any(is_massless)
       if (.not. self%is_on) return
       call cut_scene(self, scene)
       if (present(given)) then
-         if (allocated(given%law)) allocate(laws%law, source=given%law)
+         if (allocated(given%law)) allocate(self%laws%law, source=given%law)
       end if
-      call system_init(self%system, self%scene, error, laws)
+      call system_init(self%system, self%scene, error, self%laws)
       if (allocated(error)) return
       self%n_before = model%first_constraint(1)
       n = model%n_constraint - self%n_before
@@ -89,6 +92,21 @@ contains
       allocate(self%du, self%push, source=at_rest(scene%x))
       call active_set_init(self%active, self%system)
    end subroutine layer_init
+
+   !> The layer of `scene` on other massless nodes, with the same laws. The step of the deck has to
+   !> begin anew.
+   subroutine layer_renew(self, scene, is_massless, model, error)
+      type(layer_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_massless(:)      !! (n_node)
+      type(system_t), intent(in) :: model        !! whose contact it is
+      type(error_t), allocatable, intent(out) :: error
+      type(host_t) :: laws
+
+      laws = self%laws
+      call layer_free(self)
+      call layer_init(self, scene, is_massless, model, error, laws)
+   end subroutine layer_renew
 
    !> Keep of the scene the elements on massless nodes, and nothing that joins or meets.
    subroutine cut_scene(self, scene)
@@ -228,9 +246,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical :: stays(size(self%acts)), has_changed(size(self%acts))
       real(wp) :: weight(size(self%acts)), before
+      logical :: is_singular
 
       status = step_done
       self%is_settled = .false.
+      self%is_troubled = .false.
       self%acts = active%is_active(self%n_before + 1:)
       has_changed = self%acts .neqv. active%was_active(self%n_before + 1:)
       if (.not. any(has_changed)) return
@@ -238,6 +258,8 @@ contains
       call begin(self, motion, load)
       before = sum(self%system%response%energy)
       call find_apart(self, stays)
+      has_changed = has_changed .and. .not. stays
+      if (.not. any(has_changed)) return
       self%state%is_active = self%acts .and. .not. stays
       self%state%lam = self%lam
       call active_set_begin(self%active, self%system, self%motion, self%state)
@@ -245,7 +267,11 @@ contains
       self%newton%driven = 0.0_wp
       call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
          status, error)
-      if (status /= step_done .or. allocated(error)) return
+      if (allocated(error)) return
+      if (status /= step_done) then
+         call mark_trouble(self, has_changed)
+         return
+      end if
       call motion_place(self%motion)
       call system_respond(self%system, self%motion, .true.)
       self%du = self%motion%du
@@ -260,9 +286,31 @@ contains
       associate (set => self%active%set)
          self%lam(set%id) = set%lam
       end associate
-      call find_push(self, merge(weight + self%lam, 0.0_wp, has_changed .and. .not. stays), error)
-      self%is_settled = .not. allocated(error)
+      weight = merge(weight + self%lam, 0.0_wp, has_changed)
+      call find_push(self, weight, is_singular, error)
+      ! A contact that has lost its surface has no direction either.
+      is_singular = is_singular .or. .not. maxval(abs(self%push)) > epsilon(weight)*sum(abs(weight))
+      self%is_settled = .not. (is_singular .or. allocated(error))
+      if (.not. is_singular) return
+      status = step_singular
+      call mark_trouble(self, has_changed)
    end subroutine layer_settle
+
+   !> The massless slave nodes of the contacts that have opened or closed, or of all.
+   pure subroutine mark_trouble(self, has_changed)
+      type(layer_t), intent(inout) :: self
+      logical, intent(in) :: has_changed(:)      !! (contacts)
+      integer :: i
+
+      do i = 1, size(self%system%contact)
+         associate (node => self%system%contact(i)%contact%node, &
+               first => self%system%first_constraint(i))
+            self%is_troubled(pack(node, has_changed(first + 1:first + size(node)))) = .true.
+         end associate
+      end do
+      self%is_troubled = self%is_troubled .and. self%is_massless
+      if (.not. any(self%is_troubled)) self%is_troubled = self%is_massless
+   end subroutine mark_trouble
 
    !> The contacts that z takes no part in: those between massive nodes alone stay as they are.
    subroutine find_apart(self, stays)
@@ -328,9 +376,10 @@ contains
 
    !> The forces on the massive freedoms of contacts with the multipliers `weight`, condensed: z
    !> follows them without opening the others. They have neither resultant nor moment.
-   subroutine find_push(self, weight, error)
+   subroutine find_push(self, weight, is_singular, error)
       type(layer_t), intent(inout) :: self
       real(wp), intent(in) :: weight(:)          !! (contacts) [M L/T^2]; 0: it stays as it is
+      logical, intent(out) :: is_singular        !! there are none
       type(error_t), allocatable, intent(out) :: error
       type(constraint_set_t) :: opened
       real(wp), allocatable :: y(:), mu(:)
@@ -344,8 +393,8 @@ contains
          call constraints_evaluate(opened, system, self%motion)
          call constraints_force(opened, 1, self%push)
          allocate(y(system%space%numbering%n_unknown), mu(set%n), source=0.0_wp)
-         call respond_to(self, weight, y, mu, error)
-         if (allocated(error)) return
+         call respond_to(self, weight, y, mu, is_singular, error)
+         if (is_singular .or. allocated(error)) return
          field = 0.0_wp
          call add_to_dofs(system%space%numbering, y, 1.0_wp, field)
          call add_tangent(self, field)
@@ -361,18 +410,19 @@ contains
 
    !> How z moves, and which multipliers of the set that takes: those of contacts that have closed
    !> are `weight`, the others close no gap and open none.
-   subroutine respond_to(self, weight, y, mu, error)
+   subroutine respond_to(self, weight, y, mu, is_singular, error)
       type(layer_t), intent(inout) :: self
       real(wp), intent(in) :: weight(:)
       real(wp), intent(out), contiguous :: y(:)  !! (n_unknown) [L]
       real(wp), intent(out), contiguous :: mu(:)   !! (n) [M L/T^2]
+      logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: closed(:)
       real(wp), allocatable :: ways(:, :), forces(:, :), residual(:)
       real(dp), allocatable :: opening(:, :)     !! of the contacts that have closed
-      logical :: is_singular
       integer :: i, k, n
 
+      is_singular = .false.
       y = 0.0_wp
       mu = 0.0_wp
       associate (set => self%active%set, system => self%system, &

@@ -42,13 +42,13 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given
-      logical :: is_massless(size(scene%x, 2))
 
       call check_schemes(self, scene, error)
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
-      call terms_massless(self%system%term, is_massless)
-      call layer_init(self%layer, scene, is_massless, self%system, error, given)
+      allocate(self%may_shed(size(scene%x, 2)))
+      call terms_massless(self%system%term, self%may_shed)
+      call layer_init(self%layer, scene, self%may_shed, self%system, error, given)
       if (allocated(error)) return
       call host_copy_solvers(given, self%solver)
       call motion_init(self%motion, scene%x)
@@ -57,6 +57,7 @@ contains
          allocate(state%u, source=scene%u0)
          allocate(state%v, source=scene%v0)
          allocate(state%u_start, state%contact, state%reaction, state%internal, source=self%v1)
+         allocate(state%has_mass(size(scene%x, 2)), source=.false.)
          allocate(state%is_active(self%system%n_constraint), source=.false.)
          allocate(state%lam(self%system%n_constraint), source=0.0_wp)
          allocate(state%energy(size(scene%element_kind)), source=0.0_wp)

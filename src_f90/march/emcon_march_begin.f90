@@ -14,6 +14,7 @@ module emcon_march_begin
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_grid, only : march_count_grid, march_grid_time
    use emcon_march_types, only : march_t
+   use emcon_mass_return, only : mass_match
    use emcon_mechanism_text, only : free_motion_text
    use emcon_motion, only : at_rest, motion_of
    use emcon_newton, only : newton_init
@@ -115,8 +116,11 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      logical :: has_changed
 
-      call system_begin_step(self%system, scene, self%state%i_step, error)
+      call mass_match(self, scene, has_changed, error)
+      if (.not. allocated(error)) call system_begin_step(self%system, scene, self%state%i_step, &
+         error)
       if (.not. allocated(error)) call prepare(self, scene, error)
    end subroutine march_resume
 

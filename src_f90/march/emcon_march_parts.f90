@@ -1,18 +1,25 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
    use emcon_active_set, only : step_cycling, step_diverged, step_done, step_not_held, &
-      step_overlaps, step_refused, step_singular, step_stands_off, step_too_far
+      step_overlaps, step_refused, step_singular, step_stands_off, step_too_far, step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
+   use emcon_march_begin, only : march_renumber
    use emcon_march_step, only : cycling_text, march_step
    use emcon_march_types, only : increment_t, march_t, part_t
+   use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_system, only : system_may_hold, system_t
-   use emcon_text, only : note_add, notes_append, notes_t, to_text
+   use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
    implicit none
    private
    public :: march_in_parts
+
+   !> Halvings of an increment after which nodes without mass take it back.
+   integer, parameter :: return_level = 3
+   !> Nodes named in a message.
+   integer, parameter :: most_named = 10
 
 contains
 
@@ -31,6 +38,8 @@ contains
 
       call notes_append(increment%warnings, self%warnings)
       self%warnings = notes_t()
+      call match(self, scene, error)
+      if (allocated(error)) return
       level = 0
       place = 0
       do while (place < 2**self%n_level)
@@ -47,6 +56,11 @@ contains
             cycle
          end if
          call reason_text(self, scene, status, reason)
+         if (may_return(self, status, level)) then
+            call return_mass(self, scene, status, reason, increment, error)
+            if (allocated(error)) return
+            cycle
+         end if
          if (.not. is_hopeless(self, status)) then
             call note_add(increment%notes, "increment cut at time " // &
                to_text(part%start%total_time, 9) // ", h = " // to_text(part%h) // ": " // &
@@ -62,6 +76,52 @@ contains
          return
       end do
    end subroutine march_in_parts
+
+   !> Let the model have the masses of the state, which may be one of before.
+   subroutine match(self, scene, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      logical :: has_changed
+
+      call mass_match(self, scene, has_changed, error)
+      if (has_changed .and. .not. allocated(error)) call march_renumber(self, scene, error)
+   end subroutine match
+
+   !> May a step have failed as nodes without mass find no balance? Shorter ones were tried.
+   pure logical function may_return(self, status, level)
+      type(march_t), intent(in) :: self
+      integer, intent(in) :: status, level
+
+      may_return = self%layer%is_on .and. self%scheme%row%masses_resist .and. any(status == &
+         [step_refused, step_diverged, step_singular, step_cycling, step_unbalanced]) .and. &
+         level >= min(return_level, self%n_level)
+   end function may_return
+
+   !> Give the nodes that seem to be the reason their mass back.
+   subroutine return_mass(self, scene, status, reason, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: status
+      character(len=*), intent(in) :: reason
+      type(increment_t), intent(inout) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      type(string_t) :: label(size(scene%x, 2))
+      logical :: is_back(size(scene%x, 2))
+      integer :: i, n
+
+      call mass_find_troubled(self, scene, status /= step_refused, is_back)
+      n = 0
+      do i = 1, size(is_back)
+         if (.not. is_back(i)) cycle
+         n = n + 1
+         label(n)%text = to_text(scene%node_label(i))
+      end do
+      call note_add(increment%notes, reason // ": contact nodes take their mass back: " // &
+         joined(label(:n), ", ", most_named))
+      call mass_return(self, scene, is_back, error)
+      if (.not. allocated(error)) call march_renumber(self, scene, error)
+   end subroutine return_mass
 
    !> Whether a smaller step fails for the same reason: nothing was solved yet, or a larger load
    !> could bring into contact what holds a body, not a smaller one.
@@ -103,6 +163,8 @@ contains
          text = text // "; add *BOUNDARY conditions"
          if (.not. self%active%holding%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
+      case (step_unbalanced)
+         text = "nodes without mass find no balance where contacts open or close"
       case (step_overlaps)
          text = "bodies would overlap where no contact acts"
       case default

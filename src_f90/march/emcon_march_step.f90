@@ -1,6 +1,6 @@
 !> One step in time: first guess, solution, the judge's look at it, and what follows from it.
 module emcon_march_step
-   use emcon_active_set, only : active_set_begin, step_done, step_overlaps, step_refused
+   use emcon_active_set, only : active_set_begin, step_done, step_overlaps, step_refused, step_unbalanced
    use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_constraints, only : constraint_place
@@ -45,6 +45,7 @@ contains
       type(ending_t) :: ending
       integer :: attempt
 
+      self%layer%is_troubled = .false.
       self%active%may_cut = part%may_cut
       self%active%gap_tolerance = 0.0_wp
       if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
@@ -60,7 +61,7 @@ contains
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
-      call settle(self, scene, part, increment, status, error)
+      call settle(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
       ending%du = self%motion%du
       if (self%layer%is_settled) ending%du = ending%du + self%layer%du
@@ -77,11 +78,10 @@ contains
    end subroutine march_step
 
    !> Balance what has no mass, where contacts have opened or closed.
-   subroutine settle(self, scene, part, increment, status, error)
+   subroutine settle(self, scene, part, status, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
-      type(increment_t), intent(inout) :: increment
       integer, intent(inout) :: status           !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(motion_t) :: ending
@@ -93,10 +93,7 @@ contains
       ending%pose%load_instant = instant_later(part%start, part%h)
       call system_loads(self%system, ending, load)
       call layer_settle(self%layer, self%motion, self%active, load, status, error)
-      if (status == step_done .or. part%may_cut .or. allocated(error)) return
-      status = step_done
-      call note_add(increment%warnings, "nodes without mass find no balance where contacts open " &
-         // "or close: the energy of that is not restored")
+      if (status /= step_done) status = step_unbalanced
    end subroutine settle
 
    !> Look at the end of the solved step, where the scheme evaluates forces before it.

@@ -64,6 +64,7 @@ module emcon_march_types
       type(active_set_t) :: active
       type(velocity_update_t) :: velocity_update
       type(layer_t) :: layer                     !! of massless contact surfaces
+      logical, allocatable :: may_shed(:)        !! (n_node) massless at first
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(judge_t) :: judge

@@ -20,6 +20,7 @@ module emcon_state
       real(wp), allocatable :: u(:, :)           !! (n_dim, n_node) displacement [L]
       real(wp), allocatable :: v(:, :)           !! (n_dim, n_node) velocity [L/T]
       real(wp), allocatable :: u_start(:, :)     !! (n_dim, n_node) displacement at the step's start
+      logical, allocatable :: has_mass(:)        !! (n_node) contact nodes: it has come back
       logical, allocatable :: is_active(:)       !! (n_constraint)
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) nodal contact forces

@@ -10,6 +10,7 @@ module emcon_velocity_update
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_numbering, only : add_to_dofs, numbering_matrix, pick_unknowns
+   use emcon_root, only : smaller_root
    use emcon_solver_registry, only : solver_create, solver_default
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    use emcon_system, only : mass_times, system_t
@@ -93,14 +94,13 @@ contains
       real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
       logical, intent(out) :: has_root           !! .false.: `v` is left as it is
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: a, b
+      real(wp) :: a, b, part
 
       has_root = .false.
       call push_along(self, system, force, v, a, b, error)
       if (allocated(error)) return
-      has_root = a > 0.0_wp .and. b*b + 2.0_wp*a*gain >= 0.0_wp
-      if (.not. has_root) return
-      call add_jump(self, system, 2.0_wp*gain/(b + sign(sqrt(b*b + 2.0_wp*a*gain), b)), v)
+      call smaller_root(a, b, gain, part, has_root)
+      if (has_root) call add_jump(self, system, part, v)
    end subroutine velocity_update_push
 
    !> Find the jump M^-1 `force`; along it the kinetic energy changes by s b + s^2 a/2. a = 0: there

@@ -91,6 +91,8 @@ contains
          call restart_exchange(restart, "internal", state%internal)
          call restart_exchange(restart, "lam", state%lam)
          call restart_exchange(restart, "is_active", state%is_active)
+         if (restart_offers(restart, "has_mass", any(state%has_mass))) call restart_exchange( &
+            restart, "has_mass", state%has_mass)
       end associate
       call exchange_pairs(self%march%state%pairs, restart)
       call verdict_exchange(self%verdict, restart)

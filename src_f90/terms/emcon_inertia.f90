@@ -15,13 +15,15 @@ module emcon_inertia
    use emcon_term, only : response_t, role_inertia, term_t
    implicit none
    private
-   public :: inertia_t, inertia_init, inertia_times
+   public :: inertia_t, inertia_init, inertia_add, inertia_times
 
    type, extends(term_t) :: inertia_t
       type(csr_t) :: mass                        !! (n_node x n_node) [M]
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
-      integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of given mass
+      !> (n_node x n_node) beside that of elements [M]: given; added in a run
+      type(csr_t), private :: beside(2)
+      integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of these
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains
       procedure :: lay_out
@@ -42,18 +44,45 @@ contains
       integer, intent(in) :: n_dim               !! > 0
       type(csr_t), intent(in) :: given           !! (n_node x n_node) [M]; without rows: none
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: start(:), list(:), slot(:)
-      integer :: e, i, j, k, n
 
       self%role = role_inertia
-      call list_pairs(given, self%pair)
+      self%beside(1) = given
+      allocate(self%rate(n_dim, solid%n_node), self%product(n_dim, solid%n_node), source=0.0_wp)
+      call add_up(self, solid, error)
+   end subroutine inertia_init
+
+   !> Let there be the mass `added` too, in place of what was added before. The step of the deck has
+   !> to begin anew.
+   subroutine inertia_add(self, solid, added, error)
+      type(inertia_t), intent(inout) :: self
+      type(solid_t), intent(in) :: solid         !! of `inertia_init`
+      type(csr_t), intent(in) :: added           !! (n_node x n_node) [M]
+      type(error_t), allocatable, intent(out) :: error
+
+      self%beside(2) = added
+      call add_up(self, solid, error)
+   end subroutine inertia_add
+
+   !> The sum of all masses.
+   subroutine add_up(self, solid, error)
+      type(inertia_t), intent(inout) :: self
+      type(solid_t), intent(in) :: solid
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: start(:), list(:), slot(:), pair(:, :)
+      integer :: e, i, j, k, n
+
+      if (allocated(self%pair)) deallocate(self%pair)
+      allocate(self%pair(n_end, 0))
+      do i = 1, size(self%beside)
+         call list_pairs(self%beside(i), pair)
+         self%pair = reshape([self%pair, pair], [n_end, size(self%pair, 2) + size(pair, 2)])
+      end do
       call element_lists(solid, 1, start, list)
       n = size(list)
       list = [list, reshape(self%pair, [size(self%pair)])]
       start = [start, [(n + 1 + 2*i, i = 1, size(self%pair, 2))]]
       call csr_from_elements(self%mass, solid%n_node, start, list, slot, error)
       if (allocated(error)) return
-      allocate(self%rate(n_dim, solid%n_node), self%product(n_dim, solid%n_node), source=0.0_wp)
       k = 0
       do e = 1, solid%n_element
          n = start(e + 1) - start(e)
@@ -64,14 +93,25 @@ contains
             end do
          end do
       end do
-      do i = 1, given%n_row
-         do k = given%row_start(i) + 1, given%row_start(i + 1)
-            associate (to => self%mass%value(csr_find(self%mass, i, given%column(k) + 1)))
-               to = to + given%value(k)
+      do i = 1, size(self%beside)
+         call add_beside(self, self%beside(i))
+      end do
+   end subroutine add_up
+
+   !> Add a mass whose pairs are in the pattern.
+   pure subroutine add_beside(self, part)
+      type(inertia_t), intent(inout) :: self
+      type(csr_t), intent(in) :: part
+      integer :: i, k
+
+      do i = 1, part%n_row
+         do k = part%row_start(i) + 1, part%row_start(i + 1)
+            associate (to => self%mass%value(csr_find(self%mass, i, part%column(k) + 1)))
+               to = to + part%value(k)
             end associate
          end do
       end do
-   end subroutine inertia_init
+   end subroutine add_beside
 
    !> The pairs of nodes between which there is mass.
    pure subroutine list_pairs(mass, pair)

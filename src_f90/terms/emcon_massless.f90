@@ -6,16 +6,23 @@
 !> that the total is exact, and frequencies change by the square of the element size. Source:
 !> docs/theory.md, section 6.
 module emcon_massless
-   use emcon_csr, only : csr_t
+   use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_steps, only : initiation_massless
    use emcon_surface_edges, only : surface_edges
    implicit none
    private
-   public :: massless_find, massless_shed
+   public :: massless_find, massless_shed, massless_return, massless_follow
+
+   !> A node and those around it.
+   type :: stencil_t
+      real(wp) :: mass = 0.0_wp                  !! of its share of its elements [M]
+      integer, allocatable :: node(:)            !! the node, then those around it
+      real(wp), allocatable :: weight(:)         !! 1, then negative ones; their sum is 0
+   end type stencil_t
 
 contains
 
@@ -104,5 +111,86 @@ contains
       end do
       mass = mass*(total/sum(mass))
    end subroutine shed
+
+   !> Mass that comes back to nodes: that of their motion relative to what has kept its mass around
+   !> them, m d d^T with d = 1 at the node and its weights of `massless_follow` taken from it. Total
+   !> mass and centre stay, and so do momenta and energy of a node that moves with the others.
+   subroutine massless_return(solid, may_shed, has_mass, relative, error)
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: may_shed(:)         !! (n_node) massless at first
+      logical, intent(in) :: has_mass(:)         !! (n_node) those of them that get mass
+      type(csr_t), intent(out) :: relative       !! (n_node x n_node) [M]
+      type(error_t), allocatable, intent(out) :: error
+      type(stencil_t) :: stencil(count(has_mass))
+      integer, allocatable :: slot(:), start(:), list(:)
+      integer :: i, j, k, s
+
+      k = 0
+      allocate(start(size(stencil) + 1), source=1)
+      allocate(list(0))
+      do i = 1, size(has_mass)
+         if (.not. has_mass(i)) cycle
+         k = k + 1
+         call find_stencil(solid, may_shed, i, stencil(k))
+         list = [list, stencil(k)%node]
+         start(k + 1) = size(list) + 1
+      end do
+      call csr_from_elements(relative, solid%n_node, start, list, slot, error)
+      if (allocated(error)) return
+      s = 0
+      do k = 1, size(stencil)
+         associate (d => stencil(k)%weight)
+            do j = 1, size(d)
+               do i = 1, size(d)
+                  s = s + 1
+                  associate (to => relative%value(slot(s)))
+                     to = to + real(stencil(k)%mass*d(i)*d(j), dp)
+                  end associate
+               end do
+            end do
+         end associate
+      end do
+   end subroutine massless_return
+
+   !> Let the nodes `has_mass` move with what has kept its mass around them.
+   subroutine massless_follow(solid, may_shed, has_mass, v)
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: may_shed(:)         !! (n_node) massless at first
+      logical, intent(in) :: has_mass(:)         !! (n_node) those of them that get mass
+      real(wp), intent(inout) :: v(:, :)         !! (n_dim, n_node) [L/T]
+      type(stencil_t) :: stencil
+      integer :: i
+
+      do i = 1, size(has_mass)
+         if (.not. has_mass(i)) cycle
+         call find_stencil(solid, may_shed, i, stencil)
+         v(:, i) = -matmul(v(:, stencil%node(2:)), stencil%weight(2:))
+      end do
+   end subroutine massless_follow
+
+   !> A node and those around it that have kept their mass: the mean of these in each of its
+   !> elements, and of the elements by their mass.
+   pure subroutine find_stencil(solid, may_shed, node, stencil)
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: may_shed(:)
+      integer, intent(in) :: node
+      type(stencil_t), intent(out) :: stencil
+      real(wp) :: weight(size(may_shed)), share
+      integer :: e
+
+      weight = 0.0_wp
+      do e = 1, solid%n_element
+         associate (own => solid%node(:solid%geometry(e)%n_node, e))
+            if (.not. any(own == node)) cycle
+            share = sum(solid%mass(:size(own), :size(own), e))/size(own)
+            stencil%mass = stencil%mass + share
+            associate (kept => pack(own, .not. may_shed(own)))
+               weight(kept) = weight(kept) + share/size(kept)
+            end associate
+         end associate
+      end do
+      allocate(stencil%node, source=[node, pack([(e, e = 1, size(weight))], weight > 0.0_wp)])
+      allocate(stencil%weight, source=[1.0_wp, -weight(stencil%node(2:))/stencil%mass])
+   end subroutine find_stencil
 
 end module emcon_massless

@@ -5,10 +5,10 @@ module emcon_term_registry
    use emcon_host, only : host_t
    use emcon_host_check, only : host_check_mass
    use emcon_host_term, only : host_term_init, host_term_t
-   use emcon_inertia, only : inertia_init, inertia_t, inertia_times
+   use emcon_inertia, only : inertia_add, inertia_init, inertia_t, inertia_times
    use emcon_kinds, only : dp, wp
    use emcon_loads, only : loads_init, loads_t
-   use emcon_massless, only : massless_find, massless_shed
+   use emcon_massless, only : massless_find, massless_return, massless_shed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
@@ -16,7 +16,7 @@ module emcon_term_registry
    implicit none
    private
    public :: terms_create, terms_solid, terms_mass, terms_mass_times, terms_mass_values, &
-      terms_massless
+      terms_massless, terms_return_mass
 
    !> Where the terms that every model has stand; what is given comes after them.
    integer, parameter :: of_inertia = 1, of_solid = 2, of_loads = 3, n_own = 3
@@ -119,6 +119,26 @@ contains
          is_massless = part%is_massless
       end select
    end subroutine terms_massless
+
+   !> Let the nodes `has_mass`, which had given theirs away, have mass again, and the others not.
+   !> The step of the deck has to begin anew.
+   subroutine terms_return_mass(term, may_shed, has_mass, error)
+      type(term_box_t), intent(inout), target :: term(:)   !! of `terms_create`
+      logical, intent(in) :: may_shed(:)         !! (n_node) those of `terms_massless` at first
+      logical, intent(in) :: has_mass(:)         !! (n_node) of these
+      type(error_t), allocatable, intent(out) :: error
+      type(solid_t), pointer :: solid
+      type(csr_t) :: relative
+
+      solid => terms_solid(term)
+      call massless_return(solid, may_shed, has_mass, relative, error)
+      if (allocated(error)) return
+      select type (part => term(of_inertia)%term)
+      type is (inertia_t)
+         part%is_massless = may_shed .and. .not. has_mass
+         call inertia_add(part, solid, relative, error)
+      end select
+   end subroutine terms_return_mass
 
    !> The mass between unknowns of the step, in the pattern of the matrix.
    pure subroutine terms_mass_values(term, value)

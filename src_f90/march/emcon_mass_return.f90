@@ -1,0 +1,110 @@
+!> Mass that comes back to contact nodes which find no balance without it.
+!>
+!> Where a massless node has no stable balance, a soft one on a sharp corner, nothing slows its
+!> motion and no step is short enough. Such a node takes its mass back, with all massless nodes of
+!> its elements, before the step is tried again; its contact is persistent from then on. What comes
+!> back is inertia relative to what has mass around the node, so that momenta and kinetic energy
+!> stay where it moves with that. Source: docs/theory.md, section 6.
+module emcon_mass_return
+   use emcon_constraints, only : constraint_place
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_layer, only : layer_renew
+   use emcon_march_types, only : march_t
+   use emcon_massless, only : massless_follow
+   use emcon_scene, only : scene_t
+   use emcon_term_registry, only : terms_return_mass, terms_solid
+   implicit none
+   private
+   public :: mass_match, mass_return, mass_find_troubled
+
+contains
+
+   !> Let the model have the masses that the state says. The step of the deck has to begin anew
+   !> where they change.
+   subroutine mass_match(self, scene, has_changed, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      logical, intent(out) :: has_changed
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_massless(size(self%state%has_mass))
+
+      is_massless = self%may_shed .and. .not. self%state%has_mass
+      has_changed = any(is_massless .neqv. self%layer%is_massless)
+      if (.not. has_changed) return
+      call terms_return_mass(self%system%term, self%may_shed, self%state%has_mass, error)
+      if (.not. allocated(error)) call layer_renew(self%layer, scene, is_massless, self%system, error)
+   end subroutine mass_match
+
+   !> The massless nodes that keep a step from being solved, and those of their elements: where the
+   !> balance of the layer fails, those of the contacts that open or close; else the one that the
+   !> largest force is left on, or all in contact.
+   subroutine mass_find_troubled(self, scene, has_residual, is_troubled)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: has_residual        !! of the last iterate
+      logical, intent(out) :: is_troubled(:)     !! (n_node)
+      real(wp) :: left(size(is_troubled))
+      integer :: i
+
+      is_troubled = self%layer%is_troubled
+      if (.not. any(is_troubled)) then
+         left = 0.0_wp
+         if (has_residual) left = maxval(abs(merge(self%newton%left, 0.0_wp, &
+            self%system%space%numbering%unknown > 0)), 1)
+         where (.not. self%layer%is_massless) left = 0.0_wp
+         if (maxval(left) > 0.0_wp .and. maxval(left) <= huge(left)) then
+            is_troubled(maxloc(left, 1)) = .true.
+         else
+            call mark_active(self, is_troubled)
+         end if
+      end if
+      call mark_elements(scene, self%layer%is_massless .and. is_troubled, is_troubled)
+      do i = 1, size(is_troubled)
+         is_troubled(i) = is_troubled(i) .and. self%layer%is_massless(i)
+      end do
+   end subroutine mass_find_troubled
+
+   !> The slave nodes of contacts that act, if one of them is massless; else all nodes.
+   subroutine mark_active(self, is_marked)
+      type(march_t), intent(in) :: self
+      logical, intent(inout) :: is_marked(:)
+      integer :: id, pair, i
+
+      do id = self%system%first_constraint(1) + 1, self%system%n_constraint
+         if (.not. (self%active%is_active(id) .or. self%state%is_active(id))) cycle
+         call constraint_place(self%system, id, pair, i)
+         is_marked(self%system%contact(pair)%contact%node(i)) = .true.
+      end do
+      if (.not. any(is_marked .and. self%layer%is_massless)) is_marked = .true.
+   end subroutine mark_active
+
+   !> The nodes of all elements on nodes `of`.
+   pure subroutine mark_elements(scene, of, is_marked)
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: of(:)               !! (n_node)
+      logical, intent(inout) :: is_marked(:)     !! (n_node)
+      integer :: e
+
+      do e = 1, size(scene%element_kind)
+         associate (node => pack(scene%element_node(:, e), scene%element_node(:, e) > 0))
+            if (any(of(node))) is_marked(node) = .true.
+         end associate
+      end do
+   end subroutine mark_elements
+
+   !> Give the nodes `is_back` their mass back: they move with what has mass around them. The step
+   !> of the deck has to begin anew.
+   subroutine mass_return(self, scene, is_back, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_back(:)          !! (n_node) massless so far
+      type(error_t), allocatable, intent(out) :: error
+      logical :: has_changed
+
+      call massless_follow(terms_solid(self%system%term), self%may_shed, is_back, self%state%v)
+      self%state%has_mass = self%state%has_mass .or. is_back
+      call mass_match(self, scene, has_changed, error)
+   end subroutine mass_return
+
+end module emcon_mass_return
