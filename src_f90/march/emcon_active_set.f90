@@ -18,8 +18,8 @@ module emcon_active_set
 
    !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
    integer, parameter :: step_done = 0, step_refused = 1, step_diverged = 2, step_singular = 3, &
-      step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8, step_overlaps = 9, &
-      step_unbalanced = 10
+      step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8, &
+      step_overlaps = 9, step_unbalanced = 10
 
    !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))

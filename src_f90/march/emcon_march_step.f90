@@ -1,6 +1,7 @@
 !> One step in time: first guess, solution, the judge's look at it, and what follows from it.
 module emcon_march_step
-   use emcon_active_set, only : active_set_begin, step_done, step_overlaps, step_refused, step_unbalanced
+   use emcon_active_set, only : active_set_begin, step_done, step_overlaps, step_refused, &
+      step_unbalanced
    use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_constraints, only : constraint_place

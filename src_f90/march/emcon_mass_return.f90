@@ -25,7 +25,7 @@ contains
    subroutine mass_match(self, scene, has_changed, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      logical, intent(out) :: has_changed
+      logical, intent(out) :: has_changed        !! these are others
       type(error_t), allocatable, intent(out) :: error
       logical :: is_massless(size(self%state%has_mass))
 
@@ -33,7 +33,8 @@ contains
       has_changed = any(is_massless .neqv. self%layer%is_massless)
       if (.not. has_changed) return
       call terms_return_mass(self%system%term, self%may_shed, self%state%has_mass, error)
-      if (.not. allocated(error)) call layer_renew(self%layer, scene, is_massless, self%system, error)
+      if (.not. allocated(error)) call layer_renew(self%layer, scene, is_massless, &
+         self%system, error)
    end subroutine mass_match
 
    !> The massless nodes that keep a step from being solved, and those of their elements: where the

@@ -21,8 +21,7 @@ module emcon_inertia
       type(csr_t) :: mass                        !! (n_node x n_node) [M]
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
-      !> (n_node x n_node) beside that of elements [M]: given; added in a run
-      type(csr_t), private :: beside(2)
+      type(csr_t), private :: given, added       !! (n_node x n_node) beside it [M]
       integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of these
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains
@@ -46,7 +45,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       self%role = role_inertia
-      self%beside(1) = given
+      self%given = given
       allocate(self%rate(n_dim, solid%n_node), self%product(n_dim, solid%n_node), source=0.0_wp)
       call add_up(self, solid, error)
    end subroutine inertia_init
@@ -59,7 +58,7 @@ contains
       type(csr_t), intent(in) :: added           !! (n_node x n_node) [M]
       type(error_t), allocatable, intent(out) :: error
 
-      self%beside(2) = added
+      self%added = added
       call add_up(self, solid, error)
    end subroutine inertia_add
 
@@ -68,15 +67,12 @@ contains
       type(inertia_t), intent(inout) :: self
       type(solid_t), intent(in) :: solid
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: start(:), list(:), slot(:), pair(:, :)
+      integer, allocatable :: start(:), list(:), slot(:), pair(:, :), added(:, :)
       integer :: e, i, j, k, n
 
-      if (allocated(self%pair)) deallocate(self%pair)
-      allocate(self%pair(n_end, 0))
-      do i = 1, size(self%beside)
-         call list_pairs(self%beside(i), pair)
-         self%pair = reshape([self%pair, pair], [n_end, size(self%pair, 2) + size(pair, 2)])
-      end do
+      call list_pairs(self%given, pair)
+      call list_pairs(self%added, added)
+      self%pair = reshape([pair, added], [n_end, size(pair, 2) + size(added, 2)])
       call element_lists(solid, 1, start, list)
       n = size(list)
       list = [list, reshape(self%pair, [size(self%pair)])]
@@ -93,20 +89,19 @@ contains
             end do
          end do
       end do
-      do i = 1, size(self%beside)
-         call add_beside(self, self%beside(i))
-      end do
+      call add_beside(self%mass, self%given)
+      call add_beside(self%mass, self%added)
    end subroutine add_up
 
-   !> Add a mass whose pairs are in the pattern.
-   pure subroutine add_beside(self, part)
-      type(inertia_t), intent(inout) :: self
+   !> Add a matrix whose pairs are in the pattern.
+   pure subroutine add_beside(mass, part)
+      type(csr_t), intent(inout) :: mass
       type(csr_t), intent(in) :: part
       integer :: i, k
 
       do i = 1, part%n_row
          do k = part%row_start(i) + 1, part%row_start(i + 1)
-            associate (to => self%mass%value(csr_find(self%mass, i, part%column(k) + 1)))
+            associate (to => mass%value(csr_find(mass, i, part%column(k) + 1)))
                to = to + part%value(k)
             end associate
          end do

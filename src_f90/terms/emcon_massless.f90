@@ -17,11 +17,11 @@ module emcon_massless
    private
    public :: massless_find, massless_shed, massless_return, massless_follow
 
-   !> A node and those around it.
+   !> Those around a node that have kept their mass.
    type :: stencil_t
-      real(wp) :: mass = 0.0_wp                  !! of its share of its elements [M]
-      integer, allocatable :: node(:)            !! the node, then those around it
-      real(wp), allocatable :: weight(:)         !! 1, then negative ones; their sum is 0
+      real(wp) :: mass = 0.0_wp                  !! of the node: its share of its elements [M]
+      integer, allocatable :: node(:)            !! around it
+      real(wp), allocatable :: weight(:)         !! > 0, their sum is 1
    end type stencil_t
 
 contains
@@ -132,14 +132,14 @@ contains
          if (.not. has_mass(i)) cycle
          k = k + 1
          call find_stencil(solid, may_shed, i, stencil(k))
-         list = [list, stencil(k)%node]
+         list = [list, i, stencil(k)%node]
          start(k + 1) = size(list) + 1
       end do
       call csr_from_elements(relative, solid%n_node, start, list, slot, error)
       if (allocated(error)) return
       s = 0
       do k = 1, size(stencil)
-         associate (d => stencil(k)%weight)
+         associate (d => [1.0_wp, -stencil(k)%weight])
             do j = 1, size(d)
                do i = 1, size(d)
                   s = s + 1
@@ -164,12 +164,12 @@ contains
       do i = 1, size(has_mass)
          if (.not. has_mass(i)) cycle
          call find_stencil(solid, may_shed, i, stencil)
-         v(:, i) = -matmul(v(:, stencil%node(2:)), stencil%weight(2:))
+         v(:, i) = matmul(v(:, stencil%node), stencil%weight)
       end do
    end subroutine massless_follow
 
-   !> A node and those around it that have kept their mass: the mean of these in each of its
-   !> elements, and of the elements by their mass.
+   !> What has kept its mass around `node`: the mean in each of its elements, and of the elements by
+   !> their mass.
    pure subroutine find_stencil(solid, may_shed, node, stencil)
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: may_shed(:)
@@ -189,8 +189,8 @@ contains
             end associate
          end associate
       end do
-      allocate(stencil%node, source=[node, pack([(e, e = 1, size(weight))], weight > 0.0_wp)])
-      allocate(stencil%weight, source=[1.0_wp, -weight(stencil%node(2:))/stencil%mass])
+      stencil%node = pack([(e, e = 1, size(weight))], weight > 0.0_wp)
+      stencil%weight = weight(stencil%node)/stencil%mass
    end subroutine find_stencil
 
 end module emcon_massless

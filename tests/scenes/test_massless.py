@@ -161,6 +161,53 @@ def test_elements_without_other_nodes_keep_their_mass(tmp_path):
     assert (runs[0].history["kinetic"] == runs[1].history["kinetic"]).all()
 
 
+# ---- nodes that find no balance without their mass ----------------------------------------------
+
+BACK = "contact nodes take their mass back"
+
+
+@pytest.mark.parametrize(("name", "choice"), [
+    ("tower", {"formulation": "NODE TO SURFACE"}), ("corners", {"formulation": "NODE TO SURFACE"}),
+    ("crossing", {"formulation": "SEGMENT"}), ("crossing", {"formulation": "MORTAR"}),
+    ("slide off", {"formulation": "MORTAR"})], ids=lambda x: x if isinstance(x, str) else "")
+def test_soft_bodies_on_corners(name, choice, tmp_path):
+    """A massless node slips off a corner at once; with its mass back it takes its time."""
+    scene = SCENES[name]()
+    run = run_deck(scene.deck("BOTH" if choice["formulation"].startswith("NODE") else "ONE"),
+                   tmp_path, **MASSLESS, **choice)
+    assert BACK in run.log
+    assert run.history["time"][-1] == pytest.approx(scene.t_end)
+    assert balances(run.history) < 1e-12
+
+
+def test_mass_comes_back_without_a_jump_of_the_momenta(tmp_path):
+    """Two free bodies whose corners cross; bits hold through a restart behind the return."""
+    deck = SCENES["crossing"]().deck("ONE").text().replace("<initiation>", "MASSLESS").replace(
+        "<formulation>", "MORTAR")
+    (tmp_path/"deck.inp").write_text(deck)
+    with Stepper(tmp_path/"deck.inp") as whole:
+        first, mass = whole.ledger, whole.mass.toarray()
+        while (whole.mass.toarray() == mass).all():
+            before = whole.ledger
+            whole.step()
+        again = whole.mass.toarray()
+        assert abs(again.sum() - mass.sum()) <= 100*EPS*mass.sum()
+        x = whole.positions
+        assert np.abs((again - mass) @ np.ones(len(x))).max() <= 100*EPS*mass.max()
+        assert np.linalg.eigvalsh(again - mass).min() >= -100*EPS*mass.max()
+        whole.write_restart(tmp_path/"half.rst.h5")
+        with Stepper.from_restart(tmp_path/"half.rst.h5") as rest:
+            assert (rest.mass.toarray() == again).all()
+            for _ in range(5):
+                whole.step()
+                rest.step()
+            assert (rest.u == whole.u).all() and (rest.v == whole.v).all()
+        scale = math.sqrt(2*first["kinetic"]*mass.sum())
+        assert abs(whole.ledger["total"] - before["total"]) < 1e-12*first["kinetic"]
+        for name in ("px", "py", "lz"):
+            assert abs(whole.ledger[name] - first[name]) < 1e-12*scale, name
+
+
 # ---- decks --------------------------------------------------------------------------------------
 
 
