@@ -12,7 +12,8 @@ module emcon_sparse_solver
    use emcon_text, only : to_text
    implicit none
    private
-   public :: sparse_solver_t, solver_box_t, solver_check_square, solver_check_values, solver_raise
+   public :: sparse_solver_t, solver_box_t, solver_check_square, solver_check_values, &
+      solver_raise, solver_renew
    public :: matrix_general, matrix_definite, matrix_symmetric
 
    !> What a solver may rely on. Matrices are given in full, whatever they are.
@@ -30,6 +31,8 @@ module emcon_sparse_solver
       integer :: n_negative = -1              !! pivots < 0 of a symmetric matrix; < 0: not counted
       integer(int64) :: n_factor = 0_int64    !! nonzeros of the factors
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
+      integer, private :: of_analysis = 0     !! `n_analysis` when `factored` was factorised
+      real(dp), allocatable, private :: factored(:)      !! values of the last `solver_renew`
    contains
       procedure(analyse_pattern), deferred :: analyse
       procedure(factorise_values), deferred :: factorise
@@ -80,6 +83,40 @@ module emcon_sparse_solver
    end interface
 
 contains
+
+   !> Factorise `value`, of the analysed pattern, unless the last factors are those of these values:
+   !> matrices of linear bodies stay the same.
+   subroutine solver_renew(self, value, error)
+      class(sparse_solver_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)       !! (n_slot) of the pattern
+      type(error_t), allocatable, intent(out) :: error
+
+      if (is_factored(self, value)) return
+      self%of_analysis = 0
+      call self%factorise(value, error)
+      if (allocated(error)) return
+      if (allocated(self%factored)) then
+         if (size(self%factored) /= size(value)) deallocate(self%factored)
+      end if
+      if (.not. allocated(self%factored)) allocate(self%factored(size(value)))
+      self%factored = value
+      self%of_analysis = self%n_analysis
+   end subroutine solver_renew
+
+   !> Does the solver hold factors of `value`? One that does not count its analyses may not.
+   pure logical function is_factored(self, value)
+      class(sparse_solver_t), intent(in) :: self
+      real(dp), intent(in), contiguous :: value(:)
+      integer :: k
+
+      is_factored = self%of_analysis > 0 .and. self%of_analysis == self%n_analysis
+      if (is_factored) is_factored = size(self%factored) == size(value)
+      if (.not. is_factored) return
+      do k = 1, size(value)
+         is_factored = abs(value(k) - self%factored(k)) <= 0.0_dp
+         if (.not. is_factored) return
+      end do
+   end function is_factored
 
    !> An error if the matrix is not square or has no rows.
    subroutine solver_check_square(matrix, error)

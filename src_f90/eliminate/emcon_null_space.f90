@@ -19,7 +19,7 @@ module emcon_null_space
    use emcon_null_basis, only : null_basis_fill, null_basis_init, null_basis_pattern, null_basis_t
    use emcon_numbering, only : numbering_t
    use emcon_solver_registry, only : solver_create, solver_default
-   use emcon_sparse_solver, only : matrix_general, sparse_solver_t
+   use emcon_sparse_solver, only : matrix_general, solver_renew, sparse_solver_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    implicit none
@@ -221,7 +221,7 @@ contains
       if (self%obstacle /= obstacle_none) return
       call triple_product_update(self%product, self%p, matrix, self%d, self%reduced)
       call stopwatch_stop(self%clock)
-      call self%solver%factorise(self%reduced%value, error)
+      call solver_renew(self%solver, self%reduced%value, error)
       is_singular = self%solver%is_singular
    end subroutine null_space_factorise
 

@@ -8,7 +8,7 @@ module test_solvers
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_create, solver_default, solver_mumps, solvers
    use emcon_sparse_solver, only : matrix_definite, matrix_general, matrix_symmetric, &
-      sparse_solver_t
+      solver_renew, sparse_solver_t
    use sparse_samples, only : dense_of, quad_mesh_matrix
    implicit none
    private
@@ -16,6 +16,17 @@ module test_solvers
 
    !> Round-off of a factorisation, for matrices whose condition is below 1e4.
    real(wp), parameter :: tol = 1.0e4_wp*max(real(epsilon(1.0_dp), wp), epsilon(1.0_wp))
+
+   !> Solves nothing, and counts.
+   type, extends(sparse_solver_t) :: counting_t
+      integer :: n_factorisation = 0
+   contains
+      procedure :: analyse => counting_analyse
+      procedure :: factorise => counting_factorise
+      procedure :: solve => counting_solve
+      procedure :: free => counting_free
+   end type counting_t
+
    integer, parameter :: kinds(3) = [matrix_general, matrix_definite, matrix_symmetric]
 
 contains
@@ -31,8 +42,64 @@ contains
          test_case_t("no factorisation, then one", test_singular), &
          test_case_t("negative pivots of a saddle point", test_saddle_point), &
          test_case_t("a dependent constraint is one less", test_dependent), &
+         test_case_t("the same values are factorised once", test_renew), &
          test_case_t("wrong order of calls", test_misuse)]
    end subroutine collect_solvers
+
+   !> Factors are made anew for other values, for another pattern, and where nobody counts those.
+   subroutine test_renew(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(counting_t) :: solver
+      type(csr_t) :: a
+
+      call solver_renew(solver, [1.0_dp, 2.0_dp], error)
+      if (.not. allocated(error)) call solver_renew(solver, [1.0_dp, 2.0_dp], error)
+      if (.not. allocated(error)) call check_equal(error, solver%n_factorisation, 2, "not analysed")
+      if (.not. allocated(error)) call solver%analyse(a, error)
+      if (.not. allocated(error)) call solver_renew(solver, [1.0_dp, 2.0_dp], error)
+      if (.not. allocated(error)) call solver_renew(solver, [1.0_dp, 2.0_dp], error)
+      if (.not. allocated(error)) call check_equal(error, solver%n_factorisation, 3, "the same")
+      if (.not. allocated(error)) call solver_renew(solver, [1.0_dp, 3.0_dp], error)
+      if (.not. allocated(error)) call check_equal(error, solver%n_factorisation, 4, "others")
+      if (.not. allocated(error)) call solver%analyse(a, error)
+      if (.not. allocated(error)) call solver_renew(solver, [1.0_dp, 3.0_dp], error)
+      if (.not. allocated(error)) call check_equal(error, solver%n_factorisation, 5, "pattern")
+      if (.not. allocated(error)) call solver_renew(solver, [1.0_dp, 3.0_dp, 0.0_dp], error)
+      if (.not. allocated(error)) call check_equal(error, solver%n_factorisation, 6, "longer")
+   end subroutine test_renew
+
+   subroutine counting_analyse(self, matrix, error)
+      class(counting_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+
+      if (matrix%n_row == 0) self%n_analysis = self%n_analysis + 1
+   end subroutine counting_analyse
+
+   subroutine counting_factorise(self, value, error)
+      class(counting_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      self%is_singular = size(value) == 0
+      self%n_factorisation = self%n_factorisation + 1
+   end subroutine counting_factorise
+
+   subroutine counting_solve(self, rhs, x, error)
+      class(counting_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: rhs(:)
+      real(wp), intent(out), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      x = rhs
+      self%is_singular = .true.
+   end subroutine counting_solve
+
+   subroutine counting_free(self)
+      class(counting_t), intent(inout) :: self
+
+      self%n_factorisation = 0
+   end subroutine counting_free
 
    !> Each choice and each kind of matrix, with a pattern that is analysed once.
    subroutine test_all(error)
