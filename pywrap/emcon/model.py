@@ -305,10 +305,14 @@ class Model(Cards):
         self._add(text if density is None else text + card("DENSITY", rows=[(density,)]))
         return self
 
-    def section(self, material: str, elements: str = "ALL", *, thickness: Number = 1.0) -> Model:
-        """`*SOLID SECTION`: an element set is of a material, of `thickness` [L]."""
-        return self._card("SOLID SECTION", {"ELSET": elements, "MATERIAL": material},
-                          [(thickness,)])
+    def section(self, material: str, elements: str = "ALL", *, thickness: Number = 1.0,
+                kinematics: str | None = None) -> Model:
+        """`*SOLID SECTION`: an element set is of a material, of `thickness` [L].
+
+        kinematics    NONLINEAR (default), as the steps say, or LINEAR: small strains in all steps
+        """
+        return self._card("SOLID SECTION", {"ELSET": elements, "MATERIAL": material,
+                                            "KINEMATICS": kinematics}, [(thickness,)])
 
     def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
                 value: Number | ArrayLike) -> Model:

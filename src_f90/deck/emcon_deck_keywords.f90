@@ -51,7 +51,8 @@ module emcon_deck_keywords
       keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
-      keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,!ORIENTATION,!OFFSET:0,!CONTROLS"), &
+      keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,!ORIENTATION," &
+         // "!OFFSET:0,!CONTROLS"), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
       keyword_t("ELASTIC", in_model, "TYPE=,~MODULI,!DEPENDENCIES:0"), &

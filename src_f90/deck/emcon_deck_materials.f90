@@ -3,6 +3,7 @@ module emcon_deck_materials
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, is_blank, next_line
    use emcon_deck_named, only : find_set, hint_at_set, set_names
+   use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
       option_count, option_name, reader_t, refuse_option
    use emcon_diagnostics, only : label_list, quoted, suggestion
@@ -10,7 +11,7 @@ module emcon_deck_materials
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
    use emcon_law_registry, only : find_law_row, law_create, law_given, law_rows, n_constant
-   use emcon_materials, only : material_t
+   use emcon_materials, only : kinematics_linear, material_t, section_t
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
@@ -323,6 +324,7 @@ contains
             call card_error(reader, card, "unknown material " // quoted(name) &
                // suggestion(name, known))
          end if
+         call read_kinematics(reader, card, scene, section)
          call data_open(data, card)
          if (next_line(reader, data)) then
             call get_real(reader, data, 1, "thickness", section%thickness)
@@ -344,6 +346,23 @@ contains
          "element set " // quoted(set_name) // " holds lines too, which have no stiffness; give " &
          // "the section a set without them")
    end subroutine read_section
+
+   !> How the elements deform. A linear section takes the stiffness of a law at rest, which a law
+   !> that a program gives does not tell before the deck is read.
+   subroutine read_kinematics(reader, card, scene, section)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(section_t), intent(inout) :: section
+
+      call choose_option(reader, card, "KINEMATICS", "kinematics", section%kinematics)
+      if (section%kinematics /= kinematics_linear .or. section%material == 0) return
+      associate (material => scene%material(section%material))
+         if (material%law == law_given) call card_error(reader, card, "KINEMATICS=LINEAR: " &
+            // "material " // material%name // " is a *USER MATERIAL; it needs *ELASTIC or " &
+            // "*HYPERELASTIC")
+      end associate
+   end subroutine read_kinematics
 
    subroutine assign_section(reader, card, scene, item, i_section)
       type(reader_t), intent(inout) :: reader

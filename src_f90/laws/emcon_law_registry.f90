@@ -3,7 +3,7 @@
 module emcon_law_registry
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_law, only : law_t
+   use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_coupled_neo_hooke, only : law_coupled_neo_hooke_t
    use emcon_law_linear, only : law_linear_t
    use emcon_law_mooney_rivlin, only : law_mooney_rivlin_t
@@ -13,7 +13,8 @@ module emcon_law_registry
    use emcon_text, only : to_text, to_upper
    implicit none
    private
-   public :: law_row_t, law_rows, law_titles, law_variants, find_law_row, n_constant, law_create
+   public :: law_row_t, law_rows, law_titles, law_variants, find_law_row, n_constant, law_create, &
+      law_linearise
    public :: law_linear, law_neo_hooke, law_coupled_neo_hooke, law_given, law_mooney_rivlin, &
       law_yeoh, law_ogden
 
@@ -133,6 +134,28 @@ contains
       call law%take(constant, fault)
       if (fault /= "") call raise(error, err_input, fault)
    end subroutine law_create
+
+   !> Linear elasticity with the stiffness that `law` has at rest.
+   subroutine law_linearise(law, linear)
+      class(law_t), intent(in) :: law
+      class(law_t), allocatable, intent(out) :: linear
+      real(wp), parameter :: rest(3) = 0.0_wp
+      type(law_response_t) :: response
+      type(law_linear_t) :: plain
+
+      select type (law)
+      type is (law_linear_t)
+         plain = law
+      class default
+         call law_response_plane(law, rest, rest, response)
+         plain%mu = law%shear                    ! the tangent is by the end of a step of no size
+         plain%lam = 2.0_wp*(response%tangent(1, 1) - plain%mu)
+         plain%density = law%density
+         plain%shear = plain%mu
+         plain%has_volume = .false.
+      end select
+      allocate(linear, source=plain)
+   end subroutine law_linearise
 
    !> Number of constants of each row.
    pure function count_constants() result(n)

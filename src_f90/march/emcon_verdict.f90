@@ -9,7 +9,10 @@ module emcon_verdict
    use emcon_look_plane, only : overlap_text
    use emcon_march, only : increment_t, march_t
    use emcon_scene, only : scene_t
+   use emcon_small_range, only : small_limit, small_range_init, small_range_t, small_range_widen
+   use emcon_solid, only : solid_t
    use emcon_stand_off, only : stand_off_mean, stand_off_t
+   use emcon_term_registry, only : terms_solid
    use emcon_text, only : note_add, notes_t, to_text
    implicit none
    private
@@ -40,6 +43,7 @@ module emcon_verdict
       real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
       real(wp) :: unconverged_time = 0.0_wp      !! [T]
       type(stand_off_t) :: stand_off
+      type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: stabilization = 0.0_wp         !! work of what STABILIZE bears
       integer :: n_newton = 0
       integer :: n_cut = 0
@@ -58,7 +62,7 @@ module emcon_verdict
 contains
 
    !> Begin with the first state of `march`.
-   pure subroutine verdict_start(self, march)
+   subroutine verdict_start(self, march)
       type(verdict_t), intent(out) :: self
       type(march_t), intent(in) :: march
 
@@ -67,6 +71,7 @@ contains
       self%largest_energy = abs(self%total0)
       self%place = ""
       self%message = ""
+      call small_range_init(self%small, terms_solid(march%system%term))
       allocate(self%largest_force(size(march%state%pairs%total)), source=0.0_wp)
    end subroutine verdict_start
 
@@ -118,8 +123,30 @@ contains
       do i = 1, increment%warnings%n
          call add_warning(self, increment%warnings%item(i)%text)
       end do
+      if (size(self%small%section) > 0) call follow_linear(self, scene, march)
       call follow_energy(self, march)
    end subroutine verdict_update
+
+   !> Linear sections: a warning where one leaves the range of small kinematics.
+   subroutine follow_linear(self, scene, march)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(solid_t), pointer :: solid
+      logical :: was_small(size(self%small%section))
+      integer :: i
+
+      was_small = max(self%small%rotation, self%small%strain) <= small_limit
+      solid => terms_solid(march%system%term)
+      call small_range_widen(self%small, solid, march%state%u)
+      do i = 1, size(was_small)
+         if (.not. was_small(i)) cycle
+         if (max(self%small%rotation(i), self%small%strain(i)) <= small_limit) cycle
+         call add_warning(self, "section " // scene%section(self%small%section(i))%set // &
+            " is linear, but its rotations or strains are not small from time " // &
+            to_text(march%state%time, 9) // " on: KINEMATICS=NONLINEAR would follow them")
+      end do
+   end subroutine follow_linear
 
    !> The energy balance. Unless the scheme keeps energy the works are sums over increments, exact
    !> only in the limit of small ones: what they are off by is shown, not judged.
@@ -260,6 +287,7 @@ contains
                "largest stand-off of contact " // to_text(self%stand_off%largest, 3) // &
                " of an element, mean over the impulse " // &
                to_text(stand_off_mean(self%stand_off), 3))
+            call add_small(self%small, scene, lines)
             do k = 1, size(self%largest_force)
                call note_add(lines, "contact " // &
                   scene%surface(scene%pair(k)%slave)%name // " on " // &
@@ -272,6 +300,21 @@ contains
       call verdict_line(self, text)
       call note_add(lines, text)
    end subroutine verdict_balance_lines
+
+   !> What linear sections have met.
+   subroutine add_small(small, scene, lines)
+      type(small_range_t), intent(in) :: small
+      type(scene_t), intent(in) :: scene
+      type(notes_t), intent(inout) :: lines
+      integer :: i
+
+      do i = 1, size(small%section)
+         call note_add(lines, "linear section " // scene%section(small%section(i))%set // &
+            ": rotation up to " // to_text(small%rotation(i), 3) // " rad, strain up to " // &
+            to_text(small%strain(i), 3) // trim(merge("            ", ": NOT small ", &
+            max(small%rotation(i), small%strain(i)) <= small_limit)))
+      end do
+   end subroutine add_small
 
    !> What these pairs can do to need no guards.
    pure subroutine guard_advice(pair, advice)

@@ -91,6 +91,10 @@ contains
       call add_number(line, "stand_off", self%stand_off%largest)
       call add_number(line, "mean_stand_off", stand_off_mean(self%stand_off))
       call add_number(line, "unconverged", self%unconverged)
+      if (size(self%small%section) > 0) then
+         call add_number(line, "linear_rotation", maxval(self%small%rotation))
+         call add_number(line, "linear_strain", maxval(self%small%strain))
+      end if
       line = line // "}"
    end subroutine compose
 
@@ -162,6 +166,10 @@ contains
       call restart_exchange(restart, "effort", self%n_held)
       call restart_exchange(restart, "effort", self%most_held)
       call restart_exchange(restart, "pair_largest", self%largest_force)
+      if (restart_offers(restart, "linear_range", size(self%small%section) > 0)) then
+         call restart_exchange(restart, "linear_range", self%small%rotation)
+         call restart_exchange(restart, "linear_strain", self%small%strain)
+      end if
       call exchange_texts(self, restart)
    end subroutine verdict_exchange
 

@@ -5,6 +5,10 @@ module emcon_materials
    implicit none
    private
    public :: material_t, section_t
+   public :: kinematics_nonlinear, kinematics_linear
+
+   !> How the elements of a section deform: as their steps say, or by small strains in all steps.
+   integer, parameter :: kinematics_nonlinear = 1, kinematics_linear = 2
 
    type :: material_t
       character(len=:), allocatable :: name
@@ -19,6 +23,7 @@ module emcon_materials
       character(len=:), allocatable :: set           !! element set
       integer :: material = 0
       real(wp) :: thickness = 1.0_wp                 !! [L]
+      integer :: kinematics = kinematics_nonlinear   !! one of `kinematics_`
    end type section_t
 
 end module emcon_materials

@@ -9,6 +9,7 @@ module emcon_options
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
       multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
       smoothing_none
+   use emcon_materials, only : kinematics_linear, kinematics_nonlinear, section_t
    use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
    use emcon_solver_registry, only : solvers
    use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
@@ -58,6 +59,8 @@ module emcon_options
       option_row_t("initiation", initiation_massless, "MASSLESS", "", "", ""), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
+      option_row_t("kinematics", kinematics_nonlinear, "NONLINEAR", "", "", ""), &
+      option_row_t("kinematics", kinematics_linear, "LINEAR", "", "small strains", ""), &
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
       option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]
 
@@ -110,6 +113,7 @@ contains
       character(len=*), intent(in) :: kind
       type(contact_options_t) :: contact
       type(contact_pair_t) :: pair
+      type(section_t) :: section
       type(step_t) :: step
       type(tie_t) :: tie
 
@@ -128,6 +132,8 @@ contains
          code = contact%smoothing
       case ("initiation")
          code = step%initiation
+      case ("kinematics")
+         code = section%kinematics
       case ("method")
          code = step%constraint_method
       case ("scheme")

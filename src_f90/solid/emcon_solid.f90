@@ -7,7 +7,8 @@ module emcon_solid
       host_response_t, host_rest_stiffness, host_state
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
-   use emcon_law_registry, only : law_create, law_given
+   use emcon_law_registry, only : law_create, law_given, law_linearise
+   use emcon_materials, only : kinematics_linear
    use emcon_point_function, only : point_gradient, point_ok
    use emcon_scene, only : scene_t, where_text
    use emcon_shape, only : shape_table_t, shape_tabulate
@@ -30,9 +31,12 @@ module emcon_solid
       type(to_nodes_t), allocatable :: to_nodes(:)       !! one per kind of the scene
       integer, allocatable :: node(:, :)                 !! (n_most, n_element) as in scene_t
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
+      integer, allocatable :: section(:)                 !! (n_element) of the scene
+      logical, allocatable :: is_linear(:)               !! (n_element) small strains in all steps
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
-      type(law_box_t), allocatable :: law(:)             !! one per material
-      type(host_law_t), allocatable :: given(:)         !! one per material, or one in its place
+      !> One per material; behind them, if there are linear elements, those for these
+      type(law_box_t), allocatable :: law(:)
+      type(host_law_t), allocatable :: given(:)         !! like `law`, or one in its place
       logical :: has_given = .false.                     !! some law is a given one
       integer, allocatable :: n_point(:)                 !! quadrature points, of each given law
       integer, allocatable :: first_point(:)             !! (n_element) among these; 0: law of ours
@@ -70,6 +74,8 @@ contains
       n_most = size(self%node, 1)
       allocate(self%mass(n_most, n_most, n), source=0.0_wp)
       allocate(self%volume_mass(n_most, n), self%stiffness(n_most, n), source=0.0_wp)
+      self%section = scene%element_section
+      self%is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear
       call init_laws(self, scene, at_rest, error, given)
       if (allocated(error)) return
       call init_kinds(self, scene, stiffness, mass, error)
@@ -80,6 +86,7 @@ contains
          call init_element(self, scene%x, scene%material(self%law_of(e))%density, e, &
             stiffness(self%kind(e)), mass(self%kind(e)))
          call estimate_stiffness(self, at_rest(self%law_of(e)), e)
+         if (self%is_linear(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
          if (any(self%geometry(e)%weight <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
                " is inverted or has no area; check the order of its nodes")
@@ -125,9 +132,10 @@ contains
       type(host_law_t), intent(in), optional :: given(:)
       real(wp), parameter :: rest(3) = 0.0_wp
       type(law_response_t) :: state
-      integer :: k
+      integer :: k, n
 
-      allocate(self%law(size(scene%material)), self%given(size(scene%material)))
+      n = size(scene%material)*merge(2, 1, any(self%is_linear))
+      allocate(self%law(n), self%given(n))
       at_rest = 0.0_wp
       do k = 1, size(scene%material)
          select case (scene%material(k)%law)
@@ -152,6 +160,8 @@ contains
          if (.not. allocated(self%law(k)%law)) cycle
          call law_response_plane(self%law(k)%law, rest, rest, state)
          at_rest(k) = maxval(abs(state%tangent))
+         n = size(scene%material) + k
+         if (n <= size(self%law)) call law_linearise(self%law(k)%law, self%law(n)%law)
       end do
    end subroutine init_laws
 

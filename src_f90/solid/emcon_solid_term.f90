@@ -1,4 +1,4 @@
-!> All elements of a scene as one term: forces and tangents over a motion.
+!> All elements of a scene but linear ones as one term: forces and tangents over a motion.
 !>
 !> Source: docs/theory.md, section 3.
 module emcon_solid_term
@@ -25,7 +25,8 @@ module emcon_solid_term
    type, extends(term_t) :: solid_term_t
       type(solid_t) :: solid
       logical :: nlgeom = .true.                 !! .false.: small strains
-      logical :: has_linear_laws = .false.       !! all materials are
+      logical :: has_linear_laws = .false.       !! all materials of its elements are
+      logical, private :: is_empty = .false.     !! all elements are linear
       integer, allocatable, private :: slot(:)   !! element matrices by columns
       type(host_response_t), private :: given   !! what given laws answer
    contains
@@ -45,10 +46,18 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
+      logical :: is_here(size(scene%material))
 
       self%role = role_internal
       call solid_init(self%solid, scene, error, given)
-      self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear)
+      is_here = .true.
+      if (any(self%solid%is_linear)) then
+         is_here = .false.
+         is_here(pack(self%solid%law_of, .not. self%solid%is_linear)) = .true.
+      end if
+      self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear &
+         .or. .not. is_here)
+      self%is_empty = all(self%solid%is_linear) .and. self%solid%n_element > 0
    end subroutine solid_term_init
 
    !> The freedoms of each element.
@@ -57,7 +66,7 @@ contains
       type(lists_t), intent(inout) :: lists
       integer, allocatable :: start(:), freedom(:)
 
-      call element_lists(self%solid, lists%n_dim, start, freedom)
+      call element_lists(self%solid, lists%n_dim, start, freedom, .not. self%solid%is_linear)
       call lists_append(lists, start(2:) - start(:size(start) - 1), freedom)
    end subroutine lay_out
 
@@ -96,6 +105,7 @@ contains
       first = 1
       associate (solid => self%solid, total => response%part(self%role))
          do e = 1, solid%n_element
+            if (solid%is_linear(e)) cycle
             n = solid%geometry(e)%n_node
             call solid_gather(solid%node(:n, e), motion%from, motion%by, local)
             call solid_element_respond(solid, e, local, self%given, present(value), part)
@@ -182,6 +192,7 @@ contains
       associate (solid => self%solid)
          do e = 1, solid%n_element
             n = solid%geometry(e)%n_node
+            if (solid%is_linear(e)) cycle
             if (.not. any(abs(direction(:, solid%node(:n, e))) > 0.0_wp)) cycle
             call solid_gather(solid%node(:n, e), motion%from, motion%by, local)
             call solid_element_respond(solid, e, local, self%given, .true., part)
@@ -221,7 +232,8 @@ contains
       class(solid_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = motion%pose%is_gradient .or. (self%has_linear_laws .and. .not. self%nlgeom)
+      is_symmetric = motion%pose%is_gradient .or. self%is_empty &
+         .or. (self%has_linear_laws .and. .not. self%nlgeom)
    end function is_symmetric
 
 end module emcon_solid_term

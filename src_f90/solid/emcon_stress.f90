@@ -29,10 +29,10 @@ contains
       real(wp) :: at_gp(6), strain(3)
 
       call respond_at(solid, u, nlgeom, given)
-      motion%nlgeom = nlgeom
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
+         motion%nlgeom = nlgeom .and. .not. solid%is_linear(e)
          call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
          do k = 1, solid%geometry(e)%n_gp
             call point_state(solid, e, k, motion, given, at_gp, strain)
@@ -119,11 +119,11 @@ contains
       integer :: e, k
 
       call respond_at(solid, u, nlgeom, given)
-      motion%nlgeom = nlgeom
       stress = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight)
+         motion%nlgeom = nlgeom .and. .not. solid%is_linear(e)
          call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
          do k = 1, solid%geometry(e)%n_gp
             call point_state(solid, e, k, motion, given, stress_k, strain_k)

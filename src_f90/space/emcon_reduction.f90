@@ -10,7 +10,8 @@ module emcon_reduction
    use emcon_numbering, only : numbering_matrix, numbering_t
    implicit none
    private
-   public :: reduction_t, reduction_init, reduction_slot, reduction_add, freedom_numbers
+   public :: reduction_t, reduction_init, reduction_slot, reduction_add, reduction_fold, &
+      freedom_numbers
 
    type :: reduction_t
       integer :: n_unknown = 0
@@ -246,6 +247,24 @@ contains
       allocate(matrix%value(n), source=0.0_dp)
       self%touched = pack([(i, i = 1, self%n_unknown)], is_touched)
    end subroutine lay_out_matrix
+
+   !> Bring what stands on the side into `value`, of entries that stay for a step.
+   subroutine reduction_fold(self, matrix, value, side)
+      type(reduction_t), intent(in) :: self
+      type(csr_t), intent(in) :: matrix                  !! its pattern
+      real(dp), intent(inout) :: value(:)                !! entries with slots > 0
+      real(dp), intent(in) :: side(:)                    !! and those with slots < 0
+      type(reduction_t) :: reduction
+      type(csr_t) :: placed
+
+      if (self%n_dependent == 0) return
+      placed = matrix
+      placed%value = value
+      reduction = self
+      reduction%side%value = side
+      call reduction_add(reduction, placed)
+      value = placed%value
+   end subroutine reduction_fold
 
    !> Bring what stands on the side into the matrix: N_ud T + T^T (N T), and clear the side.
    pure subroutine reduction_add(self, matrix)

@@ -8,7 +8,7 @@ module emcon_inertia
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
-   use emcon_reduction, only : freedom_numbers, reduction_add, reduction_slot, reduction_t
+   use emcon_reduction, only : freedom_numbers, reduction_fold, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
@@ -148,8 +148,6 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not used: mass is placed node by node
       real(dp) :: side(size(space%reduction%side%value))
-      type(reduction_t) :: reduction
-      type(csr_t) :: placed
       integer, allocatable :: number(:)
       integer :: i, k, a, place, n_dim
 
@@ -168,13 +166,7 @@ contains
             end do
          end do
       end do
-      if (space%numbering%n_dependent == 0) return
-      placed = matrix
-      placed%value = self%value
-      reduction = space%reduction
-      reduction%side%value = side
-      call reduction_add(reduction, placed)
-      self%value = placed%value
+      call reduction_fold(space%reduction, matrix, self%value, side)
    end subroutine begin_step
 
    !> s M (b du - w v0), and the sizes of what it consists of; nothing where s = 0.

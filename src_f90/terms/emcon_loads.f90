@@ -26,7 +26,8 @@ module emcon_loads
       !> (n_dim*n, n_dim*n, n_load) places of the stiffness of pressure on it
       integer, allocatable, private :: slot(:, :, :)
       logical, private :: is_ramped = .false.    !! static: without amplitude, linear over the step
-      logical, private :: nlgeom = .false.
+      logical, allocatable, private :: is_linear(:)      !! (n_element) small strains in all steps
+      logical, allocatable, private :: follows(:)        !! (n_load) a pressure on what deforms
       real(wp), private :: duration = 1.0_wp     !! [T]
       integer, allocatable, private :: node(:, :)        !! (n_most, n_element)
       real(wp), allocatable, private :: volume_mass(:, :)   !! int rho N_i, like `node` [M]
@@ -52,6 +53,7 @@ contains
       self%node = solid%node
       self%volume_mass = solid%volume_mass
       self%thickness = solid%thickness
+      self%is_linear = solid%is_linear
       allocate(self%load(0))
       allocate(self%force, mold=scene%x)
    end subroutine loads_init
@@ -70,7 +72,10 @@ contains
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
          self%is_ramped = step%scheme%loads_ramp
-         self%nlgeom = step%nlgeom
+         self%follows = step%nlgeom .and. self%load%kind == load_pressure
+         do i = 1, size(self%load)
+            if (self%follows(i)) self%follows(i) = .not. self%is_linear(self%load(i)%target)
+         end do
          self%duration = step%duration
       end associate
       if (allocated(self%face)) deallocate(self%face, self%slot)
@@ -150,8 +155,9 @@ contains
                end do
             case (load_pressure)
                p = p*self%thickness(load%target)
-               call add_pressure(self%face(:, i), p, motion%x, motion%at, self%nlgeom, self%force)
-               if (present(value) .and. self%nlgeom) then
+               call add_pressure(self%face(:, i), p, motion%x, motion%at, self%follows(i), &
+                  self%force)
+               if (present(value) .and. self%follows(i)) then
                   call add_pressure_stiffness(p*motion%load_weight, self%slot(:, :, i), value, side)
                end if
             end select
@@ -168,7 +174,7 @@ contains
       class(loads_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = .not. (self%nlgeom .and. any(self%load%kind == load_pressure))
+      is_symmetric = .not. any(self%follows)
    end function is_symmetric
 
 end module emcon_loads

@@ -7,7 +7,9 @@ module emcon_term_registry
    use emcon_host_term, only : host_term_init, host_term_t
    use emcon_inertia, only : inertia_add, inertia_init, inertia_t, inertia_times
    use emcon_kinds, only : dp, wp
+   use emcon_linear_term, only : linear_term_init, linear_term_t
    use emcon_loads, only : loads_init, loads_t
+   use emcon_materials, only : kinematics_linear
    use emcon_massless, only : massless_find, massless_return, massless_shed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -29,21 +31,24 @@ contains
       type(term_box_t), allocatable, intent(out) :: term(:)   !! (n_term)
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given
-      integer :: n, i
+      integer :: n, i, first
 
       n = 0
       if (present(given)) then
          if (allocated(given%force)) n = size(given%force)
       end if
-      allocate(term(n_own + n))
+      first = n_own + merge(1, 0, any(scene%section(scene%element_section)%kinematics &
+         == kinematics_linear))
+      allocate(term(first + n))
       allocate(inertia_t :: term(of_inertia)%term)
       allocate(solid_term_t :: term(of_solid)%term)
       allocate(loads_t :: term(of_loads)%term)
+      if (first > n_own) allocate(linear_term_t :: term(first)%term)
       call create_own(scene, term, error, given)
       do i = 1, n
          if (allocated(error)) return
-         allocate(host_term_t :: term(n_own + i)%term)
-         select type (part => term(n_own + i)%term)
+         allocate(host_term_t :: term(first + i)%term)
+         select type (part => term(first + i)%term)
          type is (host_term_t)
             call host_term_init(part, given%force(i)%force, scene, error)
          end select
@@ -82,6 +87,11 @@ contains
       select type (part => term(of_loads)%term)
       type is (loads_t)
          call loads_init(part, scene, solid)
+      end select
+      if (size(term) == n_own) return
+      select type (part => term(n_own + 1)%term)
+      type is (linear_term_t)
+         call linear_term_init(part, solid, size(scene%x, 1))
       end select
    end subroutine create_own
 

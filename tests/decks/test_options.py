@@ -21,6 +21,7 @@ CARD = {
     "normal": "*MORTAR",
     "smoothing": "*SURFACE SMOOTHING",
     "initiation": "*CONTACT INITIATION",
+    "kinematics": "*SOLID SECTION",
     "method": "*CONSTRAINT METHOD",
     "scheme": "*TIME INTEGRATION",
     "solver": "*STATIC",

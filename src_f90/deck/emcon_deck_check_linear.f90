@@ -1,0 +1,93 @@
+!> Linear sections: small kinematics and bodies that spin do not go together.
+module emcon_deck_check_linear
+   use emcon_bodies, only : bodies_find
+   use emcon_deck_check_surfaces, only : mark_nodes
+   use emcon_deck_reader, only : reader_t
+   use emcon_diagnostics, only : add_error
+   use emcon_kinds, only : wp
+   use emcon_materials, only : kinematics_linear
+   use emcon_scene, only : scene_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: check_linear
+
+   !> A rotation that small kinematics do not follow [rad].
+   real(wp), parameter :: most_turned = 0.1_wp
+
+contains
+
+   !> A free body with linear elements must not spin over its dynamic steps. What is prescribed,
+   !> tied or in equations may have velocities like those of a spin, and swing.
+   subroutine check_linear(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      logical, allocatable :: is_linear(:), is_held(:)
+      integer, allocatable :: body(:), node(:)
+      integer :: b, i, n_body, section
+      real(wp) :: turned
+
+      if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_names) return
+      if (any(scene%element_section == 0) .or. .not. allocated(scene%v0)) return
+      is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear
+      if (.not. any(is_linear)) return
+      call bodies_find(scene%element_node, size(scene%x, 2), body, n_body)
+      call mark_held(scene, is_held)
+      do b = 1, n_body
+         node = pack([(i, i = 1, size(body))], body == b)
+         i = findloc(is_linear .and. body(scene%element_node(1, :)) == b, .true., 1)
+         if (i == 0 .or. any(is_held(node))) cycle
+         turned = spin(scene%x(:, node), scene%v0(:, node)) &
+            *sum(scene%step%duration, scene%step%scheme%masses_resist)
+         if (turned <= most_turned) cycle
+         section = scene%element_section(i)
+         call add_error(reader%log, scene%section(section)%origin, "section " // &
+            scene%section(section)%set // " is linear, but its initial velocities turn the body " &
+            // "of element " // to_text(scene%element_label(i)) // " by " // to_text(turned, 3) // &
+            " rad within the steps: small kinematics follow no more than " // &
+            to_text(most_turned) // "; use KINEMATICS=NONLINEAR")
+      end do
+   end subroutine check_linear
+
+   !> Nodes that something else than contact keeps from spinning, perhaps.
+   pure subroutine mark_held(scene, is_held)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: is_held(:)    !! (n_node)
+      integer :: i
+
+      allocate(is_held(size(scene%x, 2)), source=.false.)
+      do i = 1, size(scene%step)
+         is_held(scene%step(i)%prescribed%node) = .true.
+      end do
+      do i = 1, size(scene%equation)
+         is_held(scene%equation(i)%node) = .true.
+      end do
+      do i = 1, size(scene%tie)
+         if (scene%tie(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%slave), &
+            is_held)
+         if (scene%tie(i)%master > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%master), &
+            is_held)
+      end do
+   end subroutine mark_held
+
+   !> Angular velocity of the rotation that comes closest to the velocities of nodes.
+   pure real(wp) function spin(x, v)
+      real(wp), intent(in) :: x(:, :)            !! (n_dim, n) [L]
+      real(wp), intent(in) :: v(:, :)            !! (n_dim, n) [L/T]
+      real(wp) :: centre(size(x, 1)), moment(size(x, 1), size(x, 1)), inertia
+      integer :: a, i
+
+      centre = sum(x, 2)/real(size(x, 2), wp)
+      moment = 0.0_wp
+      inertia = 0.0_wp
+      do i = 1, size(x, 2)
+         do a = 1, size(x, 1)
+            moment(:, a) = moment(:, a) + v(:, i)*(x(a, i) - centre(a))
+         end do
+         inertia = inertia + sum((x(:, i) - centre)**2)
+      end do
+      moment = moment - transpose(moment)
+      spin = sqrt(0.5_wp*sum(moment**2))/inertia
+   end function spin
+
+end module emcon_deck_check_linear

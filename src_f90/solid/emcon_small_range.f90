@@ -1,0 +1,64 @@
+!> How far linear sections have left the range of small kinematics: the largest rotations and
+!> strains of their quadrature points.
+!>
+!> A rotation is the size of the skew part of grad u, in the plane the sine of its angle; a strain
+!> that of the symmetric part.
+module emcon_small_range
+   use emcon_kinds, only : wp
+   use emcon_solid, only : solid_t
+   implicit none
+   private
+   public :: small_range_t, small_range_init, small_range_widen, small_limit
+
+   !> Errors of small kinematics are of the order of the rotation and the strain.
+   real(wp), parameter :: small_limit = 0.05_wp
+
+   type :: small_range_t
+      integer, allocatable :: section(:)         !! (n) linear sections
+      real(wp), allocatable :: rotation(:)       !! (n) largest so far [rad]
+      real(wp), allocatable :: strain(:)         !! (n) largest so far
+   end type small_range_t
+
+contains
+
+   !> The linear sections of `solid`, at rest so far.
+   pure subroutine small_range_init(self, solid)
+      type(small_range_t), intent(out) :: self
+      type(solid_t), intent(in) :: solid
+      integer :: i, most
+
+      most = maxval(solid%section)
+      self%section = pack([(i, i = 1, most)], [(any(solid%section == i .and. solid%is_linear), &
+         i = 1, most)])
+      allocate(self%rotation(size(self%section)), self%strain(size(self%section)), source=0.0_wp)
+   end subroutine small_range_init
+
+   !> Look at the displacements `u`.
+   pure subroutine small_range_widen(self, solid, u)
+      type(small_range_t), intent(inout) :: self
+      type(solid_t), intent(in) :: solid
+      real(wp), intent(in), contiguous :: u(:, :)        !! (n_dim, n_node) [L]
+      real(wp), dimension(size(u, 1), size(u, 1)) :: slope, skew
+      integer :: e, i, k, a, s
+
+      do e = 1, solid%n_element
+         if (.not. solid%is_linear(e)) cycle
+         s = findloc(self%section, solid%section(e), 1)
+         associate (geometry => solid%geometry(e), node => solid%node(:, e))
+            do k = 1, geometry%n_gp
+               slope = 0.0_wp
+               do i = 2, geometry%n_node
+                  do a = 1, size(u, 1)
+                     slope(:, a) = slope(:, a) &
+                        + (u(:, node(i)) - u(:, node(1)))*geometry%gradient(a, i, k)
+                  end do
+               end do
+               skew = 0.5_wp*(slope - transpose(slope))
+               self%rotation(s) = max(self%rotation(s), sqrt(0.5_wp*sum(skew**2)))
+               self%strain(s) = max(self%strain(s), norm2(slope - skew))
+            end do
+         end associate
+      end do
+   end subroutine small_range_widen
+
+end module emcon_small_range
