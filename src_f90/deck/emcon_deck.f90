@@ -20,6 +20,7 @@ module emcon_deck
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
    use emcon_deck_reader, only : reader_t
+   use emcon_deck_rigid, only : read_rigid_bodies
    use emcon_deck_sets, only : read_sets
    use emcon_deck_source, only : deck_open, deck_source_t
    use emcon_deck_step, only : read_steps
@@ -79,6 +80,7 @@ contains
       call read_surfaces(reader, scene)
       call read_materials(reader, scene)
       call read_sections(reader, scene)
+      call read_rigid_bodies(reader, scene)
       call read_amplitudes(reader, scene)
       call read_time_points(reader, scene)
       call read_initial_conditions(reader, scene)

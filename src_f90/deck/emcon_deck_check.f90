@@ -16,11 +16,11 @@ contains
    subroutine check_materials(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_used(:), is_bare(:), has_weight(:)
+      logical, allocatable :: is_used(:), is_bare(:), has_weight(:), resists(:), moves(:)
       integer :: i, k, material
       logical :: needs_mass
 
-      if (reader%doubt_names .or. reader%doubt_elements) return
+      if (reader%doubt_names .or. reader%doubt_elements .or. reader%doubt_rigid) return
       is_bare = scene%element_section == 0
       if (any(is_bare)) then
          i = first_true(is_bare)
@@ -32,6 +32,7 @@ contains
       do i = 1, size(scene%section)
          if (scene%section(i)%material > 0) is_used(scene%section(i)%material) = .true.
       end do
+      call mark_rigid_materials(scene, resists, moves)
       needs_mass = .false.
       do i = 1, size(scene%step)
          needs_mass = needs_mass .or. scene%step(i)%scheme%masses_resist
@@ -45,10 +46,10 @@ contains
       do i = 1, size(scene%material)
          if (.not. is_used(i)) cycle
          associate (given => scene%material(i))
-            if (given%law == 0) call add_error(reader%log, given%origin, "material " &
-               // given%name // " has no law: *ELASTIC, *HYPERELASTIC or *USER MATERIAL is missing")
+            if (given%law == 0 .and. resists(i)) call add_error(reader%log, given%origin, &
+               "material " // given%name // " has no law: *ELASTIC, *HYPERELASTIC or *USER MATERIAL is missing")
             if (given%density > 0.0_wp .or. given%density < 0.0_wp) cycle
-            if (needs_mass) then
+            if (needs_mass .and. moves(i)) then
                call add_error(reader%log, given%origin, "material " // given%name &
                   // " has no density: a dynamic step needs *DENSITY above 0")
             else if (has_weight(i)) then
@@ -58,6 +59,38 @@ contains
          end associate
       end do
    end subroutine check_materials
+
+   !> Which materials need a law and which a mass: those of rigid bodies alone need none, and no
+   !> mass where these are prescribed in every dynamic step.
+   pure subroutine mark_rigid_materials(scene, resists, moves)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: resists(:), moves(:)      !! (n_material)
+      logical, dimension(size(scene%element_label)) :: is_rigid, is_driven
+      integer :: material(size(scene%element_label)), b, i
+
+      is_rigid = .false.
+      is_driven = .false.
+      do b = 1, size(scene%rigid)
+         is_rigid(scene%rigid(b)%element) = .true.
+         is_driven(scene%rigid(b)%element) = .true.
+         do i = 1, size(scene%step)
+            associate (step => scene%step(i))
+               if (step%scheme%masses_resist .and. .not. any(step%turn%is_about .and. &
+                  step%turn%rigid == b)) is_driven(scene%rigid(b)%element) = .false.
+            end associate
+         end do
+      end do
+      material = 0
+      do i = 1, size(material)
+         if (scene%element_section(i) > 0) material(i) = &
+            scene%section(scene%element_section(i))%material
+      end do
+      allocate(resists(size(scene%material)), moves(size(scene%material)))
+      do i = 1, size(resists)
+         resists(i) = any(.not. is_rigid .and. material == i) .or. all(material /= i)
+         moves(i) = any(.not. is_driven .and. material == i) .or. all(material /= i)
+      end do
+   end subroutine mark_rigid_materials
 
    pure integer function first_true(list)
       logical, intent(in) :: list(:)
@@ -77,7 +110,7 @@ contains
       integer :: i, k
 
       if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_positions &
-         .or. reader%doubt_equations) return
+         .or. reader%doubt_equations .or. reader%doubt_rigid) return
       if (any(scene%element_node(1, :) == 0)) return
       allocate(is_bare(size(scene%node_label)), source=.true.)
       do i = 1, size(scene%element_label)
@@ -157,7 +190,7 @@ contains
       end do
    end subroutine mark_loaded
 
-   !> The degrees of freedom that stand in equations.
+   !> The degrees of freedom that stand in equations, or move a rigid body.
    pure subroutine mark_coupled(scene, is_coupled)
       type(scene_t), intent(in) :: scene
       logical, allocatable, intent(out) :: is_coupled(:, :)      !! (n_dim, n_node)
@@ -171,6 +204,7 @@ contains
             end do
          end associate
       end do
+      is_coupled(:, scene%rigid%reference) = .true.
    end subroutine mark_coupled
 
 end module emcon_deck_check

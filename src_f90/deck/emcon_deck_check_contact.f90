@@ -201,6 +201,9 @@ contains
       do k = 1, size(step%prescribed)
          own(step%prescribed(k)%node) = own(step%prescribed(k)%node) - 1
       end do
+      do k = 1, size(step%turn)
+         if (step%turn(k)%is_about) own(scene%rigid(step%turn(k)%rigid)%node) = 0
+      end do
       n_free = own
       if (all(pair%formulation /= [formulation_segment, formulation_mortar])) return
       is_master = .false.

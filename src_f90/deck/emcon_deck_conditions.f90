@@ -11,13 +11,14 @@ module emcon_deck_conditions
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_point, load_t, prescribed_t, step_t
+   use emcon_steps, only : load_moment, load_point, load_t, prescribed_t, step_t
    implicit none
    private
    public :: conditions_t, conditions_init, conditions_carry, conditions_store
    public :: put_prescribed, drop_prescribed, put_load, drop_loads
 
-   !> What holds in the step that is being read. A slot is the index of the entry at a place, 0:
+   !> What holds in the step that is being read. The freedoms of a node are n_dim displacements,
+   !> then the rotations of a reference node. A slot is the index of the entry at a place, 0:
    !> none. Gravity has the slot of face 0. The loads at a place are a list: the slot is its head,
    !> `load_next` leads on; all of them were given in one step.
    type :: conditions_t
@@ -28,8 +29,8 @@ module emcon_deck_conditions
       integer, allocatable :: prescribed_step(:), load_step(:)         !! the step that gave it
       logical, allocatable :: prescribed_dropped(:), load_dropped(:)
       integer, allocatable :: load_next(:)
-      integer, allocatable :: prescribed_slot(:, :)                    !! (n_dim, n_node)
-      integer, allocatable :: point_slot(:, :)                         !! (n_dim, n_node)
+      integer, allocatable :: prescribed_slot(:, :)                    !! (freedoms, n_node)
+      integer, allocatable :: point_slot(:, :)                         !! (freedoms, n_node)
       integer, allocatable :: element_slot(:, :)                       !! (0:n_face, n_element)
    end type conditions_t
 
@@ -38,11 +39,14 @@ contains
    subroutine conditions_init(self, scene)
       type(conditions_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
+      integer :: k
 
       allocate(self%prescribed(16), self%prescribed_step(16), self%prescribed_dropped(16))
       allocate(self%load(16), self%load_step(16), self%load_dropped(16), self%load_next(16))
-      allocate(self%prescribed_slot(scene%n_dim, size(scene%node_label)), source=0)
-      allocate(self%point_slot(scene%n_dim, size(scene%node_label)), source=0)
+      associate (n_dim => scene%n_dim, n_node => size(scene%node_label))
+         allocate(self%prescribed_slot(sum([(k, k = 1, n_dim)]), n_node), source=0)
+         allocate(self%point_slot(sum([(k, k = 1, n_dim)]), n_node), source=0)
+      end associate
       allocate(self%element_slot(0:maxval(scene%kind%n_face), size(scene%element_label)), &
          source=0)
    end subroutine conditions_init
@@ -53,7 +57,6 @@ contains
       type(amplitude_t), intent(in) :: amplitude(:)
       type(step_t), intent(in) :: last             !! the step that ends
       real(wp), intent(in) :: time                 !! total time at its start [T]
-      real(wp) :: value_end
       integer :: i, n
 
       self%step = self%step + 1
@@ -69,7 +72,7 @@ contains
             self%prescribed_slot(entry_n%dof, entry_n%node) = n
             ! What stands before the first step has not begun.
             if (self%step > 1) call end_amplitude(amplitude, last%duration, time, &
-               entry_n%amplitude, entry_n%value, value_end)
+               entry_n%amplitude, entry_n%value, entry_n%before)
          end associate
       end do
       self%n_prescribed = n
@@ -113,11 +116,17 @@ contains
       i_amplitude = 0
    end subroutine end_amplitude
 
+   elemental logical function is_on_node(load)
+      type(load_t), intent(in) :: load
+
+      is_on_node = load%kind == load_point .or. load%kind == load_moment
+   end function is_on_node
+
    pure integer function load_slot(self, load)
       type(conditions_t), intent(in) :: self
       type(load_t), intent(in) :: load
 
-      if (load%kind == load_point) then
+      if (is_on_node(load)) then
          load_slot = self%point_slot(load%place, load%target)
       else
          load_slot = self%element_slot(load%place, load%target)
@@ -129,7 +138,7 @@ contains
       type(load_t), intent(in) :: load
       integer, intent(in) :: i
 
-      if (load%kind == load_point) then
+      if (is_on_node(load)) then
          self%point_slot(load%place, load%target) = i
       else
          self%element_slot(load%place, load%target) = i
@@ -137,13 +146,18 @@ contains
    end subroutine set_load_slot
 
    !> All that holds in the step that was read.
-   subroutine conditions_store(self, step)
+   subroutine conditions_store(self, n_dim, step)
       type(conditions_t), intent(in) :: self
+      integer, intent(in) :: n_dim                 !! displacements of a node
       type(step_t), intent(inout) :: step
-      logical :: holds(self%n_load)
+      logical :: holds(self%n_load), is_turn(self%n_prescribed), is_dropped(self%n_prescribed)
 
-      step%prescribed = pack(self%prescribed(:self%n_prescribed), &
-         .not. self%prescribed_dropped(:self%n_prescribed))
+      is_dropped = self%prescribed_dropped(:self%n_prescribed)
+      is_turn = self%prescribed(:self%n_prescribed)%dof > n_dim
+      step%prescribed = pack(self%prescribed(:self%n_prescribed), .not. (is_dropped .or. is_turn))
+      if (allocated(step%turn)) deallocate(step%turn)
+      allocate(step%turn(count(is_turn .and. .not. is_dropped)))
+      step%turn%angle = pack(self%prescribed(:self%n_prescribed), is_turn .and. .not. is_dropped)
       holds = .not. self%load_dropped(:self%n_load)
       if (step%scheme%loads_ramp) then
          holds = holds .or. self%load(:self%n_load)%value_start /= 0.0_wp
@@ -158,9 +172,12 @@ contains
       type(prescribed_t), intent(in) :: new
       logical, intent(out) :: is_other
       type(prescribed_t), allocatable :: grown(:)
+      real(wp) :: before
       integer :: i, n
 
       i = self%prescribed_slot(new%dof, new%node)
+      before = 0.0_wp
+      if (i > 0) before = self%prescribed(i)%before
       is_other = .false.
       if (i > 0) then
          if (self%prescribed_step(i) == self%step) is_other = differ(self%prescribed(i), new)
@@ -177,6 +194,7 @@ contains
          self%prescribed_slot(new%dof, new%node) = i
       end if
       self%prescribed(i) = new
+      self%prescribed(i)%before = before
       self%prescribed_step(i) = self%step
       self%prescribed_dropped(i) = .false.
    end subroutine put_prescribed
@@ -285,7 +303,7 @@ contains
       integer :: i
 
       do i = 1, self%n_load
-         if ((self%load(i)%kind == load_point) .neqv. on_nodes) cycle
+         if (is_on_node(self%load(i)) .neqv. on_nodes) cycle
          if (self%load_step(i) == self%step) cycle
          self%load_dropped(i) = .true.
          self%load(i)%value = 0.0_wp

@@ -53,6 +53,8 @@ module emcon_deck_keywords
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,!ORIENTATION," &
          // "!OFFSET:0,!CONTROLS"), &
+      keyword_t("RIGID BODY", in_model, "ELSET=,REFNODE=,!ANALYTICALSURFACE,!NSET,!ROTNODE," &
+         // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
       keyword_t("ELASTIC", in_model, "TYPE=,~MODULI,!DEPENDENCIES:0"), &
@@ -111,8 +113,7 @@ module emcon_deck_keywords
       keyword_t("KINEMATIC", in_model, "", no_couple), &
       keyword_t("DISTRIBUTING", in_model, "", no_couple), &
       keyword_t("EMBEDDED ELEMENT", in_model, "", no_couple), &
-      keyword_t("RIGID BODY", in_model, "", "rigid bodies are not in this version"), &
-      keyword_t("RIGID SURFACE", in_model, "", "rigid bodies are not in this version"), &
+      keyword_t("RIGID SURFACE", in_model, "", "use *RIGID BODY with the elements of the body"), &
       keyword_t("TRANSFORM", in_model, "", "degrees of freedom are those of the global axes"), &
       keyword_t("ORIENTATION", in_model, "", "materials are isotropic"), &
       keyword_t("SYSTEM", in_model, "", "coordinates are those of the global axes"), &
@@ -284,6 +285,10 @@ contains
       case ("POLYNOMIAL", "REDUCEDPOLYNOMIAL", "ARRUDA-BOYCE", "VANDERWAALS", "MARLOW")
          call law_titles("HYPERELASTIC", reason)
          reason = " (laws are " // reason // ")"
+      case ("ANALYTICALSURFACE", "NSET", "PINNSET", "TIENSET")
+         reason = " (a rigid body is made of elements: ELSET=)"
+      case ("ROTNODE")
+         reason = " (degree of freedom 6 of the reference node is the rotation)"
       case ("READ")
          reason = " (use: emcon restart NAME.rst.h5)"
       case ("INPUT")

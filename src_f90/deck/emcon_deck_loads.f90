@@ -8,11 +8,13 @@ module emcon_deck_loads
    use emcon_deck_named, only : get_elements, get_nodes
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
       refuse_option
+   use emcon_deck_rigid, only : mark_rigid
    use emcon_deck_tables, only : find_table, table_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
+   use emcon_steps, only : load_gravity, load_moment, load_point, load_pressure, load_t, &
+      prescribed_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -24,18 +26,18 @@ module emcon_deck_loads
    !> A support that is called by its name.
    type :: support_t
       character(len=8) :: name
-      logical :: is_held(3)                        !! displacements along x, y, z
+      logical :: is_held(last_freedom)             !! displacements along x, y, z, and rotations
    end type support_t
 
    type(support_t), parameter :: supports(*) = [ &
-      support_t("ENCASTRE", [.true., .true., .true.]), &
-      support_t("PINNED", [.true., .true., .true.]), &
-      support_t("XSYMM", [.true., .false., .false.]), &
-      support_t("YSYMM", [.false., .true., .false.]), &
-      support_t("ZSYMM", [.false., .false., .true.]), &
-      support_t("XASYMM", [.false., .true., .true.]), &
-      support_t("YASYMM", [.true., .false., .true.]), &
-      support_t("ZASYMM", [.true., .true., .false.])]
+      support_t("ENCASTRE", [1, 1, 1, 1, 1, 1] == 1), &
+      support_t("PINNED", [1, 1, 1, 0, 0, 0] == 1), &
+      support_t("XSYMM", [1, 0, 0, 0, 1, 1] == 1), &
+      support_t("YSYMM", [0, 1, 0, 1, 0, 1] == 1), &
+      support_t("ZSYMM", [0, 0, 1, 1, 1, 0] == 1), &
+      support_t("XASYMM", [0, 1, 1, 1, 0, 0] == 1), &
+      support_t("YASYMM", [1, 0, 1, 0, 1, 0] == 1), &
+      support_t("ZASYMM", [1, 1, 0, 0, 0, 1] == 1)]
 
 contains
 
@@ -90,24 +92,58 @@ contains
       do while (next_line(reader, data))
          call read_boundary_line(reader, data, is_held, new%value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
-         if (data%ok) call check_value(reader, data, is_held(scene%n_dim + 1:), new)
+         if (data%ok) call check_rigid(reader, data, scene, is_held, item)
+         if (data%ok) call check_value(reader, data, scene, is_held, item, new)
          if (.not. data%ok) cycle
          allocate(is_other(size(item)), source=.false.)
          do i = 1, size(item)
             new%node = item(i)
             do dof = 1, scene%n_dim
-               if (.not. is_held(dof)) cycle
-               new%dof = dof
-               call put_prescribed(self, new, is_again)
-               is_other(i) = is_other(i) .or. is_again
+               if (is_held(dof)) call put(dof)
             end do
+            if (is_held(last_freedom) .and. any(scene%rigid%reference == item(i))) &
+               call put(scene%n_dim + 1)
          end do
          if (any(is_other)) call data_warning(reader, data, "node " // &
             label_list(pack(scene%node_label(item), is_other)) // " was prescribed otherwise " &
             // "before, in this step too; the last one holds")
          deallocate(is_other)
       end do
+
+   contains
+
+      subroutine put(freedom)
+         integer, intent(in) :: freedom          !! of the node: rotations follow displacements
+
+         new%dof = freedom
+         call put_prescribed(self, new, is_again)
+         is_other(i) = is_other(i) .or. is_again
+      end subroutine put
+
    end subroutine read_boundary
+
+   !> Of a rigid body the reference node is prescribed, and none other.
+   subroutine check_rigid(reader, data, scene, is_held, item)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_held(:)            !! (last_freedom)
+      integer, intent(in) :: item(:)               !! nodes
+      integer :: body(size(scene%node_label)), i
+
+      if (.not. any(is_held(:scene%n_dim))) return
+      call mark_rigid(scene, body)
+      do i = 1, size(item)
+         if (body(item(i)) == 0) cycle
+         associate (rigid => scene%rigid(body(item(i))))
+            if (rigid%reference == item(i)) cycle
+            call data_error(reader, data, "node " // to_text(scene%node_label(item(i))) // &
+               " belongs to rigid body " // rigid%name // ", which moves as its reference node " &
+               // to_text(scene%node_label(rigid%reference)) // " does; prescribe that node")
+            return
+         end associate
+      end do
+   end subroutine check_rigid
 
    subroutine check_boundary_options(reader, card)
       type(reader_t), intent(inout) :: reader
@@ -178,7 +214,7 @@ contains
       known = "1, 2"
       do i = 1, size(supports)
          if (supports(i)%name == name) then
-            is_held(:3) = supports(i)%is_held
+            is_held = supports(i)%is_held
             call check_count(reader, data, 2, 2, "node or node set, " // name)
             return
          end if
@@ -188,24 +224,37 @@ contains
          // quoted(name) // "; known: " // known)
    end subroutine read_support
 
-   !> Out of the plane every displacement is 0; where FIXED holds a node, a value says nothing.
-   subroutine check_value(reader, data, is_out, new)
+   !> Out of the plane every displacement is 0, and only reference nodes turn; where FIXED holds a
+   !> node, a value says nothing.
+   subroutine check_value(reader, data, scene, is_held, item, new)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
-      logical, intent(in) :: is_out(:)             !! degrees of freedom out of the plane
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_held(:)            !! (last_freedom)
+      integer, intent(in) :: item(:)               !! nodes
       type(prescribed_t), intent(in) :: new
+      integer :: i
 
       if (new%value == 0.0_wp) return
-      if (any(is_out)) then
-         call data_error(reader, data, "the model is plane: degrees of freedom 3 to 6 are 0, not " &
+      if (any(is_held(scene%n_dim + 1:last_freedom - 1))) then
+         call data_error(reader, data, "the model is plane: degrees of freedom 3 to 5 are 0, not " &
             // to_text(new%value))
-      else if (new%is_frozen) then
+      else if (is_held(last_freedom) .and. .not. reader%doubt_rigid) then
+         do i = 1, size(item)
+            if (any(scene%rigid%reference == item(i))) cycle
+            call data_error(reader, data, "node " // to_text(scene%node_label(item(i))) // &
+               " cannot turn by " // to_text(new%value) // ": degree of freedom 6 is that of the " &
+               // "reference node of a *RIGID BODY")
+            return
+         end do
+      end if
+      if (data%ok .and. new%is_frozen) then
          call data_warning(reader, data, "FIXED holds nodes where the step finds them: the value " &
             // to_text(new%value) // " has no effect")
       end if
    end subroutine check_value
 
-   !> *CLOAD: node or set, dof, force.
+   !> *CLOAD: node or set, dof, force or moment.
    subroutine read_cload(reader, card, scene, self)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -214,11 +263,11 @@ contains
       type(data_t) :: data
       type(load_t) :: new
       integer, allocatable :: item(:)
+      logical :: is_moment
       integer :: i
 
       if (is_new(reader, card)) call drop_loads(self, on_nodes=.true.)
       new%origin = card%origin
-      new%kind = load_point
       new%amplitude = card_amplitude(reader, card, scene)
       call data_open(data, card)
       do while (next_line(reader, data))
@@ -227,18 +276,44 @@ contains
          call get_integer(reader, data, 2, "degree of freedom", new%place)
          new%value = 0.0_wp
          call get_real(reader, data, 3, "force", new%value)
-         if (data%ok .and. new%place > merge(scene%n_dim, last_freedom, new%value /= 0.0_wp)) then
-           call data_error(reader, data, "degree of freedom " // to_text(new%place) &
-            // " does not exist; known: 1, 2")
-         end if
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
-         if (.not. data%ok .or. new%place > scene%n_dim) cycle
+         if (data%ok) call check_force(reader, data, scene, item, new)
+         if (.not. data%ok) cycle
+         is_moment = new%place == last_freedom
+         if (new%place > scene%n_dim .and. .not. is_moment) cycle
+         new%kind = merge(load_moment, load_point, is_moment)
+         if (is_moment) new%place = scene%n_dim + 1
          do i = 1, size(item)
+            if (is_moment .and. .not. any(scene%rigid%reference == item(i))) cycle
             new%target = item(i)
             call put_load(self, new)
          end do
       end do
    end subroutine read_cload
+
+   !> Forces act along the axes of the plane, moments on reference nodes of rigid bodies.
+   subroutine check_force(reader, data, scene, item, new)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: item(:)               !! nodes
+      type(load_t), intent(in) :: new
+      integer :: i
+
+      if (new%value == 0.0_wp .and. new%place <= last_freedom) return
+      if (new%place == last_freedom .and. .not. reader%doubt_rigid) then
+         do i = 1, size(item)
+            if (any(scene%rigid%reference == item(i))) cycle
+            call data_error(reader, data, "no moment can act on node " // &
+               to_text(scene%node_label(item(i))) // ": degree of freedom 6 is that of the " // &
+               "reference node of a *RIGID BODY")
+            return
+         end do
+      else if (new%place > scene%n_dim) then
+         call data_error(reader, data, "degree of freedom " // to_text(new%place) &
+            // " does not exist; known: 1, 2")
+      end if
+   end subroutine check_force
 
    !> *DLOAD: element or set, P1..P4, pressure; or element or set, GRAV, acceleration, direction.
    subroutine read_dload(reader, card, scene, self)

@@ -50,6 +50,7 @@ module emcon_deck_reader
       logical :: doubt_positions = .false.               !! some node is not where it should be
       logical :: doubt_shapes = .false.                  !! some element is not what it should be
       logical :: doubt_equations = .false.               !! some equation is missing after an error
+      logical :: doubt_rigid = .false.                   !! so is some rigid body
       type(label_map_t) :: node_map
       type(label_map_t) :: element_map                   !! also of lines, these below 0
       integer, allocatable :: line_label(:)              !! (n_line) elements that are edges only

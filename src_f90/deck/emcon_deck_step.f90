@@ -15,6 +15,7 @@ module emcon_deck_step
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_options, only : choose_option
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
+   use emcon_deck_rigid, only : read_turns
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
@@ -65,7 +66,8 @@ contains
          call conditions_carry(conditions, scene%amplitude, last, time)
          if (k > 1) time = time + last%duration
          call read_conditions(reader, i, scene, conditions, requests)
-         call conditions_store(conditions, scene%step(k))
+         call conditions_store(conditions, scene%n_dim, scene%step(k))
+         call read_turns(reader, scene, k)
          scene%step(k)%output = requests%output
          last = scene%step(k)
       end do

@@ -151,10 +151,7 @@ contains
       type(motion_t), intent(in) :: motion
       integer :: pair
 
-      associate (linear => system%space%linear)
-         self%is_active(:linear%n) = linear%is_used .and. .not. system%space%is_reduced
-         self%is_active(linear%n + 1:system%first_constraint(1)) = .true.
-      end associate
+      self%is_active(:system%first_constraint(1)) = system%acts
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &

@@ -104,9 +104,10 @@ contains
       self%scene%element_node = scene%element_node(:, e)
       self%scene%element_section = scene%element_section(e)
       associate (own => self%scene)
-         deallocate(own%tie, own%equation, own%pair, own%surface, own%element_set, own%step)
-         allocate(own%tie(0), own%equation(0), own%pair(0), own%surface(0), own%element_set(0), &
-            own%step(1))
+         deallocate(own%tie, own%equation, own%rigid, own%pair, own%surface, own%element_set, &
+            own%step)
+         allocate(own%tie(0), own%equation(0), own%rigid(0), own%pair(0), own%surface(0), &
+            own%element_set(0), own%step(1))
          if (allocated(own%guard)) deallocate(own%guard)
       end associate
    end subroutine cut_scene

@@ -38,7 +38,7 @@ contains
          do k = 1, size(step%prescribed)
             associate (a => step%prescribed(k)%dof, i => step%prescribed(k)%node)
                call prescribed_motion(scene, step, step%prescribed(k), finish, &
-                  state%u_start(a, i), u, v)
+                  state%u_start, u, v)
                self%motion%du(a, i) = u - state%u(a, i)
                self%v1(a, i) = v
                if (self%scheme%row%masses_resist) then

@@ -11,6 +11,7 @@ module emcon_scene
    use emcon_materials, only : material_t, section_t
    use emcon_mesh, only : named_set_t, surface_t
    use emcon_origin, only : origin_t
+   use emcon_rigid_bodies, only : rigid_body_t
    use emcon_steps, only : step_t
    use emcon_text, only : string_t, to_text
    implicit none
@@ -42,6 +43,7 @@ module emcon_scene
       type(contact_pair_t), allocatable :: guard(:)  !! of the pairs: emcon_guards
       type(tie_t), allocatable :: tie(:)
       type(equation_t), allocatable :: equation(:)
+      type(rigid_body_t), allocatable :: rigid(:)
       type(origin_t) :: given_origin
       integer, allocatable :: given_node(:)          !! ascending: what these do comes from outside
       real(wp), allocatable :: u0(:, :)              !! (n_dim, n_node) initial displacement [L]
@@ -66,8 +68,9 @@ contains
       allocate(scene%element_node(size(x, 1), 0), scene%kind(0))     ! room for a facet
       allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
       allocate(scene%material(0), scene%section(0), scene%pair(0), scene%tie(0))
-      allocate(scene%equation(0), scene%step(1))
-      allocate(scene%step(1)%prescribed(0), scene%step(1)%load(0), scene%step(1)%output(0))
+      allocate(scene%equation(0), scene%rigid(0), scene%step(1))
+      allocate(scene%step(1)%prescribed(0), scene%step(1)%turn(0), scene%step(1)%load(0), &
+         scene%step(1)%output(0))
    end subroutine scene_of_nodes
 
    !> "file:line" of `origin`, for messages.

@@ -8,13 +8,14 @@ module emcon_steps
    use emcon_solver_registry, only : solver_default
    implicit none
    private
-   public :: prescribed_t, load_t, scheme_choice_t, step_t
-   public :: load_point, load_pressure, load_gravity
+   public :: prescribed_t, turn_t, load_t, scheme_choice_t, step_t
+   public :: load_point, load_pressure, load_gravity, load_moment
    public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
       initiation_massless
    public :: method_null_space, method_saddle_point
+   public :: prescribed_find
 
-   integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3
+   integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
       initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2
@@ -30,15 +31,26 @@ module emcon_steps
       real(wp) :: value = 0.0_wp                     !! [L]
       integer :: amplitude = 0                       !! index, 0: none
       logical :: is_frozen = .false.                 !! FIXED: stays where the step found it
+      real(wp) :: before = 0.0_wp                    !! its value at the end of the step before
+      integer :: turn = 0                            !! moves as this turn of the step says; 0: none
    end type prescribed_t
+
+   !> The rotation of a rigid body that is prescribed.
+   type :: turn_t
+      integer :: rigid = 0                           !! index into `scene_t%rigid`
+      type(prescribed_t) :: angle                    !! of the reference node; value in radians
+      !> That node is prescribed too; else it is free, and the body does not turn
+      logical :: is_about = .true.
+   end type turn_t
 
    !> One load. Without amplitude: `value`; in a static step a linear run from `value_start`.
    type :: load_t
       type(origin_t) :: origin
       integer :: kind = 0                            !! one of `load_`
-      integer :: target = 0                          !! node (point) or element (pressure, gravity)
-      integer :: place = 0                           !! dof (point) or face (pressure)
-      real(wp) :: value = 0.0_wp                     !! force | pressure, > 0 inwards | acceleration
+      integer :: target = 0                          !! node (point, moment) or element
+      integer :: place = 0                           !! dof (point, moment) or face (pressure)
+      !> Force | pressure, > 0 inwards | acceleration | moment
+      real(wp) :: value = 0.0_wp
       real(wp) :: value_start = 0.0_wp               !! its value at the end of the step before
       real(wp) :: direction(3) = 0.0_wp              !! gravity: unit vector
       integer :: amplitude = 0
@@ -76,8 +88,23 @@ module emcon_steps
       integer :: newton_maximum = 20
       integer :: restart_frequency = 0               !! 0: no restart file
       type(prescribed_t), allocatable :: prescribed(:)   !! all that hold in this step
+      type(turn_t), allocatable :: turn(:)               !! of rigid bodies, in this step
       type(load_t), allocatable :: load(:)               !! all that act in this step
       type(output_t), allocatable :: output(:)           !! all that hold in this step
    end type step_t
+
+contains
+
+   !> Where a degree of freedom stands in the list; 0: it is not prescribed.
+   pure integer function prescribed_find(list, node, dof) result(k)
+      type(prescribed_t), intent(in) :: list(:)
+      integer, intent(in) :: node                !! from 1
+      integer, intent(in) :: dof                 !! 1..n_dim
+
+      do k = 1, size(list)
+         if (list(k)%node == node .and. list(k)%dof == dof) return
+      end do
+      k = 0
+   end function prescribed_find
 
 end module emcon_steps

@@ -33,6 +33,7 @@ module emcon_solid
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
       integer, allocatable :: section(:)                 !! (n_element) of the scene
       logical, allocatable :: is_linear(:)               !! (n_element) small strains in all steps
+      logical, allocatable :: is_rigid(:)                !! (n_element) mass alone, no forces
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
       !> One per material; behind them, if there are linear elements, those for these
       type(law_box_t), allocatable :: law(:)
@@ -71,11 +72,16 @@ contains
       self%kind = scene%element_kind
       self%node = scene%element_node
       allocate(self%law_of(n), self%geometry(n), self%thickness(n))
+      allocate(self%is_rigid(n), source=.false.)
+      do k = 1, size(scene%rigid)
+         self%is_rigid(scene%rigid(k)%element) = .true.
+      end do
       n_most = size(self%node, 1)
       allocate(self%mass(n_most, n_most, n), source=0.0_wp)
       allocate(self%volume_mass(n_most, n), self%stiffness(n_most, n), source=0.0_wp)
       self%section = scene%element_section
-      self%is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear
+      self%is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear &
+         .and. .not. self%is_rigid
       call init_laws(self, scene, at_rest, error, given)
       if (allocated(error)) return
       call init_kinds(self, scene, stiffness, mass, error)
@@ -85,7 +91,7 @@ contains
          self%thickness(e) = scene%section(scene%element_section(e))%thickness
          call init_element(self, scene%x, scene%material(self%law_of(e))%density, e, &
             stiffness(self%kind(e)), mass(self%kind(e)))
-         call estimate_stiffness(self, at_rest(self%law_of(e)), e)
+         if (.not. self%is_rigid(e)) call estimate_stiffness(self, at_rest(self%law_of(e)), e)
          if (self%is_linear(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
          if (any(self%geometry(e)%weight <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
@@ -173,7 +179,7 @@ contains
       allocate(self%n_point(size(self%given)), self%first_point(self%n_element), source=0)
       do e = 1, self%n_element
          associate (k => self%law_of(e))
-            if (.not. allocated(self%given(k)%energy)) cycle
+            if (self%is_rigid(e) .or. .not. allocated(self%given(k)%energy)) cycle
             self%first_point(e) = self%n_point(k) + 1
             self%n_point(k) = self%n_point(k) + self%geometry(e)%n_gp
          end associate

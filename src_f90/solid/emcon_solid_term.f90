@@ -107,6 +107,10 @@ contains
          do e = 1, solid%n_element
             if (solid%is_linear(e)) cycle
             n = solid%geometry(e)%n_node
+            if (solid%is_rigid(e)) then
+               first = first + 4*n*n
+               cycle
+            end if
             call solid_gather(solid%node(:n, e), motion%from, motion%by, local)
             call solid_element_respond(solid, e, local, self%given, present(value), part)
             if (part%is_inverted) then
@@ -193,6 +197,7 @@ contains
          do e = 1, solid%n_element
             n = solid%geometry(e)%n_node
             if (solid%is_linear(e)) cycle
+            if (solid%is_rigid(e)) cycle
             if (.not. any(abs(direction(:, solid%node(:n, e))) > 0.0_wp)) cycle
             call solid_gather(solid%node(:n, e), motion%from, motion%by, local)
             call solid_element_respond(solid, e, local, self%given, .true., part)

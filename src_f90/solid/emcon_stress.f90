@@ -32,6 +32,7 @@ contains
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
+         if (solid%is_rigid(e)) cycle
          motion%nlgeom = nlgeom .and. .not. solid%is_linear(e)
          call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
          do k = 1, solid%geometry(e)%n_gp
@@ -123,6 +124,7 @@ contains
       strain = 0.0_wp
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight)
+         if (solid%is_rigid(e)) cycle
          motion%nlgeom = nlgeom .and. .not. solid%is_linear(e)
          call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
          do k = 1, solid%geometry(e)%n_gp

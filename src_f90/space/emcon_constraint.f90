@@ -5,6 +5,7 @@
 module emcon_constraint
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
+   use emcon_numbering, only : numbering_t
    implicit none
    private
    public :: condition_t, condition_force, condition_rate, constraint_t, constraint_box_t
@@ -31,6 +32,7 @@ module emcon_constraint
       integer, allocatable :: stands_on(:)
    contains
       procedure :: take_positions
+      procedure :: find_idle
       procedure(linearise_interface), deferred :: linearise
    end type constraint_t
 
@@ -61,6 +63,16 @@ contains
       class(constraint_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)     !! (n_dim, n_node) [L]
    end subroutine take_positions
+
+   !> Told at the beginning of each step: which conditions have nothing to hold in it, as no unknown
+   !> enters them. None unless overridden.
+   pure subroutine find_idle(self, numbering, is_idle)
+      class(constraint_t), intent(in) :: self
+      type(numbering_t), intent(in) :: numbering
+      logical, intent(out) :: is_idle(:)              !! (n_constraint)
+
+      is_idle = .false.
+   end subroutine find_idle
 
    !> The force of the multiplier `lam` on node `i` of the condition: along the discrete gradient,
    !> as there is no friction.

@@ -4,7 +4,8 @@ module emcon_prescribed
    use emcon_kinds, only : wp
    use emcon_pose, only : instant_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : prescribed_t, step_t
+   use emcon_steps, only : prescribed_find, prescribed_t, step_t
+   use emcon_turn_plane, only : turn_arm, turn_of, turned_by
    implicit none
    private
    public :: amplitude_at, prescribed_motion, ramp_at, ramp_turn
@@ -24,31 +25,66 @@ contains
       call find_amplitude_value(amplitude, time, value, rate)
    end subroutine amplitude_at
 
-   !> Displacement and velocity of a prescribed degree of freedom at `instant`; `u_start` is its
-   !> displacement at the start of the step. The velocity is the slope to the left.
+   !> Displacement and velocity of a prescribed degree of freedom at `instant`; `u_start` are the
+   !> displacements at the start of the step. The velocity is the slope to the left.
    pure subroutine prescribed_motion(scene, step, prescribed, instant, u_start, u, v)
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
       type(prescribed_t), intent(in) :: prescribed
       type(instant_t), intent(in) :: instant
-      real(wp), intent(in) :: u_start            !! [L]
+      real(wp), intent(in), contiguous :: u_start(:, :)  !! (n_dim, n_node) [L]
       real(wp), intent(out) :: u                 !! [L]
       real(wp), intent(out) :: v                 !! [L/T]
+      real(wp) :: arm(size(u_start, 1)), start(size(u_start, 1)), w(size(u_start, 1)), &
+         rate(size(u_start, 1)), angle, spin
+
+      if (prescribed%turn == 0) then
+         call given_motion(scene, step, prescribed, instant, &
+            u_start(prescribed%dof, prescribed%node), u, v)
+         return
+      end if
+      associate (turn => step%turn(prescribed%turn), a => prescribed%dof)
+         arm = scene%x(:, prescribed%node) - scene%x(:, turn%angle%node)
+         start = u_start(:, prescribed%node) - u_start(:, turn%angle%node)
+         call given_motion(scene, step, step%prescribed(prescribed_find(step%prescribed, &
+            turn%angle%node, a)), instant, u_start(a, turn%angle%node), u, v)
+         if (turn%angle%is_frozen) then
+            u = u + start(a)
+            return
+         end if
+         angle = turned_by(arm, arm + start)
+         angle = angle + turn_of*anint((turn%angle%before - angle)/turn_of)
+         call given_motion(scene, step, turn%angle, instant, angle, angle, spin)
+         call turn_arm(arm, angle, w, rate)
+         u = u + w(a)
+         v = v + spin*rate(a)
+      end associate
+   end subroutine prescribed_motion
+
+   !> What an amplitude, or the run of a step from `start`, gives.
+   pure subroutine given_motion(scene, step, prescribed, instant, start, u, v)
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(prescribed_t), intent(in) :: prescribed
+      type(instant_t), intent(in) :: instant
+      real(wp), value :: start                   !! at the start of the step [L] or radians
+      real(wp), intent(out) :: u                 !! [L] or radians
+      real(wp), intent(out) :: v                 !! its rate
       real(wp) :: factor, rate
 
       v = 0.0_wp
       if (prescribed%is_frozen) then
-         u = u_start
+         u = start
       else if (prescribed%amplitude > 0) then
          call amplitude_at(scene%amplitude(prescribed%amplitude), instant, factor, rate)
          u = prescribed%value*factor
          v = prescribed%value*rate
       else if (step%scheme%loads_ramp) then
-         u = ramp_at(step, instant%step_time, u_start, prescribed%value)
+         u = ramp_at(step, instant%step_time, start, prescribed%value)
       else
          u = prescribed%value
       end if
-   end subroutine prescribed_motion
+   end subroutine given_motion
 
    !> Where the linear run of a step from `start` to `last` is.
    pure real(wp) function ramp_at(step, step_time, start, last)

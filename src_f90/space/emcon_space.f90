@@ -4,11 +4,11 @@ module emcon_space
    use emcon_bodies, only : bodies_find_lists
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
-   use emcon_linear_rows, only : linear_rows_init, linear_rows_t
+   use emcon_linear_rows, only : linear_rows_choose, linear_rows_init, linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : method_null_space, step_t
+   use emcon_steps, only : method_null_space
    implicit none
    private
    public :: space_t, space_init, space_begin_step
@@ -25,7 +25,7 @@ module emcon_space
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
       logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term or an equation
-      type(linear_rows_t) :: linear              !! rows of ties and equations
+      type(linear_rows_t) :: linear              !! rows of rigid bodies, ties and equations
       type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
       type(unresolved_t), allocatable :: unresolved(:)   !! those of them that follow from others
       logical :: is_reduced = .true.             !! `numbering` is that one, else without them
@@ -87,32 +87,35 @@ contains
       allocate(self%unresolved(0))
    end subroutine space_init
 
-   !> Number the unknowns of `step` and lay out the matrix between them. Linear constraints are
-   !> eliminated, less those that follow from others, unless the step asks for multipliers or their
+   !> Number the unknowns of step `i_step` and lay out the matrix between them. Linear constraints
+   !> are eliminated, less those that follow from others, unless the step asks for multipliers or their
    !> rows are too long: `is_reduced` tells.
-   subroutine space_begin_step(self, step, lists, matrix, slot, error)
+   subroutine space_begin_step(self, scene, i_step, lists, matrix, slot, error)
       type(space_t), intent(inout) :: self
-      type(step_t), intent(in) :: step
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step                      !! from 1
       type(lists_t), intent(in) :: lists                 !! of all terms
       type(csr_t), intent(out) :: matrix                 !! values are zero
       integer, allocatable, intent(out) :: slot(:)       !! places of the lists in it
       type(error_t), allocatable, intent(out) :: error
       logical :: is_too_full
 
-      self%linear%is_used = .true.
-      if (self%linear%n > 0) then
-         call numbering_init(self%linked, self%is_alive, step%prescribed, self%linear, &
-            self%unresolved)
-         self%linear%is_used(self%unresolved%row) = .false.
-      end if
-      self%is_reduced = step%constraint_method == method_null_space
+      associate (step => scene%step(i_step))
+         call linear_rows_choose(self%linear, scene, step)
+         if (self%linear%n > 0) then
+            call numbering_init(self%linked, self%is_alive, step%prescribed, self%linear, &
+               self%unresolved)
+            self%linear%is_used(self%unresolved%row) = .false.
+         end if
+         self%is_reduced = step%constraint_method == method_null_space
+      end associate
       if (self%is_reduced .and. self%linear%n > 0) then
          self%numbering = self%linked
          call lay_out(self, lists, matrix, slot, is_too_full, error)
          self%is_reduced = .not. is_too_full
          if (allocated(error) .or. self%is_reduced) return
       end if
-      call numbering_init(self%numbering, self%is_alive, step%prescribed)
+      call numbering_init(self%numbering, self%is_alive, scene%step(i_step)%prescribed)
       call lay_out(self, lists, matrix, slot, is_too_full, error)
    end subroutine space_begin_step
 

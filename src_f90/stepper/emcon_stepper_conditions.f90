@@ -100,7 +100,7 @@ contains
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
          now = instant_t(state%step_time, state%time)
          call prescribed_motion(self%scene, step, step%prescribed(k), now, &
-            state%u_start(dof, node), u, v)
+            state%u_start, u, v)
          if (step%prescribed(k)%amplitude == 0) call ramp_turn(step, state%step_time, u, value, &
             state%u_start(dof, node))
          step%prescribed(k)%value = value
@@ -218,6 +218,7 @@ contains
       call restart_exchange(restart, "prescribed_place", list%dof)
       call restart_exchange(restart, "prescribed_place", list%amplitude)
       call restart_exchange(restart, "prescribed_place", list%is_frozen)
+      call restart_exchange(restart, "prescribed_place", list%turn)
       call restart_exchange(restart, "prescribed_value", list%value)
       call restart_check(restart, error)
       if (restart%is_reading .and. .not. allocated(error)) call renumber(self, list, error)

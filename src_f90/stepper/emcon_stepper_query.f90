@@ -230,11 +230,10 @@ contains
       type(gap_state_t), allocatable :: gap(:)
 
       associate (system => self%march%system, active => self%march%active, &
-            linear => self%march%system%space%linear, state => self%march%state)
+            state => self%march%state)
          call gaps_search(system, self%march%motion, gap)
          active%is_active = state%is_active .and. gap%is_near
-         active%is_active(:linear%n) = linear%is_used .and. .not. system%space%is_reduced
-         active%is_active(linear%n + 1:system%first_constraint(1)) = .true.
+         active%is_active(:system%first_constraint(1)) = system%acts
          active%lam = state%lam
          active%n_tried = 0
       end associate

@@ -38,6 +38,7 @@ module emcon_system
       integer :: n_pair = 0                      !! of the scene; guards come after them
       !> Conditions are numbered: those of `held`, those of `contact`
       integer :: n_constraint = 0
+      logical, allocatable :: acts(:)            !! (conditions of `held`) they act in the step
       integer, allocatable :: first_constraint(:)   !! (n_contact + 1) conditions before each
       integer :: i_step = 0                      !! step of the deck the rest belongs to
       type(space_t) :: space                     !! bodies, freedoms, unknowns
@@ -82,6 +83,7 @@ contains
       do i = 1, size(self%held)
          self%n_constraint = self%n_constraint + self%held(i)%constraint%n_constraint
       end do
+      allocate(self%acts(self%n_constraint), source=.false.)
       self%n_pair = size(scene%pair)
       if (allocated(scene%guard)) then
          allocate(pair, source=[scene%pair, scene%guard])
@@ -140,7 +142,7 @@ contains
       self%notes = notes_t()
       self%stiffening = stiffening_t()
       call lay_out(self, scene, lists, first)
-      call space_begin_step(self%space, scene%step(i_step), lists, self%matrix, slot, error)
+      call space_begin_step(self%space, scene, i_step, lists, self%matrix, slot, error)
       if (allocated(error)) return
       if (scene%step(i_step)%constraint_method == method_null_space &
          .and. .not. self%space%is_reduced) call note_add(self%notes, &
@@ -150,8 +152,31 @@ contains
          call self%term(k)%term%begin_step(scene, i_step, self%space, self%matrix, &
             slot(first(k) + 1:first(k + 1)))
       end do
+      call find_acting(self)
       if (scene%step(i_step)%scheme%masses_resist) call check_mass(self, scene, error)
    end subroutine system_begin_step
+
+   !> Which of the conditions of `held` act: linear ones that are not eliminated, and others that
+   !> have something to hold.
+   subroutine find_acting(self)
+      type(system_t), intent(inout) :: self
+      integer :: i, n
+
+      associate (linear => self%space%linear)
+         self%acts(:linear%n) = linear%is_used .and. .not. self%space%is_reduced
+         n = linear%n
+      end associate
+      do i = 2, size(self%held)
+         associate (constraint => self%held(i)%constraint)
+            call constraint%find_idle(self%space%numbering, &
+               self%acts(n + 1:n + constraint%n_constraint))
+            n = n + constraint%n_constraint
+         end associate
+      end do
+      associate (others => self%acts(self%space%linear%n + 1:))
+         others = .not. others
+      end associate
+   end subroutine find_acting
 
    !> In dynamics what is forced needs mass.
    subroutine check_mass(self, scene, error)

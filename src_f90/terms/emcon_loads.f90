@@ -7,21 +7,23 @@ module emcon_loads
    use emcon_motion, only : motion_t
    use emcon_pose, only : instant_t
    use emcon_prescribed, only : amplitude_at
+   use emcon_moment_load_plane, only : add_moment, add_moment_stiffness
    use emcon_pressure_plane, only : add_pressure, add_pressure_stiffness
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_space, only : space_t
-   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t
+   use emcon_space, only : lists_append, lists_t, space_t
+   use emcon_steps, only : load_gravity, load_moment, load_point, load_pressure, load_t
    use emcon_term, only : response_t, role_external, term_t
    implicit none
    private
    public :: loads_t, loads_init
 
-   !> Point loads, pressures and gravity of a step.
+   !> Point loads, moments on rigid bodies, pressures and gravity of a step.
    type, extends(term_t) :: loads_t
       type(load_t), allocatable :: load(:)
       type(amplitude_t), allocatable, private :: amplitude(:)   !! of the scene
+      integer, allocatable, private :: frame(:, :)  !! (n_dim + 1, bodies) of rigid bodies
       integer, allocatable, private :: face(:, :)   !! (n, n_load) nodes of a loaded face, else 0
       !> (n_dim*n, n_dim*n, n_load) places of the stiffness of pressure on it
       integer, allocatable, private :: slot(:, :, :)
@@ -34,6 +36,7 @@ module emcon_loads
       real(wp), allocatable, private :: thickness(:)     !! (n_element) [L]
       real(wp), allocatable, private :: force(:, :)      !! (n_dim, n_node) [M L/T^2]
    contains
+      procedure :: lay_out
       procedure :: begin_step
       procedure :: renew
       procedure :: respond
@@ -47,6 +50,7 @@ contains
       type(loads_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
+      integer :: b
 
       self%role = role_external
       self%amplitude = scene%amplitude
@@ -55,8 +59,25 @@ contains
       self%thickness = solid%thickness
       self%is_linear = solid%is_linear
       allocate(self%load(0))
+      allocate(self%frame(size(scene%x, 1) + 1, size(scene%rigid)))
+      do b = 1, size(scene%rigid)
+         self%frame(:, b) = scene%rigid(b)%frame
+      end do
       allocate(self%force, mold=scene%x)
    end subroutine loads_init
+
+   !> The frames of rigid bodies: their nodes meet under a moment, and are of one body.
+   pure subroutine lay_out(self, lists)
+      class(loads_t), intent(in) :: self
+      type(lists_t), intent(inout) :: lists
+      integer :: freedom(lists%n_dim, size(self%frame, 1), size(self%frame, 2)), a
+
+      do a = 1, lists%n_dim
+         freedom(a, :, :) = lists%n_dim*(self%frame - 1) + a
+      end do
+      call lists_append(lists, spread(lists%n_dim*size(self%frame, 1), 1, size(self%frame, 2)), &
+         reshape(freedom, [size(freedom)]))
+   end subroutine lay_out
 
    !> The loads of step `i_step`, and the places of the pressure stiffness in the matrix.
    subroutine begin_step(self, scene, i_step, space, matrix, slot)
@@ -65,7 +86,7 @@ contains
       integer, intent(in) :: i_step              !! from 1
       type(space_t), intent(in) :: space
       type(csr_t), intent(in) :: matrix
-      integer, intent(in) :: slot(:)             !! empty: what meets here meets in elements
+      integer, intent(in) :: slot(:)             !! not needed: they are found again
       integer, allocatable :: number(:)
       integer :: dof(scene%n_dim, max_face_nodes), i, e, j, k, a
 
@@ -83,10 +104,17 @@ contains
       allocate(self%slot(size(dof), size(dof), size(self%load)), source=0)
       allocate(number, source=freedom_numbers(space%numbering))
       do i = 1, size(self%load)
-         if (self%load(i)%kind /= load_pressure) cycle
-         e = self%load(i)%target
-         self%face(:, i) = scene%element_node( &
-            scene%kind(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
+         select case (self%load(i)%kind)
+         case (load_pressure)
+            e = self%load(i)%target
+            self%face(:, i) = scene%element_node( &
+               scene%kind(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
+         case (load_moment)
+            self%face(:, i) = self%frame(:max_face_nodes, &
+               findloc(self%frame(1, :), self%load(i)%target, 1))
+         case default
+            cycle
+         end select
          do a = 1, scene%n_dim
             dof(a, :) = number(scene%n_dim*(self%face(:, i) - 1) + a)
          end do
@@ -160,6 +188,11 @@ contains
                if (present(value) .and. self%follows(i)) then
                   call add_pressure_stiffness(p*motion%load_weight, self%slot(:, :, i), value, side)
                end if
+            case (load_moment)
+               call add_moment(self%face(:, i), p, motion%x, motion%at, self%force)
+               if (present(value)) call add_moment_stiffness(motion%x(:, self%face(:, i)) &
+                  + motion%at(:, self%face(:, i)), p*motion%load_weight, self%slot(:, :, i), &
+                  value, side)
             end select
          end associate
       end do
@@ -169,12 +202,12 @@ contains
       end associate
    end subroutine respond
 
-   !> It is, unless a pressure follows the surface.
+   !> It is, unless a pressure follows the surface, or there is a moment.
    pure logical function is_symmetric(self, motion)
       class(loads_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = .not. any(self%follows)
+      is_symmetric = .not. (any(self%follows) .or. any(self%load%kind == load_moment))
    end function is_symmetric
 
 end module emcon_loads

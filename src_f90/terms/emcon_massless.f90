@@ -27,7 +27,7 @@ module emcon_massless
 contains
 
    !> The slave nodes of all pairs, if dynamic steps ask for massless surfaces; less those that are
-   !> prescribed in such a step, dependent in ties and equations, or given mass, and those of
+   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass, and those of
    !> elements that would keep none.
    pure subroutine massless_find(scene, solid, given, is_massless)
       type(scene_t), intent(in) :: scene
@@ -56,6 +56,9 @@ contains
       end do
       do i = 1, size(scene%equation)
          is_massless(scene%equation(i)%node) = .false.
+      end do
+      do i = 1, size(scene%rigid)
+         is_massless(scene%rigid(i)%node) = .false.
       end do
       do i = 1, given%n_row
          if (given%row_start(i + 1) > given%row_start(i)) is_massless(i) = .false.

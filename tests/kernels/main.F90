@@ -55,6 +55,7 @@ program main
    use test_reduction, only : collect_reduction
    use test_results, only : collect_results
    use test_rigid_motion, only : collect_rigid_motion
+   use test_rigidity, only : collect_rigidity
    use test_rigid_bodies, only : collect_rigid_bodies
    use test_row_elimination, only : collect_row_elimination
    use test_saddle_point, only : collect_saddle_point
@@ -142,6 +143,7 @@ program main
    call run("linear_rows", collect_linear_rows)
    call run("loads", collect_loads)
    call run("rigid_motion", collect_rigid_motion)
+   call run("rigidity", collect_rigidity)
    call run("rigid_bodies", collect_rigid_bodies)
    call run("constraints", collect_constraints)
    call run("independent_rows", collect_independent_rows)

@@ -41,7 +41,7 @@ contains
       allocate(scene%element_node(4, 0), scene%element_section(0))
       allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
       allocate(scene%material(1), scene%section(1), scene%pair(0), scene%step(0))
-      allocate(scene%tie(0), scene%equation(0))
+      allocate(scene%tie(0), scene%equation(0), scene%rigid(0))
       allocate(scene%u0(2, 0), scene%v0(2, 0))
       scene%material(1)%name = "RUBBER"
       scene%material(1)%law = law_coupled_neo_hooke

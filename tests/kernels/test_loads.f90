@@ -288,24 +288,27 @@ contains
       type(prescribed_t) :: prescribed
       type(instant_t), parameter :: instant = instant_t(0.5_wp, 1.5_wp)
       real(wp) :: u, v
+      real(wp), parameter :: start(1, 1) = 2.0_wp
 
       call make_block(scene, "CPE4", [2, 2], block)
+      prescribed%node = 1
+      prescribed%dof = 1
       call add_step(scene, .true., 0.5_wp, 4)
       call add_step(scene, .false., 0.5_wp, 4)
       prescribed%value = 4.0_wp
-      call prescribed_motion(scene, scene%step(1), prescribed, instant, 2.0_wp, u, v)
+      call prescribed_motion(scene, scene%step(1), prescribed, instant, start, u, v)
       call check_near(error, [u, v], [2.5_wp, 0.0_wp], 0.0_wp, 1.0_wp, "static ramp from 2 to 4")
-      call prescribed_motion(scene, scene%step(2), prescribed, instant, 2.0_wp, u, v)
+      call prescribed_motion(scene, scene%step(2), prescribed, instant, start, u, v)
       call check_near(error, [u, v], [4.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "dynamic: at once")
       deallocate(scene%amplitude)
       allocate(scene%amplitude(1))
       scene%amplitude(1) = amplitude_t(name="A", time=[1.0_wp, 2.0_wp], value=[0.0_wp, 8.0_wp], &
          is_total_time=.true.)
       prescribed%amplitude = 1
-      call prescribed_motion(scene, scene%step(2), prescribed, instant, 2.0_wp, u, v)
+      call prescribed_motion(scene, scene%step(2), prescribed, instant, start, u, v)
       call check_near(error, [u, v], [16.0_wp, 32.0_wp], 0.0_wp, 1.0_wp, "along an amplitude")
       prescribed%is_frozen = .true.
-      call prescribed_motion(scene, scene%step(2), prescribed, instant, 2.0_wp, u, v)
+      call prescribed_motion(scene, scene%step(2), prescribed, instant, start, u, v)
       call check_near(error, [u, v], [2.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "frozen")
    end subroutine test_motion
 

@@ -1,0 +1,226 @@
+!> *RIGID BODY: element sets that keep their shape, their reference nodes, how these turn.
+module emcon_deck_rigid
+   use emcon_deck_labels, only : find_label
+   use emcon_deck_named, only : find_set, hint_at_set, set_names
+   use emcon_deck_reader, only : card_error, card_t, need_name, reader_t
+   use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
+   use emcon_kinds, only : wp
+   use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
+   use emcon_scene, only : scene_t
+   use emcon_sort, only : unique_sorted
+   use emcon_steps, only : prescribed_find, prescribed_t
+   use emcon_text, only : read_integer, to_text
+   implicit none
+   private
+   public :: read_rigid_bodies, read_turns, mark_rigid
+
+contains
+
+   !> All cards; a body that is refused is left out.
+   subroutine read_rigid_bodies(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      type(rigid_body_t), allocatable :: all(:)
+      type(rigid_body_t) :: new
+      integer :: i, n, n_before
+
+      allocate(scene%rigid(0))
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "RIGIDBODY") cycle
+         n_before = reader%log%n_errors
+         call read_card(reader, reader%card(i), scene, new)
+         reader%doubt_rigid = reader%doubt_rigid .or. reader%log%n_errors > n_before
+         if (.not. allocated(new%frame)) cycle
+         n = size(scene%rigid)
+         allocate(all(n + 1))
+         all(:n) = scene%rigid
+         all(n + 1) = new
+         call move_alloc(all, scene%rigid)
+      end do
+   end subroutine read_rigid_bodies
+
+   !> One body; without frame if it is wrong.
+   subroutine read_card(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(rigid_body_t), intent(out) :: new
+      integer, allocatable :: node(:)
+
+      new%origin = card%origin
+      call find_elements(reader, card, scene, new)
+      call find_reference(reader, card, scene, new%reference)
+      if (.not. allocated(new%element) .or. new%reference == 0) return
+      if (reader%doubt_elements .or. reader%doubt_positions) return
+      associate (of_element => scene%element_node(:, new%element))
+         node = [pack(of_element, of_element > 0), new%reference]
+      end associate
+      new%node = unique_sorted(node)
+      call check_alone(reader, card, scene, new)
+      call rigid_frame_choose(scene%x, new%node, new%reference, new%frame)
+      if (.not. allocated(new%frame)) call card_error(reader, card, "the nodes of element set " &
+         // new%name // " and the reference node " // to_text(scene%node_label(new%reference)) &
+         // " lie on one line, which tells no rotation; put the reference node beside it")
+   end subroutine read_card
+
+   subroutine find_elements(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(rigid_body_t), intent(inout) :: new
+      character(len=:), allocatable :: hint
+      integer :: i
+
+      call need_name(reader, card, "ELSET", new%name)
+      if (new%name == "") return
+      i = find_set(scene%element_set, new%name)
+      if (i == 0) then
+         call hint_at_set(reader, "element set", new%name, set_names(scene%element_set), hint)
+         if (.not. reader%doubt_names) call card_error(reader, card, "unknown element set " // &
+            quoted(new%name) // hint)
+      else if (size(scene%element_set(i)%item) == 0) then
+         call card_error(reader, card, "element set " // new%name // " is empty")
+      else
+         new%element = scene%element_set(i)%item
+      end if
+   end subroutine find_elements
+
+   !> The node that REF NODE names by its label, or by a set that holds it alone.
+   subroutine find_reference(reader, card, scene, node)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      integer, intent(out) :: node               !! 0: there is none
+      character(len=:), allocatable :: name
+      integer :: label, i
+      logical :: is_number
+
+      node = 0
+      call need_name(reader, card, "REFNODE", name)
+      if (name == "") return
+      call read_integer(name, label, is_number)
+      if (is_number) then
+         node = find_label(reader%node_map, label)
+         if (node == 0 .and. .not. reader%doubt_nodes) call card_error(reader, card, &
+            "the reference node " // name // " does not exist")
+      else
+         i = find_set(scene%node_set, name)
+         if (i == 0) then
+            if (.not. reader%doubt_names) call card_error(reader, card, "unknown node set " // &
+               quoted(name) // suggestion(name, set_names(scene%node_set)))
+         else if (size(scene%node_set(i)%item) /= 1) then
+            call card_error(reader, card, "the reference node is one node, but node set " // name &
+               // " has " // to_text(size(scene%node_set(i)%item)))
+         else
+            node = scene%node_set(i)%item(1)
+         end if
+      end if
+   end subroutine find_reference
+
+   !> No node is of two rigid bodies.
+   subroutine check_alone(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(rigid_body_t), intent(in) :: new
+      logical :: is_in(size(scene%node_label)), is_there(size(scene%node_label))
+      integer :: b
+
+      is_in = .false.
+      is_in(new%node) = .true.
+      do b = 1, size(scene%rigid)
+         associate (other => scene%rigid(b))
+            if (other%reference == new%reference) then
+               call card_error(reader, card, "the reference node " // to_text(scene%node_label( &
+                  new%reference)) // " is that of rigid body " // other%name // " already")
+               cycle
+            end if
+            is_there = .false.
+            is_there(other%node) = .true.
+            if (any(is_in .and. is_there)) call card_error(reader, card, "node " // &
+               label_list(pack(scene%node_label, is_in .and. is_there)) // &
+               " belongs to rigid body " // other%name // " already; make both one body, or " // &
+               "give each its own nodes")
+         end associate
+      end do
+   end subroutine check_alone
+
+   !> The rigid body of each node.
+   pure subroutine mark_rigid(scene, body)
+      type(scene_t), intent(in) :: scene
+      integer, intent(out) :: body(:)            !! (n_node) 0: none
+      integer :: b
+
+      body = 0
+      do b = 1, size(scene%rigid)
+         body(scene%rigid(b)%node) = b
+      end do
+   end subroutine mark_rigid
+
+   !> What turns in step `i_step`: with its reference node prescribed, a body is prescribed by its
+   !> frame; with that node free it must not turn, and never have done so.
+   subroutine read_turns(reader, scene, i_step)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      integer, intent(in) :: i_step              !! from 1
+      integer :: i, a
+
+      do i = 1, size(scene%step(i_step)%turn)
+         associate (turn => scene%step(i_step)%turn(i))
+            turn%rigid = findloc(scene%rigid%reference, turn%angle%node, 1)
+            turn%is_about = all([(prescribed_find(scene%step(i_step)%prescribed, &
+               turn%angle%node, a), a = 1, scene%n_dim)] > 0)
+            if (turn%is_about) then
+               call prescribe_frame(scene, i_step, i)
+               cycle
+            end if
+            if (turn%angle%is_frozen .or. .not. abs(turn%angle%value) > 0.0_wp) then
+               if (is_held_before(scene, i_step, turn%rigid)) cycle
+            end if
+            call add_error(reader%log, turn%angle%origin, "*BOUNDARY: the rotation of reference " &
+               // "node " // to_text(scene%node_label(turn%angle%node)) // " is prescribed while " &
+               // "the node is free to move; that is done only with the value 0 in every step " &
+               // "from the first one on; prescribe its degrees of freedom 1 and 2 too")
+         end associate
+      end do
+   end subroutine read_turns
+
+   !> Was the body kept from turning in all steps before `i_step`?
+   pure logical function is_held_before(scene, i_step, rigid)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step, rigid
+      integer :: k
+
+      is_held_before = .true.
+      do k = 1, i_step - 1
+         associate (turn => scene%step(k)%turn)
+            is_held_before = is_held_before .and. any(turn%rigid == rigid .and. &
+               (turn%angle%is_frozen .or. .not. abs(turn%angle%value) > 0.0_wp))
+         end associate
+      end do
+   end function is_held_before
+
+   !> Prescribe the nodes of the frame of turn `i` but the reference node, which is.
+   pure subroutine prescribe_frame(scene, i_step, i)
+      type(scene_t), intent(inout) :: scene
+      integer, intent(in) :: i_step, i
+      type(prescribed_t), allocatable :: new(:)
+      integer :: k, a, n
+
+      associate (turn => scene%step(i_step)%turn(i), n_dim => scene%n_dim)
+         allocate(new(n_dim*n_dim))
+         n = 0
+         do k = 2, n_dim + 1
+            do a = 1, n_dim
+               n = n + 1
+               new(n)%origin = turn%angle%origin
+               new(n)%node = scene%rigid(turn%rigid)%frame(k)
+               new(n)%dof = a
+               new(n)%turn = i
+            end do
+         end do
+      end associate
+      scene%step(i_step)%prescribed = [scene%step(i_step)%prescribed, new]
+   end subroutine prescribe_frame
+
+end module emcon_deck_rigid

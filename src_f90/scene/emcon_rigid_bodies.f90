@@ -1,0 +1,96 @@
+!> Rigid bodies: elements that keep their shape, and the few nodes whose motion is that of all.
+!>
+!> A rigid motion is affine: where the n_dim + 1 nodes of a frame are tells where every other node
+!> is. Source: docs/theory.md, section 13.
+module emcon_rigid_bodies
+   use emcon_kinds, only : wp
+   use emcon_origin, only : origin_t
+   implicit none
+   private
+   public :: rigid_body_t, rigid_frame_choose, rigid_weights
+
+   type :: rigid_body_t
+      type(origin_t) :: origin
+      character(len=:), allocatable :: name          !! of the element set
+      integer :: reference = 0                       !! node that is fixed, driven and loaded
+      integer, allocatable :: element(:)             !! ascending
+      integer, allocatable :: node(:)                !! ascending; with the reference node
+      integer, allocatable :: frame(:)               !! (n_dim + 1) the reference node comes first
+   end type rigid_body_t
+
+   !> Nodes nearer to the plane of others than this part of the extent lie in it.
+   real(wp), parameter :: flatness = sqrt(epsilon(1.0_wp))
+
+contains
+
+   !> Of `node` those that span the largest frame from `reference` on, one after the other. A flat
+   !> body has none: `frame` is not allocated.
+   pure subroutine rigid_frame_choose(x, node, reference, frame)
+      real(wp), intent(in) :: x(:, :)                !! (n_dim, n_node) [L]
+      integer, intent(in) :: node(:)                 !! of the body
+      integer, intent(in) :: reference
+      integer, allocatable, intent(out) :: frame(:)  !! (n_dim + 1)
+      real(wp) :: axis(size(x, 1), size(x, 1)), arm(size(x, 1)), extent, length, longest
+      integer :: chosen(size(x, 1) + 1), i, k
+
+      extent = 0.0_wp
+      chosen(1) = reference
+      do k = 1, size(x, 1)
+         longest = -1.0_wp
+         do i = 1, size(node)
+            arm = beyond(i)
+            length = norm2(arm)
+            if (length <= longest) cycle
+            longest = length
+            chosen(k + 1) = node(i)
+            axis(:, k) = arm
+         end do
+         extent = max(extent, longest)
+         if (.not. longest > flatness*extent) return
+         axis(:, k) = axis(:, k)/longest
+      end do
+      frame = chosen
+
+   contains
+
+      !> From the reference node to node `i`, less its parts along the axes so far.
+      pure function beyond(i) result(arm)
+         integer, intent(in) :: i
+         real(wp) :: arm(size(x, 1))
+         integer :: l
+
+         arm = x(:, node(i)) - x(:, reference)
+         do l = 1, k - 1
+            arm = arm - dot_product(arm, axis(:, l))*axis(:, l)
+         end do
+      end function beyond
+
+   end subroutine rigid_frame_choose
+
+   !> The affine combination of the nodes of a frame that a place is; the weights sum up to 1.
+   pure subroutine rigid_weights(frame, place, weight)
+      real(wp), intent(in) :: frame(:, :)            !! (n_dim, n_dim + 1) positions [L]
+      real(wp), intent(in) :: place(:)               !! (n_dim) [L]
+      real(wp), intent(out) :: weight(:)             !! (n_dim + 1)
+      real(wp) :: a(size(place), size(place) + 1), row(size(place) + 1)
+      integer :: i, k, n
+
+      n = size(place)
+      do k = 1, n
+         a(:, k) = frame(:, k + 1) - frame(:, 1)
+      end do
+      a(:, n + 1) = place - frame(:, 1)
+      do k = 1, n
+         i = k - 1 + maxloc(abs(a(k:, k)), 1)
+         row = a(i, :)
+         a(i, :) = a(k, :)
+         a(k, :) = row/row(k)
+         do i = 1, n
+            if (i /= k) a(i, :) = a(i, :) - a(i, k)*a(k, :)
+         end do
+      end do
+      weight(2:) = a(:, n + 1)
+      weight(1) = 1.0_wp - sum(weight(2:))
+   end subroutine rigid_weights
+
+end module emcon_rigid_bodies
