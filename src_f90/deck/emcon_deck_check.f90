@@ -47,7 +47,8 @@ contains
          if (.not. is_used(i)) cycle
          associate (given => scene%material(i))
             if (given%law == 0 .and. resists(i)) call add_error(reader%log, given%origin, &
-               "material " // given%name // " has no law: *ELASTIC, *HYPERELASTIC or *USER MATERIAL is missing")
+               "material " // given%name // " has no law: *ELASTIC, *HYPERELASTIC or *USER " &
+               // "MATERIAL is missing")
             if (given%density > 0.0_wp .or. given%density < 0.0_wp) cycle
             if (needs_mass .and. moves(i)) then
                call add_error(reader%log, given%origin, "material " // given%name &

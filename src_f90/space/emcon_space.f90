@@ -88,8 +88,8 @@ contains
    end subroutine space_init
 
    !> Number the unknowns of step `i_step` and lay out the matrix between them. Linear constraints
-   !> are eliminated, less those that follow from others, unless the step asks for multipliers or their
-   !> rows are too long: `is_reduced` tells.
+   !> are eliminated, less those that follow from others, unless the step asks for multipliers or
+   !> their rows are too long: `is_reduced` tells.
    subroutine space_begin_step(self, scene, i_step, lists, matrix, slot, error)
       type(space_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene

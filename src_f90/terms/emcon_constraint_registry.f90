@@ -35,7 +35,7 @@ contains
       call linear_conditions_init(conditions, linear)
       call move_alloc(conditions, held(1)%constraint)
       call rigidity_init(rigidity, scene%rigid)
-      call move_alloc(rigidity, held(2)%constraint)
+      call move_alloc(rigidity, held(n_own)%constraint)
       do i = 1, n
          allocate(new, source=given%constraint(i)%constraint)
          call new%take_positions(scene%x)
