@@ -13,6 +13,7 @@ or a frame that was not finished is left out.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,13 @@ __all__ = ["Array", "Bodies", "FieldFile", "FieldSeries", "HistoryFile", "Pairs"
 
 #: Columns of the history that count; all others are real numbers.
 COUNTS = ("increment", "active", "newton", "cuts")
+
+
+def _is_count(name: str) -> bool:
+    """Of the run, or the active constraints of a pair."""
+    return name in COUNTS or re.fullmatch(r"pair\d+_active", name) is not None
+
+
 #: What every history has.
 NEEDED = ("increment", "time", "kinetic", "strain", "external_work", "total")
 #: A total energy below this fraction of the largest single energy is taken for zero.
@@ -116,7 +124,7 @@ def read_history(paths: ResultPaths) -> NDArray[np.void]:
 
 def _history_array(columns: dict[str, Sequence[float] | Array]) -> NDArray[np.void]:
     """Structured array from columns of the same length."""
-    kind = [(name, np.int64 if name in COUNTS else np.float64) for name in columns]
+    kind = [(name, np.int64 if _is_count(name) else np.float64) for name in columns]
     rows = min((len(values) for values in columns.values()), default=0)
     history = np.empty(rows, dtype=kind)
     for name, values in columns.items():
@@ -144,7 +152,7 @@ def _read_table(path: Path) -> NDArray[np.void]:
             fault = (f"{len(words)} values where {len(names)} are due"
                      if len(words) != len(names) else "a value is not a number")
             raise ResultError(f"{path}:{i + 2}: {fault}") from None
-    counts = [k for k, name in enumerate(names) if name in COUNTS]
+    counts = [k for k, name in enumerate(names) if _is_count(name)]
     if not np.isfinite(rows[:, counts]).all():
         raise ResultError(f"{path}: a count among {', '.join(COUNTS)} is not a whole number")
     return _history_array({name: rows[:, k] for k, name in enumerate(names)})

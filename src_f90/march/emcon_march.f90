@@ -19,6 +19,7 @@ module emcon_march
    use emcon_newton, only : interrupt_interface
    use emcon_options, only : option_words
    use emcon_pair_record, only : pair_record_init
+   use emcon_pair_sums, only : pair_sums_init
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_given
    use emcon_state, only : state_t
@@ -63,6 +64,7 @@ contains
          allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)
+      call pair_sums_init(self%state%sums, self%system, scene%pair)
       call active_set_init(self%active, self%system)
       call ledger_init(self%ledger, scene%n_dim)
       call judge_init(self%judge, scene)

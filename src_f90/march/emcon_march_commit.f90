@@ -9,13 +9,14 @@ module emcon_march_commit
    use emcon_march_types, only : ending_t, increment_t, march_t
    use emcon_numbering, only : gather_dependent
    use emcon_pair_record, only : pair_record_measure
+   use emcon_pair_sums, only : pair_sums_add, pair_sums_push, slave_pushes
    use emcon_pose, only : pose_velocity
    use emcon_scene, only : scene_t
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_velocity_update, only : velocity_update_apply, velocity_update_push
+   use emcon_velocity_update, only : push_weights, velocity_update_apply, velocity_update_push
    implicit none
    private
    public :: march_commit
@@ -59,6 +60,7 @@ contains
          state%contact = self%newton%contact
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
             merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist))
+         call pair_sums_add(state%sums, system, set, self%motion, h, self%scheme%row%masses_resist)
          state%internal = ending%force
          state%energy = ending%energy
          state%potential = ending%potential
@@ -121,6 +123,7 @@ contains
          if (allocated(error)) return
          if (has_root) then
             self%ledger%contact_work = self%ledger%contact_work + lost
+            call pair_sums_push(self%state%sums, self%velocity_update%part*layer%slave_push)
          else
             call note_add(notes, "the energy " // to_text(lost + layer%released) // &
                " that contacts took as they opened or closed is not restored: there is no root")
@@ -133,15 +136,18 @@ contains
       type(march_t), intent(inout) :: self
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: restored
+      real(wp) :: restored, push(size(self%v1, 1), size(self%system%contact))
       logical :: has_root
 
       call velocity_update_apply(self%velocity_update, self%system, self%active%set, self%v1, &
          restored, has_root, error)
       if (allocated(error)) return
       self%ledger%contact_work = self%ledger%contact_work + restored
-      if (restored > 0.0_wp) call note_add(notes, "velocity update restores an energy of " // &
-         to_text(restored))
+      if (restored > 0.0_wp) then
+         call note_add(notes, "velocity update restores an energy of " // to_text(restored))
+         call slave_pushes(self%system, self%active%set, push_weights(self%active%set), push)
+         call pair_sums_push(self%state%sums, self%velocity_update%part*push)
+      end if
       if (.not. has_root) call note_add(notes, &
          "velocity update: no root, the energy lost in this step is not restored")
    end subroutine restore_energy

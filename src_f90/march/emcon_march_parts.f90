@@ -9,6 +9,7 @@ module emcon_march_parts
    use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
+   use emcon_pair_sums, only : pair_sums_begin
    use emcon_scene, only : scene_t
    use emcon_system, only : system_may_hold, system_t
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
@@ -38,6 +39,7 @@ contains
 
       call notes_append(increment%warnings, self%warnings)
       self%warnings = notes_t()
+      call pair_sums_begin(self%state%sums%sum)
       call match(self, scene, error)
       if (allocated(error)) return
       level = 0

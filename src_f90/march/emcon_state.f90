@@ -2,6 +2,7 @@
 module emcon_state
    use emcon_kinds, only : wp
    use emcon_pair_record, only : pair_record_t
+   use emcon_pair_sums, only : pair_sums_t
    implicit none
    private
    public :: state_t
@@ -25,6 +26,7 @@ module emcon_state
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) nodal contact forces
       type(pair_record_t) :: pairs               !! what each contact pair transmits
+      type(pair_sums_t) :: sums                  !! and has transmitted so far
       real(wp), allocatable :: reaction(:, :)    !! (n_dim, n_node) forces at prescribed freedoms
       real(wp), allocatable :: internal(:, :)    !! (n_dim, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy

@@ -19,7 +19,7 @@ module emcon_velocity_update
    implicit none
    private
    public :: velocity_update_t, velocity_update_reset, velocity_update_apply, &
-      velocity_update_push, velocity_update_free
+      velocity_update_push, velocity_update_free, push_weights
 
    !> Contacts that stay closed keep gaps of this size relative to an edge: round-off, no loss.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -30,6 +30,7 @@ module emcon_velocity_update
       class(sparse_solver_t), allocatable :: given   !! by a program, for that choice
       class(sparse_solver_t), allocatable :: mass
       real(wp), allocatable :: push(:), jump(:)  !! (n_unknown)
+      real(wp) :: part = 0.0_wp                  !! of the jump that was taken last [T]
    end type velocity_update_t
 
 contains
@@ -75,7 +76,7 @@ contains
          noise = noise + gap_noise*abs(set%lam(k))*set%item(k)%size
       end do
       if (lost <= noise) return
-      call push_forces(set, force)
+      call push_forces(set, push_weights(set), force)
       call push_along(self, system, force, v, a, b, error)
       if (allocated(error)) return
       has_root = a > 0.0_wp
@@ -113,6 +114,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: momentum(size(v, 1), size(v, 2))
 
+      self%part = 0.0_wp
       a = 0.0_wp
       b = 0.0_wp
       if (.not. self%is_ready) call factorise_mass(self, system, error)
@@ -143,11 +145,12 @@ contains
 
    !> Add `part` of the jump to `v`.
    subroutine add_jump(self, system, part, v)
-      type(velocity_update_t), intent(in) :: self
+      type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       real(wp), intent(in) :: part
       real(wp), intent(inout), contiguous :: v(:, :)
 
+      self%part = part
       if (keeps_links(system)) then
          call add_to_dofs(system%space%linked, self%jump, part, v)
       else
@@ -176,19 +179,26 @@ contains
       keeps_links = system%space%linear%n > 0 .and. .not. system%space%is_reduced
    end function keeps_links
 
-   !> Sum of w_k grad gap_k at the end of the step.
-   pure subroutine push_forces(set, force)
+   !> The weights w_k of the constraints of the set [M L^2/T^2].
+   pure function push_weights(set) result(weight)
       type(constraint_set_t), intent(in) :: set
+      real(wp) :: weight(set%n)
+
+      weight = max(0.0_wp, set%lam(:set%n))*max(0.0_wp, set%item(:set%n)%gap0)
+   end function push_weights
+
+   !> Sum of w_k grad gap_k at the end of the step.
+   pure subroutine push_forces(set, weight, force)
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: weight(:)          !! (n)
       real(wp), intent(out) :: force(:, :)
-      real(wp) :: weight
       integer :: k, i, node
 
       force = 0.0_wp
       do k = set%n_held + 1, set%n
-         weight = max(0.0_wp, set%lam(k))*max(0.0_wp, set%item(k)%gap0)
          do i = 1, set%item(k)%n_node
             node = set%item(k)%node(i)
-            force(:, node) = force(:, node) + weight*set%item(k)%c(:, i)
+            force(:, node) = force(:, node) + weight(k)*set%item(k)%c(:, i)
          end do
       end do
    end subroutine push_forces

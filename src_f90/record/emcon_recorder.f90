@@ -10,6 +10,7 @@ module emcon_recorder
    use emcon_ledger, only : body_masses, body_momenta
    use emcon_march, only : increment_t
    use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
+   use emcon_pair_columns, only : pair_columns, pair_values
    use emcon_quantities, only : quantity_fields, quantity_of_field
    use emcon_requests, only : output_contact_file
    use emcon_run_mark, only : run_mark
@@ -58,6 +59,7 @@ contains
       character(len=*), intent(in) :: base
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: run
+      type(column_t), allocatable :: column(:)
       integer, allocatable :: cell_node(:, :), vtk_type(:)
       real(dp), allocatable :: mass(:)
       integer :: k
@@ -69,7 +71,8 @@ contains
          vtk_type, self%field, error)
       if (allocated(error)) return
       call vtkhdf_put_run(self%fields, run)
-      call history_create(self%history, base, columns, error)
+      call list_columns(stepper, column)
+      call history_create(self%history, base, column, error)
       if (allocated(error)) return
       call history_put_run(self%history, run, stepper%source%line, version, error)
       if (allocated(error)) return
@@ -77,6 +80,16 @@ contains
       call body_masses(stepper%march%system, mass)
       call history_set_once(self%history, "BODIES", "MASS", [(k, k = 1, size(mass))], mass, error)
    end subroutine recorder_open
+
+   !> The columns of all runs, and those of each pair of surfaces.
+   subroutine list_columns(stepper, column)
+      type(stepper_t), intent(in) :: stepper
+      type(column_t), allocatable, intent(out) :: column(:)
+      type(column_t), allocatable :: of_pairs(:)
+
+      call pair_columns(stepper, of_pairs)
+      allocate(column, source=[columns, of_pairs])
+   end subroutine list_columns
 
    !> The elements as cells of the field file.
    pure subroutine find_cells(scene, node, vtk_type)
@@ -103,12 +116,14 @@ contains
       integer, intent(in) :: n_row, n_frame
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: run
+      type(column_t), allocatable :: column(:)
 
       call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run)
       call choose_fields(self, stepper%scene)
       call vtkhdf_resume(self%fields, base // ".vtkhdf", run, self%field, n_frame, error)
       if (allocated(error)) return
-      call history_resume(self%history, base, run, columns, n_row, error)
+      call list_columns(stepper, column)
+      call history_resume(self%history, base, run, column, n_row, error)
       if (allocated(error)) return
       self%n_row = n_row
       self%last_time = stepper%march%state%time
@@ -183,7 +198,7 @@ contains
             real(ledger%total, dp), real(ledger%momentum, dp), real(ledger%angular, dp), &
             real(increment%n_active, dp), real(increment%n_newton, dp), &
             real(increment%n_cut, dp), real(increment%overlap%depth, dp), &
-            real(increment%stand_off%largest, dp), cpu], error)
+            real(increment%stand_off%largest, dp), cpu, pair_values(stepper)], error)
          if (allocated(error)) return
          self%n_row = self%n_row + 1
          call body_momenta(stepper%march%system, stepper%scene%x, state, momenta)

@@ -10,6 +10,7 @@ module emcon_stepper_file
    use emcon_ledger, only : ledger_t
    use emcon_march, only : march_resume
    use emcon_pair_record, only : pair_record_t
+   use emcon_pair_sums, only : pair_sums_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_list, restart_offers, &
       restart_rewind, restart_t
    use emcon_state, only : state_t
@@ -95,6 +96,7 @@ contains
             restart, "has_mass", state%has_mass)
       end associate
       call exchange_pairs(self%march%state%pairs, restart)
+      call exchange_sums(self%march%state%sums, restart)
       call verdict_exchange(self%verdict, restart)
    end subroutine exchange_state
 
@@ -143,6 +145,23 @@ contains
       end do
       call restart_exchange(restart, "pair_active", pairs%total%n_active)
    end subroutine exchange_pairs
+
+   subroutine exchange_sums(sums, restart)
+      type(pair_sums_t), intent(inout) :: sums
+      type(restart_t), intent(inout) :: restart
+      real(wp) :: none(0)
+      integer :: k
+
+      call restart_exchange(restart, "pair_sum", none)       ! also where there are no pairs
+      do k = 1, size(sums%sum)
+         call restart_exchange(restart, "pair_sum", sums%sum(k)%impulse)
+         call restart_exchange(restart, "pair_sum", sums%sum(k)%duration)
+         call restart_exchange(restart, "pair_sum", sums%sum(k)%push)
+         call restart_exchange(restart, "pair_sum", sums%sum(k)%span)
+         call restart_exchange(restart, "pair_sum", sums%sum(k)%weight)
+         call restart_exchange(restart, "pair_sum", sums%sum(k)%moment)
+      end do
+   end subroutine exchange_sums
 
    !> How many forces, masses and conditions a model was given; the file says what is not 0.
    subroutine exchange_given(restart, n)

@@ -12,6 +12,7 @@ module emcon_stepper_free
    use emcon_march_guess, only : follow_links
    use emcon_motion, only : at_rest, motion_of
    use emcon_pair_record, only : pair_record_init
+   use emcon_pair_sums, only : pair_sums_begin
    use emcon_pose, only : pose_at_end
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_check_solids, stepper_t
@@ -199,6 +200,7 @@ contains
          next%contact = 0.0_wp
          next%reaction = 0.0_wp
          call pair_record_init(next%pairs, system)
+         call pair_sums_begin(next%sums%sum)
       end associate
    end subroutine measure_rest
 

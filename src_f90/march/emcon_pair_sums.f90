@@ -1,0 +1,184 @@
+!> What each pair of surfaces has transmitted: over the increment and since the start of the run.
+!>
+!> A pair that is held in both orders, or watched by guards, is one here. Forces are those on the
+!> surface that the deck names first.
+module emcon_pair_sums
+   use emcon_constraint, only : condition_force
+   use emcon_constraints, only : constraint_set_t
+   use emcon_interactions, only : contact_pair_t
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: pair_sum_t, pair_sums_t, pair_sums_init, pair_sums_begin, pair_sums_add, &
+      pair_sums_push, pair_force, pair_center, slave_pushes
+
+   type :: pair_sum_t
+      real(wp) :: impulse(3) = 0.0_wp            !! on the first surface, in dynamic steps [M L/T]
+      real(wp) :: duration = 0.0_wp              !! of force between the surfaces, in these [T]
+      ! of the increment, in statics of its last part:
+      real(wp) :: push(3) = 0.0_wp               !! force by time [M L/T]
+      real(wp) :: span = 0.0_wp                  !! that time [T]
+      real(wp) :: weight = 0.0_wp                !! sizes of nodal forces by time [M L/T]
+      real(wp) :: moment(3) = 0.0_wp             !! the same by their places [M L^2/T]
+   end type pair_sum_t
+
+   type :: pair_sums_t
+      type(pair_sum_t), allocatable :: sum(:)    !! (pairs)
+      !> (n_contact) the pair that each contact belongs to, negative: its slave side is the second
+      integer, allocatable :: of_pair(:)
+   end type pair_sums_t
+
+contains
+
+   !> Nothing has been transmitted so far. `contact` are the contacts of the system, `pair` those of
+   !> the scene.
+   pure subroutine pair_sums_init(self, system, pair)
+      type(pair_sums_t), intent(out) :: self
+      type(system_t), intent(in) :: system
+      type(contact_pair_t), intent(in) :: pair(:)    !! of the scene, before guards
+      integer :: own(size(pair)), first, k, n
+
+      n = 0
+      do k = 1, size(pair)
+         first = findloc(pair(:k - 1)%slave == pair(k)%master .and. &
+            pair(:k - 1)%master == pair(k)%slave, .true., 1)
+         if (first > 0) then
+            own(k) = -own(first)
+         else
+            n = n + 1
+            own(k) = merge(-n, n, pair(k)%is_exchanged)
+         end if
+      end do
+      allocate(self%sum(n))
+      allocate(self%of_pair(size(system%contact)))
+      do k = 1, size(system%contact)
+         associate (of_pair => system%contact(k)%of_pair)
+            self%of_pair(k) = sign(1, of_pair)*own(abs(of_pair))
+         end associate
+      end do
+   end subroutine pair_sums_init
+
+   !> An increment begins: what the last one was is forgotten.
+   elemental subroutine pair_sums_begin(sum)
+      type(pair_sum_t), intent(inout) :: sum
+
+      sum%push = 0.0_wp
+      sum%span = 0.0_wp
+      sum%weight = 0.0_wp
+      sum%moment = 0.0_wp
+   end subroutine pair_sums_begin
+
+   !> Add the constraints that acted over `motion`, of the size `h`.
+   pure subroutine pair_sums_add(self, system, set, motion, h, masses_resist)
+      type(pair_sums_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      logical, intent(in) :: masses_resist       !! forces are means over the motion, else its end
+      logical :: is_pressed(size(self%sum))
+      real(wp) :: part
+      integer :: k, i, contact, p
+
+      if (size(self%sum) == 0) return
+      if (.not. masses_resist) call pair_sums_begin(self%sum)
+      part = merge(0.5_wp, 1.0_wp, masses_resist)
+      self%sum%span = self%sum%span + h
+      is_pressed = .false.
+      contact = 1
+      do k = set%n_held + 1, set%n
+         do while (set%id(k) > system%first_constraint(contact + 1))
+            contact = contact + 1
+         end do
+         p = abs(self%of_pair(contact))
+         associate (item => set%item(k))
+            do i = 1, item%n_slave
+               call add(self%sum(p), h*condition_force(item, set%lam(k), i), &
+                  motion%x(:, item%node(i)) + (motion%u0(:, item%node(i)) &
+                  + part*motion%du(:, item%node(i))), self%of_pair(contact) > 0)
+            end do
+         end associate
+         is_pressed(p) = is_pressed(p) .or. abs(set%lam(k)) > 0.0_wp
+      end do
+      if (.not. masses_resist) return
+      where (is_pressed) self%sum%duration = self%sum%duration + h
+
+   contains
+
+      !> Add `push` on a node at `place`.
+      pure subroutine add(sum, push, place, is_first)
+         type(pair_sum_t), intent(inout) :: sum
+         real(wp), intent(in) :: push(:), place(:)   !! (n_dim) [M L/T], [L]
+         logical, intent(in) :: is_first             !! it is on the first surface
+         real(wp) :: signed(size(push))
+
+         signed = merge(push, -push, is_first)
+         associate (n => size(push))
+            sum%push(:n) = sum%push(:n) + signed
+            if (masses_resist) sum%impulse(:n) = sum%impulse(:n) + signed
+            sum%weight = sum%weight + sqrt(dot_product(push, push))
+            sum%moment(:n) = sum%moment(:n) + sqrt(dot_product(push, push))*place
+         end associate
+      end subroutine add
+
+   end subroutine pair_sums_add
+
+   !> Add what jumps of the velocities push at the end of a step.
+   pure subroutine pair_sums_push(self, push)
+      type(pair_sums_t), intent(inout) :: self
+      real(wp), intent(in) :: push(:, :)         !! (n_dim, n_contact) on slave sides [M L/T]
+      real(wp) :: signed(size(push, 1))
+      integer :: k
+
+      do k = 1, size(push, 2)
+         associate (sum => self%sum(abs(self%of_pair(k))), n => size(push, 1))
+            signed = merge(push(:, k), -push(:, k), self%of_pair(k) > 0)
+            sum%push(:n) = sum%push(:n) + signed
+            sum%impulse(:n) = sum%impulse(:n) + signed
+         end associate
+      end do
+   end subroutine pair_sums_push
+
+   !> The mean force over the last increment, of a static step that at its end [M L/T^2]; 0 before
+   !> the first.
+   pure function pair_force(sum) result(force)
+      type(pair_sum_t), intent(in) :: sum
+      real(wp) :: force(size(sum%push))
+
+      force = 0.0_wp
+      if (sum%span > 0.0_wp) force = sum%push/sum%span
+   end function pair_force
+
+   !> The mean of the places where forces act, by their sizes [L]; `none` where there is no force.
+   pure function pair_center(sum, none) result(center)
+      type(pair_sum_t), intent(in) :: sum
+      real(wp), intent(in) :: none               !! where there is no place
+      real(wp) :: center(size(sum%moment))
+
+      center = none
+      if (sum%weight > 0.0_wp) center = sum%moment/sum%weight
+   end function pair_center
+
+   !> Resultants on the slave sides of all contacts of the forces `lam` along gradients at the end.
+   pure subroutine slave_pushes(system, set, lam, push)
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: lam(:)             !! (n of the set) [M L/T^2]
+      real(wp), intent(out) :: push(:, :)        !! (n_dim, n_contact) [M L/T^2]
+      integer :: k, contact
+
+      push = 0.0_wp
+      contact = 1
+      do k = set%n_held + 1, set%n
+         do while (set%id(k) > system%first_constraint(contact + 1))
+            contact = contact + 1
+         end do
+         associate (item => set%item(k))
+            push(:, contact) = push(:, contact) + lam(k)*sum(item%c(:, :item%n_slave), 2)
+         end associate
+      end do
+   end subroutine slave_pushes
+
+end module emcon_pair_sums
