@@ -27,12 +27,12 @@ module emcon_massless
 contains
 
    !> The slave nodes of all pairs, if dynamic steps ask for massless surfaces; less those that are
-   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass, and those of
-   !> elements that would keep none.
-   pure subroutine massless_find(scene, solid, given, is_massless)
+   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces, and
+   !> those of elements that would keep none.
+   pure subroutine massless_find(scene, solid, is_given, is_massless)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
-      type(csr_t), intent(in) :: given           !! (n_node x n_node) [M]; without rows: none
+      logical, intent(in) :: is_given(:)         !! (n_node) mass or forces
       logical, intent(out) :: is_massless(:)     !! (n_node)
       integer, allocatable :: edge(:, :)
       integer :: i
@@ -60,9 +60,7 @@ contains
       do i = 1, size(scene%rigid)
          is_massless(scene%rigid(i)%node) = .false.
       end do
-      do i = 1, given%n_row
-         if (given%row_start(i + 1) > given%row_start(i)) is_massless(i) = .false.
-      end do
+      is_massless = is_massless .and. .not. is_given
       call keep_one(solid, is_massless)
    end subroutine massless_find
 

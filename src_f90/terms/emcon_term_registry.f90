@@ -63,7 +63,7 @@ contains
       type(host_t), intent(in), optional :: given
       type(csr_t) :: extra
       type(solid_t), pointer :: solid
-      logical :: is_massless(size(scene%x, 2))
+      logical :: is_massless(size(scene%x, 2)), is_given(size(scene%x, 2))
 
       select type (part => term(of_solid)%term)
       type is (solid_term_t)
@@ -77,7 +77,8 @@ contains
       if (.not. allocated(error) .and. extra%n_row > 0) call host_check_mass(extra, scene, error)
       if (allocated(error)) return
       solid => terms_solid(term)
-      call massless_find(scene, solid, extra, is_massless)
+      call mark_given(size(scene%x, 1), extra, is_given, given)
+      call massless_find(scene, solid, is_given, is_massless)
       if (any(is_massless)) call massless_shed(solid, is_massless)
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
@@ -94,6 +95,30 @@ contains
          call linear_term_init(part, solid, size(scene%x, 1))
       end select
    end subroutine create_own
+
+   !> The nodes that mass or forces are given for.
+   pure subroutine mark_given(n_dim, mass, is_given, given)
+      integer, intent(in) :: n_dim
+      type(csr_t), intent(in) :: mass            !! (n_node x n_node); without rows: none
+      logical, intent(out) :: is_given(:)        !! (n_node)
+      type(host_t), intent(in), optional :: given
+      integer :: i, k
+
+      is_given = .false.
+      do i = 1, mass%n_row
+         is_given(i) = mass%row_start(i + 1) > mass%row_start(i)
+      end do
+      if (.not. present(given)) return
+      if (.not. allocated(given%force)) return
+      do k = 1, size(given%force)
+         associate (pattern => given%force(k)%force%pattern)
+            do i = 1, pattern%n_row
+               if (pattern%row_start(i + 1) > pattern%row_start(i)) is_given((i - 1)/n_dim + 1) = &
+                  .true.
+            end do
+         end associate
+      end do
+   end subroutine mark_given
 
    !> The elements, for what is derived from them.
    function terms_solid(term) result(solid)
