@@ -27,8 +27,8 @@ module emcon_massless
 contains
 
    !> The slave nodes of all pairs, if dynamic steps ask for massless surfaces; less those that are
-   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces, and
-   !> those of elements that would keep none.
+   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces,
+   !> and those of elements that would keep none.
    pure subroutine massless_find(scene, solid, is_given, is_massless)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
