@@ -335,7 +335,8 @@ class Model(Cards):
 
     def contact_pair(self, slave: str, master: str, *, interaction: str | None = None,
                      type: str = "NODE TO SURFACE", sides: str | None = None,
-                     guard: str | None = None, adjust: Number | None = None) -> Model:
+                     guard: str | None = None, adjust: Number | None = None,
+                     initiation: str | None = None) -> Model:
         """`*CONTACT PAIR` of two surfaces, or of one with itself.
 
         interaction   default one of its own, frictionless
@@ -346,6 +347,8 @@ class Model(Cards):
         guard         YES (default): nodes that the pair does not hold go in by a twentieth of an
                       edge at most; NO: they may go in
         adjust        distance [L] up to which slave nodes are moved onto the master, or a node set
+        initiation    MASSLESS: its slave nodes carry no mass; PERSISTENT: they do; default: as
+                      `contact_initiation` says
         """
         if interaction is None:
             interaction = _FRICTIONLESS
@@ -353,7 +356,8 @@ class Model(Cards):
                 self.interaction(interaction)
                 self._has_frictionless = True
         return self._card("CONTACT PAIR", {"INTERACTION": interaction, "TYPE": type,
-                                           "SIDES": sides, "GUARD": guard, "ADJUST": adjust},
+                                           "SIDES": sides, "GUARD": guard, "ADJUST": adjust,
+                                           "INITIATION": initiation},
                           [(slave, master)])
 
     def contact(self, *surfaces: str | tuple[str, str],

@@ -1,5 +1,6 @@
 !> *SURFACE INTERACTION, *SURFACE BEHAVIOR, *FRICTION and *CONTACT PAIR.
 module emcon_deck_contact
+   use emcon_deck_contact_settings, only : read_pair_initiation
    use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, drop_zeros, &
       get_real, next_line, refuse_lines
    use emcon_deck_named, only : find_set, set_names
@@ -305,10 +306,12 @@ contains
          // quoted(name) // suggestion(name, reader%interaction))
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
+      call read_pair_initiation(reader, card, of_card%initiation)
       do i = 1, size(pair)
          pair(i)%adjust_distance = of_card%adjust_distance
          pair(i)%adjust_set = of_card%adjust_set
          pair(i)%is_guarded = of_card%is_guarded
+         pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
 

@@ -13,7 +13,8 @@ module emcon_deck_contact_settings
    use emcon_text, only : to_text
    implicit none
    private
-   public :: read_initiation, read_interference, read_controls, check_statics, check_massless
+   public :: read_initiation, read_pair_initiation, read_interference, read_controls, &
+      check_statics, check_massless, pairs_ask
 
 contains
 
@@ -30,6 +31,48 @@ contains
         call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
       end if
    end subroutine read_initiation
+
+   !> INITIATION= of a *CONTACT PAIR: with or without mass on its slave nodes.
+   subroutine read_pair_initiation(reader, card, initiation)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      integer, intent(inout) :: initiation       !! one of `initiation_`, as it is: as the step
+      integer :: code
+
+      code = initiation_persistent
+      call choose_option(reader, card, "INITIATION", "initiation", code)
+      if (any(code == [initiation_persistent, initiation_massless])) then
+         if (has_option(card, "INITIATION")) initiation = code
+      else
+         call refuse_option(reader, card, "INITIATION", "PERSISTENT, MASSLESS", &
+            "the others are of all pairs of a step: *CONTACT INITIATION")
+      end if
+   end subroutine read_pair_initiation
+
+   !> Where pairs ask for slave nodes without mass, or with it, dynamic steps are MASSLESS, and the
+   !> pairs that ask for nothing are what their steps are.
+   subroutine pairs_ask(reader, pair, step)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(inout) :: pair(:)
+      type(step_t), intent(inout) :: step(:)
+      integer :: i, k
+
+      i = findloc(pair%initiation /= 0, .true., 1)
+      if (i == 0) return
+      do k = 1, size(step)
+         if (any(step(k)%initiation == [initiation_persistent, initiation_massless]) .or. &
+            .not. step(k)%scheme%masses_resist) cycle
+         call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR, INITIATION=: it goes with " // &
+            "*CONTACT INITIATION, TYPE=PERSISTENT or MASSLESS, not with that of step " // &
+            to_text(k))
+         return
+      end do
+      if (.not. any(pair%initiation == initiation_massless)) return
+      k = findloc(step%scheme%masses_resist, .true., 1)
+      if (k == 0) return
+      where (pair%initiation == 0) pair%initiation = step(k)%initiation
+      where (step%scheme%masses_resist) step%initiation = initiation_massless
+   end subroutine pairs_ask
 
    !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
    subroutine read_interference(reader, card, pair, amplitude, step)

@@ -70,7 +70,7 @@ module emcon_deck_keywords
          // "!PENALTY,!AUGMENTEDLAGRANGE"), &
       keyword_t("FRICTION", in_model, "~SLIPTOLERANCE,!ROUGH,!LAGRANGE,!DEPENDENCIES:0"), &
       keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,SIDES=,GUARD=," &
-         // "ADJUST=,!SMALLSLIDING,!TIED"), &
+         // "ADJUST=,INITIATION=,!SMALLSLIDING,!TIED"), &
       keyword_t("CONTACT", in_model, has_data=.false.), &
       keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR"), &
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &

@@ -235,6 +235,7 @@ contains
       if (allocated(error)) return
       is_slave = .false.
       do i = 1, self%system%n_pair
+         if (scene%pair(i)%initiation == initiation_persistent) cycle
          is_slave(self%system%contact(i)%contact%node) = .true.
       end do
       n = count(self%layer%is_massless)

@@ -39,6 +39,7 @@ module emcon_interactions
       logical :: is_asked = .false.                  !! the deck says so, or which
       logical :: is_exchanged = .false.              !! the deck names what is the master first
       logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
+      integer :: initiation = 0                      !! one of `initiation_`, 0: as the step
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given

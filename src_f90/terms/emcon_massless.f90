@@ -11,7 +11,7 @@ module emcon_massless
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_steps, only : initiation_massless
+   use emcon_steps, only : initiation_massless, initiation_persistent
    use emcon_surface_edges, only : surface_edges
    implicit none
    private
@@ -26,7 +26,7 @@ module emcon_massless
 
 contains
 
-   !> The slave nodes of all pairs, if dynamic steps ask for massless surfaces; less those that are
+   !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those that are
    !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces,
    !> and those of elements that would keep none.
    pure subroutine massless_find(scene, solid, is_given, is_massless)
@@ -41,6 +41,7 @@ contains
       if (.not. any(scene%step%initiation == initiation_massless .and. &
          scene%step%scheme%masses_resist)) return
       do i = 1, size(scene%pair)
+         if (scene%pair(i)%initiation == initiation_persistent) cycle
          associate (surface => scene%surface(scene%pair(i)%slave))
             call surface_edges(scene, surface, edge)
             is_massless([edge]) = .true.

@@ -264,3 +264,47 @@ def test_a_tied_ring(tmp_path):
     assert (history["active"] > 0).any()
     assert balances(history) < 1e-12
     assert history["stand_off"].max() < 1e-12
+
+
+# ---- pairs that ask for themselves --------------------------------------------------------------
+
+
+def asking(name, pair, path, which=1):
+    """A deck whose cards *CONTACT PAIR, up to `which`, say INITIATION=."""
+    text = Deck.read(DECKS/f"{name}.inp").text()
+    path.write_text(text.replace("*CONTACT PAIR, ", f"*CONTACT PAIR, INITIATION={pair}, ", which))
+    return path
+
+
+@pytest.mark.parametrize(("pair", "step", "same"), [
+    ("MASSLESS", "PERSISTENT", "MASSLESS"), ("PERSISTENT", "MASSLESS", "PERSISTENT")])
+def test_a_pair_asks_as_its_step_would(pair, step, same, tmp_path):
+    choice = {"h": 0.02, "t_end": 1, "frame": 1, **NTS}
+    asked = run_deck(asking("two_bodies", pair, tmp_path/"asked.inp"), tmp_path,
+                     initiation=step, **choice)
+    whole = run_deck(DECKS/"two_bodies.inp", tmp_path, initiation=same, **choice)
+    assert (whole.history["active"] > 0).any()
+    assert asked.digits() == whole.digits()
+
+
+def test_pairs_with_and_without_mass(tmp_path):
+    """The middle one of three bodies has massless nodes towards the left, the right one none."""
+    path = asking("three_bodies", "MASSLESS", tmp_path/"mixed.inp")
+    card = "*CONTACT PAIR, INTERACTION=FRICTIONLESS, TYPE=<formulation>, SIDES=<sides>\n"
+    text = path.read_text().replace("RIGHT_RIM, MIDDLE_RIM", f"{card}RIGHT_RIM, MIDDLE_RIM")
+    path.write_text(text)
+    run = run_deck(path, tmp_path, h=0.02, t_end=1.5, frame=1, **{**NTS, "sides": "ONE"})
+    with Stepper(path, sides="ONE", formulation="NODE TO SURFACE") as stepper:
+        has_none = stepper.mass.toarray().diagonal() == 0
+    assert has_none.sum() == len(range(134, 204, 3))         # edges of the middle rim
+    assert run.history["pair1_duration"].max() > 0
+    assert run.history["pair2_duration"].max() > 0
+    assert balances(run.history) < 1e-12
+
+
+@pytest.mark.parametrize(("pair", "step", "message"), [
+    ("ADMISSIBLE", "PERSISTENT", "INITIATION=.ADMISSIBLE.*PERSISTENT, MASSLESS"),
+    ("MASSLESS", "ADMISSIBLE", "it goes with .*PERSISTENT or MASSLESS, not with that of step 1")])
+def test_what_a_pair_cannot_ask_for(pair, step, message, tmp_path):
+    with pytest.raises(AssertionError, match=message):
+        run_deck(asking("two_bodies", pair, tmp_path/"asked.inp"), tmp_path, initiation=step)
