@@ -16,6 +16,7 @@ module emcon_deck
    use emcon_deck_geometry, only : check_shapes
    use emcon_deck_element_kinds, only : read_element_kinds
    use emcon_deck_given, only : read_given
+   use emcon_deck_initial, only : read_initial_conditions
    use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
@@ -25,7 +26,7 @@ module emcon_deck
    use emcon_deck_source, only : deck_open, deck_source_t
    use emcon_deck_step, only : read_steps
    use emcon_deck_surfaces, only : read_surfaces
-   use emcon_deck_tables, only : read_amplitudes, read_initial_conditions, read_time_points
+   use emcon_deck_tables, only : read_amplitudes, read_time_points
    use emcon_deck_ties, only : read_ties
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_guards, only : guards_find

@@ -1,9 +1,7 @@
-!> *AMPLITUDE and *TIME POINTS: tables over time; *INITIAL CONDITIONS.
+!> *AMPLITUDE and *TIME POINTS: tables over time.
 module emcon_deck_tables
    use emcon_amplitudes, only : amplitude_t
-   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
-      get_real, next_line
-   use emcon_deck_named, only : get_nodes
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, next_line
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t, &
       refuse_option
    use emcon_kinds, only : wp
@@ -11,7 +9,7 @@ module emcon_deck_tables
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_amplitudes, read_time_points, read_initial_conditions
+   public :: read_amplitudes, read_time_points
    public :: find_table, table_names
 
    !> More output times than this are a slip of the pen.
@@ -197,63 +195,6 @@ contains
       end do
       number = number(:n)
    end subroutine read_numbers
-
-   !> *INITIAL CONDITIONS: node or set, degree of freedom, value; a later one replaces.
-   subroutine read_initial_conditions(reader, scene)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(inout) :: scene
-      integer :: i
-
-      allocate(scene%u0(scene%n_dim, size(scene%node_label)), source=0.0_wp)
-      allocate(scene%v0(scene%n_dim, size(scene%node_label)), source=0.0_wp)
-      do i = 1, size(reader%card)
-         associate (card => reader%card(i))
-            if (card%name /= "INITIALCONDITIONS") cycle
-            select case (option_name(card, "TYPE"))
-            case ("VELOCITY")
-               call read_initial(reader, card, scene, scene%v0)
-            case ("DISPLACEMENT")
-               call read_initial(reader, card, scene, scene%u0)
-            case ("")
-               call card_error(reader, card, "TYPE=VELOCITY or TYPE=DISPLACEMENT is missing")
-            case ("TEMPERATURE", "STRESS", "PLASTICSTRAIN", "SOLUTION", "HARDENING", "CONTACT")
-               call refuse_option(reader, card, "TYPE", "VELOCITY, DISPLACEMENT", &
-                  "a run starts without stress at one temperature")
-            case default
-               call refuse_option(reader, card, "TYPE", "VELOCITY, DISPLACEMENT", "")
-            end select
-         end associate
-      end do
-   end subroutine read_initial_conditions
-
-   subroutine read_initial(reader, card, scene, field)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(inout) :: field(:, :)
-      type(data_t) :: data
-      integer, allocatable :: item(:)
-      integer :: dof
-      real(wp) :: value
-
-      call data_open(data, card)
-      do while (next_line(reader, data))
-         call check_count(reader, data, 3, 3, "node or node set, degree of freedom, value")
-         if (.not. data%ok) cycle
-         call get_integer(reader, data, 2, "degree of freedom", dof)
-         if (data%ok .and. dof > 3) call data_error(reader, data, "degree of freedom " &
-            // to_text(dof) // " does not exist; known: 1, 2")
-         value = 0.0_wp
-         call get_real(reader, data, 3, "value", value)
-         if (data%ok) call get_nodes(reader, data, 1, scene, item)
-         if (.not. data%ok) cycle
-         if (dof <= scene%n_dim) then
-            field(dof, item) = value
-         else if (value /= 0.0_wp) then
-            call data_error(reader, data, "the model is plane: degree of freedom 3 must start at 0")
-         end if
-      end do
-   end subroutine read_initial
 
    !> Index of the table called `name`, 0 if there is none.
    pure integer function find_table(table, name)

@@ -32,6 +32,8 @@ module emcon_active_set
       logical :: masses_resist = .true.          !! nothing arrives at once
       logical :: pushes_out = .false.            !! also what is closed too far, which makes energy
       logical :: puts_off = .false.              !! what follows from others nearly waits
+      logical :: has_rigid = .false.             !! bodies that few contacts hold: what follows from
+                                                 !! others waits, then the set changes one by one
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
       logical, allocatable :: is_active(:)       !! (n_constraint)
@@ -45,6 +47,7 @@ module emcon_active_set
       logical :: is_stale = .false.              !! stencils were chosen for another motion
       integer :: n_stale = 0                     !! so often in this step
       logical :: only_adds = .false.             !! nothing is let go any more in this step
+      logical :: one_by_one = .false.            !! one contact a time is taken in or let go
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
@@ -137,6 +140,7 @@ contains
       self%n_tried = 0
       self%n_stale = 0
       self%only_adds = .false.
+      self%one_by_one = .false.
       self%comes_and_goes = .false.
       self%is_dropped = .false.
       self%is_put_off = .false.
@@ -236,12 +240,18 @@ contains
    end subroutine active_set_put_off
 
    !> Constraints that follow from earlier ones do not act in this step. They stand at the places
-   !> `redundant` of the set; of constraints that depend on each other the last ones go.
+   !> `redundant` of the set; of constraints that depend on each other the last ones go. Where rigid
+   !> bodies may need others of them, they come back, one by one.
    pure subroutine active_set_drop(self, redundant)
       type(active_set_t), intent(inout) :: self
       integer, intent(in) :: redundant(:)        !! (any) places in the set, from 1
 
-      self%is_dropped(self%set%id(redundant)) = .true.
+      if (self%has_rigid .and. .not. self%one_by_one) then
+         self%one_by_one = .true.
+         self%is_active(self%set%id(redundant)) = .false.
+      else
+         self%is_dropped(self%set%id(redundant)) = .true.
+      end if
       self%is_active = self%is_active .and. .not. self%is_dropped
       self%n_tried = 0
    end subroutine active_set_drop

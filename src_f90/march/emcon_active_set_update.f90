@@ -17,6 +17,13 @@ module emcon_active_set_update
    !> A step is solved again so often at most because stencils were chosen for another motion.
    integer, parameter :: most_stale = 3
 
+   !> The one change of a set.
+   type :: choice_t
+      integer :: id = 0                          !! contact; 0: none yet
+      logical :: pulls = .false.                 !! it is let go, else it is taken in
+      real(wp) :: amount = 0.0_wp                !! < 0: force, or gap by the edge
+   end type choice_t
+
 contains
 
    !> The next set from the motion and the multipliers that solve the step with the present one;
@@ -54,6 +61,7 @@ contains
       logical, intent(out) :: has_changed
       integer, intent(out) :: status             !! one of the `step_` codes
       logical :: changes
+      type(choice_t) :: choice
       integer :: pair, i, id, k
 
       status = step_done
@@ -78,12 +86,41 @@ contains
                   if (contact%slack > 0.0_wp .and. has_changed) changes = .false.
                   if (changes .and. begins_unseen(self, contact, i)) status = step_too_far
                end if
-               if (changes) self%is_active(id) = .not. self%is_active(id)
                has_changed = has_changed .or. changes
+               if (changes .and. self%one_by_one .and. .not. contact%state(i)%is_leaving) then
+                  call weigh(self, contact%state(i), id, k, choice)
+               else if (changes) then
+                  self%is_active(id) = .not. self%is_active(id)
+               end if
             end do
          end associate
       end do
+      if (choice%id > 0) self%is_active(choice%id) = .not. self%is_active(choice%id)
    end subroutine update
+
+   !> Is it contact `id` that is to change alone? What pulls most goes first, then what is deepest
+   !> comes.
+   pure subroutine weigh(self, gap, id, k, choice)
+      type(active_set_t), intent(in) :: self
+      type(gap_state_t), intent(in) :: gap
+      integer, intent(in) :: id
+      integer, intent(in) :: k                   !! its place in the set, if it acts
+      type(choice_t), intent(inout) :: choice
+      logical :: pulls
+      real(wp) :: amount
+
+      pulls = self%is_active(id)
+      if (pulls) then
+         amount = self%set%lam(k)
+      else
+         amount = (gap%gap1 - self%left(1)*self%overclosure(id) - gap%closed)/gap%size
+      end if
+      if (choice%id > 0) then
+         if (choice%pulls .and. .not. pulls) return
+         if ((choice%pulls .eqv. pulls) .and. .not. amount < choice%amount) return
+      end if
+      choice = choice_t(id, pulls, amount)
+   end subroutine weigh
 
    !> Can the step stand on constraint `k` of the set, which acts? If its stencil has moved on, the
    !> step is solved again with that for the motion that came out.

@@ -158,7 +158,7 @@ contains
             scene%x, step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
-         call begin_active(self%active, step)
+         call begin_active(self%active, step, size(scene%rigid) > 0)
          if (.not. step%scheme%masses_resist) call holding_begin(self%active%holding, self%system, &
             scene, state%u)
          do i = 1, size(self%system%contact)
@@ -204,11 +204,13 @@ contains
    end subroutine prepare
 
    !> How contact begins and ends in a step.
-   subroutine begin_active(active, step)
+   subroutine begin_active(active, step, has_rigid)
       type(active_set_t), intent(inout) :: active
       type(step_t), intent(in) :: step
+      logical, intent(in) :: has_rigid           !! some bodies are rigid
 
       active%puts_off = .true.
+      active%has_rigid = has_rigid
       active%masses_resist = step%scheme%masses_resist
       active%pushes_out = .not. active%masses_resist
       active%holds_gap = any(step%initiation == [initiation_persistent, initiation_massless]) &

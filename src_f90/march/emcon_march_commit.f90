@@ -16,7 +16,8 @@ module emcon_march_commit
    use emcon_steps, only : initiation_velocity_update
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_velocity_update, only : push_weights, velocity_update_apply, velocity_update_push
+   use emcon_velocity_update, only : push_t, push_weights, velocity_update_apply, &
+      velocity_update_push
    implicit none
    private
    public :: march_commit
@@ -118,8 +119,8 @@ contains
             lost = lost - set%lam(k)*set%item(k)%dgap
          end do
          self%ledger%external_work = self%ledger%external_work + layer%work
-         call velocity_update_push(self%velocity_update, self%system, layer%push, &
-            lost + layer%released, self%v1, has_root, error)
+         call velocity_update_push(self%velocity_update, self%system, set, &
+            push_t(layer%push, lost + layer%released), self%v1, has_root, error)
          if (allocated(error)) return
          if (has_root) then
             self%ledger%contact_work = self%ledger%contact_work + lost

@@ -9,6 +9,7 @@ module emcon_velocity_update
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
    use emcon_numbering, only : add_to_dofs, numbering_matrix, pick_unknowns
    use emcon_root, only : smaller_root
    use emcon_solver_registry, only : solver_create, solver_default
@@ -18,11 +19,22 @@ module emcon_velocity_update
    use emcon_triple_product, only : triple_product_init, triple_product_t, triple_product_update
    implicit none
    private
-   public :: velocity_update_t, velocity_update_reset, velocity_update_apply, &
+   public :: push_t, velocity_update_t, velocity_update_reset, velocity_update_apply, &
       velocity_update_push, velocity_update_free, push_weights
 
    !> Contacts that stay closed keep gaps of this size relative to an edge: round-off, no loss.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
+
+   !> A push that is to give energy.
+   type :: push_t
+      real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) along it [M L/T^2]
+      real(wp) :: gain = 0.0_wp                  !! [M L^2/T^2]
+   end type push_t
+
+   !> The kinetic energy that s times a jump gives: s b + s^2 a/2.
+   type :: gain_t
+      real(wp) :: a = 0.0_wp, b = 0.0_wp         !! [M L^2/T^2]
+   end type gain_t
 
    type :: velocity_update_t
       logical :: is_ready = .false.              !! mass factorised for the present numbering
@@ -64,7 +76,8 @@ contains
       real(wp), intent(out) :: restored          !! >= 0 [M L^2/T^2]
       logical, intent(out) :: has_root           !! .false.: `v` is left as it is
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: force(size(v, 1), size(v, 2)), lost, noise, a, b
+      real(wp) :: force(size(v, 1), size(v, 2)), lost, noise
+      type(gain_t) :: gain
       integer :: k
 
       restored = 0.0_wp
@@ -77,71 +90,106 @@ contains
       end do
       if (lost <= noise) return
       call push_forces(set, push_weights(set), force)
-      call push_along(self, system, force, v, a, b, error)
+      call push_along(self, system, set, force, v, gain, error)
       if (allocated(error)) return
-      has_root = a > 0.0_wp
+      has_root = gain%a > 0.0_wp
       if (.not. has_root) return
-      call add_jump(self, system, jump_size(a, b, lost), v)
+      call add_jump(self, system, jump_size(gain%a, gain%b, lost), v)
       restored = lost
    end subroutine velocity_update_apply
 
-   !> Add to `v` the jump along M^-1 `force` that gives the energy `gain` to it, the smaller one of
-   !> the two: docs/theory.md, eq. (22).
-   subroutine velocity_update_push(self, system, force, gain, v, has_root, error)
+   !> Add to `v` the jump along M^-1 of a force that gives an energy to it, the smaller one of the
+   !> two: docs/theory.md, eq. (22).
+   subroutine velocity_update_push(self, system, set, push, v, has_root, error)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      real(wp), intent(in), contiguous :: force(:, :)    !! (n_dim, n_node) [M L/T^2]
-      real(wp), intent(in) :: gain               !! [M L^2/T^2]
+      type(constraint_set_t), intent(in) :: set
+      type(push_t), intent(in) :: push
       real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
       logical, intent(out) :: has_root           !! .false.: `v` is left as it is
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: a, b, part
+      type(gain_t) :: gain
+      real(wp) :: part
 
       has_root = .false.
-      call push_along(self, system, force, v, a, b, error)
+      call push_along(self, system, set, push%force, v, gain, error)
       if (allocated(error)) return
-      call smaller_root(a, b, gain, part, has_root)
+      call smaller_root(gain%a, gain%b, push%gain, part, has_root)
       if (has_root) call add_jump(self, system, part, v)
    end subroutine velocity_update_push
 
-   !> Find the jump M^-1 `force`; along it the kinetic energy changes by s b + s^2 a/2. a = 0: there
-   !> is none.
-   subroutine push_along(self, system, force, v, a, b, error)
+   !> Find the jump M^-1 `force` that the shapes of rigid bodies leave; along it the kinetic energy
+   !> changes by s b + s^2 a/2; a = 0: there is none.
+   subroutine push_along(self, system, set, force, v, gain, error)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: force(:, :), v(:, :)
-      real(wp), intent(out) :: a, b
+      type(gain_t), intent(out) :: gain
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: momentum(size(v, 1), size(v, 2))
 
       self%part = 0.0_wp
-      a = 0.0_wp
-      b = 0.0_wp
       if (.not. self%is_ready) call factorise_mass(self, system, error)
       if (allocated(error)) return
       if (self%mass%is_singular) return
-      call pick(force)
+      call pick(system, force, self%push)
       call self%mass%solve(self%push, self%jump, error)
+      if (.not. allocated(error)) call keep_held(self, system, set, error)
       if (allocated(error)) return
-      a = dot_product(self%push, self%jump)
+      gain%a = dot_product(self%push, self%jump)
       call mass_times(system, v, momentum)
-      call pick(momentum)
-      b = dot_product(self%push, self%jump)
-
-   contains
-
-      !> The unknown entries of `field` to `push`.
-      subroutine pick(field)
-         real(wp), intent(in), contiguous :: field(:, :)     !! (n_dim, n_node)
-
-         if (keeps_links(system)) then
-            call pick_unknowns(system%space%linked, field, self%push)
-         else
-            call pick_unknowns(system%space%numbering, field, self%push)
-         end if
-      end subroutine pick
-
+      call pick(system, momentum, self%push)
+      gain%b = dot_product(self%push, self%jump)
    end subroutine push_along
+
+   !> The entries of `field` at the unknowns that linear constraints leave.
+   pure subroutine pick(system, field, vector)
+      type(system_t), intent(in) :: system
+      real(wp), intent(in), contiguous :: field(:, :)    !! (n_dim, n_node)
+      real(wp), intent(out) :: vector(:)                 !! (n_unknown)
+
+      if (keeps_links(system)) then
+         call pick_unknowns(system%space%linked, field, vector)
+      else
+         call pick_unknowns(system%space%numbering, field, vector)
+      end if
+   end subroutine pick
+
+   !> Take out of the jump what conditions that always hold, and are not linear, forbid: add
+   !> M^-1 C^T mu such that C times the jump is 0, with their gradients C at the end of the step.
+   subroutine keep_held(self, system, set, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), dimension(size(self%jump), set%n_held - set%n_linear) :: row, way
+      real(dp), dimension(set%n_held - set%n_linear, 1) :: rate, mu
+      real(dp) :: product(size(rate), size(rate))
+      real(wp) :: field(size(system%space%is_alive, 1), size(system%space%is_alive, 2))
+      integer :: k, i, l
+      logical :: is_singular
+
+      if (size(rate) == 0) return
+      do k = 1, size(rate)
+         field = 0.0_wp
+         associate (item => set%item(set%n_linear + k))
+            do i = 1, item%n_node
+               field(:, item%node(i)) = field(:, item%node(i)) + item%c(:, i)
+            end do
+         end associate
+         call pick(system, field, row(:, k))
+         call self%mass%solve(row(:, k), way(:, k), error)
+         if (allocated(error)) return
+         rate(k, 1) = -real(dot_product(row(:, k), self%jump), dp)
+         do l = 1, k
+            product(l, k) = real(dot_product(row(:, l), way(:, k)), dp)
+            product(k, l) = product(l, k)
+         end do
+      end do
+      call dense_solve(product, rate, mu, is_singular)
+      if (.not. is_singular) self%jump = self%jump + matmul(way, real(mu(:, 1), wp))
+   end subroutine keep_held
 
    !> Add `part` of the jump to `v`.
    subroutine add_jump(self, system, part, v)

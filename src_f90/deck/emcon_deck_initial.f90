@@ -1,0 +1,229 @@
+!> *INITIAL CONDITIONS: displacements and velocities at the start; those of rigid bodies are given
+!> at their reference nodes.
+module emcon_deck_initial
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
+      get_real, next_line
+   use emcon_deck_named, only : get_nodes
+   use emcon_deck_reader, only : card_error, card_t, option_name, reader_t, refuse_option
+   use emcon_diagnostics, only : add_error
+   use emcon_kinds, only : wp
+   use emcon_origin, only : origin_t
+   use emcon_scene, only : scene_t
+   use emcon_text, only : to_text
+   use emcon_turn_plane, only : turned_left
+   implicit none
+   private
+   public :: read_initial_conditions
+
+   !> Number of the rotation in the plane, and of the numbers that tell two points of an axis.
+   integer, parameter :: last_freedom = 6, n_axis = 6
+   !> Nodes of a rigid body may differ so much from its motion: decks round.
+   real(wp), parameter :: rounding = 1.0e-6_wp
+
+   !> One of the two fields while it grows.
+   type :: field_t
+      real(wp), allocatable :: value(:, :)         !! (n_dim, n_node) [L] or [L/T]
+      logical, allocatable :: is_given(:)          !! (n_node)
+      real(wp), allocatable :: spin(:)             !! (n_rigid) [1/T]
+      type(origin_t) :: origin                     !! of the last card
+   end type field_t
+
+contains
+
+   !> All cards; of values for one place the last one holds.
+   subroutine read_initial_conditions(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      character(len=*), parameter :: known = "VELOCITY, ROTATING VELOCITY, DISPLACEMENT"
+      type(field_t) :: u, v
+      integer :: i
+
+      call begin(u, scene)
+      call begin(v, scene)
+      do i = 1, size(reader%card)
+         associate (card => reader%card(i))
+            if (card%name /= "INITIALCONDITIONS") cycle
+            select case (option_name(card, "TYPE"))
+            case ("VELOCITY")
+               call read_values(reader, card, scene, .true., v)
+            case ("ROTATINGVELOCITY")
+               call read_rotating(reader, card, scene, v)
+            case ("DISPLACEMENT")
+               call read_values(reader, card, scene, .false., u)
+            case ("")
+               call card_error(reader, card, "TYPE=VELOCITY or TYPE=DISPLACEMENT is missing")
+            case ("TEMPERATURE", "STRESS", "PLASTICSTRAIN", "SOLUTION", "HARDENING", "CONTACT")
+               call refuse_option(reader, card, "TYPE", known, &
+                  "a run starts without stress at one temperature")
+            case default
+               call refuse_option(reader, card, "TYPE", known, "")
+            end select
+         end associate
+      end do
+      call follow_references(reader, scene, u, "displacement")
+      call follow_references(reader, scene, v, "velocity")
+      call move_alloc(u%value, scene%u0)
+      call move_alloc(v%value, scene%v0)
+   end subroutine read_initial_conditions
+
+   pure subroutine begin(self, scene)
+      type(field_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+
+      allocate(self%value(scene%n_dim, size(scene%node_label)), source=0.0_wp)
+      allocate(self%is_given(size(scene%node_label)), source=.false.)
+      allocate(self%spin(size(scene%rigid)), source=0.0_wp)
+   end subroutine begin
+
+   !> Lines of node or set, degree of freedom, value.
+   subroutine read_values(reader, card, scene, may_turn, field)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: may_turn              !! reference nodes may have a spin
+      type(field_t), intent(inout) :: field
+      type(data_t) :: data
+      integer, allocatable :: item(:)
+      integer :: dof
+      real(wp) :: value
+
+      field%origin = card%origin
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, 3, 3, "node or node set, degree of freedom, value")
+         if (.not. data%ok) cycle
+         call get_integer(reader, data, 2, "degree of freedom", dof)
+         if (data%ok .and. dof > 3 .and. dof /= last_freedom) call data_error(reader, data, &
+            "degree of freedom " // to_text(dof) // " does not exist; known: 1, 2")
+         value = 0.0_wp
+         call get_real(reader, data, 3, "value", value)
+         if (data%ok) call get_nodes(reader, data, 1, scene, item)
+         if (.not. data%ok) cycle
+         if (dof <= scene%n_dim) then
+            field%value(dof, item) = value
+            field%is_given(item) = .true.
+         else if (dof == last_freedom .and. may_turn) then
+            call put_spin(reader, data, scene, item, value, field)
+         else if (abs(value) > 0.0_wp) then
+            call data_error(reader, data, "the model is plane: degree of freedom " // &
+               to_text(dof) // " must start at 0")
+         end if
+      end do
+   end subroutine read_values
+
+   !> The spin of the rigid bodies whose reference nodes `item` are.
+   subroutine put_spin(reader, data, scene, item, value, field)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: item(:)               !! nodes
+      real(wp), intent(in) :: value                !! [1/T]
+      type(field_t), intent(inout) :: field
+      integer :: i, b
+
+      do i = 1, size(item)
+         b = findloc(scene%rigid%reference, item(i), 1)
+         if (b > 0) then
+            field%spin(b) = value
+            field%is_given(item(i)) = .true.
+         else if (abs(value) > 0.0_wp .and. .not. reader%doubt_rigid) then
+            call data_error(reader, data, "node " // to_text(scene%node_label(item(i))) // &
+               " cannot turn: degree of freedom 6 is that of the reference node of a *RIGID BODY")
+            return
+         end if
+      end do
+   end subroutine put_spin
+
+   !> Pairs of lines: node or set, spin, velocity of the axis; then a point on it, or two.
+   subroutine read_rotating(reader, card, scene, field)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(field_t), intent(inout) :: field
+      type(data_t) :: data
+      integer, allocatable :: item(:)
+      real(wp) :: spin, velocity(3), axis(n_axis)
+      integer :: i
+
+      field%origin = card%origin
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, 2, 5, "node or node set, spin, velocity of the axis")
+         spin = 0.0_wp
+         velocity = 0.0_wp
+         if (data%ok) call get_nodes(reader, data, 1, scene, item)
+         if (data%ok) call get_real(reader, data, 2, "spin", spin)
+         do i = 1, 3
+            if (data%ok) call get_real(reader, data, 2 + i, "velocity", velocity(i))
+         end do
+         if (data%ok .and. any(abs(velocity(scene%n_dim + 1:)) > 0.0_wp)) call data_error(reader, &
+            data, "the model is plane: the velocity along 3 must be 0")
+         if (.not. data%ok) return
+         call read_axis(reader, data, axis)
+         if (.not. data%ok) return
+         do i = 1, size(item)
+            field%value(:, item(i)) = velocity(:scene%n_dim) &
+               + spin*turned_left(scene%x(:, item(i)) - axis(:scene%n_dim))
+         end do
+         field%is_given(item) = .true.
+         do i = 1, size(scene%rigid)
+            if (any(item == scene%rigid(i)%reference)) field%spin(i) = spin
+         end do
+      end do
+   end subroutine read_rotating
+
+   !> The line behind: a point on the axis; a second one has to be above it, along 3.
+   subroutine read_axis(reader, data, axis)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      real(wp), intent(out) :: axis(:)             !! (n_axis) [L]
+      logical :: is_there
+      integer :: i
+
+      axis = 0.0_wp
+      is_there = next_line(reader, data)
+      if (.not. is_there) then
+         call data_error(reader, data, "the line with a point on the axis is missing")
+         return
+      end if
+      call check_count(reader, data, 1, n_axis, "coordinates of a point on the axis, or of two")
+      do i = 1, data%n
+         if (data%ok) call get_real(reader, data, i, "coordinate", axis(i))
+      end do
+      if (.not. data%ok .or. data%n <= 3) return
+      if (any(abs(axis(4:5) - axis(:2)) > 0.0_wp) .or. .not. axis(n_axis) > axis(3)) &
+         call data_error(reader, data, "the model is plane: the axis goes along 3, from its " // &
+         "first point up to a second one")
+   end subroutine read_axis
+
+   !> Rigid bodies start as their reference nodes do. What is given at their other nodes has to fit.
+   subroutine follow_references(reader, scene, field, name)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(field_t), intent(inout) :: field
+      character(len=*), intent(in) :: name
+      real(wp) :: start(scene%n_dim), largest
+      integer :: b, i
+
+      do b = 1, size(scene%rigid)
+         associate (body => scene%rigid(b))
+            largest = maxval(abs(field%value(:, body%node)))
+            do i = 1, size(body%node)
+               start = field%value(:, body%reference) + field%spin(b)*turned_left( &
+                  scene%x(:, body%node(i)) - scene%x(:, body%reference))
+               if (field%is_given(body%node(i)) .and. any(abs(field%value(:, body%node(i)) &
+                  - start) > rounding*largest)) then
+                  call add_error(reader%log, field%origin, "*INITIAL CONDITIONS: the " // name &
+                     // " of node " // to_text(scene%node_label(body%node(i))) // &
+                     " does not fit the motion of rigid body " // body%name // &
+                     "; give it at the reference node " // &
+                     to_text(scene%node_label(body%reference)) // ", degrees of freedom 1, 2, 6")
+                  exit
+               end if
+               field%value(:, body%node(i)) = start
+            end do
+         end associate
+      end do
+   end subroutine follow_references
+
+end module emcon_deck_initial
