@@ -306,13 +306,15 @@ class Model(Cards):
         return self
 
     def section(self, material: str, elements: str = "ALL", *, thickness: Number = 1.0,
-                kinematics: str | None = None) -> Model:
+                kinematics: str | None = None, massless: bool = False) -> Model:
         """`*SOLID SECTION`: an element set is of a material, of `thickness` [L].
 
         kinematics    NONLINEAR (default), as the steps say, or LINEAR: small strains in all steps
+        massless      no inertia in dynamic steps: a quasi-static part
         """
         return self._card("SOLID SECTION", {"ELSET": elements, "MATERIAL": material,
-                                            "KINEMATICS": kinematics}, [(thickness,)])
+                                            "KINEMATICS": kinematics, "MASSLESS": massless},
+                          [(thickness,)])
 
     def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
                 value: Number | ArrayLike) -> Model:

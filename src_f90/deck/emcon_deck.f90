@@ -7,6 +7,7 @@ module emcon_deck
    use emcon_deck_check, only : check_materials, check_nodes
    use emcon_deck_check_contact, only : check_pairs, choose_slaves
    use emcon_deck_check_linear, only : check_linear
+   use emcon_deck_check_massless, only : check_massless_sections
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
@@ -95,6 +96,7 @@ contains
       call check_materials(reader, scene)
       call check_nodes(reader, scene)
       call check_linear(reader, scene)
+      call check_massless_sections(reader, scene)
       call check_surfaces(reader, scene)
       call choose_slaves(reader, scene)
       call check_pairs(reader, scene)

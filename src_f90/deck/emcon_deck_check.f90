@@ -16,7 +16,8 @@ contains
    subroutine check_materials(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_used(:), is_bare(:), has_weight(:), resists(:), moves(:)
+      logical, allocatable :: is_used(:), is_bare(:), has_weight(:), has_inertia(:), resists(:), &
+         moves(:)
       integer :: i, k, material
       logical :: needs_mass
 
@@ -28,9 +29,14 @@ contains
             // label_list(pack(scene%element_label, is_bare)) &
             // " has no section; give one by *SOLID SECTION")
       end if
-      allocate(is_used(size(scene%material)), has_weight(size(scene%material)), source=.false.)
+      allocate(is_used(size(scene%material)), has_weight(size(scene%material)), &
+         has_inertia(size(scene%material)), source=.false.)
       do i = 1, size(scene%section)
-         if (scene%section(i)%material > 0) is_used(scene%section(i)%material) = .true.
+         associate (section => scene%section(i))
+            if (section%material == 0) cycle
+            is_used(section%material) = .true.
+            if (.not. section%is_massless) has_inertia(section%material) = .true.
+         end associate
       end do
       call mark_rigid_materials(scene, resists, moves)
       needs_mass = .false.
@@ -50,7 +56,7 @@ contains
                "material " // given%name // " has no law: *ELASTIC, *HYPERELASTIC or *USER " &
                // "MATERIAL is missing")
             if (given%density > 0.0_wp .or. given%density < 0.0_wp) cycle
-            if (needs_mass .and. moves(i)) then
+            if (needs_mass .and. moves(i) .and. has_inertia(i)) then
                call add_error(reader%log, given%origin, "material " // given%name &
                   // " has no density: a dynamic step needs *DENSITY above 0")
             else if (has_weight(i)) then

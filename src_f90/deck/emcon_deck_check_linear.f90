@@ -27,9 +27,13 @@ contains
       integer :: b, i, n_body, section
       real(wp) :: turned
 
-      if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_names) return
+      if (reader%doubt_nodes .or. reader%doubt_elements) return
+      if (reader%doubt_names .or. reader%doubt_rigid) return
       if (any(scene%element_section == 0) .or. .not. allocated(scene%v0)) return
       is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear
+      do b = 1, size(scene%rigid)
+         is_linear(scene%rigid(b)%element) = .false.
+      end do
       if (.not. any(is_linear)) return
       call bodies_find(scene%element_node, size(scene%x, 2), body, n_body)
       call mark_held(scene, is_held)

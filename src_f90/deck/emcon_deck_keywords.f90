@@ -51,8 +51,8 @@ module emcon_deck_keywords
       keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
-      keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,!ORIENTATION," &
-         // "!OFFSET:0,!CONTROLS"), &
+      keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
+         // "!ORIENTATION,!OFFSET:0,!CONTROLS"), &
       keyword_t("RIGID BODY", in_model, "ELSET=,REFNODE=,!ANALYTICALSURFACE,!NSET,!ROTNODE," &
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &

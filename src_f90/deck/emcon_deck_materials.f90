@@ -325,6 +325,7 @@ contains
                // suggestion(name, known))
          end if
          call read_kinematics(reader, card, scene, section)
+         section%is_massless = has_option(card, "MASSLESS")
          call data_open(data, card)
          if (next_line(reader, data)) then
             call get_real(reader, data, 1, "thickness", section%thickness)

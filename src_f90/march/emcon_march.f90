@@ -47,8 +47,8 @@ contains
       call check_schemes(self, scene, error)
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
-      allocate(self%may_shed(size(scene%x, 2)))
-      call terms_massless(self%system%term, self%may_shed)
+      allocate(self%may_shed(size(scene%x, 2)), self%is_bare(size(scene%x, 2)))
+      call terms_massless(self%system%term, self%may_shed, self%is_bare)
       call layer_init(self%layer, scene, self%may_shed, self%system, error, given)
       if (allocated(error)) return
       call host_copy_solvers(given, self%solver)

@@ -21,6 +21,7 @@ module emcon_march_begin
    use emcon_numbering, only : spread_dependent
    use emcon_overclosure, only : overclosure_check
    use emcon_pose, only : pose_at_end
+   use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_create, scheme_given
    use emcon_solver_registry, only : solver_given
@@ -64,9 +65,10 @@ contains
       call check_held(self, scene, error)
       if (allocated(error)) return
       call prepare(self, scene, error)
+      if (.not. allocated(error)) call quasi_static_begin(self, scene)
    end subroutine march_begin_step
 
-   !> Where masses do not resist no body may be free to move.
+   !> Where masses do not resist no body may be free to move, where they do none without mass.
    subroutine check_held(self, scene, error)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
@@ -74,7 +76,10 @@ contains
       character(len=:), allocatable :: text
 
       associate (step => scene%step(self%state%i_step))
-         if (step%scheme%masses_resist) return
+         if (step%scheme%masses_resist) then
+            call quasi_static_hold(self, scene, error)
+            return
+         end if
          call free_motion_text(self%system, scene, step%prescribed, text)
          if (len(text) > 0) call raise(error, err_analysis, "the static problem is singular: " &
             // text)
@@ -240,7 +245,7 @@ contains
          if (scene%pair(i)%initiation == initiation_persistent) cycle
          is_slave(self%system%contact(i)%contact%node) = .true.
       end do
-      n = count(self%layer%is_massless)
+      n = count(self%layer%is_massless .and. is_slave)
       call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
          " nodes; " // to_text(count(is_slave) - n) // " slave nodes keep theirs, as they are " // &
          "prescribed, tied, or given mass, or as an element has no other nodes")

@@ -11,6 +11,7 @@ module emcon_march_commit
    use emcon_pair_record, only : pair_record_measure
    use emcon_pair_sums, only : pair_sums_add, pair_sums_push, slave_pushes
    use emcon_pose, only : pose_velocity
+   use emcon_quasi_static, only : quasi_static_move
    use emcon_scene, only : scene_t
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update
@@ -53,6 +54,7 @@ contains
          call book_work(self)
          if (scene%step(state%i_step)%initiation == initiation_velocity_update &
             .and. self%scheme%row%masses_resist) call restore_energy(self, increment%notes, error)
+         call quasi_static_move(self, ending%du/h)
          if (self%layer%is_on .and. self%scheme%row%masses_resist) call end_massless(self, &
             ending%du/h, increment%notes, error)
          if (allocated(error)) return

@@ -95,8 +95,9 @@ contains
       type(march_t), intent(in) :: self
       integer, intent(in) :: status, level
 
-      may_return = self%layer%is_on .and. self%scheme%row%masses_resist .and. any(status == &
-         [step_refused, step_diverged, step_singular, step_cycling, step_unbalanced]) .and. &
+      may_return = any(self%layer%is_massless .and. .not. self%is_bare) &
+         .and. self%scheme%row%masses_resist .and. any(status == [step_refused, step_diverged, &
+         step_singular, step_cycling, step_unbalanced]) .and. &
          level >= min(return_level, self%n_level)
    end function may_return
 

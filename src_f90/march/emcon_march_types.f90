@@ -65,6 +65,7 @@ module emcon_march_types
       type(velocity_update_t) :: velocity_update
       type(layer_t) :: layer                     !! of massless contact surfaces
       logical, allocatable :: may_shed(:)        !! (n_node) massless at first
+      logical, allocatable :: is_bare(:)         !! (n_node) of sections without inertia
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(judge_t) :: judge

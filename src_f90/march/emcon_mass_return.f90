@@ -46,8 +46,10 @@ contains
       logical, intent(in) :: has_residual        !! of the last iterate
       logical, intent(out) :: is_troubled(:)     !! (n_node)
       real(wp) :: left(size(is_troubled))
+      logical :: may_have_mass(size(is_troubled))
       integer :: i
 
+      may_have_mass = self%layer%is_massless .and. .not. self%is_bare
       is_troubled = self%layer%is_troubled
       if (.not. any(is_troubled)) then
          left = 0.0_wp
@@ -62,8 +64,9 @@ contains
       end if
       call mark_elements(scene, self%layer%is_massless .and. is_troubled, is_troubled)
       do i = 1, size(is_troubled)
-         is_troubled(i) = is_troubled(i) .and. self%layer%is_massless(i)
+         is_troubled(i) = is_troubled(i) .and. may_have_mass(i)
       end do
+      if (.not. any(is_troubled)) is_troubled = may_have_mass
    end subroutine mass_find_troubled
 
    !> The slave nodes of contacts that act, if one of them is massless; else all nodes.

@@ -23,12 +23,13 @@ contains
    !> Names the first body that can move as a rigid one, and how, or the first assembly of bodies
    !> tied to each other; empty if none can. Bodies in a contact pair are looked at only
    !> `with_contact`: contact may hold them. `system%space%linear` holds the rows of the step.
-   subroutine free_motion_text(system, scene, prescribed, text, with_contact)
+   subroutine free_motion_text(system, scene, prescribed, text, with_contact, is_held)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       type(prescribed_t), intent(in) :: prescribed(:)
       character(len=:), allocatable, intent(out) :: text
       logical, intent(in), optional :: with_contact
+      logical, intent(in), optional :: is_held(:)        !! (n_body) by something else
       type(mechanisms_t) :: bodies
       type(mechanism_rows_t) :: rows
       integer, allocatable :: assembly(:), order(:), member(:)
@@ -40,7 +41,13 @@ contains
       contact_holds = .true.
       if (present(with_contact)) contact_holds = .not. with_contact
       call mechanism_rows_find(system, prescribed, rows)
-      call mechanisms_find(system, scene, scene%x, rows, contact_holds, contact_holds, bodies)
+      call mechanisms_find(system, scene, scene%x, rows, contact_holds, &
+         contact_holds .or. present(is_held), bodies)
+      if (present(is_held)) then
+         do n = 1, size(is_held)
+            if (is_held(n)) bodies%is_free(:, n) = .false.
+         end do
+      end if
       call find_assemblies(bodies, rows, assembly, n_assembly, order)
       text = ""
       last = 0

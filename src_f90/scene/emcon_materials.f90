@@ -24,6 +24,7 @@ module emcon_materials
       integer :: material = 0
       real(wp) :: thickness = 1.0_wp                 !! [L]
       integer :: kinematics = kinematics_nonlinear   !! one of `kinematics_`
+      logical :: is_massless = .false.               !! its elements have no inertia
    end type section_t
 
 end module emcon_materials

@@ -41,6 +41,7 @@ module emcon_solid
       logical :: has_given = .false.                     !! some law is a given one
       integer, allocatable :: n_point(:)                 !! quadrature points, of each given law
       integer, allocatable :: first_point(:)             !! (n_element) among these; 0: law of ours
+      logical, allocatable :: has_inertia(:)             !! (n_element)
       real(wp), allocatable :: mass(:, :, :)             !! (n_most, n_most, n_element) [M]
       real(wp), allocatable :: volume_mass(:, :)         !! int rho N_i: (n_most, n_element) [M]
       real(wp), allocatable :: thickness(:)              !! (n_element) [L]
@@ -80,6 +81,7 @@ contains
       allocate(self%mass(n_most, n_most, n), source=0.0_wp)
       allocate(self%volume_mass(n_most, n), self%stiffness(n_most, n), source=0.0_wp)
       self%section = scene%element_section
+      self%has_inertia = .not. scene%section(scene%element_section)%is_massless
       self%is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear &
          .and. .not. self%is_rigid
       call init_laws(self, scene, at_rest, error, given)
@@ -212,6 +214,7 @@ contains
          call reference_gradient(n, local, mass%slope(:, :, k), gradient, det)
          rho_dv = density*mass%weight(k)*det*self%thickness(e)
          self%volume_mass(:n, e) = self%volume_mass(:n, e) + rho_dv*mass%value(:, k)
+         if (.not. self%has_inertia(e)) cycle
          do i = 1, n
             self%mass(:n, i, e) = self%mass(:n, i, e) &
                + rho_dv*mass%value(i, k)*mass%value(:, k)

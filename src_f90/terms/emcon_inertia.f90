@@ -21,6 +21,7 @@ module emcon_inertia
       type(csr_t) :: mass                        !! (n_node x n_node) [M]
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
+      logical, allocatable :: is_bare(:)         !! (n_node) it has none of its own
       type(csr_t), private :: given, added       !! (n_node x n_node) beside it [M]
       integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of these
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)

@@ -15,7 +15,7 @@ module emcon_massless
    use emcon_surface_edges, only : surface_edges
    implicit none
    private
-   public :: massless_find, massless_shed, massless_return, massless_follow
+   public :: massless_bare, massless_find, massless_shed, massless_return, massless_follow
 
    !> Those around a node that have kept their mass.
    type :: stencil_t
@@ -26,13 +26,54 @@ module emcon_massless
 
 contains
 
-   !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those that are
-   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces,
-   !> and those of elements that would keep none.
-   pure subroutine massless_find(scene, solid, is_given, is_massless)
+   !> The nodes that have no mass of their own: those of elements without inertia alone, less those
+   !> that are given mass or forces or stand in ties, equations and rigid bodies, whose masses they
+   !> may bear.
+   pure subroutine massless_bare(scene, solid, is_given, is_bare)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: is_given(:)         !! (n_node) mass or forces
+      logical, intent(out) :: is_bare(:)         !! (n_node)
+      integer :: e
+
+      is_bare = .false.
+      if (all(solid%has_inertia)) return
+      do e = 1, solid%n_element
+         if (.not. solid%has_inertia(e)) is_bare(solid%node(:solid%geometry(e)%n_node, e)) = .true.
+      end do
+      do e = 1, solid%n_element
+         if (solid%has_inertia(e)) is_bare(solid%node(:solid%geometry(e)%n_node, e)) = .false.
+      end do
+      call leave_joined(scene, is_given, is_bare)
+   end subroutine massless_bare
+
+   !> Nodes of ties, equations and rigid bodies, and those that are given something, are not meant.
+   pure subroutine leave_joined(scene, is_given, is_meant)
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_given(:)         !! (n_node) mass or forces
+      logical, intent(inout) :: is_meant(:)      !! (n_node)
+      integer :: i
+
+      do i = 1, size(scene%tie)
+         is_meant(scene%tie(i)%rows%node) = .false.
+      end do
+      do i = 1, size(scene%equation)
+         is_meant(scene%equation(i)%node) = .false.
+      end do
+      do i = 1, size(scene%rigid)
+         is_meant(scene%rigid(i)%node) = .false.
+      end do
+      is_meant = is_meant .and. .not. is_given
+   end subroutine leave_joined
+
+   !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those that are
+   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces,
+   !> and those of elements that would keep none. And all nodes that have none anyway.
+   pure subroutine massless_find(scene, solid, is_given, is_bare, is_massless)
+      type(scene_t), intent(in) :: scene
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: is_given(:)         !! (n_node) mass or forces
+      logical, intent(in) :: is_bare(:)          !! (n_node) those of `massless_bare`
       logical, intent(out) :: is_massless(:)     !! (n_node)
       integer, allocatable :: edge(:, :)
       integer :: i
@@ -52,17 +93,9 @@ contains
          if (.not. scene%step(i)%scheme%masses_resist) cycle
          is_massless(scene%step(i)%prescribed%node) = .false.
       end do
-      do i = 1, size(scene%tie)
-         is_massless(scene%tie(i)%rows%node) = .false.
-      end do
-      do i = 1, size(scene%equation)
-         is_massless(scene%equation(i)%node) = .false.
-      end do
-      do i = 1, size(scene%rigid)
-         is_massless(scene%rigid(i)%node) = .false.
-      end do
-      is_massless = is_massless .and. .not. is_given
+      call leave_joined(scene, is_given, is_massless)
       call keep_one(solid, is_massless)
+      is_massless = is_massless .or. is_bare
    end subroutine massless_find
 
    !> Leave the nodes of each element that would keep no mass theirs.
@@ -75,7 +108,7 @@ contains
       keeps = .false.
       do e = 1, solid%n_element
          associate (node => solid%node(:solid%geometry(e)%n_node, e))
-            if (all(is_massless(node))) keeps(node) = .true.
+            if (solid%has_inertia(e) .and. all(is_massless(node))) keeps(node) = .true.
          end associate
       end do
       is_massless = is_massless .and. .not. keeps
@@ -88,6 +121,7 @@ contains
       integer :: e, i
 
       do e = 1, solid%n_element
+         if (.not. solid%has_inertia(e)) cycle
          associate (n => solid%geometry(e)%n_node)
             call shed(is_massless(solid%node(:n, e)), solid%mass(:n, :n, e))
             do i = 1, n

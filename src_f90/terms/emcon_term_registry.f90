@@ -10,7 +10,7 @@ module emcon_term_registry
    use emcon_linear_term, only : linear_term_init, linear_term_t
    use emcon_loads, only : loads_init, loads_t
    use emcon_materials, only : kinematics_linear
-   use emcon_massless, only : massless_find, massless_return, massless_shed
+   use emcon_massless, only : massless_bare, massless_find, massless_return, massless_shed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
@@ -63,7 +63,7 @@ contains
       type(host_t), intent(in), optional :: given
       type(csr_t) :: extra
       type(solid_t), pointer :: solid
-      logical :: is_massless(size(scene%x, 2)), is_given(size(scene%x, 2))
+      logical, dimension(size(scene%x, 2)) :: is_bare, is_massless, is_given
 
       select type (part => term(of_solid)%term)
       type is (solid_term_t)
@@ -78,12 +78,14 @@ contains
       if (allocated(error)) return
       solid => terms_solid(term)
       call mark_given(size(scene%x, 1), extra, is_given, given)
-      call massless_find(scene, solid, is_given, is_massless)
+      call massless_bare(scene, solid, is_given, is_bare)
+      call massless_find(scene, solid, is_given, is_bare, is_massless)
       if (any(is_massless)) call massless_shed(solid, is_massless)
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          call inertia_init(part, solid, size(scene%x, 1), extra, error)
          part%is_massless = is_massless
+         part%is_bare = is_bare
       end select
       select type (part => term(of_loads)%term)
       type is (loads_t)
@@ -143,15 +145,19 @@ contains
       end select
    end subroutine terms_mass
 
-   !> The nodes that have given their mass to their neighbours.
-   pure subroutine terms_massless(term, is_massless)
+   !> The nodes that contact finds without mass: those that have given theirs to their neighbours,
+   !> and of sections without inertia.
+   pure subroutine terms_massless(term, is_massless, is_bare)
       type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
       logical, intent(out) :: is_massless(:)     !! (n_node)
+      logical, intent(out) :: is_bare(:)         !! (n_node) of such sections, whatever contact does
 
       is_massless = .false.
+      is_bare = .false.
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          is_massless = part%is_massless
+         is_bare = part%is_bare
       end select
    end subroutine terms_massless
 

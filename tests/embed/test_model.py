@@ -237,7 +237,7 @@ def everything() -> Model:
     model.material("E", mooney_rivlin=(1.0, 0.1, 0.1))
     model.material("F", yeoh=(1.0, 0.0, 0.1, 0.1, 0.0, 0.0))
     model.material("G", ogden=(1.0, 2.0, 0.1, -2.0, 0.1, 3.0, 0.1, 0.0, 0.2))
-    model.section("A", "E", thickness=2.0)
+    model.section("A", "E", thickness=2.0, kinematics="LINEAR", massless=True)
     model.initial("DISPLACEMENT", "N", 1, 0.5)
     model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))

@@ -108,6 +108,19 @@ def test_other_treatments_of_first_contact(tmp_path, reference, initiation):
     assert_same_bits(run, reference(**parameters), units)
 
 
+@pytest.mark.parametrize("option", ["KINEMATICS=LINEAR", "MASSLESS"])
+def test_sections(tmp_path, option):
+    units = (-13, 7, 5)
+    parameters = {"h": 0.02, "t_end": 0.4, "frame": 0.2, "initiation": "MASSLESS"}
+    runs = []
+    for exponents in ((0, 0, 0), units):
+        deck = in_units(*exponents, **parameters)
+        deck.replace("ELSET=BLOCK, MATERIAL", f"ELSET=BLOCK, {option}, MATERIAL")
+        runs.append(run_deck(deck, tmp_path/str(len(runs))))
+    assert runs[0].history["active"].max() >= 2
+    assert_same_bits(runs[1], runs[0], units)
+
+
 FORMULATIONS = [
     {"formulation": "NODE TO SURFACE", "smoothing": "HERMITE"},
     {"formulation": "SEGMENT", "multiplier": "STANDARD"},

@@ -1,0 +1,119 @@
+!> Sections without inertia: what they need in dynamic steps, and which contact.
+module emcon_deck_check_massless
+   use emcon_deck_check_surfaces, only : mark_nodes
+   use emcon_deck_reader, only : reader_t
+   use emcon_diagnostics, only : add_error, add_warning
+   use emcon_origin, only : origin_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : initiation_massless, initiation_velocity_update
+   implicit none
+   private
+   public :: check_massless_sections
+
+contains
+
+   !> Something has inertia, and contact on what has none begins in a way that needs none.
+   subroutine check_massless_sections(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      logical, allocatable :: is_massless(:), is_bare(:), meets(:)
+      type(origin_t) :: origin
+      integer :: k
+
+      if (reader%doubt_nodes .or. reader%doubt_elements) return
+      if (reader%doubt_names .or. reader%doubt_rigid) return
+      if (any(scene%element_section == 0) .or. .not. allocated(scene%step)) return
+      is_massless = scene%section(scene%element_section)%is_massless
+      if (.not. any(is_massless)) return
+      k = scene%element_section(findloc(is_massless, .true., 1))
+      origin = scene%section(k)%origin
+      if (.not. any(scene%step%scheme%masses_resist)) then
+         call add_warning(reader%log, origin, "MASSLESS has no effect: there is no *DYNAMIC step")
+         return
+      end if
+      if (all(is_massless) .and. .not. allocated(scene%given_node)) call add_error(reader%log, &
+         origin, "all sections are MASSLESS: nothing has inertia; use *STATIC")
+      do k = 1, size(scene%rigid)
+         if (any(is_massless(scene%rigid(k)%element))) call add_error(reader%log, &
+            scene%rigid(k)%origin, "rigid body " // scene%rigid(k)%name // " has a MASSLESS " // &
+            "section: it has nothing but its inertia")
+      end do
+      call mark_bare(scene, is_massless, is_bare)
+      call mark_contact(scene, meets)
+      if (.not. any(meets .and. is_bare)) return
+      do k = 1, size(scene%step)
+         if (.not. scene%step(k)%scheme%masses_resist) cycle
+         call check_step(reader, scene, k, is_bare)
+      end do
+   end subroutine check_massless_sections
+
+   !> What is restored in a step by a jump of velocities goes along forces on masses.
+   subroutine check_step(reader, scene, k, is_bare)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: k                   !! of a dynamic step
+      logical, intent(in) :: is_bare(:)          !! (n_node)
+      logical, allocatable :: is_joined(:)
+
+      associate (step => scene%step(k))
+         if (step%initiation == initiation_velocity_update) call add_error(reader%log, &
+            step%origin, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE pushes masses, but a surface " &
+            // "in contact is of a MASSLESS section; use PERSISTENT or MASSLESS")
+         if (step%initiation /= initiation_massless) return
+         call mark_joined(scene, is_joined)
+         if (any(is_joined .and. is_bare)) call add_error(reader%log, step%origin, &
+            "*CONTACT INITIATION, TYPE=MASSLESS balances MASSLESS sections in contact by " // &
+            "themselves, but one is in a *TIE or an *EQUATION; use PERSISTENT")
+      end associate
+   end subroutine check_step
+
+   !> Nodes of massless elements alone.
+   pure subroutine mark_bare(scene, is_massless, is_bare)
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_massless(:)              !! (n_element)
+      logical, allocatable, intent(out) :: is_bare(:)    !! (n_node)
+      integer :: pass, e
+
+      allocate(is_bare(size(scene%x, 2)), source=.false.)
+      do pass = 1, 2
+         do e = 1, size(is_massless)
+            if (is_massless(e) .neqv. pass == 1) cycle
+            is_bare(pack(scene%element_node(:, e), scene%element_node(:, e) > 0)) = pass == 1
+         end do
+      end do
+   end subroutine mark_bare
+
+   !> Nodes of surfaces in contact.
+   pure subroutine mark_contact(scene, meets)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: meets(:)      !! (n_node)
+      integer :: i
+
+      allocate(meets(size(scene%x, 2)), source=.false.)
+      do i = 1, size(scene%pair)
+         if (scene%pair(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%pair(i)%slave), &
+            meets)
+         if (scene%pair(i)%master > 0) call mark_nodes(scene, &
+            scene%surface(scene%pair(i)%master), meets)
+      end do
+   end subroutine mark_contact
+
+   !> Nodes of ties and equations.
+   pure subroutine mark_joined(scene, is_joined)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: is_joined(:)  !! (n_node)
+      integer :: i
+
+      allocate(is_joined(size(scene%x, 2)), source=.false.)
+      do i = 1, size(scene%tie)
+         if (scene%tie(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%slave), &
+            is_joined)
+         if (scene%tie(i)%master > 0) call mark_nodes(scene, &
+            scene%surface(scene%tie(i)%master), is_joined)
+      end do
+      do i = 1, size(scene%equation)
+         is_joined(scene%equation(i)%node) = .true.
+      end do
+   end subroutine mark_joined
+
+end module emcon_deck_check_massless
