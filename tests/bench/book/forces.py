@@ -54,7 +54,7 @@ def draw(bounces, folder):
                      label=kind.lower())
     picture.plot([0.9, 1, 1, 5/3, 5/3, 1.8], [0, 0, 300, 500, 0, 0], color="0.6", lw=3, zorder=0,
                  label="closed form")
-    picture.set(xlim=(0.9, 1.8), ylim=(-40, 1500), xlabel="time",
+    picture.set(xlim=(0.9, 1.8), ylim=(-40, 900), xlabel="time",
                 ylabel="contact force of each increment")
     picture.legend(fontsize=7, frameon=False, loc="upper right")
     save(folder / "verification_forces.png")
