@@ -235,6 +235,7 @@ contains
       integer :: i, n
 
       if (step%initiation /= initiation_massless .or. .not. step%scheme%masses_resist) return
+      call warn_of_mass(self, scene)
       if (self%layer%is_on) then
          call layer_mark(self%layer, self%system, self%active%closes)
          call layer_begin_step(self%layer, step, self%system, error)
@@ -250,6 +251,21 @@ contains
          " nodes; " // to_text(count(is_slave) - n) // " slave nodes keep theirs, as they are " // &
          "prescribed, tied, or given mass, or as an element has no other nodes")
    end subroutine begin_massless
+
+   !> Tell of pairs whose surfaces were to be massless and are not.
+   subroutine warn_of_mass(self, scene)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer :: i
+
+      do i = 1, self%system%n_pair
+         if (scene%pair(i)%initiation == initiation_persistent) cycle
+         if (any(self%may_shed(self%system%contact(i)%contact%node))) cycle
+         call note_add(self%warnings, "the surface " // scene%surface(scene%pair(i)%slave)%name // &
+            " of a contact pair keeps its mass in spite of TYPE=MASSLESS: it is prescribed, tied, " &
+            // "rigid, given mass or forces, or one element thick")
+      end do
+   end subroutine warn_of_mass
 
    !> What solves the systems of the step: a solver of EMCON, or one that was given.
    subroutine choose_solver(self, step)
