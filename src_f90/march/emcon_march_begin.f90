@@ -262,8 +262,8 @@ contains
          if (scene%pair(i)%initiation == initiation_persistent) cycle
          if (any(self%may_shed(self%system%contact(i)%contact%node))) cycle
          call note_add(self%warnings, "the surface " // scene%surface(scene%pair(i)%slave)%name // &
-            " of a contact pair keeps its mass in spite of TYPE=MASSLESS: it is prescribed, tied, " &
-            // "rigid, given mass or forces, or one element thick")
+            " of a contact pair keeps its mass in spite of TYPE=MASSLESS: it is prescribed, " // &
+            "tied, rigid, given mass or forces, or one element thick")
       end do
    end subroutine warn_of_mass
 
