@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 from collections.abc import Callable
@@ -224,6 +225,27 @@ class Stepper(Queries, Conditions):
         """Warnings of the deck, and what was done before the first step: moved nodes and so on."""
         lines: str = self._handle.call(_text, _core.emcon_get_notes)
         return [line.rstrip() for line in lines.split("\n")] if lines else []
+
+    def report(self) -> dict[str, list[dict[str, Any]]]:
+        """What the scene consists of: `emcon check --json` but for the cost.
+
+        Lists of "bodies", "pairs", "ties", "parts" that are on or off, "sizes", "increments",
+        "advice"; "text" of each is its line in the log. A notebook shows them as tables.
+        """
+        report: dict[str, list[dict[str, Any]]] = json.loads(
+            self._handle.call(_text, _core.emcon_get_report))
+        return report
+
+    def __repr__(self) -> str:
+        lines = [row["text"] for rows in self.report().values() for row in rows]
+        return "\n".join([f"Stepper at time {self.time:g}", *lines])
+
+    def _repr_html_(self) -> str:
+        parts = [f"<b>Stepper at time {self.time:g}</b>"]
+        for kind, rows in self.report().items():
+            cells = "".join(f"<tr><td>{html.escape(row['text'])}</td></tr>" for row in rows)
+            parts.append(f"<table><tr><th>{kind}</th></tr>{cells}</table>")
+        return "".join(parts)
 
     def node_set(self, name: str) -> NDArray[np.intp]:
         """The rows of a node set in arrays of nodes, (k,). Raises `InputError` if there is none."""

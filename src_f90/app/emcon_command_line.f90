@@ -41,6 +41,8 @@ contains
       end do
       if (len(self%fault) > 0 .or. self%verb == "help" .or. self%verb == "version") return
       if (len(self%path) == 0) self%fault = "no file is named"
+      if (self%options%is_json .and. self%verb /= "check") self%fault = &
+         "--json is for emcon check; a run writes NAME.json"
       if (self%verb == "restart" .and. (size(self%options%override) > 0 .or. &
          len(self%options%folder) > 0 .or. self%options%is_lenient)) then
          self%fault = "a restart goes on as it was: it takes --quiet and --strict only"
@@ -88,6 +90,8 @@ contains
          self%options%is_quiet = .true.
       case ("--strict")
          self%options%is_strict = .true.
+      case ("--json")
+         self%options%is_json = .true.
       case ("--output", "--set")
          if (equals == 0) then
             i = i + 1
@@ -111,7 +115,7 @@ contains
    subroutine near_option(name, near)
       character(len=*), intent(in) :: name
       character(len=:), allocatable, intent(out) :: near
-      type(string_t) :: known(7)
+      type(string_t) :: known(8)
 
       known(1)%text = "--output"
       known(2)%text = "--set"
@@ -120,6 +124,7 @@ contains
       known(5)%text = "--help"
       known(6)%text = "--version"
       known(7)%text = "--strict"
+      known(8)%text = "--json"
       call nearest_word(name, known, near)
    end subroutine near_option
 
@@ -146,11 +151,11 @@ contains
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(18)
+      character(len=72) :: line(19)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
-         "       emcon check DECK [options]     read and check it, no run", &
+         "       emcon check DECK [options]     read it, report on it, no run", &
          "       emcon restart NAME.rst.h5      go on from a restart file", &
          "", &
          "options:", &
@@ -159,6 +164,7 @@ contains
          "  --lenient          unsupported output is left out, with warnings", &
          "  --quiet            nothing but errors, warnings and a bad verdict", &
          "  --strict           a bad verdict is exit code 3", &
+         "  --json             what check reports as one JSON object", &
          "  --version, --help", &
          "", &
          "results:  NAME.vtkhdf fields for ParaView, NAME.csv and NAME.h5 history,", &

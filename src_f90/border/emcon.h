@@ -350,6 +350,10 @@ int emcon_get_verdict(emcon_model *model, int *is_good, const char **json);
  * emcon_get_verdict. */
 int emcon_get_notes(emcon_model *model, const char **text);
 
+/* What the scene consists of, what of the program it needs, sizes, advice: the report of `emcon check
+ * --json` but for the cost, one JSON object: `*json` as that of emcon_get_verdict. */
+int emcon_get_report(emcon_model *model, const char **json);
+
 /* Which nodes are in the node set `name`: 1, else 0. */
 int emcon_find_nodes(emcon_model *model, const char *name, int n_node, int *is_in /* n_node */);
 

@@ -33,7 +33,7 @@ module emcon_model
       integer(c_int), allocatable :: c_redundant(:)      !! of the last null space, from 0
       type(csr_t) :: p, df                               !! of the last null space
       type(csr_t) :: matrix(6)                           !! asked for last, each kind in its place
-      type(c_text_t) :: text(2)                          !! likewise
+      type(c_text_t) :: text(3)                          !! likewise
    end type model_t
 
 contains

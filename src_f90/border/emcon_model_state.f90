@@ -6,11 +6,13 @@ module emcon_model_state
    use emcon_kinds, only : wp
    use emcon_model, only : model_t
    use emcon_quantities, only : contact_quantity
+   use emcon_report_row, only : report_row_t, rows_json
+   use emcon_scene_report, only : scene_report
    use emcon_text, only : to_upper
    use emcon_verdict_file, only : verdict_so_far
    implicit none
    private
-   public :: model_time, model_ledger, model_verdict, model_notes
+   public :: model_time, model_ledger, model_verdict, model_notes, model_report
    public :: model_find_nodes, model_labels, model_positions
    public :: model_state, model_get_multipliers, model_contact, model_pressures, model_pairs
 
@@ -62,6 +64,15 @@ contains
          text = text // model%stepper%notes%item(i)%text // new_line("a")
       end do
    end subroutine model_notes
+
+   subroutine model_report(model, json)
+      type(model_t), intent(inout) :: model
+      character(len=:), allocatable, intent(out) :: json
+      type(report_row_t), allocatable :: rows(:)
+
+      call scene_report(model%stepper, rows)
+      call rows_json(rows, json)
+   end subroutine model_report
 
    pure subroutine model_find_nodes(model, name, is_in, error)
       type(model_t), intent(in) :: model

@@ -12,7 +12,8 @@ module emcon_march
    use emcon_layer, only : layer_free, layer_init
    use emcon_ledger, only : ledger_init, ledger_measure, ledger_t
    use emcon_march_begin, only : march_begin_step, march_renumber, march_resume
-   use emcon_march_grid, only : grid_whole, march_grid_time, march_is_done, march_set_time
+   use emcon_march_grid, only : easy_increments, grid_whole, march_grid_time, march_is_done, &
+      march_set_time
    use emcon_march_parts, only : march_in_parts
    use emcon_march_types, only : increment_t, march_t
    use emcon_motion, only : at_rest, motion_init
@@ -31,9 +32,6 @@ module emcon_march
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
       march_resume, march_renumber, march_free, march_free_increment, march_set_time, march_watch
-
-   !> Increments without a cut after which an automatic increment is doubled.
-   integer, parameter :: easy_increments = 5
 
 contains
 

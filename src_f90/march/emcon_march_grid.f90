@@ -6,17 +6,20 @@ module emcon_march_grid
    use emcon_steps, only : step_t
    implicit none
    private
-   public :: march_count_grid, march_grid_time, march_is_done, march_set_time, grid_whole
+   public :: march_count_grid, march_count_increments, march_grid_time, march_is_done, &
+      march_set_time, grid_whole, easy_increments
 
    !> An increment is halved so often at most, unless the deck gives h_min.
    integer, parameter :: default_levels = 12, most_levels = 24
+   !> Increments without a cut after which an automatic increment is doubled.
+   integer, parameter :: easy_increments = 5
    !> Closer than this a step's duration counts as a whole number of increments.
    real(wp), parameter :: grid_whole = 1.0e3_wp*epsilon(1.0_wp)
 
 contains
 
    !> Grid increments in the step, and by how much they may grow and shrink.
-   subroutine march_count_grid(self, step)
+   pure subroutine march_count_grid(self, step)
       type(march_t), intent(inout) :: self
       type(step_t), intent(in) :: step
       real(wp) :: ratio, h_max
@@ -40,6 +43,23 @@ contains
          self%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
       end if
    end subroutine march_count_grid
+
+   !> Increments of a step in which none is cut.
+   pure integer function march_count_increments(step) result(n)
+      type(step_t), intent(in) :: step
+      type(march_t) :: march
+      integer :: done, stride
+
+      call march_count_grid(march, step)
+      n = 0
+      done = 0
+      stride = 1
+      do while (done < march%n_grid)
+         done = done + stride
+         n = n + 1
+         if (mod(n, easy_increments) == 0) stride = min(2*stride, march%most_stride)
+      end do
+   end function march_count_increments
 
    !> Is the last increment of the step done?
    pure logical function march_is_done(self)

@@ -14,11 +14,14 @@ module emcon_run
       recorder_resume, recorder_t, recorder_write
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_restart_data, only : restart_check, restart_exchange, restart_list
+   use emcon_probe, only : probe_cost
+   use emcon_report_row, only : report_row_t, rows_json
    use emcon_run_log, only : log_increment, log_start, model_lines
+   use emcon_scene_report, only : scene_report
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_contact_seconds, &
       stepper_fraction, stepper_is_done, stepper_open, stepper_t
    use emcon_stepper_file, only : stepper_load, stepper_save
-   use emcon_text, only : notes_t, string_t, to_text
+   use emcon_text, only : note_add, notes_t, string_t, to_text
    use emcon_timer, only : cpu_seconds, wall_seconds
    use emcon_verdict, only : verdict_balance_lines, verdict_end, verdict_is_failure, &
       verdict_is_good, verdict_line
@@ -35,6 +38,7 @@ module emcon_run
       logical :: is_lenient = .false.
       logical :: is_quiet = .false.
       logical :: is_strict = .false.             !! a bad verdict is an error
+      logical :: is_json = .false.               !! what `check` tells is one JSON object
    end type run_options_t
 
    !> What a run has to tell at its end.
@@ -75,12 +79,30 @@ contains
       type(run_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
       type(run_t), allocatable :: run
+      type(report_row_t), allocatable :: rows(:)
+      type(notes_t) :: lines
+      character(len=:), allocatable :: json
+      integer :: k
 
       allocate(run)
       call stepper_open(run%stepper, path, options%override, options%is_lenient, error)
       call move_diagnostics(run, report)
-      if (allocated(error)) return
-      report%closing = model_lines(run%stepper)
+      if (allocated(error) .or. options%is_quiet) return
+      associate (line => model_lines(run%stepper))
+         lines = notes_t(size(line), line)
+      end associate
+      call scene_report(run%stepper, rows)
+      call probe_cost(run%stepper, rows)
+      if (options%is_json) then
+         lines = notes_t()
+         call rows_json(rows, json)
+         call note_add(lines, json)
+      else
+         do k = 1, size(rows)
+            call note_add(lines, rows(k)%text)
+         end do
+      end if
+      report%closing = lines%item(:lines%n)
    end subroutine run_check
 
    !> Run the deck at `path`. What was written stays, whatever the error.

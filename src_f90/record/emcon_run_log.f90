@@ -8,7 +8,9 @@ module emcon_run_log
    use emcon_log, only : log_line, log_lines, log_t
    use emcon_march, only : increment_t
    use emcon_options, only : option_text
+   use emcon_report_row, only : report_row_t
    use emcon_scene, only : scene_t
+   use emcon_scene_report, only : scene_report
    use emcon_scheme_registry, only : scheme_given
    use emcon_solver_registry, only : solver_given
    use emcon_stepper, only : stepper_t
@@ -26,14 +28,20 @@ contains
    !> Head of the log: program, deck, model, remarks.
    subroutine log_start(log, stepper, diagnostic, path)
       type(log_t), intent(inout) :: log
-      type(stepper_t), intent(in) :: stepper
+      type(stepper_t), intent(inout) :: stepper
       type(string_t), intent(in) :: diagnostic(:)    !! of the deck
       character(len=*), intent(in) :: path
+      type(report_row_t), allocatable :: rows(:)
+      integer :: k
 
       call log_line(log, "EMCON " // version // ", deck " // path)
       call log_lines(log, "with ", notes_t(size(stepper%override), stepper%override))
       call log_lines(log, "", notes_t(size(diagnostic), diagnostic))
       call log_lines(log, "", model_notes(stepper))
+      call scene_report(stepper, rows)
+      do k = 1, size(rows)
+         call log_line(log, rows(k)%text)
+      end do
       call log_line(log, "")
       call log_line(log, " increment          time             h newton cuts active" // &
          "          kinetic           strain            total  residuals of the last solve")

@@ -1,20 +1,17 @@
 !> The verdict for scripts, as JSON, and its running figures in a restart file.
 module emcon_verdict_file
-   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : error_t
    use emcon_files, only : file_close, file_open, file_put, file_remove, file_rename, file_t
+   use emcon_json, only : json_number, json_text, json_texts
    use emcon_kinds, only : wp
    use emcon_march, only : march_t
    use emcon_restart_data, only : restart_exchange, restart_list, restart_offers, restart_t
    use emcon_stand_off, only : stand_off_mean
-   use emcon_text, only : notes_t, string_t, to_text
+   use emcon_text, only : notes_t, string_t
    use emcon_verdict, only : verdict_end, verdict_is_good, verdict_t
    implicit none
    private
    public :: verdict_so_far, verdict_write, verdict_exchange
-
-   !> Digits that are written of a number.
-   integer, parameter :: n_digit = 9
 
 contains
 
@@ -61,85 +58,40 @@ contains
       line = '{"verdict": "bad"'
       if (verdict_is_good(self)) line = '{"verdict": "good"'
       if (.not. self%is_complete) line = '{"verdict": "not completed"'
-      call add_texts(line, "reasons", self%reasons)
-      call add_texts(line, "warnings", self%warnings)
-      call add_number(line, "warning_count", real(self%n_warning, wp))
-      line = line // ', "message": '
-      call add_quoted(line, self%message)
+      call json_texts(line, "reasons", self%reasons)
+      call json_texts(line, "warnings", self%warnings)
+      call json_number(line, "warning_count", real(self%n_warning, wp))
+      call json_text(line, "message", self%message)
       associate (state => march%state, ledger => march%ledger)
-         call add_number(line, "increments", real(state%increment, wp))
-         call add_number(line, "time", state%time)
-         call add_number(line, "newton", real(self%n_newton, wp))
-         call add_number(line, "cuts", real(self%n_cut, wp))
-         call add_number(line, "guarded_increments", real(self%n_guarded, wp))
-         call add_number(line, "held_increments", real(self%n_held, wp))
-         call add_number(line, "held_contacts", real(self%most_held, wp))
-         call add_number(line, "kinetic", ledger%kinetic)
-         call add_number(line, "strain", ledger%strain)
-         call add_number(line, "external_work", ledger%external_work)
-         call add_number(line, "contact_work", ledger%contact_work)
-         call add_number(line, "stabilization", ledger%stabilization)
-         call add_number(line, "total", ledger%total)
+         call json_number(line, "increments", real(state%increment, wp))
+         call json_number(line, "time", state%time)
+         call json_number(line, "newton", real(self%n_newton, wp))
+         call json_number(line, "cuts", real(self%n_cut, wp))
+         call json_number(line, "guarded_increments", real(self%n_guarded, wp))
+         call json_number(line, "held_increments", real(self%n_held, wp))
+         call json_number(line, "held_contacts", real(self%most_held, wp))
+         call json_number(line, "kinetic", ledger%kinetic)
+         call json_number(line, "strain", ledger%strain)
+         call json_number(line, "external_work", ledger%external_work)
+         call json_number(line, "contact_work", ledger%contact_work)
+         call json_number(line, "stabilization", ledger%stabilization)
+         call json_number(line, "total", ledger%total)
       end associate
-      call add_number(line, "total_at_start", self%total0)
-      call add_number(line, "largest_energy", self%largest_energy)
-      call add_number(line, "largest_energy_error", self%largest_drift)
-      call add_number(line, "penetration", self%deepest)
-      call add_number(line, "penetration_time", self%deepest_time)
-      line = line // ', "penetration_place": '
-      call add_quoted(line, self%place)
-      call add_number(line, "stand_off", self%stand_off%largest)
-      call add_number(line, "mean_stand_off", stand_off_mean(self%stand_off))
-      call add_number(line, "unconverged", self%unconverged)
+      call json_number(line, "total_at_start", self%total0)
+      call json_number(line, "largest_energy", self%largest_energy)
+      call json_number(line, "largest_energy_error", self%largest_drift)
+      call json_number(line, "penetration", self%deepest)
+      call json_number(line, "penetration_time", self%deepest_time)
+      call json_text(line, "penetration_place", self%place)
+      call json_number(line, "stand_off", self%stand_off%largest)
+      call json_number(line, "mean_stand_off", stand_off_mean(self%stand_off))
+      call json_number(line, "unconverged", self%unconverged)
       if (size(self%small%section) > 0) then
-         call add_number(line, "linear_rotation", maxval(self%small%rotation))
-         call add_number(line, "linear_strain", maxval(self%small%strain))
+         call json_number(line, "linear_rotation", maxval(self%small%rotation))
+         call json_number(line, "linear_strain", maxval(self%small%strain))
       end if
       line = line // "}"
    end subroutine compose
-
-   !> Append a number; null where it is none.
-   subroutine add_number(line, name, value)
-      character(len=:), allocatable, intent(inout) :: line
-      character(len=*), intent(in) :: name
-      real(wp), intent(in) :: value
-
-      line = line // ', "' // name // '": '
-      if (ieee_is_finite(value)) then
-         line = line // to_text(value, n_digit)
-      else
-         line = line // "null"
-      end if
-   end subroutine add_number
-
-   !> Append a list of texts.
-   subroutine add_texts(line, name, texts)
-      character(len=:), allocatable, intent(inout) :: line
-      character(len=*), intent(in) :: name
-      type(notes_t), intent(in) :: texts
-      integer :: i
-
-      line = line // ', "' // name // '": ['
-      do i = 1, texts%n
-         if (i > 1) line = line // ", "
-         call add_quoted(line, texts%item(i)%text)
-      end do
-      line = line // "]"
-   end subroutine add_texts
-
-   !> Append `text` between quotes, with the escapes of JSON.
-   pure subroutine add_quoted(line, text)
-      character(len=:), allocatable, intent(inout) :: line
-      character(len=*), intent(in) :: text
-      integer :: i
-
-      line = line // '"'
-      do i = 1, len(text)
-         if (text(i:i) == '"' .or. text(i:i) == achar(92)) line = line // achar(92)
-         line = line // merge(" ", text(i:i), iachar(text(i:i)) < iachar(" "))
-      end do
-      line = line // '"'
-   end subroutine add_quoted
 
    !> Put the running figures into `restart`, or go on with those that it has.
    subroutine verdict_exchange(self, restart)

@@ -57,6 +57,7 @@ static void without_model(void)
    TELL(emcon_get_ledger(m, &ledger));
    TELL(emcon_get_verdict(m, i, &json));
    TELL(emcon_get_notes(m, &json));
+   TELL(emcon_get_report(m, &json));
    TELL(emcon_find_nodes(m, "ALL", 1, i));
    TELL(emcon_get_labels(m, 1, i));
    TELL(emcon_get_positions(m, 1, x));

@@ -96,6 +96,7 @@ static void ask(void)
    REFUSED(emcon_find_nodes(m, "FLOOR", sizes.n_node - 1, is_in));
    REFUSED(emcon_find_nodes(m, NULL, sizes.n_node, is_in));
    WORKS(emcon_get_notes(m, &notes));
+   WORKS(emcon_get_report(m, &notes));
    need(notes != NULL, "notes");
    free(pressure);
    free(gap);

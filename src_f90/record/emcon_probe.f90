@@ -1,0 +1,186 @@
+!> What a run will cost, by its first increments: a quarter of a second of them, or three.
+module emcon_probe
+   use, intrinsic :: iso_c_binding, only : c_int, c_long
+   use emcon_errors, only : error_t
+   use emcon_files, only : file_remove
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_march, only : increment_t
+   use emcon_march_grid, only : march_count_increments
+   use emcon_recorder, only : recorder_close, recorder_open, recorder_t, recorder_write
+   use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
+   use emcon_stepper, only : stepper_advance, stepper_is_done, stepper_t
+   use emcon_text, only : to_text
+   use emcon_timer, only : cpu_seconds
+   implicit none
+   private
+   public :: probe_cost
+
+   !> So long the probe goes on, and until so many increments are made, but no longer than `most`.
+   real(dp), parameter :: least_seconds = 0.25_dp, most_seconds = 1.0_dp
+   integer, parameter :: least_increments = 3
+   real(wp), parameter :: megabyte = 1024.0_wp**2
+
+   !> What the probe has come to.
+   type :: probe_t
+      integer :: n = 0                           !! increments
+      integer :: n_newton = 0
+      real(dp) :: begun = 0.0_dp                 !! CPU time before the first one [s]
+      real(dp) :: first = 0.0_dp                 !! of the first one [s]
+      real(dp) :: spent = 0.0_dp                 !! of all [s]
+      real(dp) :: ended = 0.0_dp                 !! of closing the files [s]
+   end type probe_t
+
+   interface
+      !> Of POSIX; the number of this process.
+      function c_getpid() bind(c, name="getpid") result(number)
+         import :: c_int
+         integer(c_int) :: number
+      end function c_getpid
+
+      !> Of POSIX; `usage` is the struct rusage, whose fifth long is the most memory held, in kB.
+      function c_getrusage(who, usage) bind(c, name="getrusage") result(stat)
+         import :: c_int, c_long
+         integer(c_int), value :: who
+         integer(c_long), intent(out) :: usage(32)
+         integer(c_int) :: stat
+      end function c_getrusage
+   end interface
+
+contains
+
+   !> Let `stepper` make increments, and tell what all of them will take. It is of no use after.
+   subroutine probe_cost(stepper, rows)
+      type(stepper_t), intent(inout) :: stepper  !! before its first increment
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(error_t), allocatable :: error
+      type(recorder_t) :: recorder
+      type(probe_t) :: probe
+      type(report_row_t) :: row
+      character(len=:), allocatable :: base
+      logical :: has_files
+
+      call row_begin(row, "cost", "cost:")
+      call scratch_base(base)
+      call open_files(recorder, stepper, base, has_files)
+      call go(stepper, recorder, has_files, probe, error)
+      call remove_files(recorder, base, has_files, probe%ended)
+      if (allocated(error)) then
+         call row_put(row, "failure", error%message, " increment " // to_text(probe%n + 1) // &
+            " of the probe fails: #")
+      else if (probe%n > 0) then
+         call put_figures(stepper, row, probe)
+         if (.not. has_files) call row_put(row, "remark", "result files not included, as " // &
+            "none can be written to try", "; #")
+      end if
+      call rows_add(rows, row)
+   end subroutine probe_cost
+
+   !> Make increments, and record them as a run would, until there are enough.
+   subroutine go(stepper, recorder, has_files, probe, error)
+      type(stepper_t), intent(inout) :: stepper
+      type(recorder_t), intent(inout) :: recorder
+      logical, intent(in) :: has_files
+      type(probe_t), intent(inout) :: probe
+      type(error_t), allocatable, intent(out) :: error
+      type(increment_t) :: increment
+
+      probe%begun = cpu_seconds()
+      do while (.not. stepper_is_done(stepper) .and. probe%spent < most_seconds)
+         if (probe%spent >= least_seconds .and. probe%n >= least_increments) exit
+         call stepper_advance(stepper, increment, error)
+         if (has_files .and. .not. allocated(error)) call recorder_write(recorder, stepper, &
+            increment, cpu_seconds(), error)
+         if (allocated(error)) exit
+         probe%spent = cpu_seconds() - probe%begun
+         probe%n = probe%n + 1
+         probe%n_newton = probe%n_newton + increment%n_newton
+         if (probe%n == 1) probe%first = probe%spent
+      end do
+   end subroutine go
+
+   !> A name for files that nobody else uses, where temporary ones belong.
+   subroutine scratch_base(base)
+      character(len=:), allocatable, intent(out) :: base
+      character(len=256) :: folder
+
+      call get_environment_variable("TMPDIR", folder)
+      if (len_trim(folder) == 0) folder = "/tmp"
+      base = trim(folder) // "/emcon_probe_" // to_text(int(c_getpid()))
+   end subroutine scratch_base
+
+   !> Begin the files of a run, and record its start.
+   subroutine open_files(recorder, stepper, base, is_open)
+      type(recorder_t), intent(inout) :: recorder
+      type(stepper_t), intent(inout) :: stepper
+      character(len=*), intent(in) :: base
+      logical, intent(out) :: is_open
+      type(error_t), allocatable :: error
+      type(increment_t) :: nothing
+
+      call recorder_open(recorder, stepper, base, error)
+      if (.not. allocated(error)) call recorder_write(recorder, stepper, nothing, 0.0_dp, error)
+      is_open = .not. allocated(error)
+   end subroutine open_files
+
+   subroutine remove_files(recorder, base, is_open, seconds)
+      type(recorder_t), intent(inout) :: recorder
+      character(len=*), intent(in) :: base
+      logical, intent(in) :: is_open
+      real(dp), intent(out) :: seconds           !! of closing them
+      type(error_t), allocatable :: ignored
+
+      seconds = cpu_seconds()
+      if (is_open) call recorder_close(recorder, ignored)
+      seconds = cpu_seconds() - seconds
+      call file_remove(base // ".vtkhdf", ignored)
+      call file_remove(base // ".h5", ignored)
+      call file_remove(base // ".csv", ignored)
+   end subroutine remove_files
+
+   !> The first increment counts once, the others stand for the rest.
+   subroutine put_figures(stepper, row, probe)
+      type(stepper_t), intent(in) :: stepper
+      type(report_row_t), intent(inout) :: row
+      type(probe_t), intent(in) :: probe
+      integer(int64) :: n_factor
+      real(dp) :: seconds
+
+      seconds = probe%spent
+      if (probe%n > 1) seconds = probe%first + real(count_all(stepper) - 1, dp) &
+         *(probe%spent - probe%first)/real(probe%n - 1, dp)
+      seconds = probe%begun + seconds + probe%ended
+      call row_put(row, "cpu_seconds", real(seconds, wp), " expected # s of CPU time")
+      call row_put(row, "increments", count_all(stepper), " for # increments")
+      call row_put(row, "newton", real(probe%n_newton, wp)/real(probe%n, wp), ", # iterations each")
+      call row_put(row, "memory_megabytes", memory_held(), ", # MB of memory")
+      associate (correction => stepper%march%newton%correction)
+         n_factor = max(correction%solver%n_factor, correction%definite_solver%n_factor)
+      end associate
+      if (n_factor > 0) call row_put(row, "factor_entries", real(n_factor, wp), &
+         ", # entries of the factor")
+      call row_put(row, "probe_increments", probe%n, "; by the first # increments")
+   end subroutine put_figures
+
+   !> Increments of all steps, if none is cut.
+   integer function count_all(stepper) result(n)
+      type(stepper_t), intent(in) :: stepper
+      integer :: k
+
+      n = 0
+      do k = 1, size(stepper%scene%step)
+         n = n + march_count_increments(stepper%scene%step(k))
+      end do
+   end function count_all
+
+   !> The most memory that the process has held so far [MB].
+   real(wp) function memory_held()
+      integer(c_long) :: usage(32)
+      integer, parameter :: most_held = 5, of_self = 0
+
+      usage = 0
+      memory_held = 0.0_wp
+      if (c_getrusage(int(of_self, c_int), usage) == 0) memory_held = &
+         real(usage(most_held), wp)*1024.0_wp/megabyte
+   end function memory_held
+
+end module emcon_probe

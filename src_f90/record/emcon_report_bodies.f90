@@ -1,0 +1,222 @@
+!> The bodies of a scene as its report tells them, and the waves in them.
+module emcon_report_bodies
+   use emcon_csr, only : csr_t
+   use emcon_kinds, only : wp
+   use emcon_law, only : law_response_plane, law_response_t
+   use emcon_law_registry, only : law_given, law_rows
+   use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
+   use emcon_stepper, only : stepper_t
+   use emcon_term_registry, only : terms_mass, terms_solid
+   implicit none
+   private
+   public :: body_t, bodies_find, bodies_rows
+
+   !> A connected part of the mesh.
+   type :: body_t
+      integer :: n_element = 0
+      integer :: n_rigid = 0                     !! elements that are part of a rigid body
+      integer :: n_linear = 0                    !! elements with small strains in all steps
+      integer :: n_unknown = 0                   !! of the present step
+      integer :: kind = 0                        !! of its elements; < 0: several
+      integer :: law = 0                         !! code of its law; < 0: several
+      real(wp) :: mass = 0.0_wp                  !! [M]
+      real(wp), allocatable :: center(:)         !! (n_dim) of mass [L]
+      real(wp) :: inertia = 0.0_wp               !! about the centre: sum of m r^2 [M L^2]
+      real(wp) :: modulus = 0.0_wp               !! of pressure waves, the largest [M/(L T^2)]
+      real(wp) :: ratio = 0.0_wp                 !! Poisson's, the largest
+      real(wp) :: speed = 0.0_wp                 !! of pressure waves, the largest [L/T]
+      real(wp) :: transit = huge(1.0_wp)         !! of a wave between two nodes, the shortest [T]
+   end type body_t
+
+contains
+
+   !> The bodies of the model that `stepper` holds.
+   subroutine bodies_find(stepper, body)
+      type(stepper_t), intent(in), target :: stepper
+      type(body_t), allocatable, intent(out) :: body(:)
+      type(solid_t), pointer :: solid
+      integer :: e, i, a
+
+      solid => terms_solid(stepper%march%system%term)
+      associate (scene => stepper%scene, space => stepper%march%system%space)
+         allocate(body(space%n_body))
+         do e = 1, size(scene%element_kind)
+            i = space%body(scene%element_node(1, e))
+            if (i > 0) call add_element(body(i), scene, solid, e)
+         end do
+         do i = 1, size(scene%x, 2)
+            if (space%body(i) == 0) cycle
+            do a = 1, scene%n_dim
+               if (space%numbering%unknown(a, i) > 0) body(space%body(i))%n_unknown = &
+                  body(space%body(i))%n_unknown + 1
+            end do
+         end do
+         call add_masses(stepper, body)
+      end associate
+   end subroutine bodies_find
+
+   subroutine add_element(body, scene, solid, e)
+      type(body_t), intent(inout) :: body
+      type(scene_t), intent(in) :: scene
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e
+      type(law_response_t) :: response
+      real(wp) :: speed, modulus
+      real(wp), parameter :: rest(3) = 0.0_wp
+
+      body%n_element = body%n_element + 1
+      if (solid%is_rigid(e)) body%n_rigid = body%n_rigid + 1
+      if (solid%is_linear(e)) body%n_linear = body%n_linear + 1
+      call unite(body%kind, scene%element_kind(e))
+      associate (material => scene%material(scene%section(scene%element_section(e))%material))
+         call unite(body%law, material%law)
+         if (.not. allocated(solid%law(solid%law_of(e))%law)) return
+         associate (law => solid%law(solid%law_of(e))%law)
+            call law_response_plane(law, rest, rest, response)
+            modulus = 2.0_wp*response%tangent(1, 1)   ! by the end of a step of no size: a half
+            if (.not. (modulus > 0.0_wp .and. material%density > 0.0_wp)) return
+            body%modulus = max(body%modulus, modulus)
+            ! lambda/(2 lambda + 2 mu) of modulus = lambda + 2 mu
+            body%ratio = max(body%ratio, 0.5_wp*(modulus - 2.0_wp*law%shear)/(modulus - law%shear))
+         end associate
+         speed = sqrt(modulus/material%density)
+      end associate
+      body%speed = max(body%speed, speed)
+      body%transit = min(body%transit, shortest(scene, e)/speed)
+   end subroutine add_element
+
+   !> One code for all, or < 0 for several.
+   pure subroutine unite(code, other)
+      integer, intent(inout) :: code
+      integer, intent(in) :: other
+
+      if (code == 0) code = other
+      if (code /= other) code = -1
+   end subroutine unite
+
+   !> The smallest distance of two nodes of an element [L].
+   pure real(wp) function shortest(scene, e)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: e
+      integer :: i, j
+
+      shortest = huge(1.0_wp)
+      associate (node => scene%element_node(:, e))
+         do i = 1, count(node > 0)
+            do j = 1, i - 1
+               shortest = min(shortest, norm2(scene%x(:, node(i)) - scene%x(:, node(j))))
+            end do
+         end do
+      end associate
+   end function shortest
+
+   !> Mass, its centre, its moment of inertia.
+   subroutine add_masses(stepper, body)
+      type(stepper_t), intent(in) :: stepper
+      type(body_t), intent(inout) :: body(:)
+      type(csr_t) :: mass
+      integer :: i, k, b
+
+      call terms_mass(stepper%march%system%term, mass)
+      do b = 1, size(body)
+         allocate(body(b)%center(stepper%scene%n_dim), source=0.0_wp)
+      end do
+      associate (x => stepper%scene%x)
+         do i = 1, mass%n_row
+            b = stepper%march%system%space%body(i)
+            do k = mass%row_start(i) + 1, mass%row_start(i + 1)
+               if (b == 0) cycle
+               body(b)%mass = body(b)%mass + mass%value(k)
+               body(b)%center = body(b)%center + mass%value(k)*x(:, i)
+               body(b)%inertia = body(b)%inertia &
+                  + mass%value(k)*dot_product(x(:, i), x(:, mass%column(k) + 1))
+            end do
+         end do
+      end associate
+      do b = 1, size(body)
+         if (.not. body(b)%mass > 0.0_wp) cycle
+         body(b)%center = body(b)%center/body(b)%mass
+         body(b)%inertia = max(0.0_wp, body(b)%inertia &
+            - body(b)%mass*dot_product(body(b)%center, body(b)%center))
+      end do
+   end subroutine add_masses
+
+   !> A row for each body.
+   subroutine bodies_rows(scene, body, rows)
+      type(scene_t), intent(in) :: scene
+      type(body_t), intent(in) :: body(:)
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_row_t) :: row
+      character(len=:), allocatable :: kind, name
+      integer :: i
+
+      do i = 1, size(body)
+         call row_begin(row, "bodies", "body")
+         call row_put(row, "number", i, " #")
+         call name_kind(scene, body(i), kind)
+         call row_put(row, "elements", body(i)%n_element, ": #")
+         call row_put(row, "kind", kind, " #")
+         call row_put(row, "unknowns", body(i)%n_unknown, ", # unknowns")
+         call name_law(body(i), name)
+         call row_put(row, "law", name, ", #")
+         call name_kinematics(body(i), name)
+         call row_put(row, "kinematics", name, ", #")
+         call row_put(row, "mass", body(i)%mass, ", mass #")
+         if (body(i)%mass > 0.0_wp) call put_inertia(body(i), row)
+         if (body(i)%speed > 0.0_wp .and. body(i)%n_rigid < body(i)%n_element) then
+            call row_put(row, "wave_speed", body(i)%speed, ", wave speed #")
+            call row_put(row, "shortest_transit", body(i)%transit, ", shortest transit #")
+         end if
+         call rows_add(rows, row)
+      end do
+   end subroutine bodies_rows
+
+   subroutine put_inertia(body, row)
+      type(body_t), intent(in) :: body
+      type(report_row_t), intent(inout) :: row
+      character(len=*), parameter :: axes = "xyz"
+      integer :: a
+
+      do a = 1, size(body%center)
+         call row_put(row, "center_" // axes(a:a), body%center(a), &
+            trim(merge(", centre #", " #        ", a == 1)))
+      end do
+      call row_put(row, "inertia", body%inertia, ", moment of inertia #")
+   end subroutine put_inertia
+
+   subroutine name_kind(scene, body, name)
+      type(scene_t), intent(in) :: scene
+      type(body_t), intent(in) :: body
+      character(len=:), allocatable, intent(out) :: name
+
+      name = "elements of several kinds"
+      if (body%kind > 0) name = trim(scene%kind(body%kind)%name)
+      if (body%kind == 0) name = "elements"
+   end subroutine name_kind
+
+   subroutine name_law(body, name)
+      type(body_t), intent(in) :: body
+      character(len=:), allocatable, intent(out) :: name
+      integer :: i
+
+      name = "several laws"
+      if (body%law == 0) name = "no law"
+      i = findloc(law_rows%code == body%law, .true., 1)
+      if (i > 0) name = trim(law_rows(i)%name)
+      if (body%law == law_given) name = "given law"
+   end subroutine name_law
+
+   subroutine name_kinematics(body, name)
+      type(body_t), intent(in) :: body
+      character(len=:), allocatable, intent(out) :: name
+
+      name = "as the steps say"
+      if (body%n_linear > 0) name = "linear in part"
+      if (body%n_linear == body%n_element) name = "linear"
+      if (body%n_rigid > 0) name = "rigid in part"
+      if (body%n_rigid == body%n_element) name = "rigid"
+   end subroutine name_kinematics
+
+end module emcon_report_bodies

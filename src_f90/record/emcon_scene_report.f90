@@ -1,0 +1,292 @@
+!> What a scene consists of, what of the program it needs and what not, and advice: the head of a
+!> log and what `emcon check` prints.
+module emcon_scene_report
+   use emcon_contact, only : gap_state_t
+   use emcon_gaps, only : gaps_forget, gaps_search
+   use emcon_interactions, only : contact_pair_t
+   use emcon_kinds, only : wp
+   use emcon_motion, only : at_rest, motion_of
+   use emcon_options, only : option_text
+   use emcon_pose, only : pose_at_end
+   use emcon_report_bodies, only : bodies_find, bodies_rows, body_t
+   use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update
+   use emcon_stepper, only : stepper_t
+   use emcon_surface_edges, only : surface_edges
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: scene_report
+
+   !> A body so many times stiffer than the softest one hardly deforms.
+   real(wp), parameter :: much_stiffer = 100.0_wp
+   !> Elements of linear shape lock above this ratio of Poisson.
+   real(wp), parameter :: nearly_incompressible = 0.49_wp
+   !> Waves are not resolved by increments of so many transits.
+   real(wp), parameter :: many_transits = 10.0_wp
+
+contains
+
+   !> The report, before the first increment.
+   subroutine scene_report(stepper, rows)
+      type(stepper_t), intent(inout) :: stepper
+      type(report_row_t), allocatable, intent(out) :: rows(:)
+      type(body_t), allocatable :: body(:)
+
+      allocate(rows(0))
+      call bodies_find(stepper, body)
+      call bodies_rows(stepper%scene, body, rows)
+      call add_pairs(stepper, rows)
+      call add_ties(stepper%scene, rows)
+      call add_choices(stepper, rows)
+      call add_sizes(stepper, rows)
+      call add_increment(stepper%scene, body, rows)
+      call advise_rigid(body, rows)
+      call advise_locking(body, rows)
+      call advise_massless(stepper%scene, body, rows)
+   end subroutine scene_report
+
+   !> A row for each pair, as the history counts them.
+   subroutine add_pairs(stepper, rows)
+      type(stepper_t), intent(inout) :: stepper
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(gap_state_t), allocatable :: gap(:)
+      type(report_row_t) :: row
+      logical, allocatable :: is_of(:)
+      integer :: p, k
+
+      associate (system => stepper%march%system, scene => stepper%scene, &
+            sums => stepper%march%state%sums)
+         if (system%n_pair == 0) return
+         call gaps_search(system, motion_of(pose_at_end, scene%x, stepper%march%state%u, &
+            at_rest(scene%x)), gap)
+         call gaps_forget(system)
+         allocate(is_of(size(gap)))
+         do p = 1, size(sums%sum)
+            is_of = .false.
+            do k = 1, system%n_pair
+               if (abs(sums%of_pair(k)) == p) is_of(system%first_constraint(k) + 1: &
+                  system%first_constraint(k + 1)) = .true.
+            end do
+            k = findloc(abs(sums%of_pair) == p, .true., 1)
+            call row_begin(row, "pairs", "pair")
+            call row_put(row, "number", p, " #")
+            call describe_pair(scene, scene%pair(k), row)
+            call row_put(row, "constraints", count(is_of), ", # possible constraints")
+            is_of = is_of .and. gap%is_near .and. gap%is_over
+            if (any(is_of)) then
+               call row_put(row, "smallest_gap", minval(gap%gap0, mask=is_of), ", smallest gap #")
+            else
+               call row_put(row, "smallest_gap", "none near", ", # at the start")
+            end if
+            call rows_add(rows, row)
+         end do
+      end associate
+   end subroutine add_pairs
+
+   subroutine describe_pair(scene, pair, row)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(report_row_t), intent(inout) :: row
+      character(len=:), allocatable :: how
+      integer, allocatable :: edge(:, :)
+
+      call row_put(row, "slave", scene%surface(pair%slave)%name, ": #")
+      call surface_edges(scene, scene%surface(pair%slave), edge)
+      call row_put(row, "slave_edges", size(edge, 2), " (# edges)")
+      call row_put(row, "master", scene%surface(pair%master)%name, " on #")
+      call surface_edges(scene, scene%surface(pair%master), edge)
+      call row_put(row, "master_edges", size(edge, 2), " (# edges)")
+      call option_text("formulation", pair%formulation, how)
+      call row_put(row, "formulation", how, ", #")
+      how = "both"
+      if (.not. pair%both_sides) how = "one"
+      call row_put(row, "sides", how, "")
+   end subroutine describe_pair
+
+   !> A row for each tie.
+   subroutine add_ties(scene, rows)
+      type(scene_t), intent(in) :: scene
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_row_t) :: row
+      integer :: k
+
+      do k = 1, size(scene%tie)
+         call row_begin(row, "ties", "tie")
+         call row_put(row, "number", k, " #")
+         call row_put(row, "slave", scene%surface(scene%tie(k)%slave)%name, ": #")
+         call row_put(row, "master", scene%surface(scene%tie(k)%master)%name, " to #")
+         call row_put(row, "rows", size(scene%tie(k)%rows%slave), ", # rows for each direction")
+         call rows_add(rows, row)
+      end do
+   end subroutine add_ties
+
+   !> What of the program the scene needs, and what is off, and why.
+   subroutine add_choices(stepper, rows)
+      type(stepper_t), intent(in) :: stepper
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      logical :: is_dynamic
+
+      associate (scene => stepper%scene, system => stepper%march%system, &
+            layer => stepper%march%layer)
+         is_dynamic = any(scene%step%scheme%masses_resist)
+         call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
+         call choose("guards", size(system%contact) > system%n_pair, &
+            "the pairs hold all nodes that may meet, or GUARD=NO, or there are none")
+         call choose("massless contact nodes", layer%is_on, "not asked for by " // &
+            "*CONTACT INITIATION, TYPE=MASSLESS, or no slave node can be without")
+         call choose("velocity update", is_dynamic .and. any(scene%step%initiation == &
+            initiation_velocity_update), "not asked for by *CONTACT INITIATION")
+         call choose("ties and equations", system%space%linear%n > 0, &
+            "no *TIE, no *EQUATION, no *RIGID BODY")
+         call choose("inertia", is_dynamic, "all steps are static")
+         call choose("large displacements", any(scene%step%nlgeom), "no step has NLGEOM")
+         call choose("pressure and other loads", has_loads(scene), "no *CLOAD, no *DLOAD")
+         call choose("stabilization of loose bodies", any(scene%step%stabilizes), &
+            "not asked for by *CONTACT CONTROLS")
+      end associate
+
+   contains
+
+      subroutine choose(name, is_on, why_not)
+         character(len=*), intent(in) :: name, why_not
+         logical, intent(in) :: is_on
+         type(report_row_t) :: row
+
+         call row_begin(row, "parts", name // ":")
+         call row_put(row, "part", name, "")
+         if (is_on) then
+            call row_put(row, "is", "on", " #")
+         else
+            call row_put(row, "is", "off", " #")
+            call row_put(row, "because", why_not, ": #")
+         end if
+         call rows_add(rows, row)
+      end subroutine choose
+
+   end subroutine add_choices
+
+   pure logical function has_loads(scene)
+      type(scene_t), intent(in) :: scene
+      integer :: k
+
+      has_loads = .false.
+      do k = 1, size(scene%step)
+         has_loads = has_loads .or. size(scene%step(k)%load) > 0
+      end do
+   end function has_loads
+
+   !> Unknowns before and after elimination, and entries of the matrix.
+   subroutine add_sizes(stepper, rows)
+      type(stepper_t), intent(in) :: stepper
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_row_t) :: row
+
+      associate (space => stepper%march%system%space, matrix => stepper%march%system%matrix)
+         call row_begin(row, "sizes", "step 1:")
+         call row_put(row, "freedoms", count(space%is_alive), " # freedoms")
+         call row_put(row, "dependent", space%numbering%n_dependent, ", # eliminated")
+         call row_put(row, "unknowns", space%numbering%n_unknown, ", # unknowns")
+         if (allocated(matrix%row_start)) call row_put(row, "matrix_entries", &
+            matrix%row_start(matrix%n_row + 1), ", # entries of the matrix")
+         call rows_add(rows, row)
+      end associate
+   end subroutine add_sizes
+
+   !> The increment that follows waves through the shortest element, against that of the deck.
+   subroutine add_increment(scene, body, rows)
+      type(scene_t), intent(in) :: scene
+      type(body_t), intent(in) :: body(:)
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_row_t) :: row
+      real(wp) :: transit
+      integer :: k
+
+      k = findloc(scene%step%scheme%masses_resist, .true., 1)
+      if (k == 0) return
+      transit = shortest_transit(body)
+      if (.not. transit < huge(transit)) return
+      call row_begin(row, "increments", "step")
+      call row_put(row, "step", k, " #")
+      call row_put(row, "h", scene%step(k)%h, ": h = #")
+      call row_put(row, "courant_number", scene%step(k)%h/transit, &
+         ", # times the shortest transit")
+      call row_put(row, "recommended_h", transit, "; recommended where waves matter: h = #")
+      if (scene%step(k)%h > many_transits*transit) call row_put(row, "remark", &
+         "waves are not resolved, rigid motion and bending are", "; #")
+      call rows_add(rows, row)
+   end subroutine add_increment
+
+   pure real(wp) function shortest_transit(body)
+      type(body_t), intent(in) :: body(:)
+
+      shortest_transit = minval(body%transit, mask=body%n_rigid < body%n_element &
+         .and. body%n_unknown > 0)
+   end function shortest_transit
+
+   !> Bodies so stiff that they may be rigid.
+   subroutine advise_rigid(body, rows)
+      type(body_t), intent(in) :: body(:)
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_row_t) :: row
+      logical :: is_elastic(size(body))
+      real(wp) :: softest
+      integer :: i
+
+      is_elastic = body%modulus > 0.0_wp .and. body%n_rigid == 0
+      softest = minval(body%modulus, mask=is_elastic)
+      do i = 1, size(body)
+         if (.not. is_elastic(i) .or. body(i)%n_unknown == 0) cycle
+         if (body(i)%modulus < much_stiffer*softest) cycle
+         call row_begin(row, "advice", "body")
+         call row_put(row, "body", i, " #")
+         call row_put(row, "stiffer", body(i)%modulus/softest, &
+            " is # times stiffer than the softest one: as *RIGID BODY ")
+         call row_put(row, "fewer_percent", nint(100.0_wp*real(body(i)%n_unknown, wp) &
+            /real(sum(body%n_unknown), wp)), "# % fewer unknowns")
+         call rows_add(rows, row)
+      end do
+   end subroutine advise_rigid
+
+   !> Bodies that hardly change their volume.
+   subroutine advise_locking(body, rows)
+      type(body_t), intent(in) :: body(:)
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_row_t) :: row
+      integer :: i
+
+      do i = 1, size(body)
+         if (.not. body(i)%ratio > nearly_incompressible .or. &
+            body(i)%n_rigid == body(i)%n_element) cycle
+         call row_begin(row, "advice", "body")
+         call row_put(row, "body", i, " #")
+         call row_put(row, "poisson", body(i)%ratio, " at nu = # locks: it is too stiff " // &
+            "in bending and contact; take nu <= " // to_text(nearly_incompressible))
+         call rows_add(rows, row)
+      end do
+   end subroutine advise_locking
+
+   !> Small increments make a comb of contact forces where slave nodes have mass.
+   subroutine advise_massless(scene, body, rows)
+      type(scene_t), intent(in) :: scene
+      type(body_t), intent(in) :: body(:)
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_row_t) :: row
+      real(wp) :: transit
+      integer :: k
+
+      if (size(scene%pair) == 0 .or. any(scene%step%initiation == initiation_massless)) return
+      k = findloc(scene%step%scheme%masses_resist .and. &
+         scene%step%initiation == initiation_persistent, .true., 1)
+      if (k == 0) return
+      transit = shortest_transit(body)
+      if (.not. scene%step(k)%h < transit) return
+      call row_begin(row, "advice", "h is")
+      call row_put(row, "courant_number", scene%step(k)%h/transit, " # of the shortest transit: " &
+         // "contact forces of slave nodes with mass alternate; *CONTACT INITIATION, " // &
+         "TYPE=MASSLESS has smooth ones, in bodies of at least two elements across")
+      call rows_add(rows, row)
+   end subroutine advise_massless
+
+end module emcon_scene_report

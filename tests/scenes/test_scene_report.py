@@ -1,0 +1,126 @@
+"""The report on a scene: `emcon check`, its JSON, the head of a log, the repr of a Stepper."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from scene_tools import DECKS, Deck, emcon, run_deck
+
+from emcon import Stepper
+
+
+def report(deck, *options):
+    done = emcon("check", deck, "--json", *options)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def ring():
+    return report(DECKS/"ring.inp")
+
+
+def test_bodies_are_those_of_the_deck(ring):
+    """The foundation: a rectangle of 60 by 5, density 0.01, 1000 times as stiff as the ring."""
+    annulus, block = ring["bodies"]
+    assert (block["elements"], block["kind"], block["law"]) == (300, "CPE4", "coupled neo hooke")
+    assert math.isclose(block["mass"], 60*5*0.01, rel_tol=1e-8)
+    assert math.isclose(block["center_x"], 5, rel_tol=1e-8)
+    assert math.isclose(block["center_y"], -2.5, rel_tol=1e-8)
+    assert math.isclose(block["inertia"], 3*(60**2 + 5**2)/12, rel_tol=1e-8)
+    modulus = block["wave_speed"]**2*0.01
+    assert math.isclose(modulus, 1000*annulus["wave_speed"]**2*0.01, rel_tol=1e-7)
+    assert math.isclose(block["shortest_transit"]*block["wave_speed"], 1, rel_tol=1e-8)
+    (sizes,) = ring["sizes"]
+    assert sum(body["unknowns"] for body in ring["bodies"]) == sizes["unknowns"] == 1250
+
+
+def test_pairs_parts_and_advice(ring):
+    (pair,) = ring["pairs"]
+    assert (pair["slave"], pair["slave_edges"], pair["constraints"]) == ("RING_OUTER", 64, 64)
+    assert math.isclose(pair["smallest_gap"], 0.1, rel_tol=1e-8)
+    parts = {part["part"]: part for part in ring["parts"]}
+    assert parts["contact"]["is"] == parts["inertia"]["is"] == "on"
+    assert parts["ties and equations"]["is"] == "off"
+    assert "*TIE" in parts["ties and equations"]["because"]
+    (advice,) = ring["advice"]
+    assert (advice["body"], advice["fewer_percent"]) == (2, 49)
+    assert math.isclose(advice["stiffer"], 1000, rel_tol=1e-8)
+    (step,) = ring["increments"]
+    assert math.isclose(step["courant_number"]*step["recommended_h"], step["h"], rel_tol=1e-8)
+
+
+def test_what_locks_and_what_makes_a_comb_is_told(tmp_path):
+    deck = Deck.read(DECKS/"bouncing_bar.inp").text()
+    assert "TYPE=MASSLESS" in report(DECKS/"bouncing_bar.inp")["advice"][0]["text"]
+    before, _, after = deck.partition("*ELASTIC\n")
+    first, _, rest = after.partition("\n")
+    (tmp_path/"locks.inp").write_text(before + "*ELASTIC\n" + first.split(",")[0] + ", 0.4999\n"
+                                      + rest)
+    texts = [row["text"] for row in report(tmp_path/"locks.inp")["advice"]]
+    assert any("nu = 0.4999 locks" in text for text in texts)
+
+
+def test_ties_have_their_rows():
+    told = report(DECKS/"tied_patch.inp")
+    assert told["ties"] and all(tie["rows"] > 0 for tie in told["ties"])
+    assert told["sizes"][0]["dependent"] > 0
+    parts = {part["part"]: part["is"] for part in told["parts"]}
+    assert (parts["ties and equations"], parts["contact"]) == ("on", "off")
+    assert "pairs" not in told
+
+
+def test_the_cost_is_that_of_a_run(tmp_path, monkeypatch):
+    """Increments to the last one, memory within a factor of 1.5; the probe leaves no file."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    (tmp_path/"out").mkdir()
+    for name in ("two_blocks_static", "tied_rotation", "hertz"):
+        (cost,) = report(DECKS/f"{name}.inp")["cost"]
+        run = run_deck(DECKS/f"{name}.inp", tmp_path/"out")
+        assert cost["increments"] == len(run.history) - 1
+        assert 0 < cost["cpu_seconds"] < 60
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_probe_that_fails_says_why(tmp_path):
+    deck = Deck.read(DECKS/"ring.inp").text().replace("TOLERANCE=<tolerance>",
+                                                      "TOLERANCE=1e-30, MAXIMUM=1")
+    (tmp_path/"hard.inp").write_text(deck)
+    (cost,) = report(tmp_path/"hard.inp")["cost"]
+    assert "of the probe fails: the analysis stops at time" in cost["text"]
+
+
+def test_a_log_begins_with_it_and_makes_no_probe(ring, tmp_path):
+    log = run_deck(DECKS/"ring.inp", tmp_path, h=0.05, t_end=0.1, frame=1).log
+    assert all(body["text"] in log for body in ring["bodies"])
+    assert "cost:" not in log
+    text = emcon("check", DECKS/"ring.inp").stdout
+    assert ring["bodies"][0]["text"] in text
+    assert "cost: expected" in text
+
+
+def test_json_is_of_check_alone(tmp_path):
+    done = emcon("run", DECKS/"ring.inp", "--json", "--output", tmp_path)
+    assert done.returncode == 2
+    assert "--json is for emcon check" in done.stderr
+
+
+def test_a_stepper_shows_it(ring):
+    with Stepper(DECKS/"ring.inp") as stepper:
+        before = stepper.u.copy()
+        assert stepper.report()["bodies"] == ring["bodies"]
+        assert ring["pairs"][0]["text"] in repr(stepper)
+        assert "<table>" in stepper._repr_html_()
+        assert (stepper.u == before).all()
+
+
+def test_asking_changes_no_bits():
+    with Stepper(DECKS/"two_bodies.inp", h=0.02) as asked, \
+            Stepper(DECKS/"two_bodies.inp", h=0.02) as silent:
+        for _ in range(30):
+            asked.step()
+            asked.report()
+            silent.step()
+        assert asked.active.any() or np.abs(asked.v).max() > 0
+        assert (asked.u == silent.u).all() and (asked.v == silent.v).all()
