@@ -135,10 +135,12 @@ class Run:
         """NAME.csv as a structured array, one row per increment."""
         return np.atleast_1d(np.genfromtxt(self.file(".csv"), delimiter=",", names=True))
 
-    def digits(self):
-        """The columns of NAME.csv as they are written, all but `cpu`, for comparison bit by bit."""
+    def digits(self, pairs=True):
+        """The columns of NAME.csv as they are written, all but `cpu`, for comparison bit by bit;
+        with those of the contact pairs or without."""
         head, *rows = [line.split(",") for line in self.file(".csv").read_text().splitlines()]
-        return {name: [row[k] for row in rows] for k, name in enumerate(head) if name != "cpu"}
+        return {name: [row[k] for row in rows] for k, name in enumerate(head)
+                if name != "cpu" and (pairs or not name.startswith("pair"))}
 
     @functools.cached_property
     def increments(self):

@@ -22,10 +22,12 @@ def run(folder, choice, slave="TOP", contact=AUTO, sides=""):
 
 @pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: ", ".join(choice.values()))
 def test_the_rounder_surface_becomes_the_slave(tmp_path, choice):
-    """Left to the program, the pair is the one that names the disc first, to the bit."""
+    """Left to the program, the pair is the one that names the disc first, to the bit; what it
+    transmits is told of the surface that the deck names first."""
     free = run(tmp_path / "free", choice)
     disc = run(tmp_path / "disc", choice, "DISC", contact=ONE)
-    assert free.digits() == disc.digits()
+    assert free.digits(pairs=False) == disc.digits(pairs=False)
+    assert (free.history["pair1_force_y"] == -disc.history["pair1_force_y"]).all()
     assert "DISC (slave, 32 nodes, the rounder one) on TOP" in free.log
     assert "DISC (slave, 32 nodes) on TOP" in disc.log
 
