@@ -8,6 +8,7 @@ module emcon_deck
    use emcon_deck_check_contact, only : check_pairs, choose_slaves
    use emcon_deck_check_linear, only : check_linear
    use emcon_deck_check_massless, only : check_massless_sections
+   use emcon_deck_check_rigid, only : check_rigid
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
@@ -101,6 +102,7 @@ contains
       call choose_slaves(reader, scene)
       call check_pairs(reader, scene)
       call check_ties(reader, scene)
+      call check_rigid(reader, scene)
       call guards_find(scene%pair, scene%surface, scene%guard)
    end subroutine read_scene
 

@@ -97,6 +97,10 @@ contains
       call check_freedom(label, dof, "is not prescribed", k > 0, error)
       call check_number("the value", value, error)
       if (allocated(error)) return
+      associate (item => self%scene%step(self%march%state%i_step)%prescribed(k))
+         if (item%turn > 0) call check_deformable(self, label, node, error)
+      end associate
+      if (allocated(error)) return
       associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
          now = instant_t(state%step_time, state%time)
          call prescribed_motion(self%scene, step, step%prescribed(k), now, &
@@ -123,6 +127,7 @@ contains
 
       call find_prescribed(self, label, dof, node, k, error)
       call check_freedom(label, dof, "is prescribed already", k == 0, error)
+      call check_deformable(self, label, node, error)
       call check_number("the value", value, error)
       if (allocated(error)) return
       added%node = node
@@ -164,6 +169,7 @@ contains
 
       call find_prescribed(self, label, dof, node, k, error)
       call check_freedom(label, dof, "is not prescribed", k > 0, error)
+      call check_deformable(self, label, node, error)
       if (allocated(error)) return
       associate (all_of => self%scene%step(self%march%state%i_step)%prescribed)
          list = pack(all_of, [(i /= k, i = 1, size(all_of))])
@@ -245,6 +251,21 @@ contains
    end subroutine find_prescribed
 
    !> An input error that says what a degree of freedom is, unless `holds`.
+   !> What is prescribed of a rigid body stays as the deck has it.
+   pure subroutine check_deformable(self, label, node, error)
+      type(stepper_t), intent(in) :: self
+      integer, intent(in) :: label, node
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: b
+
+      if (allocated(error)) return
+      do b = 1, size(self%scene%rigid)
+         call check_that(.not. any(self%scene%rigid(b)%node == node), "node " // to_text(label) &
+            // " belongs to rigid body " // self%scene%rigid(b)%name // ": what is prescribed of " &
+            // "it stays as the deck has it", error)
+      end do
+   end subroutine check_deformable
+
    pure subroutine check_freedom(label, dof, what, holds, error)
       integer, intent(in) :: label, dof
       character(len=*), intent(in) :: what
