@@ -23,7 +23,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f\ud800-\udfff]")
 Number: TypeAlias = float | str
 #: Nodes or elements: the name of a set, a number, or several of them.
 Where: TypeAlias = str | int | Sequence[str | int] | NDArray[np.integer[Any]]
-Dof: TypeAlias = Literal[1, 2] | tuple[Literal[1, 2], ...]
+Dof: TypeAlias = Literal[1, 2, 6] | tuple[Literal[1, 2, 6], ...]
 Numbers: TypeAlias = NDArray[np.int64]
 _Cards = TypeVar("_Cards", bound="Cards")
 
@@ -104,8 +104,9 @@ class Cards:
         """Data lines `node, dof, value` (`twice`: `node, dof, dof, value`)."""
         what = f"*{keyword}"
         axes = np.atleast_1d(whole(dof, f"degree of freedom of {what}", (None,)*np.ndim(dof)))
-        if axes.ndim != 1 or not np.isin(axes, (1, 2)).all() or not len(axes):
-            raise InputError(f"{what}: a degree of freedom is 1 or 2, not {dof!r}")
+        if axes.ndim != 1 or not np.isin(axes, (1, 2, 6)).all() or not len(axes):
+            raise InputError(f"{what}: a degree of freedom is 1 or 2, or 6, the "
+                             f"rotation of the reference node of a rigid body, not {dof!r}")
         names = self._names(where, self._nodes, what)
         if isinstance(value, str):
             rows = [(name, *([axis]*(2 if twice else 1)), value) for name in names
@@ -212,7 +213,7 @@ class Cards:
                  op: Literal["MOD", "NEW"] | None = None) -> _Cards:
         """`*BOUNDARY`: prescribe displacements [L]; before the first step as in it.
 
-        dof        1, 2 or (1, 2)
+        dof        1, 2 or (1, 2); 6: rotation of the reference node of a rigid body, radians
         value      one for all, (n_dof,), or (k, n_dof) for k nodes
         fixed      hold the degrees of freedom where the step finds them
         op         NEW: all supports of earlier steps go

@@ -316,15 +316,34 @@ class Model(Cards):
                                             "KINEMATICS": kinematics, "MASSLESS": massless},
                           [(thickness,)])
 
+    def rigid_body(self, elements: str, reference: int | str) -> Model:
+        """`*RIGID BODY`: an element set that keeps its shape.
+
+        reference   node, or set of one, that is prescribed, loaded and started: 1, 2 and 6
+        """
+        return self._card("RIGID BODY", {"ELSET": elements, "REF NODE": reference})
+
     def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
                 value: Number | ArrayLike) -> Model:
         """`*INITIAL CONDITIONS`: velocities [L/T] or displacements [L] at the start.
 
-        dof     1, 2 or (1, 2)
+        dof     1, 2 or (1, 2); 6: spin of the reference node of a rigid body [1/T]
         value   one for all, (n_dof,), or (k, n_dof) for k nodes
         """
         self._valued("INITIAL CONDITIONS", where, dof, value, {"TYPE": type})
         return self
+
+    def rotating(self, where: Where, spin: Number, *, velocity: tuple[Number, Number] = (0.0, 0.0),
+                 about: tuple[Number, Number] = (0.0, 0.0)) -> Model:
+        """`*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY`: a spin about a point that moves.
+
+        spin       > 0 turns left [1/T]
+        velocity   of the point [L/T]
+        about      where the point is at the start [L]
+        """
+        return self._card("INITIAL CONDITIONS", {"TYPE": "ROTATING VELOCITY"},
+                          [row for name in self._names(where, self._nodes, "*INITIAL CONDITIONS")
+                           for row in ((name, spin, *velocity), about)])
 
     # --- contact, ties, equations ----------------------------------------------------------
 

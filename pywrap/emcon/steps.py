@@ -43,7 +43,7 @@ class Step(Cards):
         """`*CLOAD`: forces on nodes [M L/T^2].
 
         where   node set, node, or (k,) of them
-        dof     1, 2 or (1, 2)
+        dof     1, 2 or (1, 2); 6: moment on the reference node of a rigid body [M L^2/T^2]
         force   one for all, (n_dof,), or (k, n_dof)
         op      NEW: all forces of earlier steps go
         """

@@ -6,6 +6,7 @@ module emcon_quantities
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : at_rest, motion_of
    use emcon_pose, only : pose_at_end
+   use emcon_rigid_bodies, only : rigid_body_t
    use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_t
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
@@ -142,6 +143,7 @@ contains
             values = real(state%v, dp)
          case ("RF")
             values = real(state%reaction, dp)
+            call gather_frames(stepper%scene%rigid, values)
          case default
             allocate(stress(6, size(state%u, 2)), values(7, size(state%u, 2)))
             call nodal_stress(solid, state%u, is_large(stepper), stress)
@@ -152,6 +154,20 @@ contains
          end select
       end associate
    end function node_quantity
+
+   !> Forces on the nodes of the frame of a rigid body are those on its reference node.
+   pure subroutine gather_frames(rigid, values)
+      type(rigid_body_t), intent(in) :: rigid(:)
+      real(dp), intent(inout) :: values(:, :)
+      real(dp) :: total(size(values, 1))
+      integer :: b
+
+      do b = 1, size(rigid)
+         total = sum(values(:, rigid(b)%frame), 2)
+         values(:, rigid(b)%frame) = 0.0_dp
+         values(:, rigid(b)%reference) = total
+      end do
+   end subroutine gather_frames
 
    !> Means and sums over elements: S (6), E (3), ENER and ELSE strain energy, ELKE kinetic energy,
    !> EVOL reference volume (1); second index the element.
