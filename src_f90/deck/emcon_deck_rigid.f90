@@ -2,7 +2,7 @@
 module emcon_deck_rigid
    use emcon_deck_labels, only : find_label
    use emcon_deck_named, only : find_set, hint_at_set, set_names
-   use emcon_deck_reader, only : card_error, card_t, need_name, reader_t
+   use emcon_deck_reader, only : card_error, card_t, need_name, option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
@@ -30,7 +30,7 @@ contains
          n_before = reader%log%n_errors
          call read_card(reader, reader%card(i), scene, new)
          reader%doubt_rigid = reader%doubt_rigid .or. reader%log%n_errors > n_before
-         if (.not. allocated(new%frame)) cycle
+         if (reader%log%n_errors > n_before .or. .not. allocated(new%frame)) cycle
          n = size(scene%rigid)
          allocate(all(n + 1))
          all(:n) = scene%rigid
@@ -96,7 +96,9 @@ contains
       logical :: is_number
 
       node = 0
-      call need_name(reader, card, "REFNODE", name)
+      name = option_name(card, "REFNODE")
+      if (name == "") call card_error(reader, card, "REF NODE= is missing: a node that is " // &
+         "prescribed, loaded and started in place of the body")
       if (name == "") return
       call read_integer(name, label, is_number)
       if (is_number) then
