@@ -271,7 +271,7 @@ class Model(Cards):
     def material(self, name: str, *, density: Number | None = None,
                  user: Sequence[Number] | None = None, law: PointFunction | None = None,
                  **constants: Sequence[Number] | None) -> Model:
-        """`*MATERIAL` with one law; stresses in [M/(L T^2)].
+        """`*MATERIAL` with one law, or none where bodies are rigid; stresses in [M/(L T^2)].
 
         density             [M/L^3]; required in dynamic steps and for gravity
         constants           those of a law of the library, `elastic=(E, nu)`, by the name of the law:
@@ -292,14 +292,13 @@ class Model(Cards):
         if unknown:
             raise InputError(f"material {name}: there is no law {unknown[0]!r}; known are "
                              f"{', '.join(sorted(known))}")
-        if len(given) != 1:
+        if len(given) > 1:
             raise InputError(f"material {name} has one law, not {len(given)}")
-        ((chosen, values),) = given.items()
-        numbers = list(values)
-        kind, options = _law_card(name, chosen, len(numbers))
-        rows = [numbers[k:k + 8] for k in range(0, len(numbers), 8)]
         text = card("MATERIAL", {"NAME": name})
-        text += card(kind, options, rows)
+        for chosen, values in given.items():
+            numbers = list(values)
+            kind, options = _law_card(name, chosen, len(numbers))
+            text += card(kind, options, [numbers[k:k + 8] for k in range(0, len(numbers), 8)])
         if law is not None:
             self.give_law(name, law)
         self._add(text if density is None else text + card("DENSITY", rows=[(density,)]))
@@ -321,7 +320,8 @@ class Model(Cards):
 
         reference   node, or set of one, that is prescribed, loaded and started: 1, 2 and 6
         """
-        return self._card("RIGID BODY", {"ELSET": elements, "REF NODE": reference})
+        (name,) = self._names(reference, self._nodes, "*RIGID BODY")
+        return self._card("RIGID BODY", {"ELSET": elements, "REF NODE": name})
 
     def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
                 value: Number | ArrayLike) -> Model:

@@ -171,6 +171,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call lay_out_matrices(self, rows)
+      if (self%n_free == 0) return
       call triple_product_init(self%product, self%p, matrix, self%d, self%reduced, error)
       if (allocated(error)) return
       if (.not. allocated(self%solver)) call solver_create(solver_default, matrix_general, &
@@ -219,6 +220,9 @@ contains
       call stopwatch_start(self%clock)
       call fill_matrices(self, set)
       if (self%obstacle /= obstacle_none) return
+      is_singular = self%n_free > 0
+      if (self%n_free == 0) call stopwatch_stop(self%clock)
+      if (.not. is_singular) return              ! the constraints alone tell where everything is
       call triple_product_update(self%product, self%p, matrix, self%d, self%reduced)
       call stopwatch_stop(self%clock)
       call solver_renew(self%solver, self%reduced%value, error)
@@ -235,6 +239,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call null_space_particular(self%gap, set%defect, self%part)
+      dq = self%part
+      if (self%n_free == 0) return
       call csr_multiply(matrix, self%part, self%image)
       self%image = -(residual + self%image)
       call csr_multiply_transposed(self%p, self%image, self%rhs)

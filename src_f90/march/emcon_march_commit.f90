@@ -59,6 +59,8 @@ contains
             ending%du/h, increment%notes, error)
          if (allocated(error)) return
          state%u = state%u + ending%du
+         ! Else round-off adds up between the nodes of a rigid body.
+         if (size(scene%rigid) > 0) call follow_links(system, state%u)
          state%v = self%v1
          state%contact = self%newton%contact
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &

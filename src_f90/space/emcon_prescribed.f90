@@ -36,7 +36,7 @@ contains
       real(wp), intent(out) :: u                 !! [L]
       real(wp), intent(out) :: v                 !! [L/T]
       real(wp) :: arm(size(u_start, 1)), start(size(u_start, 1)), w(size(u_start, 1)), &
-         rate(size(u_start, 1)), angle, spin
+         rate(size(u_start, 1)), begun, angle, spin
 
       if (prescribed%turn == 0) then
          call given_motion(scene, step, prescribed, instant, &
@@ -52,9 +52,9 @@ contains
             u = u + start(a)
             return
          end if
-         angle = turned_by(arm, arm + start)
-         angle = angle + turn_of*anint((turn%angle%before - angle)/turn_of)
-         call given_motion(scene, step, turn%angle, instant, angle, angle, spin)
+         begun = turned_by(arm, arm + start)
+         begun = begun + turn_of*anint((turn%angle%before - begun)/turn_of)
+         call given_motion(scene, step, turn%angle, instant, begun, angle, spin)
          call turn_arm(arm, angle, w, rate)
          u = u + w(a)
          v = v + spin*rate(a)
@@ -67,7 +67,7 @@ contains
       type(step_t), intent(in) :: step
       type(prescribed_t), intent(in) :: prescribed
       type(instant_t), intent(in) :: instant
-      real(wp), value :: start                   !! at the start of the step [L] or radians
+      real(wp), intent(in) :: start              !! at the start of the step [L] or radians
       real(wp), intent(out) :: u                 !! [L] or radians
       real(wp), intent(out) :: v                 !! its rate
       real(wp) :: factor, rate
