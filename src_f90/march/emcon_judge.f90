@@ -52,6 +52,7 @@ contains
       type(box_tree_t) :: tree
       integer :: p, i, n
 
+      if (self%look%outline%n_piece == 0) return
       do p = 1, self%look%outline%n_piece
          call measure(self, p, x, u0, du)
       end do

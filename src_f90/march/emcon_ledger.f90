@@ -41,7 +41,7 @@ contains
       type(system_t), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state
-      real(wp) :: momentum(size(x, 1), size(x, 2))   ! of each node
+      real(wp) :: momentum(size(x, 1), size(x, 2)), place(size(x, 1))   ! of each node
       integer :: i
 
       call mass_times(system, state%v, momentum)
@@ -52,7 +52,8 @@ contains
       self%momentum = sum(momentum, dim=2)
       self%angular = 0.0_wp
       do i = 1, size(x, 2)
-         self%angular = self%angular + moment_of(x(:, i) + state%u(:, i), momentum(:, i))
+         place = x(:, i) + state%u(:, i)
+         self%angular = self%angular + moment_of(place, momentum(:, i))
       end do
    end subroutine ledger_measure
 
@@ -62,15 +63,18 @@ contains
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state
       real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
-      real(wp) :: momentum(size(x, 1), size(x, 2))   ! of each node
-      integer :: i
+      real(wp) :: momentum(size(x, 1), size(x, 2)), place(size(x, 1))   ! of each node
+      integer :: i, n_dim
 
+      n_dim = size(x, 1)
       call mass_times(system, state%v, momentum)
       momenta = 0.0_wp
       do i = 1, size(x, 2)
          if (system%space%body(i) == 0) cycle
          associate (to => momenta(:, system%space%body(i)))
-            to = to + [momentum(:, i), moment_of(x(:, i) + state%u(:, i), momentum(:, i))]
+            place = x(:, i) + state%u(:, i)
+            to(:n_dim) = to(:n_dim) + momentum(:, i)
+            to(n_dim + 1) = to(n_dim + 1) + moment_of(place, momentum(:, i))
          end associate
       end do
    end subroutine body_momenta

@@ -118,8 +118,10 @@ contains
                return
             end if
             response%energy(e) = part%energy
-            largest = max(maxval(abs(local%from(:, :n) + local%by(:, :n))), &
-               maxval(motion%computed(:, solid%node(:n, e))))
+            largest = maxval(abs(local%from(:, :n) + local%by(:, :n)))
+            do i = 1, n
+               largest = max(largest, maxval(motion%computed(:, solid%node(i, e))))
+            end do
             do i = 1, n
                node = solid%node(i, e)
                total%force(:, node) = total%force(:, node) + part%force(:, i)

@@ -1,0 +1,169 @@
+"""Off means off: what a scene does not need is not called, and nothing is set up anew that stays.
+
+Calls and allocations of the program itself, counted by valgrind: those of a longer run less those of
+a shorter one are what its increments make. Modules are counted by the folder they stand in.
+"""
+
+import collections
+import pathlib
+import re
+import shutil
+import subprocess
+
+import pytest
+from scene_tools import PROGRAM, ROOT
+
+pytestmark = pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind counts calls")
+
+SHORT, LONG = 4, 8
+FOLDER = {path.stem: path.parent.name for path in (ROOT/"src_f90").glob("*/*.f90")}
+
+DECK = """
+*NODE, NSET=ALL
+{nodes}
+*ELEMENT, TYPE=CPE4, ELSET=BLOCK
+{elements}
+*MATERIAL, NAME=M
+*HYPERELASTIC, COUPLED NEO HOOKE
+100., 0.3
+*DENSITY
+1.
+*SOLID SECTION, ELSET=BLOCK, MATERIAL=M{section}
+1.
+*INITIAL CONDITIONS, TYPE=VELOCITY
+1, 1, 0.5
+*STEP, NLGEOM
+{procedure}
+{cards}
+*NODE FILE, FREQUENCY=0
+U
+*END STEP
+"""
+
+
+def block(n, *cards, section="", procedure="*DYNAMIC, DIRECT\n0.01, {end}"):
+    """A free block of n by n elements, and what a step says of it."""
+    nodes = "\n".join(f"{1 + i + j*(n + 1)}, {i/n}, {j/n}"
+                      for j in range(n + 1) for i in range(n + 1))
+    elements = "\n".join(
+        f"{1 + i + j*n}, {first}, {first + 1}, {first + n + 2}, {first + n + 1}"
+        for j in range(n) for i in range(n) for first in [1 + i + j*(n + 1)])
+    return DECK.format(nodes=nodes, elements=elements, section=section, procedure=procedure,
+                       cards="\n".join(cards) or "**")
+
+
+def counted(path):
+    """Calls of each function, and allocations that each function makes itself."""
+    names, calls, made = {}, collections.Counter(), collections.Counter()
+    caller = callee = ""
+
+    def named(text):
+        number, name = re.match(r"\((\d+)\) ?(.*)", text).groups()
+        return names.setdefault(number, name)
+
+    for line in path.read_text().splitlines():
+        if line.startswith("fn="):
+            caller = named(line[3:])
+        elif line.startswith("cfn="):
+            callee = named(line[4:])
+        elif line.startswith("calls="):
+            n = int(line[6:].split()[0])
+            calls[callee] += n
+            if callee in ("malloc", "calloc", "realloc"):
+                made[caller] += n
+    return calls, made
+
+
+def module(function):
+    """The module of a Fortran procedure, or nothing."""
+    found = re.match(r"__(emcon_\w+?)_MOD_", function)
+    return found[1] if found else ""
+
+
+def run_counted(text, n, folder):
+    """Calls and allocations of a run of `n` increments."""
+    deck = pathlib.Path(folder)/f"deck{n}.inp"
+    deck.write_text(text.replace("{end}", f"{n/100}"))
+    out = deck.with_suffix(".calls")
+    subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", str(PROGRAM),
+                    str(deck), "--quiet", "--output", str(folder)], check=True,
+                   capture_output=True, timeout=120)
+    return counted(out)
+
+
+def per_increment(text, folder):
+    """Calls by function, and allocations by function, of one increment."""
+    counts = [run_counted(text, n, folder) for n in (SHORT, LONG)]
+    return [{name: (after[name] - before[name])/(LONG - SHORT) for name in after
+             if after[name] != before[name]} for before, after in zip(*counts, strict=True)]
+
+
+def called(calls, *modules):
+    """The procedures of these modules that are called."""
+    return sorted(name for name in calls if module(name) in modules)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    return per_increment(block(3), tmp_path_factory.mktemp("plain"))
+
+
+def test_without_a_pair_no_code_of_contact_runs(plain):
+    calls, _ = plain
+    assert called(calls, "emcon_march") and called(calls, "emcon_solid_term")
+    contact = [name for name in FOLDER if FOLDER[name] == "contact"]
+    assert called(calls, *contact) == ["__emcon_moment_plane_MOD_moment_of"]     # of momenta
+    sets = {"constraints_select", "constraints_evaluate", "constraints_rows", "linearise"}
+    assert not [name for name in calls if name.split("_MOD_")[-1] in sets]
+    assert not called(calls, "emcon_layer", "emcon_layer_push", "emcon_velocity_update",
+                      "emcon_gaps", "emcon_holding_gaps", "emcon_overclosure")
+
+
+def test_without_a_tie_nothing_is_eliminated(plain):
+    calls, _ = plain
+    assert not called(calls, "emcon_null_space", "emcon_null_basis", "emcon_dependent_block",
+                      "emcon_independent_rows", "emcon_row_elimination", "emcon_triple_product",
+                      "emcon_saddle_point", "emcon_linear_conditions", "emcon_rigidity")
+
+
+def test_what_is_constant_is_made_once(plain):
+    """Mass, patterns, numbering, orderings: not once per increment."""
+    calls, _ = plain
+    once = {"add_up", "inertia_init", "csr_from_elements", "solid_init", "system_begin_step",
+            "space_begin_step", "umf_di_symbolic", "umfpack_di_symbolic", "cholmod_analyze",
+            "solver_create", "factorise_mass", "bodies_find", "scene_report"}
+    assert not [name for name in calls if name.split("_MOD_")[-1] in once]
+
+
+def test_nothing_is_computed_for_output_that_nobody_asks_for(plain):
+    calls, _ = plain
+    assert not called(calls, "emcon_quantities", "emcon_stress", "emcon_restart",
+                      "emcon_restart_data")
+    assert not [name for name in calls if name.endswith(("vtkhdf_write", "begin_frame"))]
+
+
+def test_allocations_do_not_grow_with_the_mesh(plain, tmp_path):
+    """What the program itself allocates in an increment is as much for four times the elements."""
+    _, made = plain
+    _, finer = per_increment(block(6), tmp_path)
+    own = [{name: n for name, n in some.items() if module(name)} for some in (made, finer)]
+    grown = {name: (own[0].get(name, 0), n) for name, n in own[1].items()
+             if n > own[0].get(name, 0) + 0.5}
+    assert not grown
+
+
+def test_a_linear_body_is_factorised_once(tmp_path):
+    """Its matrix is symmetric and constant: by CHOLMOD, once in a run."""
+    calls, _ = run_counted(block(3, section=", KINEMATICS=LINEAR"), LONG, tmp_path)
+    assert calls["__emcon_march_MOD_march_increment"] == LONG
+    assert calls["__emcon_cholmod_MOD_cholmod_factorise"] == 1
+    assert "__emcon_umfpack_MOD_umfpack_analyse" not in calls
+
+
+def test_statics_of_small_displacements_are_symmetric(tmp_path):
+    procedure = "*STATIC, DIRECT\n0.01, {end}\n*BOUNDARY\n1, 1, 2\n4, 1, 2\n*CLOAD\n16, 1, 0.01"
+    text = block(3, procedure=procedure).replace("NLGEOM", "INC=100").replace(
+        "*INITIAL CONDITIONS, TYPE=VELOCITY\n1, 1, 0.5\n", "")
+    calls, _ = run_counted(text, SHORT, tmp_path)
+    assert calls["__emcon_cholmod_MOD_cholmod_factorise"] > 0
+    assert "__emcon_umfpack_MOD_umfpack_analyse" not in calls
