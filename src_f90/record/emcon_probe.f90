@@ -1,6 +1,6 @@
 !> What a run will cost, by its first increments: a quarter of a second of them, or three.
 module emcon_probe
-   use, intrinsic :: iso_c_binding, only : c_int, c_long
+   use, intrinsic :: iso_c_binding, only : c_int
    use emcon_errors, only : error_t
    use emcon_files, only : file_remove
    use emcon_kinds, only : dp, int64, wp
@@ -36,14 +36,6 @@ module emcon_probe
          import :: c_int
          integer(c_int) :: number
       end function c_getpid
-
-      !> Of POSIX; `usage` is the struct rusage, whose fifth long is the most memory held, in kB.
-      function c_getrusage(who, usage) bind(c, name="getrusage") result(stat)
-         import :: c_int, c_long
-         integer(c_int), value :: who
-         integer(c_long), intent(out) :: usage(32)
-         integer(c_int) :: stat
-      end function c_getrusage
    end interface
 
 contains
@@ -143,6 +135,7 @@ contains
       type(report_row_t), intent(inout) :: row
       type(probe_t), intent(in) :: probe
       integer(int64) :: n_factor
+      real(wp) :: megabytes
       real(dp) :: seconds
 
       seconds = probe%spent
@@ -152,7 +145,9 @@ contains
       call row_put(row, "cpu_seconds", real(seconds, wp), " expected # s of CPU time")
       call row_put(row, "increments", count_all(stepper), " for # increments")
       call row_put(row, "newton", real(probe%n_newton, wp)/real(probe%n, wp), ", # iterations each")
-      call row_put(row, "memory_megabytes", memory_held(), ", # MB of memory")
+      megabytes = memory_held()
+      if (megabytes > 0.0_wp) call row_put(row, "memory_megabytes", megabytes, &
+         ", # MB of memory")
       associate (correction => stepper%march%newton%correction)
          n_factor = max(correction%solver%n_factor, correction%definite_solver%n_factor)
       end associate
@@ -172,15 +167,24 @@ contains
       end do
    end function count_all
 
-   !> The most memory that the process has held so far [MB].
+   !> The most memory that the process has held so far, as Linux tells it [MB]; 0: it does not.
    real(wp) function memory_held()
-      integer(c_long) :: usage(32)
-      integer, parameter :: most_held = 5, of_self = 0
+      character(len=80) :: line
+      integer :: unit, status
+      real(wp) :: kilobytes
 
-      usage = 0
       memory_held = 0.0_wp
-      if (c_getrusage(int(of_self, c_int), usage) == 0) memory_held = &
-         real(usage(most_held), wp)*1024.0_wp/megabyte
+      open(newunit=unit, file="/proc/self/status", status="old", action="read", iostat=status)
+      if (status /= 0) return
+      do
+         read(unit, "(a)", iostat=status) line
+         if (status /= 0) exit
+         if (index(line, "VmHWM:") /= 1) cycle
+         read(line(len("VmHWM:") + 1:index(line, "kB") - 1), *, iostat=status) kilobytes
+         if (status == 0) memory_held = kilobytes*1024.0_wp/megabyte
+         exit
+      end do
+      close(unit, iostat=status)
    end function memory_held
 
 end module emcon_probe

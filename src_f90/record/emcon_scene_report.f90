@@ -281,7 +281,7 @@ contains
          scene%step%initiation == initiation_persistent, .true., 1)
       if (k == 0) return
       transit = shortest_transit(body)
-      if (.not. scene%step(k)%h < transit) return
+      if (.not. (transit < huge(transit) .and. scene%step(k)%h < transit)) return
       call row_begin(row, "advice", "h is")
       call row_put(row, "courant_number", scene%step(k)%h/transit, " # of the shortest transit: " &
          // "contact forces of slave nodes with mass alternate; *CONTACT INITIATION, " // &

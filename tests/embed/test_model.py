@@ -242,7 +242,8 @@ def everything() -> Model:
     model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))
     model.interaction("I", friction=0.0)
-    model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO")
+    model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO",
+                       initiation="PERSISTENT")
     model.contact(interaction="I").contact("S1", ("S1", "S2"))
     model.tie("T", "S1", "S2", position_tolerance=0.1, multiplier="DUAL")
     model.equation([("N", 1, 1.0), (3, 1, -1.0)])
