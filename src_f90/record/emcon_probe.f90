@@ -184,7 +184,7 @@ contains
          if (status == 0) memory_held = kilobytes*1024.0_wp/megabyte
          exit
       end do
-      close(unit, iostat=status)
+      close(unit)
    end function memory_held
 
 end module emcon_probe
