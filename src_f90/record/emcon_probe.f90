@@ -25,7 +25,7 @@ module emcon_probe
       integer :: n = 0                           !! increments
       integer :: n_newton = 0
       real(dp) :: begun = 0.0_dp                 !! CPU time before the first one [s]
-      real(dp) :: first = 0.0_dp                 !! of the first one [s]
+      real(dp) :: first = 0.0_dp, last = 0.0_dp  !! of the first and of the last one [s]
       real(dp) :: spent = 0.0_dp                 !! of all [s]
       real(dp) :: ended = 0.0_dp                 !! of closing the files [s]
    end type probe_t
@@ -83,7 +83,8 @@ contains
          if (has_files .and. .not. allocated(error)) call recorder_write(recorder, stepper, &
             increment, cpu_seconds(), error)
          if (allocated(error)) exit
-         probe%spent = cpu_seconds() - probe%begun
+         probe%last = cpu_seconds() - probe%begun - probe%spent
+         probe%spent = probe%spent + probe%last
          probe%n = probe%n + 1
          probe%n_newton = probe%n_newton + increment%n_newton
          if (probe%n == 1) probe%first = probe%spent
@@ -129,7 +130,8 @@ contains
       call file_remove(base // ".csv", ignored)
    end subroutine remove_files
 
-   !> The first increment counts once, the others stand for the rest.
+   !> The first increment counts once, the others stand for the rest; the last one by half, as it is
+   !> long ones that end a probe.
    subroutine put_figures(stepper, row, probe)
       type(stepper_t), intent(in) :: stepper
       type(report_row_t), intent(inout) :: row
@@ -139,8 +141,9 @@ contains
       real(dp) :: seconds
 
       seconds = probe%spent
-      if (probe%n > 1) seconds = probe%first + real(count_all(stepper) - 1, dp) &
-         *(probe%spent - probe%first)/real(probe%n - 1, dp)
+      if (probe%n > 1 .and. .not. stepper_is_done(stepper)) seconds = probe%first &
+         + real(count_all(stepper) - 1, dp)*(probe%spent - probe%first - 0.5_dp*probe%last) &
+         /(real(probe%n, dp) - 1.5_dp)
       seconds = probe%begun + seconds + probe%ended
       call row_put(row, "cpu_seconds", real(seconds, wp), " expected # s of CPU time")
       call row_put(row, "increments", count_all(stepper), " for # increments")
