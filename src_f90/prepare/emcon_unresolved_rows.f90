@@ -98,7 +98,11 @@ contains
       character(len=:), allocatable, intent(out) :: text
 
       associate (k => linear%place(row), t => linear%tie(row))
-         if (t == 0) then
+         if (t < 0) then
+            text = where_text(scene, scene%rigid(-t)%origin) // ": *RIGID BODY " // &
+               scene%rigid(-t)%name // " in " // direction(linear%own(row)) // " at node " // &
+               to_text(scene%node_label(k))
+         else if (t == 0) then
             text = where_text(scene, scene%equation(k)%origin) // ": *EQUATION " // to_text(k)
          else
             text = where_text(scene, scene%tie(t)%origin) // ": *TIE " // scene%tie(t)%name // &

@@ -17,7 +17,7 @@ module emcon_link_lines
 
 contains
 
-   !> Add the lines to `notes`; none if the scene has neither ties nor equations.
+   !> Add the lines to `notes`; none if the scene has no rigid bodies, ties or equations.
    subroutine add_link_lines(scene, system, notes)
       type(scene_t), intent(in) :: scene
       type(system_t), intent(in) :: system
@@ -29,6 +29,7 @@ contains
       if (system%space%linear%n == 0) return
       call find_crosspoints(scene, node, place, n_place)
       call elimination_text(system, text)
+      if (size(scene%rigid) > 0) text = to_text(size(scene%rigid)) // " rigid; " // text
       call note_add(notes, to_text(system%space%n_body) // " subdomains, " // &
          to_text(size(scene%tie)) // " ties, " // to_text(n_place) // " crosspoints, " // &
          to_text(size(scene%equation)) // " equations; " // text)
