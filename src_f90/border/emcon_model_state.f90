@@ -3,7 +3,7 @@ module emcon_model_state
    use, intrinsic :: iso_c_binding, only : c_double
    use emcon_c_types, only : ledger_c
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_model, only : model_t
    use emcon_quantities, only : contact_quantity
    use emcon_report_row, only : report_row_t, rows_json
@@ -158,10 +158,10 @@ contains
       subroutine pick(name, values)
          character(len=*), intent(in) :: name
          real(wp), allocatable, intent(out) :: values(:)
-         real(wp), allocatable :: quantity(:, :)
+         real(dp), allocatable :: quantity(:, :)
 
          allocate(quantity, source=contact_quantity(model%stepper, name))
-         values = quantity(1, model%stepper%march%system%first_constraint(1) + 1:)
+         values = real(quantity(1, model%stepper%march%system%first_constraint(1) + 1:), wp)
       end subroutine pick
 
    end subroutine model_pressures
