@@ -191,9 +191,10 @@ contains
          if (data%ok) call get_real(reader, data, i, "coordinate", axis(i))
       end do
       if (.not. data%ok .or. data%n <= 3) return
-      if (any(abs(axis(4:5) - axis(:2)) > 0.0_wp) .or. .not. axis(n_axis) > axis(3)) &
+      if (any(abs(axis(4:5) - axis(:2)) > 0.0_wp) .or. .not. axis(n_axis) > axis(3)) then
          call data_error(reader, data, "the model is plane: the axis goes along 3, from its " // &
-         "first point up to a second one")
+            "first point up to a second one")
+      end if
    end subroutine read_axis
 
    !> Rigid bodies start as their reference nodes do. What is given at their other nodes has to fit.

@@ -101,8 +101,9 @@ contains
             do dof = 1, scene%n_dim
                if (is_held(dof)) call put(dof)
             end do
-            if (is_held(last_freedom) .and. any(scene%rigid%reference == item(i))) &
+            if (is_held(last_freedom) .and. any(scene%rigid%reference == item(i))) then
                call put(scene%n_dim + 1)
+            end if
          end do
          if (any(is_other)) call data_warning(reader, data, "node " // &
             label_list(pack(scene%node_label(item), is_other)) // " was prescribed otherwise " &
