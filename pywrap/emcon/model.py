@@ -308,7 +308,8 @@ class Model(Cards):
                 kinematics: str | None = None, massless: bool = False) -> Model:
         """`*SOLID SECTION`: an element set is of a material, of `thickness` [L].
 
-        kinematics    NONLINEAR (default), as the steps say, or LINEAR: small strains in all steps
+        kinematics    NONLINEAR (default), as the steps say; LINEAR: small strains in all steps;
+                      COROTATED: the same in frames that turn with the elements
         massless      no inertia in dynamic steps: a quasi-static part
         """
         return self._card("SOLID SECTION", {"ELSET": elements, "MATERIAL": material,

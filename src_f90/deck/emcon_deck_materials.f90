@@ -11,7 +11,7 @@ module emcon_deck_materials
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
    use emcon_law_registry, only : find_law_row, law_create, law_given, law_rows, n_constant
-   use emcon_materials, only : kinematics_linear, material_t, section_t
+   use emcon_materials, only : kinematics_nonlinear, material_t, section_t
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
@@ -348,7 +348,7 @@ contains
          // "the section a set without them")
    end subroutine read_section
 
-   !> How the elements deform. A linear section takes the stiffness of a law at rest, which a law
+   !> How the elements deform. Small strains take the stiffness of a law at rest, which a law
    !> that a program gives does not tell before the deck is read.
    subroutine read_kinematics(reader, card, scene, section)
       type(reader_t), intent(inout) :: reader
@@ -357,11 +357,11 @@ contains
       type(section_t), intent(inout) :: section
 
       call choose_option(reader, card, "KINEMATICS", "kinematics", section%kinematics)
-      if (section%kinematics /= kinematics_linear .or. section%material == 0) return
+      if (section%kinematics == kinematics_nonlinear .or. section%material == 0) return
       associate (material => scene%material(section%material))
-         if (material%law == law_given) call card_error(reader, card, "KINEMATICS=LINEAR: " &
-            // "material " // material%name // " is a *USER MATERIAL; it needs *ELASTIC or " &
-            // "*HYPERELASTIC")
+         if (material%law == law_given) call card_error(reader, card, "KINEMATICS=" &
+            // option_name(card, "KINEMATICS") // ": material " // material%name // " is a *USER " &
+            // "MATERIAL; it needs *ELASTIC or *HYPERELASTIC")
       end associate
    end subroutine read_kinematics
 

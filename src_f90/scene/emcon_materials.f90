@@ -5,10 +5,11 @@ module emcon_materials
    implicit none
    private
    public :: material_t, section_t
-   public :: kinematics_nonlinear, kinematics_linear
+   public :: kinematics_nonlinear, kinematics_linear, kinematics_corotated
 
-   !> How the elements of a section deform: as their steps say, or by small strains in all steps.
-   integer, parameter :: kinematics_nonlinear = 1, kinematics_linear = 2
+   !> How the elements of a section deform: as their steps say, or by small strains in all steps, of
+   !> the displacement or of what is left of it in a frame that turns with the element.
+   integer, parameter :: kinematics_nonlinear = 1, kinematics_linear = 2, kinematics_corotated = 3
 
    type :: material_t
       character(len=:), allocatable :: name

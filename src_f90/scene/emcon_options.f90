@@ -9,7 +9,8 @@ module emcon_options
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
       multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
       smoothing_none
-   use emcon_materials, only : kinematics_linear, kinematics_nonlinear, section_t
+   use emcon_materials, only : kinematics_corotated, kinematics_linear, kinematics_nonlinear, &
+      section_t
    use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
    use emcon_solver_registry, only : solvers
    use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
@@ -61,6 +62,8 @@ module emcon_options
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
       option_row_t("kinematics", kinematics_nonlinear, "NONLINEAR", "", "", ""), &
       option_row_t("kinematics", kinematics_linear, "LINEAR", "", "small strains", ""), &
+      option_row_t("kinematics", kinematics_corotated, "COROTATED", "", &
+         "small strains in a frame that turns", ""), &
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
       option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]
 

@@ -2,8 +2,9 @@
 !> strains of their quadrature points.
 !>
 !> A rotation is the size of the skew part of grad u, in the plane the sine of its angle; a strain
-!> that of the symmetric part.
+!> that of the symmetric part; of corotated elements both are in their frames.
 module emcon_small_range
+   use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t
    use emcon_kinds, only : wp
    use emcon_solid, only : solid_t
    implicit none
@@ -28,7 +29,7 @@ contains
       integer :: i, most
 
       most = maxval(solid%section)
-      self%section = pack([(i, i = 1, most)], [(any(solid%section == i .and. solid%is_linear), &
+      self%section = pack([(i, i = 1, most)], [(any(solid%section == i .and. solid%is_small), &
          i = 1, most)])
       allocate(self%rotation(size(self%section)), self%strain(size(self%section)), source=0.0_wp)
    end subroutine small_range_init
@@ -39,18 +40,27 @@ contains
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)        !! (n_dim, n_node) [L]
       real(wp), dimension(size(u, 1), size(u, 1)) :: slope, skew
+      real(wp), dimension(size(u, 1), size(solid%node, 1)) :: own, left
+      type(corotated_t) :: frame
       integer :: e, i, k, a, s
 
       do e = 1, solid%n_element
-         if (.not. solid%is_linear(e)) cycle
+         if (.not. solid%is_small(e)) cycle
          s = findloc(self%section, solid%section(e), 1)
          associate (geometry => solid%geometry(e), node => solid%node(:, e))
+            do i = 1, geometry%n_node
+               own(:, i) = u(:, node(i)) - u(:, node(1))
+            end do
+            if (solid%is_corotated(e)) then
+               call corotated_init(frame, geometry, solid%x(:, node(:geometry%n_node)))
+               left = own
+               call corotated_strip(frame, left, own, skew)
+            end if
             do k = 1, geometry%n_gp
                slope = 0.0_wp
-               do i = 2, geometry%n_node
+               do i = 1, geometry%n_node
                   do a = 1, size(u, 1)
-                     slope(:, a) = slope(:, a) &
-                        + (u(:, node(i)) - u(:, node(1)))*geometry%gradient(a, i, k)
+                     slope(:, a) = slope(:, a) + own(:, i)*geometry%gradient(a, i, k)
                   end do
                end do
                skew = 0.5_wp*(slope - transpose(slope))

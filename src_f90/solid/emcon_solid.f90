@@ -8,7 +8,7 @@ module emcon_solid
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
    use emcon_law_registry, only : law_create, law_given, law_linearise
-   use emcon_materials, only : kinematics_linear
+   use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_point_function, only : point_gradient, point_ok
    use emcon_scene, only : scene_t, where_text
    use emcon_shape, only : shape_table_t, shape_tabulate
@@ -33,6 +33,9 @@ module emcon_solid
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
       integer, allocatable :: section(:)                 !! (n_element) of the scene
       logical, allocatable :: is_linear(:)               !! (n_element) small strains in all steps
+      logical, allocatable :: is_corotated(:)            !! (n_element) in a frame that turns
+      logical, allocatable :: is_small(:)                !! (n_element) one of these two
+      real(wp), allocatable :: x(:, :)                   !! (n_dim, n_node) [L], for corotated ones
       logical, allocatable :: is_rigid(:)                !! (n_element) mass alone, no forces
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
       !> One per material; behind them, if there are linear elements, those for these
@@ -84,6 +87,10 @@ contains
       self%has_inertia = .not. scene%section(scene%element_section)%is_massless
       self%is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear &
          .and. .not. self%is_rigid
+      self%is_corotated = scene%section(scene%element_section)%kinematics == kinematics_corotated &
+         .and. .not. self%is_rigid
+      self%is_small = self%is_linear .or. self%is_corotated
+      if (any(self%is_corotated)) allocate(self%x, source=scene%x)
       call init_laws(self, scene, at_rest, error, given)
       if (allocated(error)) return
       call init_kinds(self, scene, stiffness, mass, error)
@@ -94,7 +101,7 @@ contains
          call init_element(self, scene%x, scene%material(self%law_of(e))%density, e, &
             stiffness(self%kind(e)), mass(self%kind(e)))
          if (.not. self%is_rigid(e)) call estimate_stiffness(self, at_rest(self%law_of(e)), e)
-         if (self%is_linear(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
+         if (self%is_small(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
          if (any(self%geometry(e)%weight <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
                " is inverted or has no area; check the order of its nodes")
@@ -142,7 +149,7 @@ contains
       type(law_response_t) :: state
       integer :: k, n
 
-      n = size(scene%material)*merge(2, 1, any(self%is_linear))
+      n = size(scene%material)*merge(2, 1, any(self%is_small))
       allocate(self%law(n), self%given(n))
       at_rest = 0.0_wp
       do k = 1, size(scene%material)

@@ -1,4 +1,4 @@
-!> All elements of a scene but linear ones as one term: forces and tangents over a motion.
+!> All elements of a scene but those of small strains as one term: forces and tangents.
 !>
 !> Source: docs/theory.md, section 3.
 module emcon_solid_term
@@ -26,7 +26,7 @@ module emcon_solid_term
       type(solid_t) :: solid
       logical :: nlgeom = .true.                 !! .false.: small strains
       logical :: has_linear_laws = .false.       !! all materials of its elements are
-      logical, private :: is_empty = .false.     !! all elements are linear
+      logical, private :: is_empty = .false.     !! no elements are left
       integer, allocatable, private :: slot(:)   !! element matrices by columns
       type(host_response_t), private :: given   !! what given laws answer
    contains
@@ -51,13 +51,13 @@ contains
       self%role = role_internal
       call solid_init(self%solid, scene, error, given)
       is_here = .true.
-      if (any(self%solid%is_linear)) then
+      if (any(self%solid%is_small)) then
          is_here = .false.
-         is_here(pack(self%solid%law_of, .not. self%solid%is_linear)) = .true.
+         is_here(pack(self%solid%law_of, .not. self%solid%is_small)) = .true.
       end if
       self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear &
          .or. .not. is_here)
-      self%is_empty = all(self%solid%is_linear) .and. self%solid%n_element > 0
+      self%is_empty = all(self%solid%is_small) .and. self%solid%n_element > 0
    end subroutine solid_term_init
 
    !> The freedoms of each element.
@@ -66,7 +66,7 @@ contains
       type(lists_t), intent(inout) :: lists
       integer, allocatable :: start(:), freedom(:)
 
-      call element_lists(self%solid, lists%n_dim, start, freedom, .not. self%solid%is_linear)
+      call element_lists(self%solid, lists%n_dim, start, freedom, .not. self%solid%is_small)
       call lists_append(lists, start(2:) - start(:size(start) - 1), freedom)
    end subroutine lay_out
 
@@ -105,7 +105,7 @@ contains
       first = 1
       associate (solid => self%solid, total => response%part(self%role))
          do e = 1, solid%n_element
-            if (solid%is_linear(e)) cycle
+            if (solid%is_small(e)) cycle
             n = solid%geometry(e)%n_node
             if (solid%is_rigid(e)) then
                first = first + 4*n*n
@@ -198,7 +198,7 @@ contains
       associate (solid => self%solid)
          do e = 1, solid%n_element
             n = solid%geometry(e)%n_node
-            if (solid%is_linear(e)) cycle
+            if (solid%is_small(e)) cycle
             if (solid%is_rigid(e)) cycle
             if (.not. any(abs(direction(:, solid%node(:n, e))) > 0.0_wp)) cycle
             call solid_gather(solid%node(:n, e), motion%from, motion%by, local)

@@ -6,6 +6,8 @@
 !> not answer, the stress is not a number.
 module emcon_stress
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
+   use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t, &
+      corotated_turn_stress
    use emcon_element, only : element_motion_t, element_point, point_motion_t
    use emcon_host_law, only : host_response_t, host_state
    use emcon_kinds, only : wp
@@ -26,17 +28,18 @@ contains
       type(host_response_t) :: given
       type(element_motion_t) :: motion
       integer :: count_at(solid%n_node), e, i, k, node
-      real(wp) :: at_gp(6), strain(3)
+      real(wp) :: at_gp(6), strain(3), turn(size(u, 1), size(u, 1))
 
       call respond_at(solid, u, nlgeom, given)
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
          if (solid%is_rigid(e)) cycle
-         motion%nlgeom = nlgeom .and. .not. solid%is_linear(e)
-         call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
+         motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
+         call place(solid, e, u, motion, turn)
          do k = 1, solid%geometry(e)%n_gp
             call point_state(solid, e, k, motion, given, at_gp, strain)
+            if (solid%is_corotated(e)) call corotated_turn_stress(turn, at_gp)
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
                stress(:, node) = stress(:, node) &
@@ -66,16 +69,29 @@ contains
       call solid_evaluate_given(solid, u, zero, nlgeom, .false., given)
    end subroutine respond_at
 
-   !> No motion from displacements `u`.
-   pure subroutine place(node, u, motion)
-      integer, intent(in) :: node(:)
+   !> No motion of element `e` from displacements `u`; those of a corotated one are what is left in
+   !> its frame, which has turned by `turn`.
+   pure subroutine place(solid, e, u, motion, turn)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e
       real(wp), intent(in), contiguous :: u(:, :)
       type(element_motion_t), intent(inout) :: motion
+      real(wp), intent(inout) :: turn(:, :)              !! set for corotated elements
+      type(corotated_t) :: frame
+      real(wp) :: u_left(size(u, 1), size(solid%node, 1))
       integer :: i
 
-      do i = 1, size(node)
-         motion%from(:, i) = u(:, node(i))
-      end do
+      associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         do i = 1, size(node)
+            motion%from(:, i) = u(:, node(i))
+         end do
+         if (.not. solid%is_corotated(e)) return
+         call corotated_init(frame, solid%geometry(e), solid%x(:, node))
+         do i = 1, size(node)
+            u_left(:, i) = u(:, node(i)) - u(:, node(1))
+         end do
+         call corotated_strip(frame, u_left, motion%from, turn)
+      end associate
    end subroutine place
 
    !> Stress (6) and strain (E11, E22, 2 E12) at quadrature point `k` of element `e`.
@@ -116,7 +132,7 @@ contains
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
       type(host_response_t) :: given
       type(element_motion_t) :: motion
-      real(wp) :: stress_k(6), strain_k(3), weight
+      real(wp) :: stress_k(6), strain_k(3), weight, turn(size(u, 1), size(u, 1))
       integer :: e, k
 
       call respond_at(solid, u, nlgeom, given)
@@ -125,10 +141,11 @@ contains
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight)
          if (solid%is_rigid(e)) cycle
-         motion%nlgeom = nlgeom .and. .not. solid%is_linear(e)
-         call place(solid%node(:solid%geometry(e)%n_node, e), u, motion)
+         motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
+         call place(solid, e, u, motion, turn)
          do k = 1, solid%geometry(e)%n_gp
             call point_state(solid, e, k, motion, given, stress_k, strain_k)
+            if (solid%is_corotated(e)) call corotated_turn_stress(turn, stress_k)
             weight = solid%geometry(e)%weight(k)/volume(e)
             stress(:, e) = stress(:, e) + weight*stress_k
             strain(:, e) = strain(:, e) + weight*strain_k

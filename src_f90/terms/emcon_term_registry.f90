@@ -1,5 +1,6 @@
 !> The terms of a model: which kinds there are, and what some of them are asked for by name.
 module emcon_term_registry
+   use emcon_corotated_term, only : corotated_term_init, corotated_term_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_host, only : host_t
@@ -9,7 +10,7 @@ module emcon_term_registry
    use emcon_kinds, only : dp, wp
    use emcon_linear_term, only : linear_term_init, linear_term_t
    use emcon_loads, only : loads_init, loads_t
-   use emcon_materials, only : kinematics_linear
+   use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_massless, only : massless_bare, massless_find, massless_return, massless_shed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -32,18 +33,21 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given
       integer :: n, i, first
+      logical :: has_linear, turns               ! there are linear elements, corotated ones
 
       n = 0
       if (present(given)) then
          if (allocated(given%force)) n = size(given%force)
       end if
-      first = n_own + merge(1, 0, any(scene%section(scene%element_section)%kinematics &
-         == kinematics_linear))
+      has_linear = any(scene%section(scene%element_section)%kinematics == kinematics_linear)
+      turns = any(scene%section(scene%element_section)%kinematics == kinematics_corotated)
+      first = n_own + count([has_linear, turns])
       allocate(term(first + n))
       allocate(inertia_t :: term(of_inertia)%term)
       allocate(solid_term_t :: term(of_solid)%term)
       allocate(loads_t :: term(of_loads)%term)
-      if (first > n_own) allocate(linear_term_t :: term(first)%term)
+      if (has_linear) allocate(linear_term_t :: term(n_own + 1)%term)
+      if (turns) allocate(corotated_term_t :: term(first)%term)
       call create_own(scene, term, error, given)
       do i = 1, n
          if (allocated(error)) return
@@ -63,6 +67,7 @@ contains
       type(host_t), intent(in), optional :: given
       type(csr_t) :: extra
       type(solid_t), pointer :: solid
+      integer :: i
       logical, dimension(size(scene%x, 2)) :: is_bare, is_massless, is_given
 
       select type (part => term(of_solid)%term)
@@ -91,11 +96,15 @@ contains
       type is (loads_t)
          call loads_init(part, scene, solid)
       end select
-      if (size(term) == n_own) return
-      select type (part => term(n_own + 1)%term)
-      type is (linear_term_t)
-         call linear_term_init(part, solid, size(scene%x, 1))
-      end select
+      do i = n_own + 1, size(term)
+         if (.not. allocated(term(i)%term)) exit
+         select type (part => term(i)%term)
+         type is (linear_term_t)
+            call linear_term_init(part, solid, size(scene%x, 1))
+         type is (corotated_term_t)
+            call corotated_term_init(part, solid, size(scene%x, 1))
+         end select
+      end do
    end subroutine create_own
 
    !> The nodes that mass or forces are given for.

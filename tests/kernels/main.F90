@@ -17,6 +17,7 @@ program main
 #endif
    use test_constraints, only : collect_constraints
    use test_correction, only : collect_correction
+   use test_corotated, only : collect_corotated
    use test_csr, only : collect_csr
    use test_dgrad, only : collect_dgrad
    use test_dgrad_series, only : collect_dgrad_series
@@ -120,6 +121,7 @@ program main
    call run("judge", collect_judge)
    call run("law", collect_law)
    call run("element", collect_element)
+   call run("corotated", collect_corotated)
    call run("solid", collect_solid)
    call run("chain", collect_chain)
    call run("search", collect_search)

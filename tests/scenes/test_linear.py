@@ -1,6 +1,7 @@
-"""Linear sections: small strains beside large ones, exact balances, and when they are too large."""
+"""Linear and corotated sections: small strains beside large ones, exact balances, warnings."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -19,9 +20,9 @@ def balance(history):
     return np.abs(total - total[0]).max()/(history["kinetic"] + history["strain"]).max()
 
 
-def linear(deck, name):
-    """The deck with KINEMATICS=LINEAR in the section of the element set `name`."""
-    deck.replace(f"ELSET={name}, MATERIAL", f"ELSET={name}, KINEMATICS=LINEAR, MATERIAL")
+def linear(deck, name, kinematics="LINEAR"):
+    """The deck with these kinematics in the section of the element set `name`."""
+    deck.replace(f"ELSET={name}, MATERIAL", f"ELSET={name}, KINEMATICS={kinematics}, MATERIAL")
     return deck
 
 
@@ -276,3 +277,57 @@ def test_a_linear_body_must_not_spin(tmp_path):
     run = run_deck(spinner(0.5, velocity=(3, 1)), tmp_path)
     assert balance(run.history) < 1e-12                   # it flies, and does not deform
     assert run.verdict["linear_rotation"] < 1e-12
+
+
+# ---- corotated ----------------------------------------------------------------------------------
+
+
+def test_a_corotated_ring_spins_and_vibrates(tmp_path):
+    """All momenta and the energy to round-off, over a turn and a half; close to large strains."""
+    deck = Deck.read(DECKS/"spinning_ring.inp")
+    deck.set_parameter("t_end", 2.0)
+    runs = [run_deck(d, tmp_path/str(k)) for k, d in enumerate(
+        (linear(deck, "RING", "COROTATED"), Deck.read(DECKS/"spinning_ring.inp")))]
+    history = runs[0].history
+    assert history["strain"].max() > 0.01*history["kinetic"].max()
+    assert balance(history) < 1e-12
+    for column in ("px", "py", "lz"):
+        change = np.abs(history[column] - history[column][0]).max()
+        assert change < 1e-12*np.abs(history["lz"][0]), column
+    strain = runs[0].verdict["linear_strain"]
+    other = runs[1].history["strain"][:len(history)]
+    assert np.abs(history["strain"] - other).max() < 3*strain*other.max()
+
+
+def test_corotated_bodies_in_contact(tmp_path):
+    for choice in ({"formulation": "MORTAR"}, {"initiation": "MASSLESS"}):
+        deck = Deck.read(DECKS/"two_bodies.inp")
+        for name in re.findall(r"\*SOLID SECTION, ELSET=(\w+)", deck.text()):
+            linear(deck, name, "COROTATED")
+        history = run_deck(deck, tmp_path, h=0.02, frame=1, **choice).history
+        assert (history["active"] > 0).any()
+        assert balance(history) < 1e-12
+        scale = math.sqrt(2*history["kinetic"].max())
+        for column in ("px", "py", "lz"):
+            assert np.abs(history[column] - history[column][0]).max() < 1e-12*scale, column
+
+
+@pytest.mark.parametrize("angle", [0.5, 2.0, 3.1])
+def test_stress_turns_with_the_body(angle, tmp_path):
+    """A patch with the strain of the linear one, turned in 20 increments."""
+    slope, deck = patch(LAWS["rubber"])
+    slope = (slope + slope.T)/2
+    x = np.array([[0, 0], [1.1, .1], [2, 0], [0, 1], [2, .9], [0, 2], [1.2, 2], [2, 2]])
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    k = deck.find("*BOUNDARY")
+    deck.card[k][1][:] = [
+        f"{node}, {a + 1}, {a + 1}, {number(((turn @ (np.eye(2) + slope) - np.eye(2)) @ place)[a])}"
+        for node, place in zip([1, 2, 3, 4, 6, 7, 8, 9], x) for a in range(2)]
+    deck.replace("KINEMATICS=LINEAR", "KINEMATICS=COROTATED")
+    run = run_deck(deck, tmp_path)
+    mu, bulk = 100, 1000
+    expected = turn @ ((bulk - 2*mu/3)*np.trace(slope)*np.eye(2) + 2*mu*slope) @ turn.T
+    stress = run.fields()["cauchy_stress"][-1][:, [0, 1, 3]]
+    right = [expected[0, 0], expected[1, 1], expected[0, 1]]
+    assert np.abs(stress - right).max() < 1e-9*np.abs(expected).max()
+    assert run.verdict["linear_strain"] < 0.1                          # none of the turn

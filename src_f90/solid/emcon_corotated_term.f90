@@ -1,0 +1,198 @@
+!> Elements of corotated sections as one term: a constant stiffness in frames that turn with them.
+!>
+!> Source: docs/theory.md, section 3.
+module emcon_corotated_term
+   use emcon_corotated_plane, only : corotated_force, corotated_image, corotated_init, &
+      corotated_motion_t, corotated_move, corotated_t
+   use emcon_csr, only : csr_t
+   use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_t
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
+   use emcon_space, only : lists_append, lists_t, space_t
+   use emcon_stiff_elements, only : stiff_elements_init, stiff_elements_t
+   use emcon_term, only : response_t, role_internal, term_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: corotated_term_t, corotated_term_init
+
+   type, extends(term_t) :: corotated_term_t
+      type(stiff_elements_t), private :: own
+      type(corotated_t), allocatable, private :: frame(:)    !! (n)
+      integer, allocatable, private :: label(:)              !! (n) of the elements
+      integer, allocatable, private :: slot(:)   !! element matrices by columns
+   contains
+      procedure :: lay_out
+      procedure :: begin_step
+      procedure :: respond
+      procedure :: tangent_times
+      procedure :: is_symmetric
+   end type corotated_term_t
+
+contains
+
+   !> The corotated elements of `solid`.
+   subroutine corotated_term_init(self, solid, n_dim)
+      type(corotated_term_t), intent(out) :: self
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: n_dim               !! > 0
+      integer :: k, m
+
+      self%role = role_internal
+      call stiff_elements_init(self%own, solid, n_dim, solid%is_corotated)
+      self%label = solid%label(self%own%element)
+      allocate(self%frame(size(self%own%element)))
+      do k = 1, size(self%frame)
+         m = n_dim*self%own%n_node(k)
+         call corotated_init(self%frame(k), solid%geometry(self%own%element(k)), &
+            solid%x(:, self%own%node(:self%own%n_node(k), k)))
+         self%frame(k)%stiffness(:m, :m) = self%own%stiffness(:m, :m, k)
+      end do
+   end subroutine corotated_term_init
+
+   !> The freedoms of each element.
+   pure subroutine lay_out(self, lists)
+      class(corotated_term_t), intent(in) :: self
+      type(lists_t), intent(inout) :: lists
+
+      associate (start => self%own%start)
+         call lists_append(lists, start(2:) - start(:size(start) - 1), self%own%freedom)
+      end associate
+   end subroutine lay_out
+
+   !> As `term_t` has it.
+   subroutine begin_step(self, scene, i_step, space, matrix, slot)
+      class(corotated_term_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! from 1
+      type(space_t), intent(in) :: space
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: slot(:)             !! element matrices by columns
+
+      self%slot = slot
+   end subroutine begin_step
+
+   !> Forces of a motion, discrete gradients of the energies of the elements.
+   subroutine respond(self, motion, response, value, side)
+      class(corotated_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion                     !! placed
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      type(corotated_motion_t) :: moved
+      real(wp), dimension(size(motion%x, 1), size(self%own%node, 1)) :: from, by, force
+      real(wp) :: largest
+      integer :: i, k, s
+
+      s = 0
+      associate (total => response%part(self%role))
+         do k = 1, size(self%frame)
+            call gather(self, k, motion, from, by)
+            call corotated_move(self%frame(k), from, by, moved)
+            if (.not. min(moved%first%rho, moved%last%rho) > 0.0_wp) then
+               response%refusal = "element " // to_text(self%label(k)) // " is inverted"
+               return
+            end if
+            call corotated_force(self%frame(k), moved, force)
+            response%energy(self%own%element(k)) = moved%energy
+            largest = maxval(abs(from + by))
+            do i = 1, self%own%n_node(k)
+               largest = max(largest, maxval(motion%computed(:, self%own%node(i, k))))
+            end do
+            do i = 1, self%own%n_node(k)
+               associate (node => self%own%node(i, k))
+                  total%force(:, node) = total%force(:, node) + force(:, i)
+                  total%magnitude(:, node) = total%magnitude(:, node) + abs(force(:, i))
+                  response%rounding(:, node) = response%rounding(:, node) &
+                     + largest*self%own%rounding(i, k)
+               end associate
+            end do
+            if (present(value)) call scatter(self, k, moved, motion%weight, s, value, side)
+         end do
+      end associate
+   end subroutine respond
+
+   !> Displacements of the nodes of element `k` of the list, from those of its first node.
+   pure subroutine gather(self, k, motion, from, by)
+      class(corotated_term_t), intent(in) :: self
+      integer, intent(in) :: k
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(inout) :: from(:, :), by(:, :)    !! (n_dim, n_most)
+      integer :: i
+
+      from = 0.0_wp
+      by = 0.0_wp
+      do i = 2, self%own%n_node(k)
+         associate (node => self%own%node(i, k), first => self%own%node(1, k))
+            from(:, i) = motion%from(:, node) - motion%from(:, first)
+            by(:, i) = motion%by(:, node) - motion%by(:, first)
+         end associate
+      end do
+   end subroutine gather
+
+   !> Add the tangent of element `k` to its places, column by column.
+   subroutine scatter(self, k, moved, weight, s, value, side)
+      class(corotated_term_t), intent(in) :: self
+      integer, intent(in) :: k
+      type(corotated_motion_t), intent(in) :: moved
+      real(wp), intent(in) :: weight                     !! as in `motion_t`
+      integer, intent(inout) :: s                        !! slots that were used
+      real(dp), intent(inout) :: value(:), side(:)
+      real(wp), dimension(size(moved%g), size(self%own%node, 1)) :: way, image
+      integer :: i, j, a, b
+
+      way = 0.0_wp
+      do j = 1, self%own%n_node(k)
+         do b = 1, size(way, 1)
+            way(b, j) = 1.0_wp
+            call corotated_image(self%frame(k), moved, way, image)
+            way(b, j) = 0.0_wp
+            do i = 1, self%own%n_node(k)
+               do a = 1, size(way, 1)
+                  s = s + 1
+                  associate (at => self%slot(s), more => real(weight*image(a, i), dp))
+                     if (at > 0) value(at) = value(at) + more
+                     if (at < 0) side(-at) = side(-at) + more
+                  end associate
+               end do
+            end do
+         end do
+      end do
+   end subroutine scatter
+
+   !> Add the tangent of a motion times `direction` to `product`.
+   subroutine tangent_times(self, motion, direction, product)
+      class(corotated_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion                             !! placed
+      real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
+      real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
+      type(corotated_motion_t) :: moved
+      real(wp), dimension(size(motion%x, 1), size(self%own%node, 1)) :: from, by, image
+      integer :: i, k
+
+      do k = 1, size(self%frame)
+         associate (node => self%own%node(:self%own%n_node(k), k))
+            if (.not. any(abs(direction(:, node)) > 0.0_wp)) cycle
+            call gather(self, k, motion, from, by)
+            call corotated_move(self%frame(k), from, by, moved)
+            if (.not. min(moved%first%rho, moved%last%rho) > 0.0_wp) return
+            do i = 1, size(node)
+               by(:, i) = direction(:, node(i))
+            end do
+            call corotated_image(self%frame(k), moved, by, image)
+            do i = 1, size(node)
+               product(:, node(i)) = product(:, node(i)) + motion%weight*image(:, i)
+            end do
+         end associate
+      end do
+   end subroutine tangent_times
+
+   !> Second derivatives of an energy are symmetric, those of its discrete gradient are not.
+   pure logical function is_symmetric(self, motion)
+      class(corotated_term_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+
+      is_symmetric = motion%pose%is_gradient .or. size(self%frame) == 0
+   end function is_symmetric
+
+end module emcon_corotated_term

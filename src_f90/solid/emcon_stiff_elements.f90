@@ -1,0 +1,63 @@
+!> Elements whose stiffness stays: which they are, and the stiffness of their laws at rest.
+module emcon_stiff_elements
+   use emcon_element, only : element_motion_t, element_response_t
+   use emcon_element_lists, only : element_lists
+   use emcon_host_law, only : host_response_t
+   use emcon_kinds, only : wp
+   use emcon_solid, only : solid_element_respond, solid_t
+   implicit none
+   private
+   public :: stiff_elements_t, stiff_elements_init, stiff_elements_gather
+
+   type :: stiff_elements_t
+      integer, allocatable :: element(:)         !! (n) their numbers
+      integer, allocatable :: n_node(:)          !! (n)
+      integer, allocatable :: node(:, :)         !! (n_most, n)
+      integer, allocatable :: start(:), freedom(:)   !! lists of `element_lists`
+      real(wp), allocatable :: stiffness(:, :, :)    !! (n_most*n_dim, ., n) [M/T^2]
+      real(wp), allocatable :: rounding(:, :)    !! (n_most, n) as `stiffness` of solid_t
+   end type stiff_elements_t
+
+contains
+
+   !> Some elements of `solid`, whose law is linear.
+   subroutine stiff_elements_init(self, solid, n_dim, is_in)
+      type(stiff_elements_t), intent(out) :: self
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: n_dim               !! > 0
+      logical, intent(in) :: is_in(:)            !! (n_element) these
+      type(element_motion_t) :: rest
+      type(element_response_t) :: part
+      type(host_response_t) :: none
+      integer :: k, m
+
+      self%element = pack([(k, k = 1, solid%n_element)], is_in)
+      self%n_node = solid%geometry(self%element)%n_node
+      self%node = solid%node(:, self%element)
+      self%rounding = solid%stiffness(:, self%element)
+      call element_lists(solid, n_dim, self%start, self%freedom, is_in)
+      m = n_dim*size(self%node, 1)
+      allocate(self%stiffness(m, m, size(self%element)), source=0.0_wp)
+      rest%nlgeom = .false.
+      do k = 1, size(self%element)
+         m = n_dim*self%n_node(k)
+         call solid_element_respond(solid, self%element(k), rest, none, .true., part)
+         self%stiffness(:m, :m, k) = 2.0_wp*part%tangent(:m, :m)   ! by the end of no way: half
+      end do
+   end subroutine stiff_elements_init
+
+   !> A field on the nodes of element `k` of the list, from that of its first node.
+   pure subroutine stiff_elements_gather(self, k, field, local)
+      type(stiff_elements_t), intent(in) :: self
+      integer, intent(in) :: k                                 !! 1 to n
+      real(wp), intent(in), contiguous :: field(:, :)          !! (n_dim, n_node)
+      real(wp), intent(inout) :: local(:)                      !! (n_dim*n_most)
+      integer :: i, n_dim
+
+      n_dim = size(field, 1)
+      do i = 1, self%n_node(k)
+         local(n_dim*(i - 1) + 1:n_dim*i) = field(:, self%node(i, k)) - field(:, self%node(1, k))
+      end do
+   end subroutine stiff_elements_gather
+
+end module emcon_stiff_elements

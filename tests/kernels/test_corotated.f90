@@ -1,0 +1,151 @@
+!> A corotated element over one step: identity, momenta, tangent, rigid motions.
+module test_corotated
+   use check, only : check_near, test_case_t
+   use emcon_corotated_plane, only : corotated_force, corotated_image, corotated_motion_t, &
+      corotated_move, corotated_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: collect_corotated
+
+   integer, parameter :: n = 4
+   !> Sums over four nodes, each term of some dozen roundings.
+   real(wp), parameter :: tol = 256.0_wp*epsilon(1.0_wp)
+
+contains
+
+   subroutine collect_corotated(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("identity and momenta", test_identity), &
+         test_case_t("tangent", test_tangent), &
+         test_case_t("rigid motions cost nothing", test_rigid)]
+   end subroutine collect_corotated
+
+   !> A quadrilateral with a stiffness that has no force in rigid motions of small angles: springs
+   !> between all its nodes. Mean gradients are those of its outline.
+   pure subroutine sample(element)
+      type(corotated_t), intent(out) :: element
+      real(wp) :: along(2*n), way(2), area
+      integer :: i, j, before, after
+
+      element%n_node = n
+      element%x(:, :n) = reshape([0.0_wp, 0.0_wp, 1.1_wp, 0.1_wp, 1.3_wp, 0.9_wp, -0.1_wp, &
+         1.0_wp], [2, n])
+      area = 0.0_wp
+      do i = 1, n
+         before = modulo(i - 2, n) + 1
+         after = modulo(i, n) + 1
+         area = area + 0.5_wp*(element%x(1, i)*element%x(2, after) &
+            - element%x(1, after)*element%x(2, i))
+         way = 0.5_wp*(element%x(:, after) - element%x(:, before))
+         element%slope(:, i) = [way(2), -way(1)]
+         do j = i + 1, n
+            along = 0.0_wp
+            way = element%x(:, j) - element%x(:, i)
+            along(2*i - 1:2*i) = -way/norm2(way)
+            along(2*j - 1:2*j) = way/norm2(way)
+            element%stiffness(:2*n, :2*n) = element%stiffness(:2*n, :2*n) &
+               + real(i + j, wp)*spread(along, 2, 2*n)*spread(along, 1, 2*n)
+         end do
+      end do
+      element%slope = element%slope/area
+   end subroutine sample
+
+   !> Displacements of a deformation of a fifth and a turn.
+   pure function field(seed, angle) result(u)
+      real(wp), intent(in) :: seed, angle
+      real(wp) :: u(2, n)
+      type(corotated_t) :: element
+      integer :: i
+
+      call sample(element)
+      do i = 1, n
+         u(:, i) = turn(element%x(:, i) + 0.2_wp*[sin(seed*i), cos(3.0_wp*seed*i)], angle) &
+            - element%x(:, i)
+      end do
+   end function field
+
+   pure function turn(x, angle)
+      real(wp), intent(in) :: x(2), angle
+      real(wp) :: turn(2)
+
+      turn = cos(angle)*x + sin(angle)*[-x(2), x(1)]
+   end function turn
+
+   !> f.du is the change of energy; f has no resultant, and no moment on the mean positions.
+   subroutine test_identity(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(corotated_t) :: element
+      type(corotated_motion_t) :: motion, start
+      real(wp) :: from(2, n), by(2, n), force(2, n), mean(2, n), scale
+      integer :: k
+
+      call sample(element)
+      do k = 1, 5
+         from = field(0.7_wp*k, 0.9_wp*k)
+         by = field(1.1_wp*k + 0.3_wp, 0.9_wp*k + 0.7_wp) - from
+         call corotated_move(element, from, by, motion)
+         call corotated_move(element, from, 0.0_wp*by, start)
+         call corotated_force(element, motion, force)
+         scale = sum(abs(force*by)) + motion%energy + start%energy
+         call check_near(error, sum(force*by), motion%energy - start%energy, tol, scale, "energy")
+         if (allocated(error)) return
+         call check_near(error, sum(force, 2), [0.0_wp, 0.0_wp], tol, sum(abs(force)), "resultant")
+         if (allocated(error)) return
+         mean = element%x(:, :n) + from + 0.5_wp*by
+         call check_near(error, sum(mean(1, :)*force(2, :) - mean(2, :)*force(1, :)), 0.0_wp, tol, &
+            4.0_wp*sum(abs(force)), "moment")
+         if (allocated(error)) return
+      end do
+   end subroutine test_identity
+
+   !> Against central differences, whose error is of third order.
+   subroutine test_tangent(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: h = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      type(corotated_t) :: element
+      type(corotated_motion_t) :: motion
+      real(wp), dimension(2, n) :: from, by, way, image, ahead, behind
+      integer :: k
+
+      call sample(element)
+      do k = 1, 4
+         from = field(0.5_wp*k, 0.8_wp*k)
+         by = field(1.3_wp*k + 0.3_wp, 0.8_wp*k + 0.6_wp) - from
+         way = field(2.1_wp*k, 0.3_wp)
+         call corotated_move(element, from, by, motion)
+         call corotated_image(element, motion, way, image)
+         call corotated_move(element, from, by + h*way, motion)
+         call corotated_force(element, motion, ahead)
+         call corotated_move(element, from, by - h*way, motion)
+         call corotated_force(element, motion, behind)
+         call check_near(error, reshape(image, [2*n]), reshape(0.5_wp*(ahead - behind)/h, [2*n]), &
+            100.0_wp*h*h, maxval(abs(image)), "tangent")
+         if (allocated(error)) return
+      end do
+   end subroutine test_tangent
+
+   subroutine test_rigid(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(corotated_t) :: element
+      type(corotated_motion_t) :: motion
+      real(wp) :: u(2, n), force(2, n)
+      integer :: i, k
+
+      call sample(element)
+      do k = 1, 12
+         do i = 1, n
+            u(:, i) = turn(element%x(:, i), 0.5_wp*k) - element%x(:, i)
+         end do
+         call corotated_move(element, 0.0_wp*u, u, motion)
+         call corotated_force(element, motion, force)
+         call check_near(error, reshape(force, [2*n]), spread(0.0_wp, 1, 2*n), tol, &
+            maxval(element%stiffness), "force")
+         if (allocated(error)) return
+      end do
+   end subroutine test_rigid
+
+end module test_corotated
