@@ -32,7 +32,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench soak sanitize docs install status clean \
+.PHONY: run test lib app pywrap kernels benches lint bench trade soak sanitize docs install status clean \
 	help kernel_objects FORCE
 
 # ---- set-up -------------------------------------------------------------------------------------
@@ -271,6 +271,10 @@ bench:  ## print the timed scenes of tests/bench
 	$(BUILDING) app lib pywrap $(BENCHES)
 	@set -e; for program in $(filter %/bench_%,$(BENCHES)); do $$program; done
 	@set -e; for script in tests/bench/*.py; do $(PY) $$script; done
+
+trade: .venv/test.stamp  ## write the table and the figure of docs/trade.md anew
+	$(BUILDING) app
+	$(PY) tests/bench/trade.py --update
 
 SECONDS ?= 600
 soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, calls, kills; threads

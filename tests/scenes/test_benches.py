@@ -30,6 +30,13 @@ def test_chapter_of_the_book():
     assert text.startswith("patch\n") and text.count("|") > 6
 
 
+def test_table_of_simplifications():
+    """The scene of docs/trade.md that is the quickest to run, each kind once."""
+    lines = run(BENCH / "trade.py", "--rounds", "1", "gears").splitlines()
+    assert len(lines) == 8 and all(line.count("|") == 11 for line in lines)
+    assert all("e-1" in line for line in lines[2:])                 # the balances close
+
+
 @pytest.mark.parametrize("generator", sorted(p.name for p in DECKS.glob("make_*.py")))
 def test_generator_of_decks(generator, tmp_path):
     """What it makes by default is the deck of its name, one that the program accepts."""

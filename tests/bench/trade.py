@@ -1,0 +1,262 @@
+"""Make the table and the figure of docs/trade.md again: what each simplification saves and costs.
+
+    .venv/bin/python tests/bench/trade.py            # print the table
+    .venv/bin/python tests/bench/trade.py --update   # write it and the figure into docs/
+
+Five scenes, each with one body as it is, corotated, linear, quasi-static and rigid, and with massive and
+massless surfaces of contact, one run at a time. Times are those of whole processes, as ratios to
+the first run of the scene in the same round; of three rounds the medians. Needs the program
+(`make app`).
+"""
+
+import argparse
+import dataclasses
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "scenes")]
+
+from book.common import COLOURS, axes, save, size, table  # noqa: E402
+from plain_scenes import AUTO, Scene, below, bowl, gears  # noqa: E402
+from scene_tools import DECKS, PROGRAM, Deck, Run  # noqa: E402
+from verification import update  # noqa: E402
+
+PAGE = ROOT / "docs" / "trade.md"
+SURFACES = {"PERSISTENT": "massive", "MASSLESS": "massless"}
+#: What is written into the section of the body.
+SECTION = {"elastic": "", "corotated": ", KINEMATICS=COROTATED",
+           "linear": ", KINEMATICS=LINEAR", "quasi-static": ", MASSLESS",
+           "quasi-static, linear": ", KINEMATICS=LINEAR, MASSLESS"}
+KINDS = (*SECTION, "rigid")
+DRAWN = ("elastic", "linear", "quasi-static", "rigid")
+NODE = 99999
+#: In place of the stiffness of plain scenes, 100, for a body that others meet.
+STIFF = 1e4
+
+
+# ---- scenes -------------------------------------------------------------------------------------
+
+
+def rigid(body, place, held):
+    """Cards of a rigid body with a reference node of its own, held there."""
+    boundary = f"*BOUNDARY\n{NODE}, 1, 2\n{NODE}, 6\n" if held else ""
+    return (f"*NODE\n{NODE}, {place[0]}, {place[1]}\n*RIGID BODY, ELSET={body}, REF NODE={NODE}\n"
+            + boundary)
+
+
+def simplified(deck, body, kind):
+    if kind != "rigid":
+        deck.replace(f"ELSET={body}, MATERIAL", f"ELSET={body}{SECTION[kind]}, MATERIAL")
+    return deck
+
+
+def ring(kind):
+    deck = Deck.read(DECKS / "ring.inp")
+    if kind == "rigid":
+        deck.replace("*BOUNDARY\nBOTTOM, 1, 2\n", rigid("BLOCK", (0, -5), True))
+    return simplified(deck, "BLOCK", kind)
+
+
+def bar(kind):
+    deck = Deck.read(DECKS / "bouncing_bar.inp")
+    return simplified(deck, "BAR", kind)
+
+
+def drawn(scene, body, place):
+    """A plain scene, its body held as before or, where it is rigid, at its reference node."""
+
+    def deck(kind):
+        drawing = scene()
+        is_held = bool(drawing.held)
+        if kind == "rigid":
+            drawing.held = []
+        text = drawing.deck(AUTO)
+        if is_held:
+            text.replace(f"NAME={body}\n*HYPERELASTIC, COUPLED NEO HOOKE\n100.0",
+                         f"NAME={body}\n*HYPERELASTIC, COUPLED NEO HOOKE\n{STIFF}")
+        for head, lines in text.card:
+            if head == "*DLOAD":                                 # of the others alone
+                lines[:] = [line for line in lines if not line.startswith(body)]
+        if kind == "rigid":
+            text.insert(rigid(body, place, is_held), before="*STEP")
+        return simplified(text, body, kind)
+
+    return deck
+
+
+def ball():
+    scene = Scene(0.01, 1.0)
+    scene.disc("BALL", (0.0, 0.52), 0.5, (8, 4), velocity=(0.3, -1.0))
+    scene.block("BLOCK", (-1.5, -0.8), (3.0, 0.8), (30, 8))
+    scene.pairs = [("BALL", "BLOCK")]
+    return scene.hold("BLOCK", below(-0.8))
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A scene, the body that is simplified, how, and the parameters of its runs."""
+
+    name: str
+    deck: object
+    kinds: tuple
+    parameters: dict
+
+
+NTS = {"formulation": "NODE TO SURFACE"}
+CASES = (
+    Case("ring on a foundation", ring, KINDS, {**NTS, "h": 0.02, "t_end": 4.0, "frame": 4}),
+    Case("bar on a floor, the bar", bar, ("elastic", "linear"),
+         {**NTS, "h": 0.0025, "t_end": 2.0, "frame": 2}),
+    Case("ball on a block", drawn(ball, "BLOCK", (0, -0.4)), KINDS, NTS),
+    Case("disc in a bowl", drawn(bowl, "BOWL", (0, 0)), KINDS, {**NTS, "h": 0.01}),
+    Case("gears, the driven one", drawn(gears, "DRIVEN", (2.06, 0)), ("elastic", "corotated", "rigid"),
+         {**NTS, "h": 0.005}),
+)
+
+
+#: Runs a command and prints its exit code, processor time and memory. A process begins with the
+#: memory of the one that starts it: this one is small.
+WATCH = """
+import os, sys
+pid = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
+_, status, usage = os.wait4(pid, 0)
+print(os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime, usage.ru_maxrss)
+"""
+
+
+# ---- runs ---------------------------------------------------------------------------------------
+
+
+def measured(deck, folder, parameters):
+    """The run of a deck, its processor time [s] and its largest memory [MiB]."""
+    folder.mkdir(parents=True)
+    path = deck.write(folder / "deck.inp")
+    options = [f"--set={name}={value}" for name, value in parameters.items()]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    command = [PROGRAM, path, "--quiet", "--output", folder, *options]
+    done = subprocess.run([sys.executable, "-S", "-c", WATCH, *map(str, command)],
+                          capture_output=True, text=True, env=environment, check=True)
+    code, seconds, kilobytes = map(float, done.stdout.split())
+    assert code == 0 or "bodies overlap" in done.stderr, done.stderr
+    return Run(folder / "deck"), seconds, kilobytes/1024
+
+
+def force_of(history, n=5):
+    """Sum of the forces of all pairs, the mean of `n` increments at a time, and its times."""
+    names = [name for name in history.dtype.names if "_force_" in name]
+    both = np.array([sum(history[name] for name in names if name.endswith(axis)) for axis in "xy"])
+    usable = (both.shape[1] - 1)//n*n
+    mean = both[:, 1:usable + 1].reshape(2, -1, n).mean(axis=2)
+    return history["time"][1:usable + 1].reshape(-1, n).mean(axis=1), mean
+
+
+def impulse_of(history):
+    force = force_of(history, 1)[1]
+    return force @ np.diff(history["time"])
+
+
+@dataclasses.dataclass
+class Result:
+    """What the runs of one kind of a scene gave."""
+
+    history: object
+    rows: int
+    cpu: list
+    memory: list
+
+
+def results(case, folder, rounds):
+    """Results by kind of body and of surface."""
+    found = {}
+    for k in range(rounds):
+        for kind in case.kinds:
+            for surfaces in SURFACES:
+                where = folder / f"{len(list(folder.iterdir()))}"
+                run, cpu, memory = measured(case.deck(kind), where,
+                                            {**case.parameters, "initiation": surfaces})
+                key = kind, surfaces
+                if k == 0:
+                    unknowns = int(run.closing(r"(\d+) unknowns in step 1"))
+                    found[key] = Result(run.history, unknowns, [], [])
+                found[key].cpu.append(cpu)
+                found[key].memory.append(memory)
+    return found
+
+
+def drift(history):
+    kept = history["total"] - history["contact_work"]
+    return np.abs(kept - kept[0]).max()/(history["kinetic"] + history["strain"]).max()
+
+
+def rows_of(case, found):
+    """Lines of the table; differences are from the elastic body with the same surfaces, those of
+    its own massless surfaces from the massive ones."""
+    first = found["elastic", "PERSISTENT"]
+    for (kind, surfaces), result in found.items():
+        other = found["elastic", surfaces]
+        if kind == "elastic":
+            other = first
+        _, force = force_of(result.history)
+        _, expected = force_of(other.history)
+        impulse, full = impulse_of(result.history), impulse_of(other.history)
+        rms = np.sqrt(np.mean((force - expected)**2)/np.mean(expected**2))
+        is_first = result is first
+        yield (case.name, kind, SURFACES[surfaces], result.rows,
+               f"{np.median(np.divide(result.cpu, first.cpu)):.2f}",
+               f"{np.median(result.memory):.0f}",
+               f"{np.linalg.norm(impulse):.4g}",
+               "" if is_first else percent(np.linalg.norm(impulse - full)/np.linalg.norm(full)),
+               "" if is_first else percent(rms),
+               size(drift(result.history)))
+
+
+def percent(part):
+    return f"{100*part:.2g} %" if part >= 1e-4 else "< 0.01 %"
+
+
+# ---- the page -----------------------------------------------------------------------------------
+
+
+def draw(found, path):
+    """Contact force of the ring on its foundations, massive and massless surfaces."""
+    pictures = axes(2)
+    for picture, surfaces in zip(pictures, SURFACES, strict=True):
+        for kind, colour in zip(DRAWN, COLOURS, strict=False):
+            time, force = force_of(found[kind, surfaces].history)
+            picture.plot(time, np.abs(force[1]), color=colour, lw=0.8, label=kind)
+        picture.set(xlim=(0, 3), xlabel="time", title=f"{SURFACES[surfaces]} surfaces",
+                    ylabel="contact force, mean of 5 increments")
+    pictures[1].legend(fontsize=7, frameon=False)
+    save(path)
+
+
+def main():
+    parser = argparse.ArgumentParser(description="The table and the figure of docs/trade.md")
+    parser.add_argument("--update", action="store_true", help="write into docs/")
+    parser.add_argument("--rounds", type=int, default=3, help="runs of each kind (3)")
+    parser.add_argument("only", nargs="*", help="words of the names of scenes")
+    options = parser.parse_args()
+    lines = []
+    for case in CASES:
+        if options.only and not any(word in case.name for word in options.only):
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            found = results(case, pathlib.Path(folder), options.rounds)
+        lines += rows_of(case, found)
+        if options.update and case.deck is ring:
+            draw(found, PAGE.parent / "trade_ring.png")
+    lines = table(["scene", "body", "surfaces", "unknowns", "CPU", "MiB", "impulse", "differs by",
+                   "force, rms", "energy"], lines)
+    print(*lines, sep="\n")
+    if options.update:
+        PAGE.write_text(update(PAGE.read_text(), "simplified", lines))
+
+
+if __name__ == "__main__":
+    main()
