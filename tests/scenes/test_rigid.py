@@ -276,6 +276,14 @@ def test_flat_on_a_floor(form, floor, tmp_path):
         assert drift(history, "px") < 1e-12
 
 
+def split(x, v):
+    """The spin of a field of velocities, and the largest velocity beside the rigid motion."""
+    arm = x - x.mean(0)
+    left = np.stack([-arm[:, 1], arm[:, 0]], 1)
+    spin = (left*v).sum()/(arm**2).sum()
+    return spin, np.abs(v - v.mean(0) - spin*left).max()
+
+
 @pytest.mark.parametrize("initiation", ["PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE", "MASSLESS"])
 @pytest.mark.parametrize("floor", ["rigid", "elastic"])
 def test_tilted_on_a_floor(initiation, floor, tmp_path):
@@ -286,12 +294,13 @@ def test_tilted_on_a_floor(initiation, floor, tmp_path):
         assert balance(history) < 1e-11
     fields = run.fields()
     assert shape_error(fields.x[:15] + fields["displacement"][-1][:15], fields.x[:15]) < 1e-13
-    # A jump leaves a rigid field: the nodes' velocities are those of three of them.
-    x, v = fields.x[:15] + fields["displacement"][-1][:15], fields["velocity"][-1][:15]
-    spin = ((x - x.mean(0))[:, 0]*v[:, 1] - (x - x.mean(0))[:, 1]*v[:, 0]).sum() \
-        / ((x - x.mean(0))**2).sum()
-    rest = v - v.mean(0) - spin*np.stack([-(x - x.mean(0))[:, 1], (x - x.mean(0))[:, 0]], 1)
-    assert np.abs(rest).max() < 0.1*np.abs(v).max()
+    # Velocities are those of a rigid motion but for what impacts leave: half the angle of a step
+    # times the jump, for each change of the set at most.
+    spin, rest = zip(*(split(fields.x[:15] + u[:15], v[:15]) for u, v in
+                       zip(fields["displacement"], fields["velocity"])))
+    changes = np.count_nonzero(np.diff(history["active"]))
+    largest = np.abs(fields["velocity"][:, :15]).max()
+    assert max(rest) < changes*0.5*0.01*np.abs(spin).max()*largest
 
 
 def test_null_space_and_saddle_point_agree(tmp_path):
