@@ -218,33 +218,39 @@ class Model(Cards):
 
     def surface(self, name: str, *, faces: ArrayLike | Sequence[tuple[Any, int]] | None = None,
                 elements: Where | None = None, nodes: Where | None = None,
-                edges: ArrayLike | None = None) -> Model:
-        """`*SURFACE`: made of faces, of the free faces of elements, of nodes, or of edges.
+                edges: ArrayLike | None = None,
+                segments: Sequence[tuple[Any, ...]] | None = None) -> Model:
+        """`*SURFACE`: made of faces, of the free faces of elements, of nodes, of edges, or a profile.
 
         faces      (k, 2): element (or element set) and face 1..4; face i of an element goes from
                    corner i to the next
         elements   element set, or (k,) elements
         nodes      node set, or (k,) nodes; only for slave surfaces of NODE TO SURFACE
         edges      (k, 2): first and last node of each edge
+        segments   ("START", x, y), then ("LINE", x, y) or ("CIRCL", x, y, xc, yc): lines and arcs
+                   for `rigid_body(profile=)`, the body to the right [L]
         """
         given = [kind for kind, value in (("faces", faces), ("elements", elements),
-                                          ("nodes", nodes), ("edges", edges)) if value is not None]
+                                          ("nodes", nodes), ("edges", edges), ("segments", segments))
+                 if value is not None]
         if len(given) != 1:
-            raise InputError(f"surface {name} is made of faces, elements, nodes or edges, one of "
-                             f"them, not {len(given)}")
+            raise InputError(f"surface {name} is made of faces, elements, nodes, edges or segments, "
+                             f"one of them, not {len(given)}")
         what = f"surface {name}"
         rows: Sequence[Sequence[object]] = ()
         data = ""
         if edges is not None:
             ends = self._nodes.labels(edges, what, (None, 2))
             data = table(*ends.T) if len(ends) else ""
+        elif segments is not None:
+            rows = [tuple(row) for row in segments]
         elif faces is not None:
             rows = [(item, f"S{face}") for item, face in self._faces(faces, what)]
         elif elements is not None:
             rows = [(item,) for item in self._names(elements, self._elements, what)]
         elif nodes is not None:
             rows = [(item,) for item in self._names(nodes, self._nodes, what)]
-        kind = {"edges": "EDGE", "nodes": "NODE"}.get(given[0], "ELEMENT")
+        kind = {"edges": "EDGE", "nodes": "NODE", "segments": "SEGMENTS"}.get(given[0], "ELEMENT")
         return self._card("SURFACE", {"NAME": name, "TYPE": kind}, rows, data)
 
     def _faces(self, faces: ArrayLike | Sequence[tuple[Any, int]],
@@ -316,13 +322,16 @@ class Model(Cards):
                                             "KINEMATICS": kinematics, "MASSLESS": massless},
                           [(thickness,)])
 
-    def rigid_body(self, elements: str, reference: int | str) -> Model:
-        """`*RIGID BODY`: an element set that keeps its shape.
+    def rigid_body(self, elements: str | None, reference: int | str, *,
+                   profile: str | None = None) -> Model:
+        """`*RIGID BODY`: an element set that keeps its shape, a profile, or both.
 
         reference   node, or set of one, that is prescribed, loaded and started: 1, 2 and 6
+        profile     surface of segments; without elements it is prescribed in every step
         """
         (name,) = self._names(reference, self._nodes, "*RIGID BODY")
-        return self._card("RIGID BODY", {"ELSET": elements, "REF NODE": name})
+        return self._card("RIGID BODY", {"ELSET": elements, "ANALYTICAL SURFACE": profile,
+                                         "REF NODE": name})
 
     def initial(self, type: Literal["VELOCITY", "DISPLACEMENT"], where: Where, dof: Dof,
                 value: Number | ArrayLike) -> Model:

@@ -126,6 +126,12 @@ contains
          end do
       end do
       if (allocated(scene%given_node)) is_bare(scene%given_node) = .false.
+      do i = 1, size(scene%rigid)
+         is_bare(scene%rigid(i)%node) = .false.
+      end do
+      do i = 1, size(scene%surface)
+         if (scene%surface(i)%is_profile) is_bare([scene%surface(i)%edge]) = .false.
+      end do
       if (.not. any(is_bare) .or. all(is_bare)) return
       call mark_coupled(scene, is_coupled)
       is_idle = is_bare .and. .not. any(is_coupled, 1)

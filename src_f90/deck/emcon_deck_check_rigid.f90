@@ -5,6 +5,7 @@ module emcon_deck_check_rigid
    use emcon_deck_rigid, only : mark_rigid
    use emcon_diagnostics, only : add_error, label_list
    use emcon_scene, only : scene_t
+   use emcon_steps, only : prescribed_find
    use emcon_text, only : to_text
    implicit none
    private
@@ -20,8 +21,9 @@ contains
       integer :: body(size(scene%node_label)), i, k
       logical, allocatable :: is_slave(:)
 
-      if (size(scene%rigid) == 0) return
       call mark_rigid(scene, body)
+      call check_profiles(reader, scene, body)
+      if (size(scene%rigid) == 0) return
       allocate(is_slave(size(body)))
       do i = 1, size(scene%tie)
          if (scene%tie(i)%slave == 0) cycle
@@ -49,5 +51,35 @@ contains
          end associate
       end do
    end subroutine check_rigid
+
+   !> Profiles belong to rigid bodies, which are prescribed in every step if they have nothing else:
+   !> there is no mass.
+   subroutine check_profiles(reader, scene, body)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: body(:)             !! (n_node) rigid ones, 0: none
+      integer :: i, k, a
+
+      do i = 1, size(scene%surface)
+         if (.not. scene%surface(i)%is_profile .or. reader%doubt_rigid) cycle
+         if (any(body([scene%surface(i)%edge]) == 0)) call add_error(reader%log, &
+            scene%surface(i)%origin, "surface " // scene%surface(i)%name // " of TYPE=SEGMENTS " &
+            // "is that of no *RIGID BODY, ANALYTICAL SURFACE=")
+      end do
+      do i = 1, size(scene%rigid)
+         associate (rigid => scene%rigid(i))
+            if (size(rigid%element) > 0) cycle
+            do k = 1, size(scene%step)
+               if (any(scene%step(k)%turn%rigid == i) .and. all([(prescribed_find( &
+                  scene%step(k)%prescribed, rigid%reference, a), a = 1, scene%n_dim)] > 0)) cycle
+               call add_error(reader%log, rigid%origin, "rigid body " // rigid%name // " has no " &
+                  // "elements, and so no mass: in step " // to_text(k) // " its reference node " &
+                  // to_text(scene%node_label(rigid%reference)) // " is not prescribed in all " &
+                  // "degrees of freedom, 1, 2 and 6")
+               exit
+            end do
+         end associate
+      end do
+   end subroutine check_profiles
 
 end module emcon_deck_check_rigid

@@ -49,11 +49,12 @@ module emcon_deck_keywords
          // "!IPROPERTIES:0,!VARIABLES:1,~UNSYMM,!LINEAR,!TENSOR,!INTEGRATION,!FILE"), &
       keyword_t("NSET", in_both, "NSET=,GENERATE,ELSET=,~INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
-      keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM"), &
+      keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM," &
+         // "!FILLETRADIUS:0"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
          // "!ORIENTATION,!OFFSET:0,!CONTROLS"), &
-      keyword_t("RIGID BODY", in_model, "ELSET=,REFNODE=,!ANALYTICALSURFACE,!NSET,!ROTNODE," &
+      keyword_t("RIGID BODY", in_model, "ELSET=,ANALYTICALSURFACE=,REFNODE=,!NSET,!ROTNODE," &
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
@@ -113,7 +114,7 @@ module emcon_deck_keywords
       keyword_t("KINEMATIC", in_model, "", no_couple), &
       keyword_t("DISTRIBUTING", in_model, "", no_couple), &
       keyword_t("EMBEDDED ELEMENT", in_model, "", no_couple), &
-      keyword_t("RIGID SURFACE", in_model, "", "use *RIGID BODY with the elements of the body"), &
+      keyword_t("RIGID SURFACE", in_model, "", "use *RIGID BODY and TYPE=SEGMENTS"), &
       keyword_t("TRANSFORM", in_model, "", "degrees of freedom are those of the global axes"), &
       keyword_t("ORIENTATION", in_model, "", "materials are isotropic"), &
       keyword_t("SYSTEM", in_model, "", "coordinates are those of the global axes"), &

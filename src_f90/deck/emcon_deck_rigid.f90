@@ -2,7 +2,8 @@
 module emcon_deck_rigid
    use emcon_deck_labels, only : find_label
    use emcon_deck_named, only : find_set, hint_at_set, set_names
-   use emcon_deck_reader, only : card_error, card_t, need_name, option_name, reader_t
+   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t
+   use emcon_deck_surfaces, only : find_surface, surface_names
    use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
@@ -48,17 +49,21 @@ contains
       integer, allocatable :: node(:)
 
       new%origin = card%origin
-      call find_elements(reader, card, scene, new)
+      if (has_option(card, "ELSET") .or. .not. has_option(card, "ANALYTICALSURFACE")) then
+         call find_elements(reader, card, scene, new)
+      else
+         allocate(new%element(0))
+      end if
+      call find_profile(reader, card, scene, new, node)
       call find_reference(reader, card, scene, new%reference)
-      if (.not. allocated(new%element) .or. new%reference == 0) return
+      if (.not. (allocated(new%element) .and. allocated(node)) .or. new%reference == 0) return
       if (reader%doubt_elements .or. reader%doubt_positions) return
       associate (of_element => scene%element_node(:, new%element))
-         node = [pack(of_element, of_element > 0), new%reference]
+         new%node = unique_sorted([pack(of_element, of_element > 0), node, new%reference])
       end associate
-      new%node = unique_sorted(node)
       call check_alone(reader, card, scene, new)
       call rigid_frame_choose(scene%x, new%node, new%reference, new%frame)
-      if (.not. allocated(new%frame)) call card_error(reader, card, "the nodes of element set " &
+      if (.not. allocated(new%frame)) call card_error(reader, card, "the nodes of " &
          // new%name // " and the reference node " // to_text(scene%node_label(new%reference)) &
          // " lie on one line, which tells no rotation; put the reference node beside it")
    end subroutine read_card
@@ -84,6 +89,35 @@ contains
          new%element = scene%element_set(i)%item
       end if
    end subroutine find_elements
+
+   !> The nodes of the profile that ANALYTICAL SURFACE names; not allocated: it is wrong.
+   subroutine find_profile(reader, card, scene, new, node)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(rigid_body_t), intent(inout) :: new
+      integer, allocatable, intent(out) :: node(:)
+      character(len=:), allocatable :: name
+      integer :: i
+
+      if (.not. has_option(card, "ANALYTICALSURFACE")) then
+         allocate(node(0))
+         return
+      end if
+      call need_name(reader, card, "ANALYTICALSURFACE", name)
+      if (name == "") return
+      if (.not. allocated(new%name)) new%name = name
+      i = find_surface(scene%surface, name)
+      if (i == 0) then
+         if (.not. reader%doubt_names) call card_error(reader, card, "unknown surface " // &
+            quoted(name) // suggestion(name, surface_names(scene%surface)))
+      else if (.not. scene%surface(i)%is_profile) then
+         call card_error(reader, card, "surface " // name // " is not of TYPE=SEGMENTS; a " // &
+            "surface of elements becomes rigid with these, by ELSET=")
+      else
+         node = reshape(scene%surface(i)%edge, [size(scene%surface(i)%edge)])
+      end if
+   end subroutine find_profile
 
    !> The node that REF NODE names by its label, or by a set that holds it alone.
    subroutine find_reference(reader, card, scene, node)

@@ -8,6 +8,7 @@ module emcon_deck_surfaces
    use emcon_deck_named, only : get_elements, get_lines, get_nodes
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
+   use emcon_deck_segments_plane, only : read_segments
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
@@ -66,7 +67,7 @@ contains
    subroutine read_surface(reader, card, scene, adjacency, surface)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      type(scene_t), intent(in) :: scene
+      type(scene_t), intent(inout) :: scene
       type(adjacency_t), intent(in) :: adjacency
       type(surface_t), intent(out) :: surface
       integer :: n_before, n_item
@@ -81,11 +82,13 @@ contains
          call read_nodes(reader, card, scene, surface)
       case ("EDGE")
          call read_edges(reader, card, scene, surface)
-      case ("CYLINDER", "CUTTINGSURFACE", "REVOLUTION", "SEGMENTS", "USER")
-         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE", &
-            "surfaces belong to elements")
+      case ("SEGMENTS")
+         call read_segments(reader, card, scene, surface)
+      case ("CYLINDER", "CUTTINGSURFACE", "REVOLUTION", "USER")
+         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE, SEGMENTS", &
+            "the model is plane")
       case default
-         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE", "")
+         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE, SEGMENTS", "")
       end select
       n_item = size(surface%element) + size(surface%node)
       if (allocated(surface%edge)) n_item = size(surface%edge, 2)

@@ -17,6 +17,7 @@ module emcon_mesh
       character(len=:), allocatable :: name
       type(origin_t) :: origin
       logical :: is_nodal = .false.
+      logical :: is_profile = .false.                !! of edges between nodes of its own
       logical :: is_exterior = .false.               !! every free face that no tie covers
       integer, allocatable :: element(:)             !! (n_face)
       integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind

@@ -24,7 +24,7 @@ module emcon_space
    type :: space_t
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
-      logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term or an equation
+      logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term, a row
       type(linear_rows_t) :: linear              !! rows of rigid bodies, ties and equations
       type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
       type(unresolved_t), allocatable :: unresolved(:)   !! those of them that follow from others
@@ -63,8 +63,8 @@ contains
       self%freedom = [self%freedom, freedom]
    end subroutine lists_append
 
-   !> Bodies, linear rows, and which freedoms are part of the model: those of `lists` and of
-   !> equations.
+   !> Bodies, linear rows, and which freedoms are part of the model: those of `lists`, of equations
+   !> and of rigid bodies.
    pure subroutine space_init(self, scene, lists)
       type(space_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
@@ -84,6 +84,9 @@ contains
          end associate
       end do
       self%is_alive = reshape(is_alive, [lists%n_dim, n_node])
+      do i = 1, size(scene%rigid)
+         self%is_alive(:, scene%rigid(i)%node) = .true.
+      end do
       allocate(self%unresolved(0))
    end subroutine space_init
 
