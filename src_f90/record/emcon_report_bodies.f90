@@ -18,6 +18,7 @@ module emcon_report_bodies
       integer :: n_element = 0
       integer :: n_rigid = 0                     !! elements that are part of a rigid body
       integer :: n_linear = 0                    !! elements with small strains in all steps
+      integer :: n_corotated = 0                 !! and in frames that turn
       integer :: n_static = 0                    !! elements without inertia
       integer :: n_unknown = 0                   !! of the present step
       integer :: kind = 0                        !! of its elements; < 0: several
@@ -70,6 +71,7 @@ contains
       body%n_element = body%n_element + 1
       if (solid%is_rigid(e)) body%n_rigid = body%n_rigid + 1
       if (solid%is_linear(e)) body%n_linear = body%n_linear + 1
+      if (solid%is_corotated(e)) body%n_corotated = body%n_corotated + 1
       if (.not. solid%has_inertia(e)) body%n_static = body%n_static + 1
       call unite(body%kind, scene%element_kind(e))
       associate (material => scene%material(scene%section(scene%element_section(e))%material))
@@ -217,6 +219,8 @@ contains
       name = "as the steps say"
       if (body%n_linear > 0) name = "linear in part"
       if (body%n_linear == body%n_element) name = "linear"
+      if (body%n_corotated > 0) name = "corotated in part"
+      if (body%n_corotated == body%n_element) name = "corotated"
       if (body%n_static > 0) then
          name = name // ", without inertia"
          if (body%n_static < body%n_element) name = name // " in part"

@@ -146,12 +146,14 @@ contains
       call restart_exchange(restart, "pair_active", pairs%total%n_active)
    end subroutine exchange_pairs
 
+   !> Where the file has none they begin at 0.
    subroutine exchange_sums(sums, restart)
       type(pair_sums_t), intent(inout) :: sums
       type(restart_t), intent(inout) :: restart
       real(wp) :: none(0)
       integer :: k
 
+      if (.not. restart_offers(restart, "pair_sum", is_written=.true.)) return
       call restart_exchange(restart, "pair_sum", none)       ! also where there are no pairs
       do k = 1, size(sums%sum)
          call restart_exchange(restart, "pair_sum", sums%sum(k)%impulse)

@@ -356,7 +356,7 @@ def test_ring_balances_and_rebounds(tmp_path, choice):
 
 
 def test_ring_balances_by_small_steps(tmp_path):
-    assert_balances(whole_impact(tmp_path, "edge", 0.01))
+    assert_balances(whole_impact(tmp_path, "edge", 0.02))
 
 
 def bottom_nodes(run):

@@ -252,11 +252,10 @@ def ring_momentum(run, mass):
     return run.series("BODIES", "MOMENTUM")[1][-1, :n, :2].sum(axis=0)/masses[:n].sum()
 
 
-@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR"])
-def test_ring_in_pieces(tmp_path, formulation):
-    """Energy, and the rebound of the ring of one piece within 1 percent."""
+def test_ring_in_pieces(tmp_path):
+    """Energy, and the rebound of the ring of one piece within 1 percent; with nodes in the book."""
     runs = [
-        run_deck(DECKS / f"{name}.inp", tmp_path, formulation=formulation, frame=8, h=0.02)
+        run_deck(DECKS / f"{name}.inp", tmp_path, formulation="MORTAR", frame=8, h=0.02)
         for name in ("ring", "tied_ring")
     ]
     velocity = []
