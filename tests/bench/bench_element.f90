@@ -1,0 +1,141 @@
+!> Time per element: forces, and forces with tangent, of every law on CPE4 and CPE3.
+!>
+!> Prints a table; asserts nothing. The time is the least of several runs over a block of elements
+!> at strains of some ten percent, with the way from the nodes and back to them: `respond` of
+!> `emcon_solid_term`. Each entry of a matrix has a place of its own.
+program bench_element
+   use, intrinsic :: iso_fortran_env, only : output_unit
+   use emcon_csr, only : csr_t
+   use emcon_element_registry, only : element_kinds_create, find_element_row
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_law_registry, only : law_rows, n_constant
+   use emcon_motion, only : motion_t, motion_init, motion_place
+   use emcon_scene, only : scene_t
+   use emcon_solid_term, only : solid_term_init, solid_term_t
+   use emcon_space, only : space_t
+   use emcon_term, only : response_begin, response_init, response_t
+   implicit none
+   integer, parameter :: n_side = 40, n_run = 25
+   character(len=4), parameter :: kind_name(2) = ["CPE4", "CPE3"]
+   !> In the order of the names that laws have for their constants.
+   character(len=6), parameter :: names(14) = [character(len=6) :: "E", "nu", "C10", "D1", "C01", &
+      "C20", "C30", "D2", "D3", "mu1", "alpha1", "mu2", "alpha2", "mu3"]
+   real(wp), parameter :: values(14) = [3.0_wp, 0.3_wp, 0.5_wp, 0.4_wp, 0.1_wp, -0.03_wp, &
+      0.01_wp, 3.0_wp, 5.0_wp, 1.0_wp, 1.3_wp, 0.2_wp, 4.0_wp, 0.1_wp]
+   integer :: i_kind, i_law
+
+   write(output_unit, "(/, a)") "Elements, microseconds each"
+   write(output_unit, "(a6, 1x, a18, 2a18)") "kind", "law", "forces", "and tangent"
+   do i_kind = 1, size(kind_name)
+      do i_law = 1, size(law_rows)
+         call bench(kind_name(i_kind), i_law)
+      end do
+   end do
+
+contains
+
+   subroutine bench(kind, i_law)
+      character(len=*), intent(in) :: kind
+      integer, intent(in) :: i_law               !! row
+      type(scene_t) :: scene
+      type(solid_term_t) :: term
+      type(motion_t) :: motion
+      type(response_t) :: response
+      type(space_t) :: space
+      type(csr_t) :: matrix
+      type(error_t), allocatable :: error
+      real(dp), allocatable :: value(:)
+      real(dp) :: side(1), seconds(2)
+      integer, allocatable :: slot(:)
+      integer :: i, n
+
+      call make_scene(kind, i_law, scene)
+      call solid_term_init(term, scene, error)
+      if (allocated(error)) then
+         write(output_unit, "(a)") error%message
+         return
+      end if
+      n = 4*sum(count(scene%element_node > 0, 1)**2)
+      allocate(slot(n), source=[(i, i = 1, n)])
+      allocate(value(n), source=0.0_dp)
+      call term%begin_step(scene, 1, space, matrix, slot)
+      call response_init(response, size(scene%x, 1), size(scene%x, 2), size(scene%element_kind))
+      call motion_init(motion, scene%x)
+      motion%pose%place = 1.0_wp
+      motion%pose%is_gradient = .false.
+      call random_number(motion%u0)
+      call random_number(motion%du)
+      motion%u0 = 0.06_wp*motion%u0 + 0.1_wp*scene%x
+      motion%du = 0.06_wp*motion%du
+      call motion_place(motion)
+      seconds = huge(seconds)
+      do i = 1, n_run
+         call time_of(term, motion, response, seconds(1))
+         call time_of(term, motion, response, seconds(2), value, side)
+      end do
+      write(output_unit, "(a6, 1x, a18, 2f18.3)") kind, law_rows(i_law)%name, &
+         1.0e6_dp*seconds/real(size(scene%element_kind), dp)
+   end subroutine bench
+
+   subroutine time_of(term, motion, response, least, value, side)
+      type(solid_term_t), intent(inout) :: term
+      type(motion_t), intent(in) :: motion
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout) :: least           !! so far [s]
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
+      integer(int64) :: begin, end, rate
+
+      call response_begin(response)
+      call system_clock(begin, rate)
+      call term%respond(motion, response, value, side)
+      call system_clock(end)
+      least = min(least, real(end - begin, dp)/real(rate, dp))
+      if (allocated(response%refusal)) write(output_unit, "(a)") response%refusal
+   end subroutine time_of
+
+   !> A block of square elements, or of their halves.
+   subroutine make_scene(kind, i_law, scene)
+      character(len=*), intent(in) :: kind
+      integer, intent(in) :: i_law
+      type(scene_t), intent(out) :: scene
+      integer :: i, j, e, corner(4), n
+
+      call element_kinds_create(scene%kind)
+      n = n_side**2*merge(1, 2, kind == "CPE4")
+      allocate(scene%x(2, (n_side + 1)**2), scene%element_node(4, n), scene%rigid(0))
+      allocate(scene%element_label(n), source=[(i, i = 1, n)])
+      allocate(scene%element_kind(n), source=find_element_row(kind))
+      allocate(scene%element_section(n), source=1)
+      allocate(scene%material(1), scene%section(1), scene%step(1), scene%element_origin(n))
+      scene%element_node = 0
+      e = 0
+      do j = 0, n_side
+         do i = 0, n_side
+            scene%x(:, 1 + i + (n_side + 1)*j) = real([i, j], wp)
+            if (i == n_side .or. j == n_side) cycle
+            corner = 1 + i + (n_side + 1)*j + [0, 1, n_side + 2, n_side + 1]
+            e = e + 1
+            if (kind == "CPE4") then
+               scene%element_node(:, e) = corner
+            else
+               scene%element_node(:3, e) = corner(:3)
+               e = e + 1
+               scene%element_node(:3, e) = corner([1, 3, 4])
+            end if
+         end do
+      end do
+      scene%material(1)%name = "M"
+      scene%material(1)%density = 1.0_wp
+      scene%material(1)%law = law_rows(i_law)%code
+      allocate(scene%material(1)%constant(n_constant(law_rows(i_law))))
+      do i = 1, size(scene%material(1)%constant)
+         j = findloc(names, law_rows(i_law)%constant(i), 1)
+         scene%material(1)%constant(i) = 2.0_wp
+         if (j > 0) scene%material(1)%constant(i) = values(j)
+      end do
+      scene%section(1)%material = 1
+      scene%step(1)%nlgeom = .true.
+   end subroutine make_scene
+
+end program bench_element
