@@ -6,10 +6,10 @@ module emcon_timer
    public :: cpu_seconds, wall_seconds
    public :: stopwatch_t, stopwatch_start, stopwatch_stop
 
-   !> Sums up the CPU time between starts and stops.
+   !> Sums up the wall time between starts and stops, in ticks of the system's clock.
    type :: stopwatch_t
-      real(dp) :: seconds = 0.0_dp
-      real(dp) :: since = 0.0_dp
+      integer(int64) :: ticks = 0
+      integer(int64) :: since = 0
    end type stopwatch_t
 
 contains
@@ -30,13 +30,15 @@ contains
    subroutine stopwatch_start(self)
       type(stopwatch_t), intent(inout) :: self
 
-      self%since = cpu_seconds()
+      call system_clock(self%since)
    end subroutine stopwatch_start
 
    subroutine stopwatch_stop(self)
       type(stopwatch_t), intent(inout) :: self
+      integer(int64) :: now
 
-      self%seconds = self%seconds + (cpu_seconds() - self%since)
+      call system_clock(now)
+      self%ticks = self%ticks + (now - self%since)
    end subroutine stopwatch_stop
 
 end module emcon_timer

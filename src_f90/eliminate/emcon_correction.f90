@@ -7,7 +7,7 @@ module emcon_correction
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : dp, int64, wp
    use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
       null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
       obstacle_pivot
@@ -23,7 +23,7 @@ module emcon_correction
    private
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
       correction_multipliers, correction_reset, correction_free, correction_reason, &
-      correction_seconds
+      correction_ticks
 
    type :: correction_t
       integer :: method = method_null_space      !! as the deck asks
@@ -229,12 +229,12 @@ contains
       call null_space_multipliers(self%null_space, set, system%space%numbering, residual, set%lam)
    end subroutine correction_multipliers
 
-   !> CPU time spent on constraints so far, over what the system without them would take [s].
-   pure real(dp) function correction_seconds(self)
+   !> Time spent on constraints so far, over what the system without them would take [ticks].
+   pure integer(int64) function correction_ticks(self)
       type(correction_t), intent(in) :: self
 
-      correction_seconds = self%clock%seconds + self%null_space%clock%seconds
-   end function correction_seconds
+      correction_ticks = self%clock%ticks + self%null_space%clock%ticks
+   end function correction_ticks
 
    !> Why the last factorisation is of the saddle point although the null space was asked for.
    pure function correction_reason(self) result(text)

@@ -2,12 +2,13 @@
 !> what is let go, put off and dropped. How it goes on: emcon_active_set_update.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
+   use emcon_gaps, only : pair_measure, pair_search
    use emcon_holding, only : holding_forget, holding_t
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest, motion_t
+   use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_state, only : state_t
    use emcon_system, only : system_t
-   use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_overclosure, active_set_begin, &
@@ -115,16 +116,16 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       type(state_t), intent(in) :: state
-      integer :: pair
+      integer :: pair, left
 
-      call stopwatch_start(system%contact_clock)
+      call phase_enter(system%phases, phase_gaps, left)
       self%was_active = state%is_active
       self%lam0 = state%lam
       do pair = 1, size(system%contact)
          system%contact(pair)%contact%is_sharp = .false.
       end do
       call active_set_restart(self, system, motion)
-      call stopwatch_stop(system%contact_clock)
+      call phase_leave(system%phases, left)
    end subroutine active_set_begin
 
    !> Stencils and the first set, as the step began.
@@ -160,12 +161,12 @@ contains
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            call contact%begin_step(motion%x, motion%u0, motion%du)
-            call contact%measure(motion%x, motion%u0, at_rest(motion%u0))
+            call pair_search(system, pair, motion)
+            call pair_measure(system, pair, motion%x, motion%u0, at_rest(motion%u0))
             self%is_active(first:last) = self%was_active(first:last) &
                .and. contact%state%is_near .and. contact%state%is_over
             if (.not. any(self%is_active(first:last))) cycle
-            call contact%measure(motion%x, motion%u0, motion%du)
+            call pair_measure(system, pair, motion%x, motion%u0, motion%du)
             self%is_active(first:last) = self%is_active(first:last) &
                .and. .not. contact%state%is_leaving
          end associate
@@ -183,7 +184,7 @@ contains
       if (self%set%n == 0 .and. .not. any(self%is_active)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
       do pair = 1, size(system%contact)
-         call system%contact(pair)%contact%measure(motion%x, motion%u0, motion%du)
+         call pair_measure(system, pair, motion%x, motion%u0, motion%du)
       end do
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))

@@ -13,14 +13,15 @@ module emcon_active_set_solve
       active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_not_held
    use emcon_active_set_update, only : active_set_advance
    use emcon_errors, only : error_t
+   use emcon_gaps, only : pair_search
    use emcon_holding, only : holding_complete, holding_find_free
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, &
       newton_t
+   use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
    use emcon_system, only : system_t
-   use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
    public :: active_set_solve
@@ -37,14 +38,15 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: is_done, is_held
+      integer :: left
 
       self%first = motion%du
       self%driven = newton%driven
       do
-         call stopwatch_start(system%contact_clock)
+         call phase_enter(system%phases, phase_gaps, left)
          if (self%holding%is_needed) call hold(self, system, scene, newton%driven, motion)
          call active_set_select(self, system, motion)
-         call stopwatch_stop(system%contact_clock)
+         call phase_leave(system%phases, left)
          status = step_not_held
          if (allocated(self%holding%text)) return
          self%before = motion%du
@@ -68,13 +70,13 @@ contains
          end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
          if (status /= newton_converged .or. size(system%contact) == 0) return
-         call stopwatch_start(system%contact_clock)
+         call phase_enter(system%phases, phase_gaps, left)
          call active_set_advance(self, system, motion, is_done, status)
          if (is_done .and. status == step_done .and. self%holding%is_needed) then
             call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
             if (.not. is_held) status = step_not_held
          end if
-         call stopwatch_stop(system%contact_clock)
+         call phase_leave(system%phases, left)
          if (status == step_cycling) call begin_sharp(self, system, newton, motion, is_done)
          if (is_done) return
       end do
@@ -123,7 +125,7 @@ contains
       call holding_complete(self%holding, system, scene, motion, self%is_active)
       motion%du = motion%du + driven
       do pair = 1, size(system%contact)
-         call system%contact(pair)%contact%begin_step(motion%x, motion%u0, motion%du)
+         call pair_search(system, pair, motion)
       end do
    end subroutine hold
 

@@ -4,6 +4,7 @@ module emcon_active_set_update
    use emcon_active_set, only : active_set_t, most_sets, step_cycling, step_done, step_stands_off, &
       step_too_far, touch_tol
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
+   use emcon_gaps, only : pair_measure, pair_search
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -71,8 +72,8 @@ contains
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             ! The motion may be more than was expected.
-            call contact%begin_step(motion%x, motion%u0, motion%du)
-            call contact%measure(motion%x, motion%u0, motion%du)
+            call pair_search(system, pair, motion)
+            call pair_measure(system, pair, motion%x, motion%u0, motion%du)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then

@@ -3,6 +3,7 @@ module emcon_holding_gaps
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
       constraints_select
+   use emcon_gaps, only : pair_measure, pair_search
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_mechanisms, only : mechanisms_t, mechanism_field
@@ -27,8 +28,8 @@ contains
       integer :: pair
 
       do pair = 1, size(system%contact)
-         call system%contact(pair)%contact%begin_step(motion%x, motion%u0, motion%du)
-         call system%contact(pair)%contact%measure(motion%x, motion%u0, motion%du)
+         call pair_search(system, pair, motion)
+         call pair_measure(system, pair, motion%x, motion%u0, motion%du)
       end do
    end subroutine gaps_measure
 

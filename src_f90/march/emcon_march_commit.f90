@@ -10,6 +10,7 @@ module emcon_march_commit
    use emcon_numbering, only : gather_dependent
    use emcon_pair_record, only : pair_record_measure
    use emcon_pair_sums, only : pair_sums_add, pair_sums_push, slave_pushes
+   use emcon_phases, only : phase_enter, phase_leave, phase_restitution
    use emcon_pose, only : pose_velocity
    use emcon_quasi_static, only : quasi_static_move
    use emcon_scene, only : scene_t
@@ -52,11 +53,7 @@ contains
          state%reaction = system%response%residual
          if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
          call book_work(self)
-         if (scene%step(state%i_step)%initiation == initiation_velocity_update &
-            .and. self%scheme%row%masses_resist) call restore_energy(self, increment%notes, error)
-         call quasi_static_move(self, ending%du/h)
-         if (self%layer%is_on .and. self%scheme%row%masses_resist) call end_massless(self, &
-            ending%du/h, increment%notes, error)
+         call restitute(self, scene, ending%du/h, increment%notes, error)
          if (allocated(error)) return
          state%u = state%u + ending%du
          ! Else round-off adds up between the nodes of a rigid body.
@@ -85,6 +82,24 @@ contains
       end associate
       call keep_constraints(self)
    end subroutine march_commit
+
+   !> The velocities that impacts and what has no mass call for.
+   subroutine restitute(self, scene, v, notes, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: v(:, :)            !! (n_dim, n_node) mean over the step [L/T]
+      type(notes_t), intent(inout) :: notes      !! for the log
+      type(error_t), allocatable, intent(out) :: error
+      integer :: left
+
+      call phase_enter(self%system%phases, phase_restitution, left)
+      if (self%scheme%row%masses_resist .and. scene%step(self%state%i_step)%initiation &
+         == initiation_velocity_update) call restore_energy(self, notes, error)
+      call quasi_static_move(self, v)
+      if (self%layer%is_on .and. self%scheme%row%masses_resist) call end_massless(self, v, notes, &
+         error)
+      call phase_leave(self%system%phases, left)
+   end subroutine restitute
 
    !> What acts at the end of the step, with which multipliers: those of the step, or of the balance
    !> of what has no mass.

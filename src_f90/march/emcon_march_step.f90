@@ -15,13 +15,13 @@ module emcon_march_step
    use emcon_march_types, only : ending_t, increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
+   use emcon_phases, only : phase_enter, phase_judge, phase_leave, phase_restitution
    use emcon_pose, only : instant_later, pose_at_end
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : system_loads, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
-   use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
    public :: march_step, cycling_text
@@ -44,7 +44,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
       type(ending_t) :: ending
-      integer :: attempt
+      integer :: attempt, left
 
       self%layer%is_troubled = .false.
       self%active%may_cut = part%may_cut
@@ -62,7 +62,9 @@ contains
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
+      call phase_enter(self%system%phases, phase_restitution, left)
       call settle(self, scene, part, status, error)
+      call phase_leave(self%system%phases, left)
       if (status /= step_done .or. allocated(error)) return
       ending%du = self%motion%du
       if (self%layer%is_settled) ending%du = ending%du + self%layer%du
@@ -144,14 +146,15 @@ contains
       type(increment_t), intent(inout) :: increment
       integer, intent(inout) :: status
       type(overlap_t) :: overlap
+      integer :: left
 
-      call stopwatch_start(self%judge_clock)
+      call phase_enter(self%system%phases, phase_judge, left)
       call judge_step(self%judge, scene%x, self%state%u, du, overlap)
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
       if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then
          if (goes_in(self, scene, overlap)) status = step_overlaps
       end if
-      call stopwatch_stop(self%judge_clock)
+      call phase_leave(self%system%phases, left)
       if (status == step_done .and. overlap%depth > increment%overlap%depth) then
          increment%overlap = overlap
       end if

@@ -15,7 +15,6 @@ module emcon_march_types
    use emcon_state, only : state_t
    use emcon_system, only : system_t
    use emcon_text, only : notes_t
-   use emcon_timer, only : stopwatch_t
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
@@ -69,7 +68,6 @@ module emcon_march_types
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(judge_t) :: judge
-      type(stopwatch_t) :: judge_clock
       !> Overlap per edge with which a step began that resolves it
       real(wp) :: meant_overlap = 0.0_wp
       integer :: n_grid = 0                      !! grid increments in the step

@@ -9,16 +9,17 @@ module emcon_newton
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_t, most_rounding, next_done, next_give_up, next_tangent, round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
-      correction_solve, correction_t
+      correction_solve, correction_t, correction_ticks
    use emcon_errors, only : err_interrupt, error_t, raise
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : int64, wp
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
    use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
+   use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, &
+      phase_leave, phase_move, phase_solve
    use emcon_pose, only : pose_is_equilibrium
    use emcon_system, only : system_respond, system_tangent_times, system_t
    use emcon_term, only : role_external, role_inertia
-   use emcon_timer, only : stopwatch_start, stopwatch_stop
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
@@ -200,13 +201,21 @@ contains
    !> Factorise for the present tangent.
    subroutine factorise(self, system, set, status, error)
       type(newton_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
+      type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       logical :: is_singular
+      integer(int64) :: before
+      integer :: left
 
+      call phase_enter(system%phases, phase_factorise, left)
+      before = correction_ticks(self%correction)
       call correction_factorise(self%correction, system, set, is_singular, error)
+      call phase_move(system%phases, phase_factorise, phase_eliminate, &
+         correction_ticks(self%correction) - before)
+      call phase_leave(system%phases, left)
+      system%phases%n_factorisation = system%phases%n_factorisation + 1
       self%convergence%n_iteration = self%convergence%n_iteration + 1
       status = merge(newton_singular, newton_converged, is_singular)
    end subroutine factorise
@@ -214,13 +223,17 @@ contains
    !> Correct `du` and the multipliers for the present residual.
    subroutine correct(self, system, set, du, error)
       type(newton_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
+      type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(inout), contiguous :: du(:, :)
       type(error_t), allocatable, intent(out) :: error
+      integer :: left
 
+      call phase_enter(system%phases, phase_solve, left)
       call correction_solve(self%correction, set, self%residual, self%dq, self%dlam, error)
+      call phase_leave(system%phases, left)
       if (allocated(error)) return
+      system%phases%n_solve = system%phases%n_solve + 1
       self%n_solve = self%n_solve + 1
       if (set%n > set%n_linear .and. .not. self%convergence%is_polish) then
          self%dq = self%convergence%damping*self%dq
@@ -263,7 +276,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
-      integer :: i
+      integer :: i, left
 
       status = newton_refused
       do i = 0, most_halvings
@@ -279,13 +292,14 @@ contains
          call add_to_dofs(system%space%numbering, self%dq, -1.0_wp, motion%du)
       end do
       status = newton_converged
+      call phase_enter(system%phases, phase_gaps, left)
       if (set%n > 0) then
-         call stopwatch_start(system%contact_clock)
          call constraints_evaluate(set, system, motion)
          call constraints_rows(set, system%space%numbering)
-         call stopwatch_stop(system%contact_clock)
       end if
+      call phase_leave(system%phases, phase_eliminate)
       call correction_lay_out(self%correction, system, set, error)
+      call phase_leave(system%phases, left)
    end subroutine evaluate_damped
 
    !> Residual with contact forces, its size relative to its contributions, and the largest gap
@@ -296,10 +310,12 @@ contains
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(out) :: norm, defect
       logical, intent(out) :: is_rounding        !! nothing but round-off is left
-      integer :: k
+      integer :: k, left
 
       call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
+      call phase_enter(system%phases, phase_eliminate, left)
       call correction_multipliers(self%correction, system, set, self%residual)
+      call phase_leave(system%phases, left)
       call constraints_force(set, 1, self%contact, system%response%magnitude)
       if (set%n > 0) then
          self%left = system%response%residual - self%contact

@@ -14,15 +14,19 @@ module emcon_run
       recorder_resume, recorder_t, recorder_write
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_restart_data, only : restart_check, restart_exchange, restart_list
+   use emcon_phases, only : n_phase, phase_eliminate, phase_gaps, phase_judge, phase_search, &
+      phases_seconds, phases_start
    use emcon_probe, only : probe_cost
    use emcon_report_row, only : report_row_t, rows_json
    use emcon_run_log, only : log_increment, log_start, model_lines
+   use emcon_run_phases, only : part_march, part_output, part_read, run_parts_mark, run_parts_t, &
+      run_phases_json, run_phases_lines
    use emcon_scene_report, only : scene_report
-   use emcon_stepper, only : stepper_advance, stepper_close, stepper_contact_seconds, &
-      stepper_fraction, stepper_is_done, stepper_open, stepper_t
+   use emcon_stepper, only : stepper_advance, stepper_close, stepper_fraction, &
+      stepper_is_done, stepper_open, stepper_t
    use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_text, only : note_add, notes_t, string_t, to_text
-   use emcon_timer, only : cpu_seconds, wall_seconds
+   use emcon_timer, only : wall_seconds
    use emcon_verdict, only : verdict_balance_lines, verdict_end, verdict_is_failure, &
       verdict_is_good, verdict_line
    use emcon_verdict_file, only : verdict_write
@@ -58,6 +62,7 @@ module emcon_run
       type(progress_t) :: progress
       character(len=:), allocatable :: base
       real(dp) :: wall_start = 0.0_dp
+      type(run_parts_t) :: parts                 !! of its time
    end type run_t
 
 contains
@@ -120,6 +125,7 @@ contains
       call stepper_open(run%stepper, path, options%override, options%is_lenient, error)
       call move_diagnostics(run, report)
       if (allocated(error)) return
+      call run_parts_mark(run%parts, part_read)
       call result_base(path, options, run%base)
       report%base = run%base
       if (is_result(path, run%base)) call raise(error, err_input, path // ": the results would " &
@@ -133,8 +139,10 @@ contains
       if (.not. allocated(error)) call file_remove(run%base // ".rst.h5", error)
       if (.not. allocated(error)) call file_remove(run%base // ".json", error)
       if (.not. allocated(error)) then
+         call run_parts_mark(run%parts, part_output)
          call log_start(run%log, run%stepper, report%diagnostic, path)
-         call recorder_write(run%recorder, run%stepper, nothing, cpu_seconds(), error)
+         call run_parts_mark(run%parts, part_read)
+         call recorder_write(run%recorder, run%stepper, nothing, run%parts%marked, error)
       end if
       call march_on(run, options, is_interrupted, report, error)
    end subroutine run_deck
@@ -174,6 +182,7 @@ contains
          if (error%code /= err_file) error%code = err_input
          return
       end if
+      call run_parts_mark(run%parts, part_read)
       call move_diagnostics(run, report)
       call build_differences(build, path // ": warning: ", differences)
       call log_lines(run%log, "", differences)
@@ -238,16 +247,19 @@ contains
 
       has_stopped = .false.
       call march_watch(run%stepper%march, is_interrupted)
+      call phases_start(run%stepper%march%system%phases)
       call progress_start(run%progress, real(stepper_fraction(run%stepper), dp), options%is_quiet)
       do while (.not. allocated(error) .and. .not. stepper_is_done(run%stepper))
          has_stopped = is_interrupted()
          if (has_stopped) exit
+         call run_parts_mark(run%parts, part_output)
          call stepper_advance(run%stepper, increment, error)
+         call run_parts_mark(run%parts, part_march)
          if (allocated(error)) has_stopped = error%code == err_interrupt
          if (has_stopped) exit
          call log_increment(run%log, run%stepper, increment)
          if (allocated(error)) exit
-         call recorder_write(run%recorder, run%stepper, increment, cpu_seconds(), error)
+         call recorder_write(run%recorder, run%stepper, increment, run%parts%marked, error)
          if (is_save_due(run) .and. .not. allocated(error)) call save(run, error)
          if (.not. allocated(error)) call recorder_publish(run%recorder, .false., error)
          associate (state => run%stepper%march%state)
@@ -272,11 +284,14 @@ contains
       type(run_report_t), intent(inout) :: report
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: second
-      type(notes_t) :: lines
+      type(notes_t) :: lines, table
+      character(len=:), allocatable :: members
+      real(dp) :: seconds(n_phase)
 
       if (.not. allocated(error)) then
+         seconds = phases_seconds(run%stepper%march%system%phases, run%parts%seconds(part_march))
          call recorder_finish(run%recorder, wall_seconds() - run%wall_start, &
-            stepper_contact_seconds(run%stepper), run%stepper%march%judge_clock%seconds, error)
+            sum(seconds([phase_search, phase_gaps, phase_eliminate])), seconds(phase_judge), error)
       end if
       call recorder_close(run%recorder, second)
       if (.not. allocated(error)) call move_alloc(second, error)
@@ -284,7 +299,12 @@ contains
       call pass_verdict(run, is_strict, report, lines, error)
       call log_lines(run%log, "", lines)
       report%closing = lines%item(:lines%n)
-      call verdict_write(run%stepper%verdict, run%stepper%march, run%base // ".json", second)
+      call run_parts_mark(run%parts, part_output)
+      call run_phases_lines(run%parts, run%stepper%march%system%phases, table)
+      call log_lines(run%log, "", table)
+      call run_phases_json(run%parts, run%stepper%march%system%phases, members)
+      call verdict_write(run%stepper%verdict, run%stepper%march, run%base // ".json", members, &
+         second)
       if (.not. allocated(error)) call move_alloc(second, error)
       call stepper_close(run%stepper)
       call log_close(run%log, second)

@@ -29,17 +29,20 @@ contains
       is_good = verdict_is_good(ended)
    end subroutine verdict_so_far
 
-   !> Write the one line of the file `path`. It appears under its name when it is whole.
-   subroutine verdict_write(self, march, path, error)
+   !> Write the one line of the file `path`, with further members of the object. It appears under
+   !> its name when it is whole.
+   subroutine verdict_write(self, march, path, members, error)
       type(verdict_t), intent(in) :: self
       type(march_t), intent(in) :: march
       character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: members    !! as JSON has them, with commas between them
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: second
       type(file_t) :: file
       character(len=:), allocatable :: line
 
       call compose(self, march, line)
+      line = line(:len(line) - 1) // ", " // members // "}"
       call file_open(file, path // ".tmp", "w", error)
       if (allocated(error)) return
       call file_put(file, line // achar(10), error)

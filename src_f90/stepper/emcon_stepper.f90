@@ -1,7 +1,6 @@
 !> The stepper: open a deck, step, query, save, go on. All state is in the object; any number of
 !> steppers live side by side.
 module emcon_stepper
-   use emcon_correction, only : correction_seconds
    use emcon_deck, only : deck_read
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
@@ -10,7 +9,7 @@ module emcon_stepper
    use emcon_host_check, only : host_check_scene
    use emcon_heap, only : heap_adapt
    use emcon_initial_contact, only : initial_contact_prepare
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_t
    use emcon_scene, only : scene_t
@@ -22,7 +21,7 @@ module emcon_stepper
    private
    public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &
       stepper_build, stepper_advance, stepper_is_done
-   public :: stepper_check_solids, stepper_close, stepper_fraction, stepper_contact_seconds
+   public :: stepper_check_solids, stepper_close, stepper_fraction
 
    type :: stepper_t
       type(scene_t) :: scene
@@ -206,13 +205,5 @@ contains
 
       stepper_fraction = min(1.0_wp, self%march%state%time/sum(self%scene%step%duration))
    end function stepper_fraction
-
-   !> CPU time of search, gaps, constraints and null space since the program began [s].
-   pure real(dp) function stepper_contact_seconds(self)
-      type(stepper_t), intent(in) :: self
-
-      stepper_contact_seconds = self%march%system%contact_clock%seconds &
-         + correction_seconds(self%march%newton%correction)
-   end function stepper_contact_seconds
 
 end module emcon_stepper

@@ -14,6 +14,7 @@ module emcon_system
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
+   use emcon_phases, only : phase_assemble, phase_enter, phase_leave, phase_residual, phases_t
    use emcon_reduction, only : reduction_add
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_begin, lists_t, space_begin_step, space_init, space_t
@@ -23,7 +24,6 @@ module emcon_system
       role_inertia, role_internal, term_box_t
    use emcon_term_registry, only : terms_create, terms_mass, terms_mass_times
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_timer, only : stopwatch_t
    implicit none
    private
    public :: system_t, system_init, system_begin_step, system_renew, system_respond, &
@@ -47,7 +47,7 @@ module emcon_system
       type(stiffening_t) :: stiffening           !! of bodies that nothing holds, in `matrix`
       type(response_t) :: response               !! of the terms to the last motion
       type(notes_t) :: notes                     !! on the linear constraints of the step
-      type(stopwatch_t) :: contact_clock         !! search, gaps, constraints
+      type(phases_t) :: phases                   !! where the time goes
    end type system_t
 
 contains
@@ -246,12 +246,16 @@ contains
       type(system_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion       !! placed
       logical, intent(in) :: with_tangent        !! else the matrix is left as it is
-      integer :: k
+      integer :: k, left
 
+      call phase_enter(self%phases, merge(phase_assemble, phase_residual, with_tangent), left)
       call response_begin(self%response)
       if (with_tangent) then
+         self%phases%n_tangent = self%phases%n_tangent + 1
          self%is_symmetric = .true.
          self%matrix%value = 0.0_dp
+      else
+         self%phases%n_residual = self%phases%n_residual + 1
       end if
       do k = 1, size(self%term)
          associate (term => self%term(k)%term)
@@ -275,6 +279,7 @@ contains
          response%residual = inertia%force + (internal%force - external%force)
          response%magnitude = inertia%magnitude + (internal%magnitude + external%magnitude)
       end associate
+      call phase_leave(self%phases, left)
    end subroutine system_respond
 
    !> The external forces of a motion.

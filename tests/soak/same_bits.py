@@ -1,9 +1,10 @@
 """Does a rebuilt program give the same bits? `same_bits.py BEFORE AFTER [DECK...]`, two programs.
 
 Each deck is run by both; exit codes, messages, and all that the result files hold must agree to
-the last bit, times of the processor excepted. Without decks: all of input_decks/ and build/bits/,
-where `same_bits.py collect [TEST...]` puts each deck that tests and the chapters of the book run.
-What a program gives is kept in build/bits/, so that BEFORE is run once.
+the last bit, times of the processor excepted; counts of calls where both tell them. Without decks:
+all of input_decks/ and build/bits/, where `same_bits.py collect [TEST...]` puts each deck that
+tests and the chapters of the book run. What a program gives is kept in build/bits/, so that BEFORE
+is run once.
 """
 
 import concurrent.futures
@@ -66,6 +67,12 @@ def table(path):
     return "\n".join(",".join(row[k] for k in columns if k < len(row)) for row in rows).encode()
 
 
+def verdict(path):
+    """NAME.json without its seconds and counts."""
+    found = json.loads(path.read_bytes())
+    return json.dumps({k: v for k, v in found.items() if k not in ("seconds", "counts")}).encode()
+
+
 def arrays(path):
     """Names and bytes of all arrays of an HDF5 file but times of the machine and its version."""
     parts = []
@@ -79,7 +86,7 @@ def arrays(path):
     return b"".join(name.encode() + repr(a.shape).encode() + a.tobytes() for name, a in parts)
 
 
-READ = {".csv": table, ".json": pathlib.Path.read_bytes, ".vtkhdf": arrays, ".h5": arrays}
+READ = {".csv": table, ".json": verdict, ".vtkhdf": arrays, ".h5": arrays}
 
 
 def outcome(program, deck, options):
@@ -101,6 +108,9 @@ def outcome(program, deck, options):
             if path.suffix in READ:
                 held = READ[path.suffix](path).replace(folder.encode(), b"")
                 result["".join(path.suffixes)] = digest(held)
+            if path.suffix == ".json":
+                counts = json.loads(path.read_bytes()).get("counts")
+                result["counts"] = digest(json.dumps(counts).encode()) if counts else ""
     return result
 
 
@@ -137,6 +147,8 @@ def compare(before, after, decks):
     different = 0
     for deck in decks:
         names = sorted(old[deck].keys() | new[deck].keys())
+        if not (old[deck].get("counts") and new[deck].get("counts")):
+            names = [name for name in names if name != "counts"]
         unlike = [n for n in names if old[deck].get(n) != new[deck].get(n)]
         if unlike:
             different += 1
