@@ -357,9 +357,14 @@ class Model(Cards):
 
     # --- contact, ties, equations ----------------------------------------------------------
 
-    def interaction(self, name: str, *, friction: Number | None = None) -> Model:
-        """`*SURFACE INTERACTION` with hard contact; `friction` may only be 0."""
-        text = card("SURFACE INTERACTION", {"NAME": name})
+    def interaction(self, name: str, *, friction: Number | None = None,
+                    pad_thickness: Number | None = None) -> Model:
+        """`*SURFACE INTERACTION` with hard contact; `friction` may only be 0.
+
+        pad_thickness   of a layer that keeps the surfaces apart, 0 or more [L]; a node with a pad
+                        as thick as a radius is a circle
+        """
+        text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness})
         text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})
         self._add(text if friction is None else text + card("FRICTION", rows=[(friction,)]))
         return self

@@ -42,6 +42,7 @@ module emcon_contact
       logical :: meets_statics = .false.              !! a step of the deck is static
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
+      real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
       !> from there on the other side of a thin body is meant.

@@ -14,7 +14,8 @@ module emcon_first_touch_plane
 contains
 
    !> The first time at which a node of a contact pair passes through an edge of the other surface
-   !> from outside; huge if that never happens. Every node is looked at with every edge.
+   !> from outside, or the layer in front of it; huge if that never happens. Every node is looked at
+   !> with every edge.
    real(wp) function touch_time(scene, x, way)
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) where nodes are [L]
@@ -33,14 +34,15 @@ contains
                node = unique_sorted(reshape(slave, [size(slave)]))
             end if
          end associate
-         touch_time = min(touch_time, nodes_time(node, master, x, way))
+         touch_time = min(touch_time, nodes_time(node, master, scene%pair(i)%offset, x, way))
          node = unique_sorted(reshape(master, [size(master)]))
-         touch_time = min(touch_time, nodes_time(node, slave, x, way))
+         touch_time = min(touch_time, nodes_time(node, slave, scene%pair(i)%offset, x, way))
       end do
    end function touch_time
 
-   pure real(wp) function nodes_time(node, edge, x, way)
+   pure real(wp) function nodes_time(node, edge, offset, x, way)
       integer, intent(in) :: node(:), edge(:, :)
+      real(wp), intent(in) :: offset             !! thickness of the layer [L]
       real(wp), intent(in) :: x(:, :), way(:, :)
       integer :: i, e
 
@@ -48,11 +50,21 @@ contains
       do e = 1, size(edge, 2)
          do i = 1, size(node)
             if (any(edge(:, e) == node(i))) cycle
-            nodes_time = min(nodes_time, passing_time(x(:, [node(i), edge(:, e)]), &
+            nodes_time = min(nodes_time, passing_time(lifted(x(:, [node(i), edge(:, e)]), offset), &
                way(:, [node(i), edge(:, e)])))
          end do
       end do
    end function nodes_time
+
+   !> A node, the first, and an edge, with the edge moved outwards.
+   pure function lifted(x, offset)
+      real(wp), intent(in) :: x(2, 3), offset
+      real(wp) :: lifted(2, 3), e(2)
+
+      e = x(:, 3) - x(:, 2)
+      lifted = x
+      lifted(:, 2:3) = x(:, 2:3) + spread(offset*[e(2), -e(1)]/sqrt(dot_product(e, e)), 2, 2)
+   end function lifted
 
    !> When a node, the first, passes through the edge of the other two, whose outside is to the
    !> right: the double area a0 + a1 t + a2 t^2 falls through zero there, within the edge.

@@ -64,8 +64,8 @@ contains
       call weighted_init(self, scene, pair, error)
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%edge, self%master%edge, scene%u0, &
-         maxval(self%slave%length))
-      self%farthest_start = self%near%depth
+         maxval(self%slave%length) + self%offset)
+      self%farthest_start = maxval(self%slave%length)
       allocate(self%start(self%slave%n_edge + 1), source=1)
       allocate(self%pair(0))
       call self%configure(scene%x, self%options)
@@ -172,7 +172,7 @@ contains
                value = value + part
                if (part(moment_cover, 0) > 0.0_wp .or. .not. part(moment_cover, 1) > 0.0_wp) cycle
                ahead = min(ahead, gap_ahead(frame(0), self%pair(k), &
-                  part(moment_area_xi, 1)/part(moment_area, 1)))
+                  part(moment_area_xi, 1)/part(moment_area, 1)) - self%offset)
             end do
          end associate
       end do

@@ -98,6 +98,7 @@ contains
       allocate(self%state(self%n_constraint), self%polygon(2, self%n_constraint))
       self%deepest_start = touch_tol
       self%slack = pair%slack
+      self%offset = pair%offset
       self%both_sides = pair%both_sides
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
@@ -105,7 +106,7 @@ contains
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
          call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%edge, &
-            scene%u0, 0.0_wp)
+            scene%u0, self%offset)
       end associate
    end subroutine nts_init
 
@@ -283,6 +284,8 @@ contains
             local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
          end do
          call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap1, xi1)
+         state%gap0 = state%gap0 - self%offset
+         state%gap1 = state%gap1 - self%offset
          state%size = stencil_length(x, stencil%node)
          state%is_over = is_over(state, xi0, xi1, [before > 0, after > 0])
       end associate
@@ -343,6 +346,8 @@ contains
          end do
          call hermite_gap_value(curve, local(:, :n), place, state%gap1, is_found)
          if (.not. is_found) return
+         state%gap0 = state%gap0 - self%offset
+         state%gap1 = state%gap1 - self%offset
          state%size = stencil_length(x, node)
          state%is_near = .true.
          state%is_over = is_over(state, xi0, xi1, curve%node([2, 5]) > 0 .and. &
@@ -427,13 +432,15 @@ contains
 
       do k = 1, size(wanted)
          if (self%smoothing == smoothing_hermite) then
-            call smooth_constraint(self%smooth(wanted(k)), x, u0, du, target(k), item(k), is_found)
+            call smooth_constraint(self%smooth(wanted(k)), x, u0, du, target(k) + self%offset, &
+               item(k), is_found)
             self%is_lost(wanted(k)) = .not. is_found
             if (is_found) cycle
          end if
          ! One polygon, or two over a corner.
          associate (n => merge(2, 1, self%other(wanted(k)) > 0))
-            call polygon_constraint(self%polygon(:n, wanted(k)), x, u0, du, target(k), item(k))
+            call polygon_constraint(self%polygon(:n, wanted(k)), x, u0, du, &
+               target(k) + self%offset, item(k))
          end associate
       end do
    end subroutine nts_evaluate

@@ -46,6 +46,7 @@ contains
       if (allocated(error)) return
       call nts_init(self%nts, scene, pair, error, has_twins=.true.)
       if (allocated(error)) return
+      self%nts%offset = 0.0_wp                       ! it is taken off the means
       allocate(self%end_node(2, self%slave%n_edge))
       do e = 1, self%slave%n_edge
          do k = 1, 2

@@ -86,6 +86,7 @@ contains
       n = size(self%node)
       self%n_constraint = n
       self%deepest_start = deepest_mean
+      self%offset = pair%offset
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_edge))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)
@@ -134,9 +135,9 @@ contains
             state%gap0 = 0.0_wp
             state%gap1 = 0.0_wp
             state%was_open = .true.
-            if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0)
+            if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset
             if (state%is_arriving) state%was_open = is_open(self, i)
-            if (state%is_over) state%gap1 = gap(1)/area(1)
+            if (state%is_over) state%gap1 = gap(1)/area(1) - self%offset
             self%scale(i) = max(area(0), least)
             self%cover(i) = area(1)
          end associate
@@ -177,7 +178,7 @@ contains
             end associate
          end do
          call form_constraint(self%form, weighted_gap_t(self%node(i), self%node_edge(:, i), &
-            self%is_dual, target(n), self%scale(i)), self%work, item(n))
+            self%is_dual, target(n) + self%offset, self%scale(i)), self%work, item(n))
          item(n)%size = self%state(i)%size
       end do
    end subroutine weighted_evaluate

@@ -21,13 +21,14 @@ module emcon_deck_contact
 
 contains
 
-   !> The names of the surface interactions. All of them mean hard contact without friction.
+   !> The names of the surface interactions and their pads. All mean hard contact, no friction.
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
       integer :: i, n
 
       allocate(reader%interaction(size(reader%card)))
+      allocate(reader%pad(size(reader%card)), source=0.0_wp)
       n = 0
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
@@ -36,6 +37,7 @@ contains
                call need_name(reader, card, "NAME", name)
                n = n + 1
                reader%interaction(n)%text = name
+               call read_pad(reader, card, reader%pad(n))
             case ("SURFACEBEHAVIOR", "FRICTION")
                if (n == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
@@ -48,7 +50,28 @@ contains
          end associate
       end do
       reader%interaction = reader%interaction(:n)
+      reader%pad = reader%pad(:n)
    end subroutine read_interactions
+
+   !> PAD THICKNESS: of a layer between the surfaces.
+   subroutine read_pad(reader, card, pad)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      real(wp), intent(inout) :: pad               !! as it is if the option is absent or wrong [L]
+      real(wp) :: number
+      logical :: is_number
+
+      if (.not. has_option(card, "PADTHICKNESS")) return
+      call read_real(option_name(card, "PADTHICKNESS"), number, is_number)
+      if (is_number) is_number = number >= 0.0_wp .and. number <= huge(number)
+      if (is_number) then
+         pad = number
+      else
+         call card_error(reader, card, "PAD THICKNESS=" // quoted(option_name(card, &
+            "PADTHICKNESS")) // " is not a length of 0 or more: it keeps surfaces apart; overlap " &
+            // "at the start is resolved by *CONTACT INTERFERENCE")
+      end if
+   end subroutine read_pad
 
    subroutine check_behavior(reader, card)
       type(reader_t), intent(inout) :: reader
@@ -292,18 +315,10 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(inout) :: pair(:)
       type(contact_pair_t) :: of_card
-      character(len=:), allocatable :: name
-      logical :: is_known
       integer :: i
 
       if (size(pair) == 0) call card_error(reader, card, "no pair of surfaces is given")
-      call need_name(reader, card, "INTERACTION", name)
-      is_known = name == "" .or. reader%doubt_names
-      do i = 1, size(reader%interaction)
-         is_known = is_known .or. reader%interaction(i)%text == name
-      end do
-      if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
-         // quoted(name) // suggestion(name, reader%interaction))
+      call read_interaction(reader, card, pair, of_card%offset)
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
       call read_pair_initiation(reader, card, of_card%initiation)
@@ -311,9 +326,35 @@ contains
          pair(i)%adjust_distance = of_card%adjust_distance
          pair(i)%adjust_set = of_card%adjust_set
          pair(i)%is_guarded = of_card%is_guarded
+         pair(i)%offset = of_card%offset
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
+
+   !> INTERACTION= of a card: the thickness of its pad.
+   subroutine read_interaction(reader, card, pair, offset)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      real(wp), intent(inout) :: offset            !! [L]
+      character(len=:), allocatable :: name
+      logical :: is_known
+      integer :: i
+
+      call need_name(reader, card, "INTERACTION", name)
+      is_known = name == "" .or. reader%doubt_names
+      do i = 1, size(reader%interaction)
+         if (reader%interaction(i)%text /= name) cycle
+         is_known = .true.
+         offset = reader%pad(i)
+      end do
+      if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
+         // quoted(name) // suggestion(name, reader%interaction))
+      if (.not. offset > 0.0_wp) return
+      if (any(pair%slave == pair%master .and. pair%slave > 0)) call card_error(reader, card, &
+         "the surface interaction " // quoted(name) // " has a PAD THICKNESS, which has no " // &
+         "meaning for a surface in contact with itself: neighbours on it are nearer than that")
+   end subroutine read_interaction
 
    !> GUARD= of a card: are nodes that the pairs do not hold kept from going in too far?
    subroutine read_guard(reader, card, both_sides, of_card)

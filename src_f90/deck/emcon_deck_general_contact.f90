@@ -11,6 +11,7 @@ module emcon_deck_general_contact
    use emcon_deck_surfaces, only : find_surface, surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_interactions, only : contact_pair_t, formulation_nts
+   use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t, where_text
    implicit none
@@ -203,7 +204,7 @@ contains
    end subroutine find_exterior
 
    !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions
-   !> mean the same, hard contact without friction.
+   !> mean the same, hard contact without friction, but for pads, which are of pairs only.
    subroutine check_properties(reader, card, scene)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -228,7 +229,11 @@ contains
          if (.not. data%ok) cycle
          is_known = reader%doubt_names
          do i = 1, size(reader%interaction)
-            is_known = is_known .or. reader%interaction(i)%text == name
+            if (reader%interaction(i)%text /= name) cycle
+            is_known = .true.
+            if (reader%pad(i) > 0.0_wp) call data_error(reader, data, "the surface interaction " &
+               // quoted(name) // " has a PAD THICKNESS, which has no meaning where surfaces may " &
+               // "be in contact with themselves; name what it keeps apart by *CONTACT PAIR")
          end do
          if (.not. is_known) call data_error(reader, data, "unknown surface interaction " &
             // quoted(name) // suggestion(name, reader%interaction))

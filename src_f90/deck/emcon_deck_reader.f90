@@ -57,6 +57,7 @@ module emcon_deck_reader
       integer, allocatable :: line_node(:, :)            !! (2, n_line), 0: it had errors
       type(named_set_t), allocatable :: line_set(:)      !! the lines of element sets that have some
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
+      real(wp), allocatable :: pad(:)                    !! PAD THICKNESS of each [L]
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
 

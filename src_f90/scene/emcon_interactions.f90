@@ -41,6 +41,7 @@ module emcon_interactions
       logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
       integer :: initiation = 0                      !! one of `initiation_`, 0: as the step
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
+      real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
