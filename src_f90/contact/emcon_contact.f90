@@ -44,6 +44,9 @@ module emcon_contact
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
+      !> No state changes before a node has moved farther from where the last step began [L].
+      real(wp) :: clearance = 0.0_wp
+      integer :: n_look = 0                           !! steps begun so far
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
       !> from there on the other side of a thin body is meant.
       real(wp) :: deepest_start = 0.0_wp
@@ -58,6 +61,7 @@ module emcon_contact
    contains
       procedure :: suit_steps
       procedure :: linearise
+      procedure :: has_looked
       procedure(configure_interface), deferred :: configure
       procedure(begin_interface), deferred :: begin_step
       procedure(measure_interface), deferred :: measure
@@ -127,6 +131,15 @@ contains
       self%meets_statics = meets_statics
       self%rounding = merge(static_rounding, dynamic_rounding, meets_statics)
    end subroutine suit_steps
+
+   !> A step has begun; see `clearance`.
+   pure subroutine has_looked(self, clearance)
+      class(contact_t), intent(inout) :: self
+      real(wp), intent(in) :: clearance          !! >= 0; 0: something is near [L]
+
+      self%clearance = clearance
+      self%n_look = 1 + mod(self%n_look, huge(self%n_look) - 1)
+   end subroutine has_looked
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces.

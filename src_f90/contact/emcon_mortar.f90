@@ -101,6 +101,7 @@ contains
       integer :: e, n
 
       call near_list_update(self%near, x, u0, du, self%reach)
+      call self%has_looked(self%near%clearance)
       n = 0
       do e = 1, self%slave%n_edge
          self%start(e) = n + 1

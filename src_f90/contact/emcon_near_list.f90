@@ -13,6 +13,9 @@ module emcon_near_list
    !> multiple of the largest motion expected in one step, at least.
    real(wp), parameter :: reach_per_edge = 0.5_wp, reach_per_motion = 8.0_wp
 
+   !> Of a reach that round-off does not touch.
+   real(wp), parameter :: surely = 0.99_wp
+
    type :: near_list_t
       integer, allocatable :: item(:, :)         !! (1 or 2, n_item) nodes of each slave item
       integer, allocatable :: edge(:, :)         !! (2, n_edge) master edges
@@ -21,6 +24,10 @@ module emcon_near_list
       type(candidates_t) :: candidates
       !> Up to this distance the list is complete, whenever it was made [L].
       real(wp) :: depth = 0.0_wp
+      !> As long as no node has moved farther since the last update, the list is empty and stays so
+      !> [L].
+      real(wp) :: clearance = 0.0_wp
+      real(wp) :: edge_reach = 0.0_wp            !! least reach of the last search, by the edges [L]
    end type near_list_t
 
 contains
@@ -45,11 +52,17 @@ contains
       type(near_list_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(inout) :: reach           !! [L]
-      real(wp) :: step_motion, motion
+      real(wp) :: step_motion, way
 
       step_motion = largest(du(:, self%node))
-      motion = largest(u0(:, self%node) - self%u) + step_motion
-      if (.not. 2.0_wp*motion + self%depth < reach) call search(self, x, u0, step_motion, reach)
+      way = largest(u0(:, self%node) - self%u)
+      if (.not. 2.0_wp*(way + step_motion) + self%depth < reach) then
+         call search(self, x, u0, step_motion, reach)
+         way = 0.0_wp
+      end if
+      self%clearance = 0.0_wp
+      if (size(self%candidates%edge) == 0) self%clearance = max(0.0_wp, &
+         0.5_wp*(surely*reach - self%depth) - way)
    end subroutine near_list_update
 
    !> Surfaces far apart get a reach as large as their distance and an empty list: then nothing is
@@ -67,8 +80,8 @@ contains
       call boxes(x, u0, self%edge, edge)
       apart = box_distance(minval(item(:, :, 1), 2), maxval(item(:, :, 2), 2), &
          minval(edge(:, :, 1), 2), maxval(edge(:, :, 2), 2))
-      reach = max(reach_per_edge*sum(edge(:, :, 2) - edge(:, :, 1))/real(size(edge, 2), wp), &
-         reach_per_motion*step_motion, 0.99_wp*apart) + self%depth
+      self%edge_reach = reach_per_edge*sum(edge(:, :, 2) - edge(:, :, 1))/real(size(edge, 2), wp)
+      reach = max(self%edge_reach, reach_per_motion*step_motion, 0.99_wp*apart) + self%depth
       call search_candidates(item(:, :, 1), item(:, :, 2), edge(:, :, 1), edge(:, :, 2), reach, &
          self%candidates)
    end subroutine search

@@ -147,6 +147,7 @@ contains
       real(wp) :: best
 
       call near_list_update(self%near, x, u0, du, self%reach)
+      call self%has_looked(self%near%clearance)
       do i = 1, self%n_constraint
          self%edge(i) = 0
          best = huge(best)

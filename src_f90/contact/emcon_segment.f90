@@ -75,6 +75,11 @@ contains
       self%nts%is_sharp = self%is_sharp
       call self%nts%begin_step(x, u0, du)
       self%reach = self%nts%reach
+      ! Searched anew, the list stays empty: its reach grows with the motion and with the edges.
+      associate (near => self%nts%near)
+         call self%has_looked(max(0.0_wp, min(0.2_wp*near%clearance, &
+            0.5_wp*near%clearance - 0.25_wp*near%edge_reach)))
+      end associate
    end subroutine segment_begin_step
 
    !> The weights of an edge's nodal gaps in the moments, in units of its length: docs/theory.md,

@@ -9,10 +9,11 @@ module emcon_active_set
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_state, only : state_t
    use emcon_system, only : system_t
+   use emcon_travel, only : largest_motion, travel_t, travel_to
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_overclosure, active_set_begin, &
-      active_set_restart, active_set_select
+      active_set_restart, active_set_select, active_set_look, active_set_passes
    public :: active_set_let_go, active_set_put_off, active_set_drop, touch_tol, most_sets
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced
@@ -26,6 +27,12 @@ module emcon_active_set
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
    !> Sets tried in one step at most.
    integer, parameter :: most_sets = 40
+
+   !> Until when a contact whose surfaces are far apart need not be looked at.
+   type :: outlook_t
+      real(wp) :: until = 0.0_wp                 !! by `travel%total` [L]
+      integer :: n_look = 0                      !! of the contact; another one: look again
+   end type outlook_t
 
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
@@ -62,6 +69,8 @@ module emcon_active_set
       real(wp), allocatable :: overclosure(:)
       real(wp) :: left(0:1) = 0.0_wp
       type(holding_t) :: holding                 !! bodies that contact alone holds, in statics
+      type(travel_t) :: travel                   !! of all nodes, over the steps
+      type(outlook_t), allocatable :: outlook(:) !! (n_contact)
    end type active_set_t
 
 contains
@@ -73,8 +82,9 @@ contains
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
          self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure, &
-         self%closes)
+         self%closes, self%outlook)
       allocate(self%closes(system%n_constraint), source=.false.)
+      allocate(self%outlook(size(system%contact)))
       allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%comes_and_goes(system%n_constraint), source=.false.)
@@ -119,6 +129,7 @@ contains
       integer :: pair, left
 
       call phase_enter(system%phases, phase_gaps, left)
+      if (size(system%contact) > 0) call travel_to(self%travel, motion%u0)
       self%was_active = state%is_active
       self%lam0 = state%lam
       do pair = 1, size(system%contact)
@@ -148,6 +159,49 @@ contains
       self%is_let_go = .false.
    end subroutine active_set_restart
 
+   !> Choose the stencils of a contact for `motion`, and measure it over `du`.
+   subroutine active_set_look(self, system, pair, motion, du)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      integer, intent(in) :: pair                !! number of the contact
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in), contiguous :: du(:, :)   !! (n_dim, n_node) [L]
+
+      call pair_search(system, pair, motion)
+      call pair_measure(system, pair, motion%x, motion%u0, du)
+      associate (contact => system%contact(pair)%contact)
+         self%outlook(pair) = outlook_t(self%travel%total + contact%clearance, contact%n_look)
+      end associate
+   end subroutine active_set_look
+
+   !> The contacts whose surfaces `motion` cannot bring near each other: they are as last measured.
+   pure subroutine active_set_passes(self, system, motion, passes)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: passes(:)          !! (n_contact)
+      real(wp) :: total
+      integer :: pair
+
+      if (size(passes) == 0) return
+      total = self%travel%total + largest_motion(motion%du)
+      do pair = 1, size(passes)
+         passes(pair) = is_empty(self, system, pair) .and. total < self%outlook(pair)%until
+      end do
+   end subroutine active_set_passes
+
+   !> Has nothing of this contact been near at the last look at it?
+   pure logical function is_empty(self, system, pair)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: pair
+
+      associate (contact => system%contact(pair)%contact)
+         is_empty = contact%reach > 0.0_wp .and. contact%clearance > 0.0_wp &
+            .and. contact%n_look == self%outlook(pair)%n_look
+      end associate
+   end function is_empty
+
    !> Choose stencils; start from the constraints that acted before and still can, also where the
    !> step is expected to end.
    subroutine begin_contact(self, system, motion)
@@ -155,14 +209,19 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       integer :: pair
+      logical :: passes(size(system%contact))
 
       self%is_active(:system%first_constraint(1)) = system%acts
+      call active_set_passes(self, system, motion, passes)
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            call pair_search(system, pair, motion)
-            call pair_measure(system, pair, motion%x, motion%u0, at_rest(motion%u0))
+            if (passes(pair)) then
+               self%is_active(first:last) = .false.
+               cycle
+            end if
+            call active_set_look(self, system, pair, motion, at_rest(motion%u0))
             self%is_active(first:last) = self%was_active(first:last) &
                .and. contact%state%is_near .and. contact%state%is_over
             if (.not. any(self%is_active(first:last))) cycle
@@ -184,6 +243,7 @@ contains
       if (self%set%n == 0 .and. .not. any(self%is_active)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
       do pair = 1, size(system%contact)
+         if (is_empty(self, system, pair)) cycle
          call pair_measure(system, pair, motion%x, motion%u0, motion%du)
       end do
       do k = 1, self%set%n

@@ -16,6 +16,8 @@ module emcon_judge
    !> Between two looks pieces move against each other by less than this part of the thinnest
    !> element: one look at what goes through it is then at least half as deep.
    real(wp), parameter :: look_motion = 0.5_wp
+   !> Boxes that are apart do not meet as long as both move by less than this part of the distance.
+   real(wp), parameter :: half_way = 0.495_wp
    !> Looks at one step at most.
    integer, parameter :: most_looks = 64
 
@@ -27,6 +29,9 @@ module emcon_judge
       real(wp), allocatable :: thinnest(:)       !! (n_piece) element at the outline [L]
       real(wp), allocatable :: longest(:)        !! (n_piece) edge [L]
       integer, allocatable :: other(:)           !! (n_piece) work space
+      !> As long as no node has moved farther since the start of the step that was last looked at,
+      !> there is no overlap [L].
+      real(wp) :: clearance = 0.0_wp
    end type judge_t
 
 contains
@@ -51,8 +56,10 @@ contains
       type(overlap_t), intent(out) :: overlap
       type(box_tree_t) :: tree
       integer :: p, i, n
+      logical :: is_apart
 
       if (self%look%outline%n_piece == 0) return
+      is_apart = .true.
       do p = 1, self%look%outline%n_piece
          call measure(self, p, x, u0, du)
       end do
@@ -64,9 +71,27 @@ contains
             if (self%other(i) < p) cycle
             if (.not. outline_meets(self%look%outline, p, self%other(i))) cycle
             call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
+            is_apart = .false.
          end do
       end do
+      self%clearance = 0.0_wp
+      if (is_apart) self%clearance = half_way*least_distance(self)
    end subroutine judge_step
+
+   !> Smallest distance of the boxes of two pieces that may meet, by the axis where it is largest.
+   pure real(wp) function least_distance(self)
+      type(judge_t), intent(in) :: self
+      integer :: p, q
+
+      least_distance = huge(least_distance)
+      do p = 1, self%look%outline%n_piece
+         do q = p + 1, self%look%outline%n_piece
+            if (.not. outline_meets(self%look%outline, p, q)) cycle
+            least_distance = min(least_distance, maxval(max(self%low(:, p) - self%high(:, q), &
+               self%low(:, q) - self%high(:, p))))
+         end do
+      end do
+   end function least_distance
 
    !> Look at two pieces, or one and itself, as often as the step needs.
    subroutine judge_pieces(self, p, q, x, u0, du, overlap)

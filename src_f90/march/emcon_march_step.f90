@@ -22,6 +22,7 @@ module emcon_march_step
    use emcon_system, only : system_loads, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
+   use emcon_travel, only : largest_motion
    implicit none
    private
    public :: march_step, cycling_text
@@ -148,8 +149,12 @@ contains
       type(overlap_t) :: overlap
       integer :: left
 
+      if (self%judge%look%outline%n_piece == 0) return
       call phase_enter(self%system%phases, phase_judge, left)
-      call judge_step(self%judge, scene%x, self%state%u, du, overlap)
+      if (self%active%travel%total + largest_motion(du) >= self%clear_until) then
+         call judge_step(self%judge, scene%x, self%state%u, du, overlap)
+         self%clear_until = self%active%travel%total + self%judge%clearance
+      end if
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
       if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then
          if (goes_in(self, scene, overlap)) status = step_overlaps

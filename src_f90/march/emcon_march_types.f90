@@ -68,6 +68,7 @@ module emcon_march_types
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(judge_t) :: judge
+      real(wp) :: clear_until = 0.0_wp           !! nothing for it to see, by `active%travel` [L]
       !> Overlap per edge with which a step began that resolves it
       real(wp) :: meant_overlap = 0.0_wp
       integer :: n_grid = 0                      !! grid increments in the step

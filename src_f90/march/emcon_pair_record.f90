@@ -24,7 +24,8 @@ module emcon_pair_record
       type(pair_total_t), allocatable :: total(:)   !! (n_pair)
       !> (2, n_constraint) by its pair on the slave node, and on the other one at its place
       real(wp), allocatable :: force(:, :)
-      real(wp), allocatable :: area(:)           !! (n_constraint) of each multiplier [L^2]
+      !> (n_constraint) of each multiplier [L^2]; 0: nothing acts in its pair
+      real(wp), allocatable :: area(:)
    end type pair_record_t
 
 contains
@@ -59,8 +60,15 @@ contains
             call add_up(total, set%item(first:last), set%lam(first:last), x, u, du, lag)
             if (system%contact(k)%of_pair < 0) call exchange_sides(total)
          end associate
-         call measure_nodes(self, system, k, set%item(first:last), set%lam(first:last))
-         call measure_areas(self, system, k, set%id(first:last), x, u)
+         if (last < first) then
+            associate (before => system%first_constraint(k), n => system%first_constraint(k + 1))
+               self%force(:, before + 1:n) = 0.0_wp
+               self%area(before + 1:n) = 0.0_wp
+            end associate
+         else
+            call measure_nodes(self, system, k, set%item(first:last), set%lam(first:last))
+            call measure_areas(self, system, k, set%id(first:last), x, u)
+         end if
       end do
    end subroutine pair_record_measure
 

@@ -11,7 +11,9 @@ import shutil
 import subprocess
 
 import pytest
-from scene_tools import PROGRAM, ROOT
+from emcon import Stepper
+from plain_scenes import AUTO, Scene
+from scene_tools import PROGRAM, ROOT, run_deck
 
 pytestmark = pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind counts calls")
 
@@ -167,3 +169,63 @@ def test_statics_of_small_displacements_are_symmetric(tmp_path):
     calls, _ = run_counted(text, SHORT, tmp_path)
     assert calls["__emcon_cholmod_MOD_cholmod_factorise"] > 0
     assert "__emcon_umfpack_MOD_umfpack_analyse" not in calls
+
+
+# ---- surfaces that are far apart ----------------------------------------------------------------
+
+
+def bullet(speed, distance, looks=False):
+    """A block that flies at another one; with `looks` it is looked where they are all the time."""
+    scene = Scene(h=0.01, t_end=0.6)
+    scene.block("TARGET", (0, 0), (1, 1), (4, 4), stiffness=1000.0)
+    scene.block("TIP", (-0.5 - distance, 0.23), (0.5, 0.5), (2, 2), stiffness=1000.0,
+                velocity=(speed, 0))
+    deck = scene.deck(AUTO)
+    deck.card[deck.find("*NODE FILE")] = ("*NODE FILE, FREQUENCY=0", ["U"])
+    if not looks:
+        deck.card[deck.find("*CONTACT FILE")] = ("*CONTACT FILE, FREQUENCY=0", ["CDIS"])
+    return deck
+
+
+def test_nothing_of_a_far_pair_is_called(tmp_path):
+    """The judge and guards included: the increments after the first do not know of it."""
+    deck = bullet(0.5, 50.0)
+    deck.set_parameter("t_end", "{end}")
+    calls, _ = per_increment(deck.text(), tmp_path)
+    contact = [name for name in FOLDER if FOLDER[name] == "contact"]
+    assert called(calls, *contact) == ["__emcon_moment_plane_MOD_moment_of"]     # of momenta
+    assert not called(calls, "emcon_gaps", "emcon_judge")
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_what_was_far_is_found_in_time(tmp_path, formulation):
+    """At most a third of an edge per increment and at more: the same bits as where it is looked in
+    every increment."""
+    for speed in (8.0, 40.0):
+        runs = [run_deck(bullet(speed, 0.3*speed, looks).write(tmp_path/f"{name}.inp"), tmp_path,
+                         formulation=formulation)
+                for looks, name in ((False, "passed"), (True, "looked"))]
+        assert runs[0].digits() == runs[1].digits()
+        passed, looked = (run.verdict["counts"]["searched"] for run in runs)
+        assert passed < 0.8*looked
+        assert runs[0].history["active"].max() > 0 == runs[0].history["active"][:29].max()
+
+
+def test_what_was_far_is_found_after_going_back(tmp_path):
+    """From a snapshot and from a restart file of the flight, the same bits."""
+    def go(stepper):
+        while stepper.time < 0.45:
+            stepper.step()
+        return stepper.u.tobytes(), stepper.v.tobytes()
+
+    with Stepper(bullet(20.0, 6.0).write(tmp_path/"bullet.inp")) as flight:
+        while flight.time < 0.2:
+            flight.step()
+        flight.write_restart(tmp_path/"bullet.rst.h5")
+        there = flight.save()
+        found = go(flight)
+        assert flight.v[:25].any()                       # the target was hit
+        flight.restore(there)
+        assert go(flight) == found
+    with Stepper.from_restart(tmp_path/"bullet.rst.h5") as resumed:
+        assert go(resumed) == found
