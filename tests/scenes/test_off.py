@@ -1,7 +1,7 @@
 """Off means off: what a scene does not need is not called, and nothing is set up anew that stays.
 
-Calls and allocations of the program itself, counted by valgrind: those of a longer run less those of
-a shorter one are what its increments make. Modules are counted by the folder they stand in.
+Calls and allocations of the program itself, counted by valgrind: those of a longer run less those
+of a shorter one are what its increments make. Modules are counted by the folder they stand in.
 """
 
 import collections
