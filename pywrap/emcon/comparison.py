@@ -21,7 +21,8 @@ SAME_PLACE = 1e-9
 #: Columns of the history that say how the state was reached, not what it is.
 _EFFORT = ("increment", "h", "newton", "cuts", "penetration", "cpu", "time")
 #: Columns that are measured by one scale, the largest of them.
-_FAMILIES = (("kinetic", "strain", "external_work", "contact_work", "stabilization", "total"),
+_FAMILIES = (("kinetic", "strain", "external_work", "contact_work", "stabilization",
+              "restitution_loss", "total"),
              ("px", "py"))
 _NO_SERIES = ("RUN",)
 

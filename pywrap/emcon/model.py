@@ -358,13 +358,17 @@ class Model(Cards):
     # --- contact, ties, equations ----------------------------------------------------------
 
     def interaction(self, name: str, *, friction: Number | None = None,
-                    pad_thickness: Number | None = None) -> Model:
+                    pad_thickness: Number | None = None,
+                    restitution: Number | None = None) -> Model:
         """`*SURFACE INTERACTION` with hard contact; `friction` may only be 0.
 
         pad_thickness   of a layer that keeps the surfaces apart, 0 or more [L]; a node with a pad
                         as thick as a radius is a circle
+        restitution     0 to 1: the part of the velocity at which nodes with mass meet that is
+                        left afterwards; default 1
         """
-        text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness})
+        text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness,
+                                            "RESTITUTION": restitution})
         text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})
         self._add(text if friction is None else text + card("FRICTION", rows=[(friction,)]))
         return self

@@ -40,6 +40,7 @@ contains
          ledger%py = real(from%momentum(2), c_double)
          ledger%lz = real(from%angular, c_double)
          ledger%stabilization = real(from%stabilization, c_double)
+         ledger%restitution_loss = real(from%restitution, c_double)
       end associate
    end subroutine model_ledger
 

@@ -43,6 +43,7 @@ module emcon_contact
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
+      real(wp) :: restitution = 1.0_wp                !! of impacts, 0 to 1
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> No state changes before a node has moved farther from where the last step began [L].
       real(wp) :: clearance = 0.0_wp

@@ -99,6 +99,7 @@ contains
       self%deepest_start = touch_tol
       self%slack = pair%slack
       self%offset = pair%offset
+      self%restitution = pair%restitution
       self%both_sides = pair%both_sides
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)

@@ -87,6 +87,7 @@ contains
       self%n_constraint = n
       self%deepest_start = deepest_mean
       self%offset = pair%offset
+      self%restitution = pair%restitution
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_edge))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)

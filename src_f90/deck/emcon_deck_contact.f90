@@ -14,14 +14,14 @@ module emcon_deck_contact
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
-   use emcon_text, only : read_real, to_text
+   use emcon_text, only : read_real, squeezed, to_text
    implicit none
    private
    public :: read_interactions, read_pairs
 
 contains
 
-   !> The names of the surface interactions and their pads. All mean hard contact, no friction.
+   !> The surface interactions: names, pads and restitution. All mean hard contact, no friction.
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
@@ -29,6 +29,7 @@ contains
 
       allocate(reader%interaction(size(reader%card)))
       allocate(reader%pad(size(reader%card)), source=0.0_wp)
+      allocate(reader%restitution(size(reader%card)), source=1.0_wp)
       n = 0
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
@@ -37,7 +38,11 @@ contains
                call need_name(reader, card, "NAME", name)
                n = n + 1
                reader%interaction(n)%text = name
-               call read_pad(reader, card, reader%pad(n))
+               call read_number(reader, card, "PAD THICKNESS", "a length of 0 or more: it keeps " &
+                  // "surfaces apart; overlap at the start is resolved by *CONTACT INTERFERENCE", &
+                  reader%pad(n))
+               call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is left " &
+                  // "of the velocity at which bodies meet", reader%restitution(n))
             case ("SURFACEBEHAVIOR", "FRICTION")
                if (n == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
@@ -51,27 +56,31 @@ contains
       end do
       reader%interaction = reader%interaction(:n)
       reader%pad = reader%pad(:n)
+      reader%restitution = reader%restitution(:n)
    end subroutine read_interactions
 
-   !> PAD THICKNESS: of a layer between the surfaces.
-   subroutine read_pad(reader, card, pad)
+   !> The value of a parameter, 0 or more; of RESTITUTION up to 1.
+   subroutine read_number(reader, card, name, what, value)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      real(wp), intent(inout) :: pad               !! as it is if the option is absent or wrong [L]
+      character(len=*), intent(in) :: name         !! blanks are for the message
+      character(len=*), intent(in) :: what         !! it is, for the message
+      real(wp), intent(inout) :: value             !! as it is if the option is absent or wrong
+      character(len=:), allocatable :: text
       real(wp) :: number
-      logical :: is_number
+      logical :: is_ok
 
-      if (.not. has_option(card, "PADTHICKNESS")) return
-      call read_real(option_name(card, "PADTHICKNESS"), number, is_number)
-      if (is_number) is_number = number >= 0.0_wp .and. number <= huge(number)
-      if (is_number) then
-         pad = number
+      if (.not. has_option(card, squeezed(name))) return
+      text = option_name(card, squeezed(name))
+      call read_real(text, number, is_ok)
+      if (is_ok) is_ok = number >= 0.0_wp .and. &
+         number <= merge(1.0_wp, huge(number), name == "RESTITUTION")
+      if (is_ok) then
+         value = number
       else
-         call card_error(reader, card, "PAD THICKNESS=" // quoted(option_name(card, &
-            "PADTHICKNESS")) // " is not a length of 0 or more: it keeps surfaces apart; overlap " &
-            // "at the start is resolved by *CONTACT INTERFERENCE")
+         call card_error(reader, card, name // "=" // quoted(text) // " is not " // what)
       end if
-   end subroutine read_pad
+   end subroutine read_number
 
    subroutine check_behavior(reader, card)
       type(reader_t), intent(inout) :: reader
@@ -318,7 +327,7 @@ contains
       integer :: i
 
       if (size(pair) == 0) call card_error(reader, card, "no pair of surfaces is given")
-      call read_interaction(reader, card, pair, of_card%offset)
+      call read_interaction(reader, card, pair, of_card)
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
       call read_pair_initiation(reader, card, of_card%initiation)
@@ -327,16 +336,17 @@ contains
          pair(i)%adjust_set = of_card%adjust_set
          pair(i)%is_guarded = of_card%is_guarded
          pair(i)%offset = of_card%offset
+         pair(i)%restitution = of_card%restitution
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
 
-   !> INTERACTION= of a card: the thickness of its pad.
-   subroutine read_interaction(reader, card, pair, offset)
+   !> INTERACTION= of a card: the thickness of its pad, and restitution.
+   subroutine read_interaction(reader, card, pair, of_card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(contact_pair_t), intent(in) :: pair(:)
-      real(wp), intent(inout) :: offset            !! [L]
+      type(contact_pair_t), intent(inout) :: of_card
       character(len=:), allocatable :: name
       logical :: is_known
       integer :: i
@@ -346,11 +356,12 @@ contains
       do i = 1, size(reader%interaction)
          if (reader%interaction(i)%text /= name) cycle
          is_known = .true.
-         offset = reader%pad(i)
+         of_card%offset = reader%pad(i)
+         of_card%restitution = reader%restitution(i)
       end do
       if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))
-      if (.not. offset > 0.0_wp) return
+      if (.not. of_card%offset > 0.0_wp) return
       if (any(pair%slave == pair%master .and. pair%slave > 0)) call card_error(reader, card, &
          "the surface interaction " // quoted(name) // " has a PAD THICKNESS, which has no " // &
          "meaning for a surface in contact with itself: neighbours on it are nearer than that")

@@ -9,12 +9,12 @@ module emcon_deck_contact_settings
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_options, only : option_default
-   use emcon_steps, only : initiation_massless, initiation_persistent, step_t
+   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, step_t
    use emcon_text, only : to_text
    implicit none
    private
    public :: read_initiation, read_pair_initiation, read_interference, read_controls, &
-      check_statics, check_massless, pairs_ask
+      check_statics, check_massless, check_restitution, pairs_ask
 
 contains
 
@@ -153,6 +153,23 @@ contains
          return
       end do
    end subroutine check_massless
+
+   !> What loses energy by itself leaves no velocity that a restitution could speak of.
+   subroutine check_restitution(reader, pair, step)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(step_t), intent(in) :: step(:)
+      integer :: i, k
+
+      i = findloc(pair%restitution < 1.0_wp, .true., 1)
+      if (i == 0) return
+      k = findloc(step%scheme%masses_resist .and. step%initiation == initiation_admissible, &
+         .true., 1)
+      if (k > 0) call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " // &
+         "interaction has RESTITUTION=" // to_text(pair(i)%restitution) // ", but step " // &
+         to_text(k) // " has *CONTACT INITIATION, TYPE=ADMISSIBLE, which loses energy by " // &
+         "itself; use PERSISTENT")
+   end subroutine check_restitution
 
    !> The part of overclosure that is left: all of it at the start of the step, none at its end.
    subroutine check_left(reader, card, amplitude, duration)

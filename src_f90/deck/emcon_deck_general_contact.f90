@@ -204,7 +204,7 @@ contains
    end subroutine find_exterior
 
    !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions
-   !> mean the same, hard contact without friction, but for pads, which are of pairs only.
+   !> mean the same, hard contact without friction; pads and restitution are of pairs only.
    subroutine check_properties(reader, card, scene)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -231,6 +231,9 @@ contains
          do i = 1, size(reader%interaction)
             if (reader%interaction(i)%text /= name) cycle
             is_known = .true.
+            if (reader%restitution(i) < 1.0_wp) call data_error(reader, data, "the surface " // &
+               "interaction " // quoted(name) // " has a RESTITUTION, which is of pairs only; " // &
+               "name what it is of by *CONTACT PAIR")
             if (reader%pad(i) > 0.0_wp) call data_error(reader, data, "the surface interaction " &
                // quoted(name) // " has a PAD THICKNESS, which has no meaning where surfaces may " &
                // "be in contact with themselves; name what it keeps apart by *CONTACT PAIR")

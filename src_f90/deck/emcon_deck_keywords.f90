@@ -66,7 +66,8 @@ module emcon_deck_keywords
       keyword_t("INITIAL CONDITIONS", in_model, "TYPE=,!USER"), &
       keyword_t("AMPLITUDE", in_both, "NAME=,TIME=,DEFINITION=,!USER,!VALUE:RELATIVE,!SMOOTH:0"), &
       keyword_t("TIME POINTS", in_both, "NAME=,GENERATE"), &
-      keyword_t("SURFACE INTERACTION", in_model, "NAME=,PADTHICKNESS=", has_data=.false.), &
+      keyword_t("SURFACE INTERACTION", in_model, "NAME=,PADTHICKNESS=,RESTITUTION=", &
+         has_data=.false.), &
       keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,DIRECT,!NOSEPARATION," &
          // "!PENALTY,!AUGMENTEDLAGRANGE"), &
       keyword_t("FRICTION", in_model, "~SLIPTOLERANCE,!ROUGH,!LAGRANGE,!DEPENDENCIES:0"), &

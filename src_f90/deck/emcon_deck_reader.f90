@@ -58,6 +58,7 @@ module emcon_deck_reader
       type(named_set_t), allocatable :: line_set(:)      !! the lines of element sets that have some
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
       real(wp), allocatable :: pad(:)                    !! PAD THICKNESS of each [L]
+      real(wp), allocatable :: restitution(:)            !! RESTITUTION of each
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
 

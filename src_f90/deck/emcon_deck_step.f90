@@ -6,8 +6,8 @@ module emcon_deck_step
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_conditions, only : conditions_carry, conditions_init, conditions_store, &
       conditions_t
-   use emcon_deck_contact_settings, only : check_massless, check_statics, pairs_ask, &
-      read_controls, read_initiation, read_interference
+   use emcon_deck_contact_settings, only : check_massless, check_restitution, check_statics, &
+      pairs_ask, read_controls, read_initiation, read_interference
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
    use emcon_deck_loads, only : read_boundary, read_cload, read_dload
@@ -72,6 +72,7 @@ contains
       end do
       call pairs_ask(reader, scene%pair, scene%step)
       call check_massless(reader, scene%step)
+      call check_restitution(reader, scene%pair, scene%step)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
       end if

@@ -20,6 +20,8 @@ module emcon_ledger
       real(wp) :: contact_work = 0.0_wp          !! of contact forces, since the start
       !> Of what STABILIZE bears: forces that are left on bodies that nothing holds, since the start
       real(wp) :: stabilization = 0.0_wp
+      !> Of contact work: what impacts with a restitution below 1 took, since the start, >= 0
+      real(wp) :: restitution = 0.0_wp
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]
       real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]

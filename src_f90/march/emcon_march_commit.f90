@@ -13,6 +13,7 @@ module emcon_march_commit
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
    use emcon_pose, only : pose_velocity
    use emcon_quasi_static, only : quasi_static_move
+   use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update
@@ -95,6 +96,9 @@ contains
       call phase_enter(self%system%phases, phase_restitution, left)
       if (self%scheme%row%masses_resist .and. scene%step(self%state%i_step)%initiation &
          == initiation_velocity_update) call restore_energy(self, notes, error)
+      if (self%scheme%row%masses_resist .and. .not. allocated(error)) then
+         call restitution_take(self, notes, error)
+      end if
       call quasi_static_move(self, v)
       if (self%layer%is_on .and. self%scheme%row%masses_resist) call end_massless(self, v, notes, &
          error)

@@ -20,7 +20,7 @@ module emcon_velocity_update
    implicit none
    private
    public :: push_t, velocity_update_t, velocity_update_reset, velocity_update_apply, &
-      velocity_update_push, velocity_update_free, push_weights
+      velocity_update_push, velocity_update_free, push_weights, rate_jump_t, velocity_update_change
 
    !> Contacts that stay closed keep gaps of this size relative to an edge: round-off, no loss.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -30,6 +30,19 @@ module emcon_velocity_update
       real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) along it [M L/T^2]
       real(wp) :: gain = 0.0_wp                  !! [M L^2/T^2]
    end type push_t
+
+   !> A jump that changes the rates C v of conditions by impulses along their gradients C.
+   type :: rate_jump_t
+      integer, allocatable :: row(:)             !! (n) which conditions of the set
+      real(wp), allocatable :: rate(:)           !! (n) before [L/T]
+      real(wp), allocatable :: change(:)         !! (n) [L/T]
+      logical :: is_done = .false.               !! .false.: they depend on each other, or it would
+                                                 !! make energy
+      real(wp), allocatable :: impulse(:)        !! (n) [M L/T]
+      real(wp) :: lost = 0.0_wp                  !! in the conditions, >= 0 [M L^2/T^2]
+      real(wp) :: gained = 0.0_wp                !! of kinetic energy; more than -lost: by what is
+                                                 !! driven [M L^2/T^2]
+   end type rate_jump_t
 
    !> The kinetic energy that s times a jump gives: s b + s^2 a/2.
    type :: gain_t
@@ -118,6 +131,40 @@ contains
       if (has_root) call add_jump(self, system, part, v)
    end subroutine velocity_update_push
 
+   !> Add to `v` the jump M^-1 C^T mu with C M^-1 C^T mu = `change`: docs/theory.md, eq. (22e).
+   subroutine velocity_update_change(self, system, set, jump, v, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(rate_jump_t), intent(inout) :: jump
+      real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: momentum(size(v, 1), size(v, 2))
+      real(wp), allocatable :: row(:, :), way(:, :)
+      real(dp) :: product(size(jump%row), size(jump%row)), mu(size(jump%row), 1)
+      logical :: is_singular
+
+      jump%is_done = .false.
+      if (.not. self%is_ready) call factorise_mass(self, system, error)
+      if (allocated(error)) return
+      if (self%mass%is_singular) return
+      call find_ways(self, system, set, jump%row, row, way, error)
+      if (allocated(error)) return
+      product = real(matmul(transpose(row), way), dp)
+      call dense_solve(product, reshape(real(jump%change, dp), shape(mu)), mu, is_singular)
+      if (is_singular) return
+      jump%impulse = real(mu(:, 1), wp)
+      jump%lost = -dot_product(jump%impulse, jump%rate + 0.5_wp*jump%change)
+      jump%is_done = jump%lost >= 0.0_wp
+      if (.not. jump%is_done) return
+      self%jump = matmul(way, jump%impulse)
+      call mass_times(system, v, momentum)
+      call pick(system, momentum, self%push)
+      jump%gained = dot_product(self%push, self%jump) &
+         + 0.5_wp*dot_product(jump%impulse, jump%change)
+      call add_jump(self, system, 1.0_wp, v)
+   end subroutine velocity_update_change
+
    !> Find the jump M^-1 `force` that the shapes of rigid bodies leave; along it the kinetic energy
    !> changes by s b + s^2 a/2; a = 0: there is none.
    subroutine push_along(self, system, set, force, v, gain, error)
@@ -163,24 +210,16 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       type(error_t), allocatable, intent(out) :: error
-      real(wp), dimension(size(self%jump), set%n_held - set%n_linear) :: row, way
+      real(wp), allocatable :: row(:, :), way(:, :)
       real(dp), dimension(set%n_held - set%n_linear, 1) :: rate, mu
       real(dp) :: product(size(rate), size(rate))
-      real(wp) :: field(size(system%space%is_alive, 1), size(system%space%is_alive, 2))
-      integer :: k, i, l
+      integer :: k, l
       logical :: is_singular
 
       if (size(rate) == 0) return
+      call find_ways(self, system, set, [(k, k = set%n_linear + 1, set%n_held)], row, way, error)
+      if (allocated(error)) return
       do k = 1, size(rate)
-         field = 0.0_wp
-         associate (item => set%item(set%n_linear + k))
-            do i = 1, item%n_node
-               field(:, item%node(i)) = field(:, item%node(i)) + item%c(:, i)
-            end do
-         end associate
-         call pick(system, field, row(:, k))
-         call self%mass%solve(row(:, k), way(:, k), error)
-         if (allocated(error)) return
          rate(k, 1) = -real(dot_product(row(:, k), self%jump), dp)
          do l = 1, k
             product(l, k) = real(dot_product(row(:, l), way(:, k)), dp)
@@ -190,6 +229,31 @@ contains
       call dense_solve(product, rate, mu, is_singular)
       if (.not. is_singular) self%jump = self%jump + matmul(way, real(mu(:, 1), wp))
    end subroutine keep_held
+
+   !> Gradients of conditions at the end of the step, and what impulses of 1 along them move.
+   subroutine find_ways(self, system, set, which, row, way, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: which(:)            !! (n) of the conditions of the set
+      real(wp), allocatable, intent(out) :: row(:, :), way(:, :)     !! (n_unknown, n) C, M^-1 C^T
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: field(size(system%space%is_alive, 1), size(system%space%is_alive, 2))
+      integer :: k, i
+
+      allocate(row(size(self%jump), size(which)), way(size(self%jump), size(which)))
+      do k = 1, size(which)
+         field = 0.0_wp
+         associate (item => set%item(which(k)))
+            do i = 1, item%n_node
+               field(:, item%node(i)) = field(:, item%node(i)) + item%c(:, i)
+            end do
+         end associate
+         call pick(system, field, row(:, k))
+         call self%mass%solve(row(:, k), way(:, k), error)
+         if (allocated(error)) return
+      end do
+   end subroutine find_ways
 
    !> Add `part` of the jump to `v`.
    subroutine add_jump(self, system, part, v)

@@ -265,6 +265,8 @@ contains
                ", strain " // to_text(ledger%strain, 9) // ", external work " // &
                to_text(ledger%external_work, 9) // ", contact work " // &
                to_text(ledger%contact_work, 9))
+            if (ledger%restitution > 0.0_wp) call note_add(lines, "impacts took an energy of " // &
+               to_text(ledger%restitution, 9) // " (RESTITUTION), part of contact work")
             call note_add(lines, "total at start " // to_text(self%total0, 12) // ", at end " // &
                to_text(ledger%total, 12))
             call note_add(lines, "largest error of the energy balance " // &

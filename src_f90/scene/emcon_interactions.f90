@@ -42,6 +42,7 @@ module emcon_interactions
       integer :: initiation = 0                      !! one of `initiation_`, 0: as the step
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
       real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
+      real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given

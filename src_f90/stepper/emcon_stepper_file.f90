@@ -127,6 +127,11 @@ contains
       call restart_exchange(restart, "ledger", ledger%momentum)
       call restart_exchange(restart, "ledger", ledger%angular)
       call restart_exchange(restart, "ledger", ledger%stabilization)
+      if (restart_offers(restart, "restitution", is_written=ledger%restitution > 0.0_wp)) then
+         call restart_exchange(restart, "restitution", ledger%restitution)
+      else
+         ledger%restitution = 0.0_wp
+      end if
    end subroutine exchange_ledger
 
    subroutine exchange_pairs(pairs, restart)

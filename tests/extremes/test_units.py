@@ -19,6 +19,7 @@ DIMENSION = {
     "external_work": (2, 1, -2),
     "contact_work": (2, 1, -2),
     "stabilization": (2, 1, -2),
+    "restitution_loss": (2, 1, -2),
     "total": (2, 1, -2),
     "px": (1, 1, -1),
     "py": (1, 1, -1),
