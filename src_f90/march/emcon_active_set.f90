@@ -13,7 +13,7 @@ module emcon_active_set
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_overclosure, active_set_begin, &
-      active_set_restart, active_set_select, active_set_look, active_set_passes
+      active_set_restart, active_set_select, active_set_look, active_set_pass
    public :: active_set_let_go, active_set_put_off, active_set_drop, touch_tol, most_sets
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced
@@ -32,6 +32,7 @@ module emcon_active_set
    type :: outlook_t
       real(wp) :: until = 0.0_wp                 !! by `travel%total` [L]
       integer :: n_look = 0                      !! of the contact; another one: look again
+      logical :: passes = .false.                !! nothing comes near: see `active_set_pass`
    end type outlook_t
 
    type :: active_set_t
@@ -170,25 +171,26 @@ contains
       call pair_search(system, pair, motion)
       call pair_measure(system, pair, motion%x, motion%u0, du)
       associate (contact => system%contact(pair)%contact)
-         self%outlook(pair) = outlook_t(self%travel%total + contact%clearance, contact%n_look)
+         self%outlook(pair) = outlook_t(self%travel%total + contact%clearance, &
+            contact%n_look)
       end associate
    end subroutine active_set_look
 
-   !> The contacts whose surfaces `motion` cannot bring near each other: they are as last measured.
-   pure subroutine active_set_passes(self, system, motion, passes)
-      type(active_set_t), intent(in) :: self
+   !> Find the contacts whose surfaces `motion` cannot bring near: they are as last measured.
+   pure subroutine active_set_pass(self, system, motion)
+      type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(motion_t), intent(in) :: motion
-      logical, intent(out) :: passes(:)          !! (n_contact)
       real(wp) :: total
       integer :: pair
 
-      if (size(passes) == 0) return
+      if (size(self%outlook) == 0) return
       total = self%travel%total + largest_motion(motion%du)
-      do pair = 1, size(passes)
-         passes(pair) = is_empty(self, system, pair) .and. total < self%outlook(pair)%until
+      do pair = 1, size(self%outlook)
+         self%outlook(pair)%passes = is_empty(self, system, pair) .and. &
+            total < self%outlook(pair)%until
       end do
-   end subroutine active_set_passes
+   end subroutine active_set_pass
 
    !> Has nothing of this contact been near at the last look at it?
    pure logical function is_empty(self, system, pair)
@@ -209,15 +211,14 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       integer :: pair
-      logical :: passes(size(system%contact))
 
       self%is_active(:system%first_constraint(1)) = system%acts
-      call active_set_passes(self, system, motion, passes)
+      call active_set_pass(self, system, motion)
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            if (passes(pair)) then
+            if (self%outlook(pair)%passes) then
                self%is_active(first:last) = .false.
                cycle
             end if

@@ -38,7 +38,7 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: is_done, is_held
-      integer :: left
+      integer :: left, k
 
       self%first = motion%du
       self%driven = newton%driven
@@ -52,7 +52,9 @@ contains
          self%before = motion%du
          call newton_solve(newton, system, self%set, motion, status, error)
          if (allocated(error)) return
-         self%lam(self%set%id) = self%set%lam
+         do k = 1, self%set%n
+            self%lam(self%set%id(k)) = self%set%lam(k)
+         end do
          self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (status == newton_redundant) then
             associate (redundant => newton%correction%redundant, is_near => &

@@ -1,7 +1,7 @@
 !> The next set of active constraints, from the gaps and multipliers of one that solves the step.
 !> Source: docs/theory.md, section 6.
 module emcon_active_set_update
-   use emcon_active_set, only : active_set_look, active_set_passes, active_set_t, most_sets, &
+   use emcon_active_set, only : active_set_look, active_set_pass, active_set_t, most_sets, &
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
    use emcon_kinds, only : wp
@@ -60,7 +60,7 @@ contains
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: has_changed
       integer, intent(out) :: status             !! one of the `step_` codes
-      logical :: changes, passes(size(system%contact))
+      logical :: changes
       type(choice_t) :: choice
       integer :: pair, i, id, k
 
@@ -68,12 +68,12 @@ contains
       has_changed = .false.
       self%is_stale = .false.
       k = count(self%is_active(:system%first_constraint(1)))
-      call active_set_passes(self, system, motion, passes)
+      call active_set_pass(self, system, motion)
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             ! The motion may be more than was expected.
-            if (passes(pair) .and. .not. any(self%is_active(system%first_constraint(pair) &
-               + 1:system%first_constraint(pair + 1)))) cycle
+            if (self%outlook(pair)%passes .and. .not. any(self%is_active( &
+               system%first_constraint(pair) + 1:system%first_constraint(pair + 1)))) cycle
             call active_set_look(self, system, pair, motion, motion%du)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i

@@ -10,6 +10,9 @@ module emcon_ledger
    private
    public :: ledger_t, ledger_init, ledger_measure, body_momenta, body_masses
 
+   !> Dimensions of space, at most.
+   integer, parameter :: most_dim = 3
+
    !> total = kinetic + strain + potential - external_work stays constant up to the work of contact:
    !> docs/theory.md, eqs. (23) and (24).
    type :: ledger_t
@@ -25,6 +28,7 @@ module emcon_ledger
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]
       real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]
+      real(wp), allocatable, private :: work(:, :)   !! (n_dim, n_node) momentum of each node
    end type ledger_t
 
 contains
@@ -43,19 +47,21 @@ contains
       type(system_t), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state
-      real(wp) :: momentum(size(x, 1), size(x, 2)), place(size(x, 1))   ! of each node
-      integer :: i
+      real(wp) :: place(most_dim)
+      integer :: i, n_dim
 
-      call mass_times(system, state%v, momentum)
-      self%kinetic = 0.5_wp*sum(state%v*momentum)
+      n_dim = size(x, 1)
+      if (.not. allocated(self%work)) allocate(self%work, mold=x)
+      call mass_times(system, state%v, self%work)
+      self%kinetic = 0.5_wp*sum(state%v*self%work)
       self%strain = sum(state%energy)
       self%potential = state%potential
       self%total = self%kinetic + self%strain + self%potential - self%external_work
-      self%momentum = sum(momentum, dim=2)
+      self%momentum = sum(self%work, dim=2)
       self%angular = 0.0_wp
       do i = 1, size(x, 2)
-         place = x(:, i) + state%u(:, i)
-         self%angular = self%angular + moment_of(place, momentum(:, i))
+         place(:n_dim) = x(:, i) + state%u(:, i)
+         self%angular = self%angular + moment_of(place(:n_dim), self%work(:, i))
       end do
    end subroutine ledger_measure
 

@@ -114,14 +114,8 @@ contains
       type(scene_t), intent(in) :: scene
       type(increment_t), intent(out) :: increment
       type(error_t), allocatable, intent(out) :: error
-      type(state_t) :: before
-      type(ledger_t) :: ledger_before
       integer :: stride
 
-      if (associated(self%is_interrupted)) then
-         before = self%state
-         ledger_before = self%ledger
-      end if
       associate (state => self%state, step => scene%step(self%state%i_step))
          if (step%max_increments > 0 .and. &
             state%increment - state%n_before >= step%max_increments) then
@@ -140,8 +134,10 @@ contains
          call cross_grid(self, scene, state%n_grid + stride, increment, error)
          if (allocated(error)) then
             if (error%code == err_interrupt) then
-               state = before
-               self%ledger = ledger_before
+               if (allocated(self%before)) then
+                  state = self%before%state
+                  self%ledger = self%before%ledger
+               end if
                return
             end if
             if (increment%done > 0.0_wp) call march_set_time(self, scene, state%step_time &
@@ -183,6 +179,7 @@ contains
          if (n_end < self%n_grid .or. abs(real(n_end, wp)*step%h - step%duration) &
             <= grid_whole*step%duration) increment%h = real(n_end - self%state%n_grid, wp)*step%h
       end associate
+      if (allocated(self%before)) deallocate(self%before)
       call march_in_parts(self, scene, t0, increment, error)
    end subroutine cross_grid
 

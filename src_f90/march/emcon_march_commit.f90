@@ -6,10 +6,10 @@ module emcon_march_commit
    use emcon_holding, only : holding_t
    use emcon_kinds, only : wp
    use emcon_march_guess, only : follow_links
-   use emcon_march_types, only : ending_t, increment_t, march_t
+   use emcon_march_types, only : increment_t, march_t
    use emcon_numbering, only : gather_dependent
    use emcon_pair_record, only : pair_record_measure
-   use emcon_pair_sums, only : pair_sums_add, pair_sums_push, slave_pushes
+   use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_push, slave_pushes
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
    use emcon_pose, only : pose_velocity
    use emcon_quasi_static, only : quasi_static_move
@@ -28,15 +28,15 @@ module emcon_march_commit
 contains
 
    !> Take over the solved step: works, velocities, contact and reaction forces.
-   subroutine march_commit(self, scene, h, ending, increment, error)
+   subroutine march_commit(self, scene, h, increment, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(ending_t), intent(in) :: ending
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
       integer :: i, a
 
+      if (.not. increment%done > 0.0_wp) call pair_sums_begin(self%state%sums%sum)
       associate (state => self%state, system => self%system, set => self%active%set)
          system%response%residual = system%response%residual - self%newton%contact
          call gather_dependent(system%space%numbering, system%response%residual)
@@ -54,9 +54,9 @@ contains
          state%reaction = system%response%residual
          if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
          call book_work(self)
-         call restitute(self, scene, ending%du/h, increment%notes, error)
+         call restitute(self, scene, h, increment%notes, error)
          if (allocated(error)) return
-         state%u = state%u + ending%du
+         state%u = state%u + self%ending%du
          ! Else round-off adds up between the nodes of a rigid body.
          if (size(scene%rigid) > 0) call follow_links(system, state%u)
          state%v = self%v1
@@ -64,9 +64,9 @@ contains
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
             merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist))
          call pair_sums_add(state%sums, system, set, self%motion, h, self%scheme%row%masses_resist)
-         state%internal = ending%force
-         state%energy = ending%energy
-         state%potential = ending%potential
+         state%internal = self%ending%force
+         state%energy = self%ending%energy
+         state%potential = self%ending%potential
          if (self%newton%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             trim(correction_reason(self%newton%correction)) // ": solved as a saddle point")
          call stand_off_add(increment%stand_off, system, set, h)
@@ -85,10 +85,10 @@ contains
    end subroutine march_commit
 
    !> The velocities that impacts and what has no mass call for.
-   subroutine restitute(self, scene, v, notes, error)
+   subroutine restitute(self, scene, h, notes, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: v(:, :)            !! (n_dim, n_node) mean over the step [L/T]
+      real(wp), intent(in) :: h                  !! > 0 [T]
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
       integer :: left
@@ -96,12 +96,11 @@ contains
       call phase_enter(self%system%phases, phase_restitution, left)
       if (self%scheme%row%masses_resist .and. scene%step(self%state%i_step)%initiation &
          == initiation_velocity_update) call restore_energy(self, notes, error)
-      if (self%scheme%row%masses_resist .and. .not. allocated(error)) then
-         call restitution_take(self, notes, error)
-      end if
-      call quasi_static_move(self, v)
-      if (self%layer%is_on .and. self%scheme%row%masses_resist) call end_massless(self, v, notes, &
-         error)
+      if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_held &
+         .and. .not. allocated(error)) call restitution_take(self, notes, error)
+      call quasi_static_move(self, h)
+      if (self%layer%is_on .and. self%scheme%row%masses_resist .and. .not. allocated(error)) &
+         call end_massless(self, h, notes, error)
       call phase_leave(self%system%phases, left)
    end subroutine restitute
 
@@ -109,12 +108,15 @@ contains
    !> of what has no mass.
    subroutine keep_constraints(self)
       type(march_t), intent(inout) :: self
+      integer :: k
 
       associate (state => self%state, set => self%active%set, layer => self%layer)
          state%is_active = .false.
          state%lam = 0.0_wp
-         state%is_active(set%id) = .true.
-         state%lam(set%id) = set%lam
+         do k = 1, set%n
+            state%is_active(set%id(k)) = .true.
+            state%lam(set%id(k)) = set%lam(k)
+         end do
          if (.not. layer%is_settled) return
          state%is_active(layer%n_before + 1:) = layer%acts
          state%lam(layer%n_before + 1:) = layer%lam
@@ -123,9 +125,9 @@ contains
 
    !> What has no mass moves as its displacement says. Where it was balanced anew, what that and
    !> closing contacts have taken is given back by a jump of the velocities.
-   subroutine end_massless(self, v, notes, error)
+   subroutine end_massless(self, h, notes, error)
       type(march_t), intent(inout) :: self
-      real(wp), intent(in) :: v(:, :)            !! (n_dim, n_node) mean over the step [L/T]
+      real(wp), intent(in) :: h                  !! > 0 [T]
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: lost
@@ -134,7 +136,7 @@ contains
 
       associate (layer => self%layer, set => self%active%set)
          do i = 1, size(self%v1, 2)
-            if (layer%is_massless(i)) self%v1(:, i) = v(:, i)
+            if (layer%is_massless(i)) self%v1(:, i) = self%ending%du(:, i)/h
          end do
          if (.not. layer%is_settled) return
          lost = 0.0_wp

@@ -6,10 +6,9 @@ module emcon_march_parts
    use emcon_kinds, only : wp
    use emcon_march_begin, only : march_renumber
    use emcon_march_step, only : cycling_text, march_step
-   use emcon_march_types, only : increment_t, march_t, part_t
+   use emcon_march_types, only : increment_t, march_t, part_t, start_t
    use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
-   use emcon_pair_sums, only : pair_sums_begin
    use emcon_scene, only : scene_t
    use emcon_system, only : system_may_hold, system_t
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
@@ -39,7 +38,6 @@ contains
 
       call notes_append(increment%warnings, self%warnings)
       self%warnings = notes_t()
-      call pair_sums_begin(self%state%sums%sum)
       call match(self, scene, error)
       if (allocated(error)) return
       level = 0
@@ -57,6 +55,7 @@ contains
             if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
             cycle
          end if
+         if (.not. allocated(self%before)) self%before = start_t(self%state, self%ledger)
          call reason_text(self, scene, status, reason)
          if (may_return(self, status, level)) then
             call return_mass(self, scene, status, reason, increment, error)

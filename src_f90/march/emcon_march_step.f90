@@ -12,7 +12,7 @@ module emcon_march_step
    use emcon_look_plane, only : overlap_names
    use emcon_march_commit, only : march_commit
    use emcon_march_guess, only : march_guess
-   use emcon_march_types, only : ending_t, increment_t, march_t, part_t
+   use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
    use emcon_phases, only : phase_enter, phase_judge, phase_leave, phase_restitution
@@ -44,7 +44,6 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
-      type(ending_t) :: ending
       integer :: attempt, left
 
       self%layer%is_troubled = .false.
@@ -63,14 +62,17 @@ contains
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
       if (status /= step_done) return
-      call phase_enter(self%system%phases, phase_restitution, left)
-      call settle(self, scene, part, status, error)
-      call phase_leave(self%system%phases, left)
+      self%layer%is_settled = .false.
+      if (self%layer%is_on .and. self%scheme%row%masses_resist) then
+         call phase_enter(self%system%phases, phase_restitution, left)
+         call settle(self, scene, part, status, error)
+         call phase_leave(self%system%phases, left)
+      end if
       if (status /= step_done .or. allocated(error)) return
-      ending%du = self%motion%du
-      if (self%layer%is_settled) ending%du = ending%du + self%layer%du
-      call judge(self, scene, part, ending%du, increment, status)
-      if (status == step_done) call find_ending(self, ending, status, error)
+      self%ending%du = self%motion%du
+      if (self%layer%is_settled) self%ending%du = self%ending%du + self%layer%du
+      call judge(self, scene, part, increment, status)
+      if (status == step_done) call find_ending(self, status, error)
       if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
       if (any(self%active%is_dropped)) then
@@ -78,7 +80,7 @@ contains
          call note_add(increment%notes, "contact is left out, as it follows from that of other " &
             // "nodes or has lost its surface, at slave nodes " // text)
       end if
-      call march_commit(self, scene, part%h, ending, increment, error)
+      call march_commit(self, scene, part%h, increment, error)
    end subroutine march_step
 
    !> Balance what has no mass, where contacts have opened or closed.
@@ -91,8 +93,6 @@ contains
       type(motion_t) :: ending
       real(wp) :: load(size(scene%x, 1), size(scene%x, 2))
 
-      self%layer%is_settled = .false.
-      if (.not. (self%layer%is_on .and. self%scheme%row%masses_resist)) return
       ending = motion_of(pose_at_end, scene%x, self%motion%u0, self%motion%du)
       ending%pose%load_instant = instant_later(part%start, part%h)
       call system_loads(self%system, ending, load)
@@ -101,15 +101,14 @@ contains
    end subroutine settle
 
    !> Look at the end of the solved step, where the scheme evaluates forces before it.
-   subroutine find_ending(self, ending, status, error)
+   subroutine find_ending(self, status, error)
       type(march_t), intent(inout) :: self
-      type(ending_t), intent(inout) :: ending
       integer, intent(inout) :: status           !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: is_elsewhere
 
       is_elsewhere = self%motion%pose%place < 1.0_wp .or. self%layer%is_settled
-      associate (system => self%system, motion => self%motion)
+      associate (system => self%system, motion => self%motion, ending => self%ending)
          if (is_elsewhere) call system_respond(system, motion_of(pose_at_end, motion%x, motion%u0, &
             ending%du), .false.)
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
@@ -139,11 +138,10 @@ contains
    end function overclosure_left
 
    !> Let the judge look at the solved step: cut it, or keep what was found.
-   subroutine judge(self, scene, part, du, increment, status)
+   subroutine judge(self, scene, part, increment, status)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
-      real(wp), intent(in), contiguous :: du(:, :)       !! (n_dim, n_node) over the step [L]
       type(increment_t), intent(inout) :: increment
       integer, intent(inout) :: status
       type(overlap_t) :: overlap
@@ -151,8 +149,8 @@ contains
 
       if (self%judge%look%outline%n_piece == 0) return
       call phase_enter(self%system%phases, phase_judge, left)
-      if (self%active%travel%total + largest_motion(du) >= self%clear_until) then
-         call judge_step(self%judge, scene%x, self%state%u, du, overlap)
+      if (self%active%travel%total + largest_motion(self%ending%du) >= self%clear_until) then
+         call judge_step(self%judge, scene%x, self%state%u, self%ending%du, overlap)
          self%clear_until = self%active%travel%total + self%judge%clearance
       end if
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)

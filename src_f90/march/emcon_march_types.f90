@@ -18,7 +18,7 @@ module emcon_march_types
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, part_t, ending_t
+   public :: march_t, increment_t, part_t, ending_t, start_t
 
    !> What one increment took.
    type :: increment_t
@@ -53,6 +53,12 @@ module emcon_march_types
       logical :: may_cut = .false.               !! smaller ones are possible
    end type part_t
 
+   !> What an increment that is interrupted goes back to.
+   type :: start_t
+      type(state_t) :: state
+      type(ledger_t) :: ledger
+   end type start_t
+
    type :: march_t
       type(system_t) :: system
       type(state_t) :: state
@@ -77,6 +83,8 @@ module emcon_march_types
       integer :: revision = 0                    !! changes with the numbering of the unknowns
       type(motion_t) :: motion                   !! of the step
       real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity at its end
+      type(ending_t) :: ending                   !! of the step that was solved last
+      type(start_t), allocatable :: before       !! of an increment that was cut
       !> Asked before each iteration, if there is one.
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
    end type march_t

@@ -27,14 +27,13 @@ contains
       type(scene_t), intent(in) :: scene
       logical, intent(out) :: has_changed        !! these are others
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_massless(size(self%state%has_mass))
 
-      is_massless = self%may_shed .and. .not. self%state%has_mass
-      has_changed = any(is_massless .neqv. self%layer%is_massless)
+      has_changed = any((self%may_shed .and. .not. self%state%has_mass) &
+         .neqv. self%layer%is_massless)
       if (.not. has_changed) return
       call terms_return_mass(self%system%term, self%may_shed, self%state%has_mass, error)
-      if (.not. allocated(error)) call layer_renew(self%layer, scene, is_massless, &
-         self%system, error)
+      if (.not. allocated(error)) call layer_renew(self%layer, scene, &
+         self%may_shed .and. .not. self%state%has_mass, self%system, error)
    end subroutine mass_match
 
    !> The massless nodes that keep a step from being solved, and those of their elements: where the

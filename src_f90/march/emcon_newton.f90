@@ -190,8 +190,10 @@ contains
       type(newton_t), intent(inout) :: self
       integer, intent(in) :: n_constraint
 
-      if (allocated(self%dlam)) deallocate(self%dlam)
-      allocate(self%dlam(n_constraint))
+      if (allocated(self%dlam)) then
+         if (size(self%dlam) /= n_constraint) deallocate(self%dlam)
+      end if
+      if (.not. allocated(self%dlam)) allocate(self%dlam(n_constraint))
       call convergence_begin(self%convergence)
       self%n_solve = 0
       self%work = 0.0_wp

@@ -22,6 +22,7 @@ module emcon_pair_sums
       real(wp) :: span = 0.0_wp                  !! that time [T]
       real(wp) :: weight = 0.0_wp                !! sizes of nodal forces by time [M L/T]
       real(wp) :: moment(3) = 0.0_wp             !! the same by their places [M L^2/T]
+      logical :: is_pressed = .false.            !! there is force
    end type pair_sum_t
 
    type :: pair_sums_t
@@ -78,7 +79,6 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: masses_resist       !! forces are means over the motion, else its end
-      logical :: is_pressed(size(self%sum))
       real(wp) :: part
       integer :: k, i, contact, p
 
@@ -86,7 +86,7 @@ contains
       if (.not. masses_resist) call pair_sums_begin(self%sum)
       part = merge(0.5_wp, 1.0_wp, masses_resist)
       self%sum%span = self%sum%span + h
-      is_pressed = .false.
+      self%sum%is_pressed = .false.
       contact = 1
       do k = set%n_held + 1, set%n
          do while (set%id(k) > system%first_constraint(contact + 1))
@@ -100,10 +100,10 @@ contains
                   + part*motion%du(:, item%node(i))), self%of_pair(contact) > 0)
             end do
          end associate
-         is_pressed(p) = is_pressed(p) .or. abs(set%lam(k)) > 0.0_wp
+         self%sum(p)%is_pressed = self%sum(p)%is_pressed .or. abs(set%lam(k)) > 0.0_wp
       end do
       if (.not. masses_resist) return
-      where (is_pressed) self%sum%duration = self%sum%duration + h
+      where (self%sum%is_pressed) self%sum%duration = self%sum%duration + h
 
    contains
 

@@ -66,14 +66,14 @@ contains
    end subroutine quasi_static_begin
 
    !> What has no mass moves as its displacement says.
-   pure subroutine quasi_static_move(self, v)
+   pure subroutine quasi_static_move(self, h)
       type(march_t), intent(inout) :: self
-      real(wp), intent(in) :: v(:, :)            !! (n_dim, n_node) mean over the step [L/T]
+      real(wp), intent(in) :: h                  !! of the step, > 0 [T]
       integer :: i
 
       if (.not. self%scheme%row%masses_resist) return
       do i = 1, size(self%is_bare)
-         if (self%is_bare(i)) self%v1(:, i) = v(:, i)
+         if (self%is_bare(i)) self%v1(:, i) = self%ending%du(:, i)/h
       end do
    end subroutine quasi_static_move
 

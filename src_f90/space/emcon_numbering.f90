@@ -236,25 +236,27 @@ contains
    pure subroutine pick_unknowns(self, field, vector)
       type(numbering_t), intent(in) :: self
       real(wp), intent(in) :: field(size(self%start) - 1)    !! (n_dim, n_node)
-      real(wp), intent(out) :: vector(:)                     !! (n_unknown)
+      real(wp), intent(out), contiguous :: vector(:)         !! (n_unknown)
 
-      call pick(self, self%weight, field, vector)
+      call pick(self, .false., field, vector)
    end subroutine pick_unknowns
 
    !> |T|^T field: the same for magnitudes, which do not cancel.
    pure subroutine pick_magnitudes(self, field, vector)
       type(numbering_t), intent(in) :: self
       real(wp), intent(in) :: field(size(self%start) - 1)    !! (n_dim, n_node)
-      real(wp), intent(out) :: vector(:)                     !! (n_unknown)
+      real(wp), intent(out), contiguous :: vector(:)         !! (n_unknown)
 
-      call pick(self, abs(self%weight), field, vector)
+      call pick(self, .true., field, vector)
    end subroutine pick_magnitudes
 
-   pure subroutine pick(self, weight, field, vector)
+   !> T^T field, or |T|^T field.
+   pure subroutine pick(self, is_magnitude, field, vector)
       type(numbering_t), intent(in) :: self
-      real(wp), intent(in) :: weight(:)                      !! (terms)
-      real(wp), intent(in) :: field(:)
-      real(wp), intent(out) :: vector(:)
+      logical, intent(in) :: is_magnitude
+      real(wp), intent(in), contiguous :: field(:)
+      real(wp), intent(out), contiguous :: vector(:)
+      real(wp) :: weight
       integer :: k, t
 
       do k = 1, self%n_unknown
@@ -264,7 +266,8 @@ contains
          associate (d => self%dependent(k))
             do t = self%start(d) + 1, self%start(d + 1)
                if (self%column(t) == 0) cycle
-               vector(self%column(t)) = vector(self%column(t)) + weight(t)*field(d)
+               weight = merge(abs(self%weight(t)), self%weight(t), is_magnitude)
+               vector(self%column(t)) = vector(self%column(t)) + weight*field(d)
             end do
          end associate
       end do

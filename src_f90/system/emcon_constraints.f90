@@ -328,10 +328,19 @@ contains
       integer, intent(in) :: first               !! place in the set, from 1
       real(wp), intent(out), contiguous :: force(:, :)                   !! (2, n_node)
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (2, n_node), added to
+
+      force = 0.0_wp
+      if (first <= self%n) call add_forces(self, first, force, magnitude)
+   end subroutine constraints_force
+
+   pure subroutine add_forces(self, first, force, magnitude)
+      type(constraint_set_t), intent(in) :: self
+      integer, intent(in) :: first
+      real(wp), intent(inout), contiguous :: force(:, :)
+      real(wp), intent(inout), contiguous, optional :: magnitude(:, :)
       real(wp) :: part(size(force, 1))
       integer :: k, i, node
 
-      force = 0.0_wp
       do k = first, self%n
          do i = 1, self%item(k)%n_node
             node = self%item(k)%node(i)
@@ -340,7 +349,7 @@ contains
             if (present(magnitude)) magnitude(:, node) = magnitude(:, node) + abs(part)
          end do
       end do
-   end subroutine constraints_force
+   end subroutine add_forces
 
    !> Subtract the sum of lam_k d(discrete gradient of gap_k)/d q1 from the matrix `merged`.
    subroutine constraints_add_curvature(self, numbering, merged)

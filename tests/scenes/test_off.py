@@ -144,6 +144,19 @@ def test_nothing_is_computed_for_output_that_nobody_asks_for(plain):
     assert not [name for name in calls if name.endswith(("vtkhdf_write", "begin_frame"))]
 
 
+def test_an_increment_allocates_for_its_record_alone(plain):
+    """Rows of the history, lines of the log, and the residuals that the log tells. What is left is
+    made by the libraries of solvers and files."""
+    _, made = plain
+    own = {name: n for name, n in made.items() if module(name) and n > 0}
+    assert sum(n for name, n in own.items() if FOLDER[module(name)] in ("record", "results")) > 0
+    others = {name: n for name, n in own.items()
+              if FOLDER[module(name)] not in ("record", "results", "base")}
+    assert others.pop("__emcon_march_commit_MOD_march_commit") == 1                # residuals
+    assert others.pop("__emcon_ledger_MOD_body_momenta") == 2              # of the history
+    assert not others
+
+
 def test_allocations_do_not_grow_with_the_mesh(plain, tmp_path):
     """What the program itself allocates in an increment is as much for four times the elements."""
     _, made = plain
