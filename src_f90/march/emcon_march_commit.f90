@@ -99,8 +99,9 @@ contains
       if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_held &
          .and. .not. allocated(error)) call restitution_take(self, notes, error)
       call quasi_static_move(self, h)
-      if (self%layer%is_on .and. self%scheme%row%masses_resist .and. .not. allocated(error)) &
+      if (self%layer%is_on .and. self%scheme%row%masses_resist .and. .not. allocated(error)) then
          call end_massless(self, h, notes, error)
+      end if
       call phase_leave(self%system%phases, left)
    end subroutine restitute
 

@@ -161,7 +161,9 @@ def test_allocations_do_not_grow_with_the_mesh(plain, tmp_path):
     """What the program itself allocates in an increment is as much for four times the elements."""
     _, made = plain
     _, finer = per_increment(block(6), tmp_path)
-    own = [{name: n for name, n in some.items() if module(name)} for some in (made, finer)]
+    # Numbers as text: how many are tried until one gives its digits depends on the number.
+    own = [{name: n for name, n in some.items() if module(name) not in ("", "emcon_text")}
+           for some in (made, finer)]
     grown = {name: (own[0].get(name, 0), n) for name, n in own[1].items()
              if n > own[0].get(name, 0) + 0.5}
     assert not grown
