@@ -11,8 +11,8 @@ module emcon_cholmod
    use emcon_errors, only : err_internal, error_t, raise
    use emcon_kinds, only : dp, int64, wp
    use emcon_power_scaling, only : power_of_two
-   use emcon_sparse_solver, only : solver_check_square, solver_check_values, solver_raise, &
-      sparse_solver_t
+   use emcon_sparse_solver, only : matrix_definite, solver_check_square, solver_check_values, &
+      solver_raise, sparse_solver_t
    implicit none
    private
    public :: cholmod_t
@@ -22,7 +22,6 @@ module emcon_cholmod
    type, extends(sparse_solver_t) :: cholmod_t
       integer, private :: first_slot = 0                     !! of the entry (1, 1); 0: not there
       type(csr_t), private :: scaled                         !! the pattern, and factor*value
-      real(dp), private :: factor = 1.0_dp                   !! scaled = factor*value
       real(dp), allocatable, private :: rhs(:), x(:)
       logical, private :: is_factorised = .false.
       type(c_ptr), private :: handle = c_null_ptr
@@ -30,13 +29,17 @@ module emcon_cholmod
       procedure :: analyse => cholmod_analyse
       procedure :: factorise => cholmod_factorise
       procedure :: solve => cholmod_solve
+      procedure :: has_halves => cholmod_has_halves
+      procedure :: solve_half => cholmod_solve_half
+      procedure :: reach_half => cholmod_reach_half
       procedure :: free => cholmod_free
    end type cholmod_t
 
    interface
-      function emcon_cholmod_new() result(handle) bind(c)
-         import :: c_ptr
+      function emcon_cholmod_new(halves) result(handle) bind(c)
+         import :: c_int, c_ptr
          implicit none
+         integer(c_int), value :: halves
          type(c_ptr) :: handle
       end function emcon_cholmod_new
 
@@ -71,6 +74,29 @@ module emcon_cholmod
          integer(c_int) :: status
       end function emcon_cholmod_solve
 
+      function emcon_cholmod_half(handle, n, is_second, b, x) result(status) bind(c)
+         import :: c_double, c_int, c_ptr
+         implicit none
+         type(c_ptr), value :: handle
+         integer(c_int), value :: n, is_second
+         real(c_double), intent(in) :: b(*)
+         real(c_double), intent(inout) :: x(*)
+         integer(c_int) :: status
+      end function emcon_cholmod_half
+
+      function emcon_cholmod_reach(handle, n, m, column, value, n_reached, index, x) &
+         result(status) bind(c)
+         import :: c_double, c_int, c_ptr
+         implicit none
+         type(c_ptr), value :: handle
+         integer(c_int), value :: n, m
+         integer(c_int), intent(in) :: column(*)
+         real(c_double), intent(in) :: value(*)
+         integer(c_int), intent(inout) :: n_reached, index(*)
+         real(c_double), intent(inout) :: x(*)
+         integer(c_int) :: status
+      end function emcon_cholmod_reach
+
       subroutine emcon_cholmod_free(handle) bind(c)
          import :: c_ptr
          implicit none
@@ -95,7 +121,7 @@ contains
       call csr_copy_pattern(matrix, self%scaled)
       self%first_slot = csr_find(matrix, 1, 1)
       allocate(self%rhs(matrix%n_row), self%x(matrix%n_row))
-      self%handle = emcon_cholmod_new()
+      self%handle = emcon_cholmod_new(merge(1_c_int, 0_c_int, self%needs_halves))
       status = cholmod_out_of_memory
       if (c_associated(self%handle)) then
          status = emcon_cholmod_analyse(self%handle, int(matrix%n_row, c_int), &
@@ -159,6 +185,49 @@ contains
          status == cholmod_out_of_memory, self%scaled)
       x = real(self%x, wp)
    end subroutine cholmod_solve
+
+   pure logical function cholmod_has_halves(self)
+      class(cholmod_t), intent(in) :: self
+
+      cholmod_has_halves = self%symmetry == matrix_definite
+   end function cholmod_has_halves
+
+   subroutine cholmod_solve_half(self, is_second, rhs, x, error)
+      class(cholmod_t), intent(inout) :: self
+      logical, intent(in) :: is_second
+      real(dp), intent(in), contiguous :: rhs(:)
+      real(dp), intent(inout), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+      type(ieee_status_type) :: fp_status
+
+      call blas_enter(fp_status)
+      status = emcon_cholmod_half(self%handle, int(size(rhs), c_int), &
+         merge(1_c_int, 0_c_int, is_second), rhs, x)
+      call blas_leave(fp_status)
+      if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "solution", int(status), &
+         status == cholmod_out_of_memory, self%scaled)
+   end subroutine cholmod_solve_half
+
+   subroutine cholmod_reach_half(self, column, value, n_reached, index, x, error)
+      class(cholmod_t), intent(inout) :: self
+      integer, intent(in), contiguous :: column(:)
+      real(dp), intent(in), contiguous :: value(:)
+      integer, intent(out) :: n_reached
+      integer, intent(inout), contiguous :: index(:)
+      real(dp), intent(inout), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status, n
+      type(ieee_status_type) :: fp_status
+
+      call blas_enter(fp_status)
+      status = emcon_cholmod_reach(self%handle, int(self%scaled%n_row, c_int), &
+         int(size(column), c_int), column, value, n, index, x)
+      call blas_leave(fp_status)
+      n_reached = n
+      if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "solution", int(status), &
+         status == cholmod_out_of_memory, self%scaled)
+   end subroutine cholmod_reach_half
 
    subroutine cholmod_free(self)
       class(cholmod_t), intent(inout) :: self

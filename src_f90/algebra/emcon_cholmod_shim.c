@@ -7,6 +7,9 @@ typedef struct {
    cholmod_common c;
    cholmod_factor *l;
    cholmod_dense *x, *y, *e;      /* solution and workspaces of cholmod_solve2, kept */
+   cholmod_sparse *reached;       /* and the entries that a sparse right-hand side reaches */
+   int *place;                    /* of each unknown in the order of the factor */
+   double *zero;                  /* n zeros between calls */
 } emcon_cholmod_t;
 
 /* View of a full symmetric matrix: CSR is CSC here; CHOLMOD reads the lower triangle only. */
@@ -26,7 +29,8 @@ static cholmod_sparse view(int n, int *ap, int *ai, double *ax)
    return a;
 }
 
-void *emcon_cholmod_new(void)
+/* `halves`: each half of the factor is to be solved with, for sparse right-hand sides. */
+void *emcon_cholmod_new(int halves)
 {
    emcon_cholmod_t *h = calloc(1, sizeof *h);
    if (h == NULL) return NULL;
@@ -36,6 +40,7 @@ void *emcon_cholmod_new(void)
    }
    h->c.print = 0;       /* a library does not write to stdout */
    h->c.final_ll = 1;    /* else LDL^T accepts indefinite matrices */
+   if (halves) h->c.supernodal = CHOLMOD_SIMPLICIAL;
    return h;
 }
 
@@ -45,6 +50,8 @@ int emcon_cholmod_analyse(void *handle, int n, int *ap, int *ai)
    cholmod_sparse a = view(n, ap, ai, NULL);
    cholmod_free_factor(&h->l, &h->c);
    h->l = cholmod_analyze(&a, &h->c);
+   free(h->place);
+   h->place = NULL;
    return h->c.status;
 }
 
@@ -78,6 +85,88 @@ int emcon_cholmod_solve(void *handle, int n, double *b, double *x)
    return h->c.status;
 }
 
+/* x = L^-1 P b, or x = P^T L^-T b. */
+int emcon_cholmod_half(void *handle, int n, int is_second, double *b, double *x)
+{
+   emcon_cholmod_t *h = handle;
+   const int *perm = h->l->Perm;
+   cholmod_dense rhs = {0};
+   const double *y;
+   int i;
+   if (!is_second)
+      for (i = 0; i < n; i++) x[i] = b[perm[i]];
+   rhs.nrow = rhs.d = rhs.nzmax = (size_t)n;
+   rhs.ncol = 1;
+   rhs.x = is_second ? b : x;
+   rhs.xtype = CHOLMOD_REAL;
+   rhs.dtype = CHOLMOD_DOUBLE;
+   if (!cholmod_solve2(is_second ? CHOLMOD_Lt : CHOLMOD_L, h->l, &rhs, NULL, &h->x, NULL, &h->y,
+                       &h->e, &h->c))
+      return h->c.status == CHOLMOD_OK ? CHOLMOD_INVALID : h->c.status;
+   y = h->x->x;
+   if (is_second)
+      for (i = 0; i < n; i++) x[perm[i]] = y[i];
+   else
+      for (i = 0; i < n; i++) x[i] = y[i];
+   return h->c.status;
+}
+
+static int places(emcon_cholmod_t *h, int n)
+{
+   const int *perm = h->l->Perm;
+   int i;
+   if (h->place != NULL) return CHOLMOD_OK;
+   free(h->zero);
+   h->zero = calloc((size_t)n, sizeof *h->zero);
+   h->place = malloc((size_t)n*sizeof *h->place);
+   if (h->zero == NULL || h->place == NULL) return CHOLMOD_OUT_OF_MEMORY;
+   for (i = 0; i < n; i++) h->place[perm[i]] = i;
+   return CHOLMOD_OK;
+}
+
+/* L^-1 P b of a vector with the entries `value` at the unknowns `column`: what of it is not zero,
+   `n_reached` entries at `index`, from 0, in the order of the factor. */
+int emcon_cholmod_reach(void *handle, int n, int m, const int *column, const double *value,
+                        int *n_reached, int *index, double *x)
+{
+   emcon_cholmod_t *h = handle;
+   cholmod_dense rhs = {0};
+   cholmod_sparse pattern = {0};
+   int p[2], *i = index, k, status = places(h, n);
+   if (status != CHOLMOD_OK) return status;
+   p[0] = 0;
+   p[1] = m;
+   for (k = 0; k < m; k++) {
+      i[k] = h->place[column[k]];
+      h->zero[i[k]] = value[k];
+   }
+   pattern.nrow = (size_t)n;
+   pattern.ncol = 1;
+   pattern.nzmax = (size_t)m;
+   pattern.p = p;
+   pattern.i = i;
+   pattern.itype = CHOLMOD_INT;
+   pattern.xtype = CHOLMOD_PATTERN;
+   pattern.dtype = CHOLMOD_DOUBLE;
+   pattern.packed = 1;
+   rhs.nrow = rhs.d = rhs.nzmax = (size_t)n;
+   rhs.ncol = 1;
+   rhs.x = h->zero;
+   rhs.xtype = CHOLMOD_REAL;
+   rhs.dtype = CHOLMOD_DOUBLE;
+   status = CHOLMOD_OK;
+   if (!cholmod_solve2(CHOLMOD_L, h->l, &rhs, &pattern, &h->x, &h->reached, &h->y, &h->e, &h->c))
+      status = h->c.status == CHOLMOD_OK ? CHOLMOD_INVALID : h->c.status;
+   for (k = 0; k < m; k++) h->zero[i[k]] = 0.0;
+   if (status != CHOLMOD_OK) return status;
+   *n_reached = ((int *)h->reached->p)[1];
+   for (k = 0; k < *n_reached; k++) {
+      index[k] = ((int *)h->reached->i)[k];
+      x[k] = ((double *)h->x->x)[index[k]];
+   }
+   return h->c.status;
+}
+
 void emcon_cholmod_free(void *handle)
 {
    emcon_cholmod_t *h = handle;
@@ -86,6 +175,9 @@ void emcon_cholmod_free(void *handle)
    cholmod_free_dense(&h->x, &h->c);
    cholmod_free_dense(&h->y, &h->c);
    cholmod_free_dense(&h->e, &h->c);
+   cholmod_free_sparse(&h->reached, &h->c);
+   free(h->place);
+   free(h->zero);
    cholmod_finish(&h->c);
    free(h);
 }

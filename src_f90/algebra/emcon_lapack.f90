@@ -9,7 +9,7 @@ module emcon_lapack
    implicit none
    private
    public :: dense_solve, dense_singular_values, dense_rank, dense_condition, dense_null_space
-   public :: dense_eigen
+   public :: dense_eigen, dense_cholesky, dense_cholesky_solve
 
    interface
       subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
@@ -39,6 +39,25 @@ module emcon_lapack
          real(dp), intent(out) :: w(*), work(*)
          integer, intent(out) :: info
       end subroutine dsyev
+
+      subroutine dpotrf(uplo, n, a, lda, info)
+         import :: dp
+         implicit none
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         real(dp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: info
+      end subroutine dpotrf
+
+      subroutine dpotrs(uplo, n, nrhs, a, lda, b, ldb, info)
+         import :: dp
+         implicit none
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, nrhs, lda, ldb
+         real(dp), intent(in) :: a(lda, *)
+         real(dp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dpotrs
    end interface
 
 contains
@@ -177,5 +196,32 @@ contains
       if (info /= 0) call raise(error, err_analysis, "eigenvalues of a matrix with " &
          // to_text(n) // " rows: no convergence (dsyev returns " // to_text(info) // ")")
    end subroutine dense_eigen
+
+   !> A = L L^T of a symmetric matrix, in place of its lower triangle, which alone is read.
+   subroutine dense_cholesky(a, is_definite)
+      real(dp), intent(inout), contiguous :: a(:, :)        !! (n, n)
+      logical, intent(out) :: is_definite                   !! else there is no factor
+      type(ieee_status_type) :: status
+      integer :: info
+
+      info = 0
+      call blas_enter(status)
+      if (size(a) > 0) call dpotrf("L", size(a, 1), a, size(a, 1), info)
+      call blas_leave(status)
+      is_definite = info == 0
+   end subroutine dense_cholesky
+
+   !> x = A^-1 x by the factor of `dense_cholesky`.
+   subroutine dense_cholesky_solve(l, x)
+      real(dp), intent(in), contiguous :: l(:, :)           !! (n, n)
+      real(dp), intent(inout), contiguous :: x(:)           !! (n)
+      type(ieee_status_type) :: status
+      integer :: info
+
+      if (size(x) == 0) return
+      call blas_enter(status)
+      call dpotrs("L", size(x), 1, l, size(x), x, size(x), info)
+      call blas_leave(status)
+   end subroutine dense_cholesky_solve
 
 end module emcon_lapack

@@ -30,6 +30,8 @@ module emcon_sparse_solver
       real(dp) :: rcond = 0.0_dp              !! smallest over largest pivot, or 0: an indicator
       integer :: n_negative = -1              !! pivots < 0 of a symmetric matrix; < 0: not counted
       integer(int64) :: n_factor = 0_int64    !! nonzeros of the factors
+      logical :: needs_halves = .false.       !! set before `analyse`, if it `has_halves`
+      real(dp) :: factor = 1.0_dp             !! > 0, what is factorised is factor*A: halves show it
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
       integer, private :: of_analysis = 0     !! `n_analysis` when `factored` was factorised
       real(dp), allocatable, private :: factored(:)      !! values of the last `solver_renew`
@@ -38,6 +40,9 @@ module emcon_sparse_solver
       procedure(factorise_values), deferred :: factorise
       procedure(solve_system), deferred :: solve
       procedure(free_memory), deferred :: free
+      procedure :: has_halves
+      procedure :: solve_half
+      procedure :: reach_half
    end type sparse_solver_t
 
    !> For arrays of solvers.
@@ -83,6 +88,39 @@ module emcon_sparse_solver
    end interface
 
 contains
+
+   !> Does it factorise definite matrices as factor*A = L L^T, and solve by each half alone?
+   pure logical function has_halves(self)
+      class(sparse_solver_t), intent(in) :: self
+
+      has_halves = self%choice < -1           ! no solver but those that override it
+   end function has_halves
+
+   !> x = L^-1 P rhs, or the second half x = P^T L^-T rhs, P an order of the unknowns; for who
+   !> `needs_halves`.
+   subroutine solve_half(self, is_second, rhs, x, error)
+      class(sparse_solver_t), intent(inout) :: self
+      logical, intent(in) :: is_second
+      real(dp), intent(in), contiguous :: rhs(:)         !! (n)
+      real(dp), intent(inout), contiguous :: x(:)        !! (n)
+      type(error_t), allocatable, intent(out) :: error
+
+      call raise(error, err_internal, "a solver without halves was asked to solve by one")
+   end subroutine solve_half
+
+   !> L^-1 P rhs of a sparse right-hand side: what of it is not zero.
+   subroutine reach_half(self, column, value, n_reached, index, x, error)
+      class(sparse_solver_t), intent(inout) :: self
+      integer, intent(in), contiguous :: column(:)       !! (m) places of the entries, from 0
+      real(dp), intent(in), contiguous :: value(:)       !! (m)
+      integer, intent(out) :: n_reached                  !! entries of the solution
+      integer, intent(inout), contiguous :: index(:)     !! (n) their places, from 0
+      real(dp), intent(inout), contiguous :: x(:)        !! (n) and values, the first n_reached
+      type(error_t), allocatable, intent(out) :: error
+
+      n_reached = 0
+      call raise(error, err_internal, "a solver without halves was asked to solve by one")
+   end subroutine reach_half
 
    !> Factorise `value`, of the analysed pattern, unless the last factors are those of these values:
    !> matrices of linear bodies stay the same.

@@ -89,6 +89,7 @@ contains
       step%gap_tolerance = last%gap_tolerance
       step%contact = last%contact
       step%stabilizes = last%stabilizes
+      step%newton = last%newton
       step%newton_tolerance = last%newton_tolerance
       step%newton_maximum = last%newton_maximum
       step%restart_frequency = last%restart_frequency
@@ -291,14 +292,16 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
+      character(len=:), allocatable :: known
 
       select case (option_name(card, "TYPE"))
-      case ("", "FULL")
-         continue
+      case ("")
+         step%newton = option_default("newton")
       case ("MODIFIED", "INEXACT")
-         call refuse_option(reader, card, "TYPE", "FULL", "not in this version")
+         call option_words("newton", known)
+         call refuse_option(reader, card, "TYPE", known, "not in this version")
       case default
-         call refuse_option(reader, card, "TYPE", "FULL", "")
+         call choose_option(reader, card, "TYPE", "newton", step%newton)
       end select
       call option_real(reader, card, "TOLERANCE", step%newton_tolerance)
       if (step%newton_tolerance >= 1.0_wp) then

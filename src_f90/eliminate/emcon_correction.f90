@@ -7,6 +7,7 @@ module emcon_correction
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find
+   use emcon_kept_factor, only : kept_factor_forget, kept_factor_t
    use emcon_kinds, only : dp, int64, wp
    use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
       null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
@@ -43,6 +44,7 @@ module emcon_correction
       integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
       integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
       type(null_space_t) :: null_space
+      type(kept_factor_t) :: kept                !! over increments
       type(saddle_point_t) :: saddle_point
       type(stopwatch_t), private :: clock        !! layouts and curvature of the constraints
       logical, private :: has_saddle_point = .false.    !! it is laid out for these rows
@@ -71,6 +73,8 @@ contains
 
       call solver_create(self%choice, matrix_general, self%solver, self%given)
       call solver_create(self%choice, matrix_definite, self%definite_solver, self%given)
+      call solver_create(self%choice, matrix_definite, self%kept%solver, self%given)
+      call kept_factor_forget(self%kept)
       call solver_create(self%choice, matrix_general, self%null_space%solver, self%given)
       call saddle_point_reset(self%saddle_point, self%choice, self%given)
    end subroutine make_solvers
@@ -82,6 +86,7 @@ contains
       if (.not. allocated(self%solver)) return
       call self%solver%free()
       call self%definite_solver%free()
+      call self%kept%solver%free()
       call self%null_space%solver%free()
       call saddle_point_free(self%saddle_point)
    end subroutine correction_free

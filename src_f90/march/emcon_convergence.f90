@@ -30,7 +30,16 @@ module emcon_convergence
    !> Least part of a correction that is taken: at a kink of contact whole ones lead to and fro.
    real(wp), parameter :: least_damping = 0.125_wp
 
+   !> Corrections by a kept factor, which gain less each: so many without a new best residual are a
+   !> stall, so many times the maximum of tangents are allowed, and after so many with one factor
+   !> it is too old. Within this multiple of epsilon a stall is convergence.
+   integer, parameter :: kept_stalls = 4, kept_for_tangent = 2, too_old = 12
+   real(wp), parameter :: kept_floor = 32.0_wp*epsilon(1.0_wp)
+
    type :: convergence_t
+      logical :: is_kept = .false.               !! corrections are by a kept factor
+      integer :: n_kept = 0                      !! by the present one
+      integer :: n_renewal = 0                   !! factors made in the solve for that they stalled
       real(wp) :: tolerance = 0.0_wp             !! of the relative residual
       integer :: maximum = 0                     !! iterations
       integer :: n_iteration = 0                 !! tangents factorised so far
@@ -54,7 +63,7 @@ contains
 
       self%tolerance = tolerance
       self%maximum = maximum
-      allocate(self%history(maximum + most_polish + 1), source=0.0_wp)
+      allocate(self%history((1 + kept_for_tangent)*maximum + most_polish + 3), source=0.0_wp)
       call convergence_begin(self)
    end subroutine convergence_init
 
@@ -70,11 +79,60 @@ contains
       self%best = huge(self%best)
       self%last = huge(self%last)
       self%is_polish = .false.
+      self%is_kept = .false.
+      self%n_kept = 0
+      self%n_renewal = 0
    end subroutine convergence_begin
 
-   !> What to do next, now that the largest relative residual is `size`: once it is within the
-   !> tolerance, or nothing but round-off, go on with the old tangent as long as that gains.
+   !> What to do next, now that the largest relative residual is `size`.
    pure subroutine convergence_judge(self, size, is_rounding, next)
+      type(convergence_t), intent(inout) :: self
+      real(wp), intent(in) :: size               !! >= 0
+      logical, intent(in) :: is_rounding         !! nothing else is left
+      integer, intent(out) :: next               !! one of the `next_` codes
+
+      if (self%is_kept) then
+         call judge_kept(self, size, is_rounding, next)
+      else
+         call judge_newton(self, size, is_rounding, next)
+      end if
+   end subroutine convergence_judge
+
+   !> On with a kept factor down to round-off as long as that gains, then with a new one, once.
+   pure subroutine judge_kept(self, size, is_rounding, next)
+      type(convergence_t), intent(inout) :: self
+      real(wp), intent(in) :: size
+      logical, intent(in) :: is_rounding
+      integer, intent(out) :: next
+      logical :: is_stalled
+
+      self%n_history = self%n_history + 1
+      self%history(self%n_history) = size
+      self%last = size
+      self%n_stall = self%n_stall + 1
+      if (size < stall_gain*self%best) self%n_stall = 0
+      self%best = min(self%best, size)
+      next = next_done
+      if (size <= round_off) return
+      is_stalled = self%n_stall >= kept_stalls .or. self%n_kept >= too_old
+      if (is_stalled .and. (size <= kept_floor .or. is_rounding)) return
+      next = next_give_up
+      if (.not. size < huge(size) .or. self%n_history > kept_for_tangent*self%maximum) return
+      if (is_stalled .and. self%n_renewal > 0) return
+      next = merge(next_tangent, next_old_tangent, is_stalled)
+      if (is_stalled) then
+         self%n_renewal = self%n_renewal + 1
+         self%n_kept = 0
+         self%n_stall = 0
+      else
+         self%n_kept = self%n_kept + 1
+         if (size > self%tolerance .and. .not. is_rounding) self%n_iteration = self%n_iteration + 1
+      end if
+   end subroutine judge_kept
+
+   !> Once it is within the tolerance, or nothing but round-off, go on with the old tangent as long
+   !> as that gains.
+   pure subroutine judge_newton(self, size, is_rounding, next)
       type(convergence_t), intent(inout) :: self
       real(wp), intent(in) :: size               !! >= 0
       logical, intent(in) :: is_rounding         !! nothing else is left
@@ -106,7 +164,7 @@ contains
       next = next_tangent
       if (self%n_stall > most_stalls .or. self%n_iteration == self%maximum &
          .or. .not. size < huge(size)) next = next_give_up
-   end subroutine convergence_judge
+   end subroutine judge_newton
 
    !> Half of what was taken of the last correction if the residual, the last in the history, is no
    !> smaller than one of the two before it, else twice as much. The first guess may happen to have

@@ -8,6 +8,7 @@ module emcon_march
    use emcon_host, only : host_copy_solvers, host_t
    use emcon_host_scheme, only : host_scheme_find
    use emcon_judge, only : judge_init
+   use emcon_keeping, only : keeping_forget
    use emcon_kinds, only : wp
    use emcon_layer, only : layer_free, layer_init
    use emcon_ledger, only : ledger_init, ledger_measure, ledger_t
@@ -31,7 +32,8 @@ module emcon_march
    implicit none
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
-      march_resume, march_renumber, march_free, march_free_increment, march_set_time, march_watch
+      march_resume, march_renumber, march_go_back, march_free, march_free_increment, &
+      march_set_time, march_watch
 
 contains
 
@@ -133,6 +135,7 @@ contains
          stride = min(state%grid_stride, self%n_grid - state%n_grid)
          call cross_grid(self, scene, state%n_grid + stride, increment, error)
          if (allocated(error)) then
+            call keeping_forget(self%newton%keeping, self%newton%correction)
             if (error%code == err_interrupt) then
                if (allocated(self%before)) then
                   state = self%before%state
@@ -163,6 +166,17 @@ contains
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine march_increment
+
+   !> Put a state of before in place of the present one; the kept factor is made again as it was.
+   subroutine march_go_back(self, state, ledger)
+      type(march_t), intent(inout) :: self
+      type(state_t), intent(in) :: state
+      type(ledger_t), intent(in) :: ledger
+
+      self%state = state
+      self%ledger = ledger
+      call keeping_forget(self%newton%keeping, self%newton%correction)
+   end subroutine march_go_back
 
    !> Go to grid point `n_end` in one step, or in dyadic parts of one.
    subroutine cross_grid(self, scene, n_end, increment, error)
@@ -200,8 +214,7 @@ contains
       increment%h = h
       call march_in_parts(self, scene, self%state%step_time, increment, error)
       if (allocated(error)) then
-         self%state = before
-         self%ledger = ledger_before
+         call march_go_back(self, before, ledger_before)
          return
       end if
       self%state%increment = self%state%increment + 1

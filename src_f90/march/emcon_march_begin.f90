@@ -4,6 +4,7 @@ module emcon_march_begin
    use emcon_active_set, only : active_set_overclosure, active_set_t
    use emcon_correction, only : correction_reset
    use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_factor_base, only : factor_base_t
    use emcon_holding, only : holding_begin, holding_t
    use emcon_host, only : host_find_solver
    use emcon_host_scheme, only : host_scheme_find
@@ -26,7 +27,8 @@ module emcon_march_begin
    use emcon_scheme_registry, only : scheme_create, scheme_given
    use emcon_solver_registry, only : solver_given
    use emcon_state, only : state_t
-   use emcon_steps, only : initiation_massless, initiation_persistent, method_saddle_point, step_t
+   use emcon_steps, only : initiation_massless, initiation_persistent, method_saddle_point, &
+      newton_kept, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : note_add, to_text
@@ -146,6 +148,7 @@ contains
       if (.not. allocated(error)) call check_held(self, scene, error)
       if (.not. allocated(error)) call prepare(self, scene, error)
       self%state = before
+      self%state%base = factor_base_t()
       self%ledger = ledger_before
    end subroutine march_renumber
 
@@ -163,6 +166,8 @@ contains
             scene%x, step%newton_tolerance, step%newton_maximum)
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
+         state%base = factor_base_t()
+         self%newton%keeping%is_wanted = step%newton == newton_kept
          call begin_active(self%active, step, size(scene%rigid) > 0)
          if (.not. step%scheme%masses_resist) call holding_begin(self%active%holding, self%system, &
             scene, state%u)

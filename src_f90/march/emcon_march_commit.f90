@@ -4,6 +4,7 @@ module emcon_march_commit
    use emcon_correction, only : correction_reason
    use emcon_errors, only : error_t
    use emcon_holding, only : holding_t
+   use emcon_keeping, only : keeping_commit
    use emcon_kinds, only : wp
    use emcon_march_guess, only : follow_links
    use emcon_march_types, only : increment_t, march_t
@@ -82,6 +83,7 @@ contains
          end associate
       end associate
       call keep_constraints(self)
+      call keeping_commit(self%newton%keeping, self%state%base)
    end subroutine march_commit
 
    !> The velocities that impacts and what has no mass call for.

@@ -8,6 +8,8 @@ module emcon_march_step
    use emcon_errors, only : error_t
    use emcon_guards, only : guard_slack
    use emcon_judge, only : judge_step, overlap_t
+   use emcon_keeping, only : keeping_forget, keeping_step
+   use emcon_kept_factor, only : kept_factor_renew
    use emcon_kinds, only : wp
    use emcon_look_plane, only : overlap_names
    use emcon_march_commit, only : march_commit
@@ -19,6 +21,7 @@ module emcon_march_step
    use emcon_pose, only : instant_later, pose_at_end
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
+   use emcon_steps, only : method_null_space
    use emcon_system, only : system_loads, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
@@ -52,6 +55,8 @@ contains
       if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
       self%active%left = [overclosure_left(scene, self%state, part%start%step_time), &
          overclosure_left(scene, self%state, part%start%step_time + part%h)]
+      call keep_factor(self, part, error)
+      if (allocated(error)) return
       do attempt = 1, 2
          call march_guess(self, scene, part%start, part%h, is_at_rest=attempt == 2)
          call active_set_begin(self%active, self%system, self%motion, self%state)
@@ -82,6 +87,31 @@ contains
       end if
       call march_commit(self, scene, part%h, increment, error)
    end subroutine march_step
+
+   !> Find out whether a factor may be kept in the step, and make the one that is kept again where
+   !> it was lost, as in a run that was resumed.
+   subroutine keep_factor(self, part, error)
+      type(march_t), intent(inout) :: self
+      type(part_t), intent(in) :: part
+      type(error_t), allocatable, intent(out) :: error
+      type(motion_t) :: motion
+      logical :: is_lost
+
+      associate (keeping => self%newton%keeping, correction => self%newton%correction)
+         keeping%is_allowed = keeping%is_wanted .and. self%scheme%row%masses_resist .and. &
+            (correction%method == method_null_space .or. self%system%n_constraint == 0)
+         call keeping_step(keeping, correction, self%state%base, part%start, part%h, &
+            self%state%increment, is_lost)
+         if (.not. is_lost) return
+         motion = motion_of(self%scheme%pose(keeping%base%start, keeping%base%h), self%motion%x, &
+            keeping%base%u0, keeping%base%du)
+         call system_respond(self%system, motion, .true.)
+         if (.not. (allocated(self%system%response%refusal) .or. &
+            allocated(self%system%response%failure))) &
+            call kept_factor_renew(correction%kept, self%system%matrix, error)
+         if (.not. correction%kept%is_made) call keeping_forget(keeping, correction)
+      end associate
+   end subroutine keep_factor
 
    !> Balance what has no mass, where contacts have opened or closed.
    subroutine settle(self, scene, part, status, error)

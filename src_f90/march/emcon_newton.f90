@@ -11,6 +11,8 @@ module emcon_newton
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t, correction_ticks
    use emcon_errors, only : err_interrupt, error_t, raise
+   use emcon_keeping, only : keeping_begin, keeping_correct, keeping_give_up, keeping_make, &
+      keeping_renew, keeping_t
    use emcon_kinds, only : int64, wp
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
    use emcon_motion, only : motion_place, motion_t
@@ -59,6 +61,7 @@ module emcon_newton
       type(correction_t) :: correction           !! how linear systems are solved
       real(wp) :: work = 0.0_wp                  !! of the correction at its start; 0: no search
       type(line_search_t) :: line
+      type(keeping_t) :: keeping                 !! of a factor over steps
       logical :: is_idle = .false.               !! no load: all forces are round-off
    end type newton_t
 
@@ -86,13 +89,110 @@ contains
    end subroutine newton_init
 
    !> Solve for `motion%du`, whose prescribed entries stand; on entry a first guess. The multipliers
-   !> of `set` start from what they are.
+   !> of `set` start from what they are. By a kept factor where that leads to the end, else by
+   !> tangents.
    subroutine newton_solve(self, system, set, motion, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_done
+
+      is_done = .false.
+      if (self%keeping%is_allowed .and. size(self%residual) > 0) call solve_by_kept_factor(self, &
+         system, set, motion, status, is_done, error)
+      if (is_done .or. allocated(error)) return
+      call solve_by_tangents(self, system, set, motion, status, error)
+   end subroutine newton_solve
+
+   !> The step by corrections of a factor that is kept; `is_done` unless it does not lead to an end.
+   subroutine solve_by_kept_factor(self, system, set, motion, status, is_done, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      logical, intent(out) :: is_done            !! else `motion%du` is the first guess again
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: norm, defect
+      logical :: is_rounding, is_fit
+      integer :: next
+
+      call begin(self, set%n)
+      self%convergence%is_kept = .true.
+      call keeping_begin(self%keeping, size(self%residual), motion%du)
+      is_done = .true.
+      do
+         call check_interrupt(self, status, error)
+         if (.not. allocated(error)) call evaluate_damped(self, system, set, motion, &
+            .not. self%correction%kept%is_made, status, error)
+         if (allocated(error)) return
+         if (status /= newton_converged) exit
+         call measure(self, system, set, norm, defect, is_rounding)
+         if (self%correction%n_redundant > 0) status = newton_redundant
+         if (status /= newton_converged) return
+         call make_factor(self, system, set, motion, is_fit, error)
+         if (allocated(error)) return
+         if (.not. is_fit) exit
+         call convergence_judge(self%convergence, max(norm, defect), is_rounding, next)
+         if (next == next_done) return
+         if (next == next_give_up) exit
+         if (next == next_tangent) then
+            call keeping_renew(self%keeping, self%correction)
+            cycle
+         end if
+         call correct_by_kept_factor(self, system, set, motion%du, error)
+         if (allocated(error)) return
+      end do
+      is_done = .false.
+      call keeping_give_up(self%keeping, self%correction, motion%du)
+   end subroutine solve_by_kept_factor
+
+   !> Let there be a factor that knows the constraints.
+   subroutine make_factor(self, system, set, motion, is_fit, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: is_fit             !! there is one
+      type(error_t), allocatable, intent(out) :: error
+      integer :: left
+
+      if (.not. self%correction%kept%is_made) then
+         system%phases%n_factorisation = system%phases%n_factorisation + 1
+      end if
+      call phase_enter(system%phases, phase_factorise, left)
+      call keeping_make(self%keeping, self%correction, system, set, motion, is_fit, error)
+      call phase_leave(system%phases, left)
+   end subroutine make_factor
+
+   !> The next correction of `du` by the kept factor.
+   subroutine correct_by_kept_factor(self, system, set, du, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(inout), contiguous :: du(:, :)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: left
+
+      call phase_enter(system%phases, phase_solve, left)
+      call keeping_correct(self%keeping, self%correction, set, self%residual, self%dq, error)
+      call phase_leave(system%phases, left)
+      if (allocated(error)) return
+      system%phases%n_solve = system%phases%n_solve + 1
+      self%n_solve = self%n_solve + 1
+      call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
+   end subroutine correct_by_kept_factor
+
+   !> The step by Newton's method.
+   subroutine solve_by_tangents(self, system, set, motion, status, error)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: norm, defect
       logical :: is_rounding, is_driven, goes_on
@@ -104,7 +204,8 @@ contains
       do
          call check_interrupt(self, status, error)
          if (allocated(error)) return
-         call evaluate_damped(self, system, set, motion, status, error)
+         call evaluate_damped(self, system, set, motion, .not. self%convergence%is_polish, status, &
+            error)
          if (.not. allocated(error) .and. status == newton_converged) call measure(self, system, &
             set, norm, defect, is_rounding)
          if (self%correction%n_redundant > 0 .and. status == newton_converged) then
@@ -138,7 +239,7 @@ contains
             return
          end if
       end do
-   end subroutine newton_solve
+   end subroutine solve_by_tangents
 
    !> In statics, go back on the last correction if contact forces turned on the way.
    subroutine search(self, system, set, motion, goes_on)
@@ -271,11 +372,12 @@ contains
    end subroutine start_driven
 
    !> Forces and constraints; the last correction is halved as long as there are none.
-   subroutine evaluate_damped(self, system, set, motion, status, error)
+   subroutine evaluate_damped(self, system, set, motion, with_tangent, status, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
+      logical, intent(in) :: with_tangent        !! else the matrix is left as it is
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       integer :: i, left
@@ -283,7 +385,7 @@ contains
       status = newton_refused
       do i = 0, most_halvings
          call motion_place(motion)
-         call system_respond(system, motion, with_tangent=.not. self%convergence%is_polish)
+         call system_respond(system, motion, with_tangent)
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(error)) return
          if (.not. allocated(system%response%refusal)) exit

@@ -1,5 +1,6 @@
 !> Where an analysis stands: all that the next increment depends on.
 module emcon_state
+   use emcon_factor_base, only : factor_base_t
    use emcon_kinds, only : wp
    use emcon_pair_record, only : pair_record_t
    use emcon_pair_sums, only : pair_sums_t
@@ -31,6 +32,7 @@ module emcon_state
       real(wp), allocatable :: internal(:, :)    !! (n_dim, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy
       real(wp) :: potential = 0.0_wp             !! energy of the given forces
+      type(factor_base_t) :: base                !! of the factor that is kept over steps
    end type state_t
 
 end module emcon_state

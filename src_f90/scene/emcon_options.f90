@@ -14,7 +14,8 @@ module emcon_options
    use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
    use emcon_solver_registry, only : solvers
    use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
-      initiation_velocity_update, method_null_space, method_saddle_point, step_t
+      initiation_velocity_update, method_null_space, method_saddle_point, newton_full, &
+      newton_kept, step_t
    implicit none
    private
    public :: option_row_t, n_option_row, option_row, option_code, option_default, option_words, &
@@ -60,6 +61,8 @@ module emcon_options
       option_row_t("initiation", initiation_massless, "MASSLESS", "", "", ""), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
+      option_row_t("newton", newton_kept, "KEPT", "", "", ""), &
+      option_row_t("newton", newton_full, "FULL", "", "a tangent in each iteration", ""), &
       option_row_t("kinematics", kinematics_nonlinear, "NONLINEAR", "", "", ""), &
       option_row_t("kinematics", kinematics_linear, "LINEAR", "", "small strains", ""), &
       option_row_t("kinematics", kinematics_corotated, "COROTATED", "", &
@@ -139,6 +142,8 @@ contains
          code = section%kinematics
       case ("method")
          code = step%constraint_method
+      case ("newton")
+         code = step%newton
       case ("scheme")
          code = scheme_energy_momentum
       case ("solver")

@@ -13,12 +13,14 @@ module emcon_steps
    public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
       initiation_massless
    public :: method_null_space, method_saddle_point
+   public :: newton_kept, newton_full
    public :: prescribed_find
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
       initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2
+   integer, parameter :: newton_kept = 1, newton_full = 2
 
    !> One prescribed degree of freedom: u = `value` times the amplitude.
    !>
@@ -84,6 +86,7 @@ module emcon_steps
       logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
       integer :: overclosure_amplitude = 0           !! part that is left over time; 0: linear to 0
       logical :: stabilizes = .false.                !! statics: what no load works on may be free
+      integer :: newton = newton_kept                !! one of `newton_`
       real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
       integer :: newton_maximum = 20
       integer :: restart_frequency = 0               !! 0: no restart file

@@ -5,6 +5,8 @@
 !> value at the end of the step; in a dynamic step it holds from the next step on.
 module emcon_stepper_conditions
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_factor_base, only : factor_base_t
+   use emcon_keeping, only : keeping_forget
    use emcon_kinds, only : wp
    use emcon_prescribed, only : prescribed_motion, ramp_at, ramp_turn
    use emcon_march, only : march_renumber
@@ -79,6 +81,8 @@ contains
          end associate
       end associate
       call system_renew(self%march%system, self%scene)
+      self%march%state%base%is_set = .false.
+      call keeping_forget(self%march%newton%keeping, self%march%newton%correction)
    end subroutine stepper_set_load
 
    !> Give the boundary condition on degree of freedom `dof` of node `label` the value `value`.
@@ -205,6 +209,7 @@ contains
       type(restart_t), intent(inout) :: restart
       type(error_t), allocatable, intent(out) :: error
       type(prescribed_t), allocatable :: list(:)
+      type(factor_base_t) :: base
 
       if (.not. restart_offers(restart, "step_time", .true.)) return
       call stepper_check_open(self, error)
@@ -227,7 +232,10 @@ contains
       call restart_exchange(restart, "prescribed_place", list%turn)
       call restart_exchange(restart, "prescribed_value", list%value)
       call restart_check(restart, error)
-      if (restart%is_reading .and. .not. allocated(error)) call renumber(self, list, error)
+      if (.not. restart%is_reading .or. allocated(error)) return
+      base = self%march%state%base
+      call renumber(self, list, error)
+      self%march%state%base = base
    end subroutine conditions_exchange
 
    !> The node of label `label`, and the condition on its degree of freedom `dof`; 0: it is free.

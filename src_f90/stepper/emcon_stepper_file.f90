@@ -5,6 +5,7 @@ module emcon_stepper_file
    use emcon_deck_source, only : deck_source_t
    use emcon_diagnostics, only : diagnostics_t
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_factor_base, only : factor_base_t
    use emcon_host, only : host_count, host_count_conditions
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -95,6 +96,7 @@ contains
          if (restart_offers(restart, "has_mass", any(state%has_mass))) call restart_exchange( &
             restart, "has_mass", state%has_mass)
       end associate
+      call exchange_base(self%march%state%base, self%march%state%u, restart)
       call exchange_pairs(self%march%state%pairs, restart)
       call exchange_sums(self%march%state%sums, restart)
       call verdict_exchange(self%verdict, restart)
@@ -113,6 +115,27 @@ contains
       call restart_exchange(restart, "time", state%start_time)
       call restart_exchange(restart, "time", state%time)
    end subroutine exchange_progress
+
+   !> Of which motion the kept factor was made; where the file has none it is made anew.
+   subroutine exchange_base(base, u, restart)
+      type(factor_base_t), intent(inout) :: base
+      real(wp), intent(in) :: u(:, :)                !! (n_dim, n_node) for its shape
+      type(restart_t), intent(inout) :: restart
+
+      if (.not. restart_offers(restart, "factor_u0", base%is_set)) return
+      if (.not. base%is_set) base = factor_base_t(is_set=.true.)
+      if (.not. allocated(base%u0)) then
+         allocate(base%u0, source=u)
+         allocate(base%du, source=u)
+      end if
+      call restart_exchange(restart, "factor_made", base%increment)
+      call restart_exchange(restart, "factor_made", base%n_correction)
+      call restart_exchange(restart, "factor_time", base%start%step_time)
+      call restart_exchange(restart, "factor_time", base%start%total_time)
+      call restart_exchange(restart, "factor_time", base%h)
+      call restart_exchange(restart, "factor_u0", base%u0)
+      call restart_exchange(restart, "factor_du", base%du)
+   end subroutine exchange_base
 
    subroutine exchange_ledger(ledger, restart)
       type(ledger_t), intent(inout) :: ledger

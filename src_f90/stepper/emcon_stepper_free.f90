@@ -7,7 +7,8 @@ module emcon_stepper_free
    use emcon_gaps, only : gaps_forget
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
-   use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_resume, &
+   use emcon_march, only : increment_t, march_begin_step, march_free_increment, march_go_back, &
+      march_resume, &
       march_set_time
    use emcon_march_guess, only : follow_links
    use emcon_motion, only : at_rest, motion_of
@@ -87,8 +88,7 @@ contains
 
       self%march%state = before%state
       call march_resume(self%march, self%scene, ignored)
-      self%march%state = before%state
-      self%march%ledger = before%ledger
+      call march_go_back(self%march, before%state, before%ledger)
    end subroutine put_back
 
    !> Put the given parts of the state in place of the present ones; on an error nothing changes.
@@ -117,7 +117,8 @@ contains
       call check_motion(self, next%v, error, time)
       if (present(u)) call measure_rest(self, next, error)
       if (allocated(error)) return
-      self%march%state = next
+      next%base%is_set = .false.
+      call march_go_back(self%march, next, self%march%ledger)
       call gaps_forget(self%march%system)
       if (present(time)) call march_set_time(self%march, self%scene, &
          time - self%march%state%start_time)
@@ -237,7 +238,7 @@ contains
          end if
          self%march%state = snapshot%state
       end if
-      self%march%ledger = snapshot%ledger
+      call march_go_back(self%march, snapshot%state, snapshot%ledger)
       self%verdict = snapshot%verdict
       call gaps_forget(self%march%system)
    end subroutine stepper_restore

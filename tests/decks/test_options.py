@@ -23,6 +23,7 @@ CARD = {
     "initiation": "*CONTACT INITIATION",
     "kinematics": "*SOLID SECTION",
     "method": "*CONSTRAINT METHOD",
+    "newton": "*NEWTON",
     "scheme": "*TIME INTEGRATION",
     "solver": "*STATIC",
 }

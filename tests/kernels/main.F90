@@ -59,6 +59,8 @@ program main
    use test_rigidity, only : collect_rigidity
    use test_rigid_bodies, only : collect_rigid_bodies
    use test_row_elimination, only : collect_row_elimination
+   use test_kept_factor, only : collect_kept_factor
+   use test_mixing, only : collect_mixing
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
@@ -151,6 +153,8 @@ program main
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)
    call run("saddle_point", collect_saddle_point)
+   call run("kept_factor", collect_kept_factor)
+   call run("mixing", collect_mixing)
    call run("correction", collect_correction)
    call run("reduction", collect_reduction)
    call run("system", collect_system)

@@ -1,0 +1,217 @@
+!> Corrections of a step by a factor that is kept over many steps.
+!>
+!> L L^T is the symmetric part of an earlier tangent without constraints. With G the gradients of
+!> the active constraints and W = L^-1 G^T a correction is
+!>
+!>    dq = L^-T (y + W mu),  y = -L^-1 r,  W^T W mu = -defect - W^T y
+!>
+!> which is zero only where residual and defects are: the age of L makes the way longer, not its
+!> end another one. Source: docs/theory.md, section 8.
+module emcon_kept_factor
+   use emcon_constraints, only : constraint_set_t
+   use emcon_csr, only : csr_find, csr_is_same, csr_t, csr_transpose
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
+   use emcon_sparse_solver, only : solver_renew, sparse_solver_t
+   implicit none
+   private
+   public :: kept_factor_t, kept_factor_renew, kept_factor_take, kept_factor_serves, &
+      kept_factor_correct, kept_factor_forget
+
+   !> The stiffness that a constraint has by its curvature may be so large a part of that of the
+   !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
+   real(dp), parameter :: most_curved = 0.5_dp
+
+   !> W^T W may have so many times the entries of the matrix.
+   integer, parameter :: most_products = 4
+
+   type :: kept_factor_t
+      logical :: is_made = .false.               !! there is a factor
+      class(sparse_solver_t), allocatable :: solver
+      integer :: n_renewal = 0                   !! factors made so far
+      integer :: n_forward = 0                   !! columns of W made so far
+      integer, allocatable, private :: mirror(:)     !! (n_slot) slot of the transposed entry
+      real(dp), allocatable, private :: value(:)     !! (n_slot) of the symmetric part
+      real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
+      ! W of the constraints last taken, by its entries that are not zero:
+      integer, allocatable, private :: start(:)      !! (n + 1) entries before each column
+      integer, allocatable, private :: index(:)      !! (>= start(n + 1)) rows, from 0
+      real(dp), allocatable, private :: w(:)         !! (>= start(n + 1))
+      real(dp), allocatable, private :: l(:, :)      !! (n, n) Cholesky factor of W^T W
+      real(dp), allocatable, private :: y(:), x(:)   !! (n_unknown)
+      real(dp), allocatable, private :: mu(:)        !! (n)
+   end type kept_factor_t
+
+contains
+
+   !> There is no factor any more.
+   pure subroutine kept_factor_forget(self)
+      type(kept_factor_t), intent(inout) :: self
+
+      self%is_made = .false.
+   end subroutine kept_factor_forget
+
+   !> Factorise the symmetric part of `matrix`; `is_made` if it is definite, and the pattern is
+   !> symmetric.
+   subroutine kept_factor_renew(self, matrix, error)
+      type(kept_factor_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, n
+
+      self%is_made = .false.
+      self%solver%needs_halves = .true.
+      n = self%solver%n_analysis
+      call self%solver%analyse(matrix, error)
+      if (allocated(error)) return
+      if (self%solver%n_analysis /= n .or. .not. allocated(self%value)) call lay_out(self, matrix)
+      if (size(self%mirror) == 0) return
+      do k = 1, size(self%value)
+         self%value(k) = 0.5_dp*(matrix%value(k) + matrix%value(self%mirror(k)))
+      end do
+      do k = 1, matrix%n_row
+         self%diagonal(k) = matrix%value(csr_find(matrix, k, k))
+      end do
+      call solver_renew(self%solver, self%value, error)
+      if (allocated(error)) return
+      self%is_made = .not. self%solver%is_singular
+      self%n_renewal = self%n_renewal + 1
+   end subroutine kept_factor_renew
+
+   !> Room for matrices of the pattern of `matrix`; no mirror if it is not symmetric.
+   subroutine lay_out(self, matrix)
+      type(kept_factor_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(csr_t) :: transposed
+
+      call csr_transpose(matrix, transposed, self%mirror)
+      if (.not. csr_is_same(matrix, transposed)) self%mirror = [integer ::]
+      if (allocated(self%y)) deallocate(self%y, self%x, self%value, self%diagonal, self%index, &
+         self%w)
+      associate (n => matrix%n_row)
+         allocate(self%y(n), self%x(n), self%value(size(matrix%column)), self%diagonal(n))
+         allocate(self%index(n), self%w(n))
+      end associate
+   end subroutine lay_out
+
+   !> Take the constraints of `set` at their present gradients.
+   subroutine kept_factor_take(self, set, is_fit, error)
+      type(kept_factor_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(out) :: is_fit             !! there is a factor, and one of W^T W, not t
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, n
+
+      is_fit = self%is_made .and. set%n**2 <= most_products*size(self%value)
+      if (.not. is_fit) return
+      if (allocated(self%l)) then
+         if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start)
+      end if
+      if (.not. allocated(self%l)) allocate(self%l(set%n, set%n), self%mu(set%n), &
+         self%start(set%n + 1))
+      self%start(1) = 0
+      do k = 1, set%n
+         call make_room(self, self%start(k) + size(self%y))
+         associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
+               last => set%gap_rows%row_start(k + 1), at => self%start(k) + 1)
+            call self%solver%reach_half(rows%column(first:last), rows%value(first:last), n, &
+               self%index(at:), self%w(at:), error)
+         end associate
+         if (allocated(error)) return
+         self%start(k + 1) = self%start(k) + n
+      end do
+      self%n_forward = self%n_forward + set%n
+      call fill_products(self)
+      call dense_cholesky(self%l, is_fit)
+   end subroutine kept_factor_take
+
+   !> Room for `n` entries of W; what there is stays.
+   pure subroutine make_room(self, n)
+      type(kept_factor_t), intent(inout) :: self
+      integer, intent(in) :: n
+      integer, allocatable :: index(:)
+      real(dp), allocatable :: w(:)
+
+      if (n <= size(self%w)) return
+      allocate(index(2*n), source=0)
+      allocate(w(2*n), source=0.0_dp)
+      index(:size(self%index)) = self%index
+      w(:size(self%w)) = self%w
+      call move_alloc(index, self%index)
+      call move_alloc(w, self%w)
+   end subroutine make_room
+
+   !> W^T W, its lower triangle.
+   pure subroutine fill_products(self)
+      type(kept_factor_t), intent(inout) :: self
+      integer :: k, i, j
+      real(dp) :: total
+
+      self%y = 0.0_dp
+      do k = 1, size(self%mu)
+         do j = self%start(k) + 1, self%start(k + 1)
+            self%y(self%index(j) + 1) = self%w(j)
+         end do
+         do i = k, size(self%mu)
+            total = 0.0_dp
+            do j = self%start(i) + 1, self%start(i + 1)
+               total = total + self%w(j)*self%y(self%index(j) + 1)
+            end do
+            self%l(i, k) = total
+         end do
+         do j = self%start(k) + 1, self%start(k + 1)
+            self%y(self%index(j) + 1) = 0.0_dp
+         end do
+      end do
+   end subroutine fill_products
+
+   !> Is what the factor does not know, the curvature of the constraints, small beside it?
+   pure logical function kept_factor_serves(self, set)
+      type(kept_factor_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(dp) :: curved
+      integer :: k, n
+
+      kept_factor_serves = .true.
+      do k = set%n_linear + 1, set%n
+         associate (item => set%item(k), rows => set%force_rows)
+            n = size(item%g, 1)*item%n_node
+            curved = real(abs(set%lam(k))*maxval(abs(item%h(:n, :n))), dp)
+            if (any(curved > most_curved*self%diagonal(rows%column(rows%row_start(k) + 1: &
+               rows%row_start(k + 1)) + 1))) kept_factor_serves = .false.
+         end associate
+      end do
+   end function kept_factor_serves
+
+   !> The correction for `residual` (with contact forces) and the defects of the constraints last
+   !> taken.
+   subroutine kept_factor_correct(self, set, residual, dq, error)
+      type(kept_factor_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
+      real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, j
+
+      self%x = -real(residual, dp)
+      call self%solver%solve_half(.false., self%x, self%y, error)
+      if (allocated(error)) return
+      do k = 1, set%n
+         self%mu(k) = -real(set%defect(k), dp)/self%solver%factor
+         do j = self%start(k) + 1, self%start(k + 1)
+            self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
+         end do
+      end do
+      call dense_cholesky_solve(self%l, self%mu)
+      do k = 1, set%n
+         do j = self%start(k) + 1, self%start(k + 1)
+            self%y(self%index(j) + 1) = self%y(self%index(j) + 1) + self%mu(k)*self%w(j)
+         end do
+      end do
+      call self%solver%solve_half(.true., self%y, self%x, error)
+      if (allocated(error)) return
+      dq = real(self%solver%factor*self%x, wp)
+   end subroutine kept_factor_correct
+
+end module emcon_kept_factor

@@ -1,0 +1,19 @@
+!> Of which motion a factor was made that is kept over steps: with it the same factor is made again.
+module emcon_factor_base
+   use emcon_kinds, only : wp
+   use emcon_pose, only : instant_t
+   implicit none
+   private
+   public :: factor_base_t
+
+   type :: factor_base_t
+      logical :: is_set = .false.                !! there is a factor
+      integer :: increment = -1                  !! increments done before it was made
+      integer :: n_correction = 0                !! of the last step
+      type(instant_t) :: start                   !! of the step that it was made in
+      real(wp) :: h = 0.0_wp                     !! and its size [T]
+      real(wp), allocatable :: u0(:, :)          !! (n_dim, n_node) displacement at its start [L]
+      real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) and over it [L]
+   end type factor_base_t
+
+end module emcon_factor_base

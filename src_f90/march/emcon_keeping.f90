@@ -1,0 +1,167 @@
+!> Solves of a step whose corrections come from a factor that is kept over many steps: when there
+!> may be one, when it is made anew, and how its corrections are mixed.
+!>
+!> It is made anew on fixed increments, for another size of the step, and after a step that it has
+!> led through slowly. The state knows of which motion it was made, so that a run that was resumed
+!> makes the same one and has the bits of one that was not. Source: docs/theory.md, section 8.
+module emcon_keeping
+   use emcon_constraints, only : constraint_set_t
+   use emcon_correction, only : correction_t
+   use emcon_errors, only : error_t
+   use emcon_factor_base, only : factor_base_t
+   use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, kept_factor_renew, &
+      kept_factor_serves, kept_factor_take
+   use emcon_kinds, only : wp
+   use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
+   use emcon_motion, only : motion_t
+   use emcon_pose, only : instant_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: keeping_t, keeping_step, keeping_begin, keeping_make, keeping_renew, &
+      keeping_correct, keeping_give_up, keeping_commit, keeping_forget
+
+   !> A factor serves so many increments at most, and none after a step of more corrections.
+   integer, parameter :: most_increments = 20, most_corrections = 16
+
+   type :: keeping_t
+      logical :: is_wanted = .true.              !! in steps that it may serve
+      logical :: is_allowed = .false.            !! in the present step
+      type(factor_base_t) :: base                !! of the present factor
+      logical, private :: is_new = .false.       !! made in the present step
+      logical, private :: knows_set = .false.    !! it has taken the solve's constraints
+      type(instant_t), private :: start          !! of the present step
+      real(wp), private :: h = 0.0_wp            !! and its size [T]
+      integer, private :: increment = 0          !! increments done before it
+      integer, private :: n_correction = 0       !! in it
+      type(mixing_t), private :: mixing
+      real(wp), allocatable, private :: guess(:, :)      !! (n_dim, n_node) the solve's first [L]
+      real(wp), allocatable, private :: proposed(:)      !! (n_unknown) correction before mixing
+   end type keeping_t
+
+contains
+
+   !> Forget the factor, as what it is made of has changed.
+   pure subroutine keeping_forget(self, correction)
+      type(keeping_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+
+      call kept_factor_forget(correction%kept)
+      self%base%is_set = .false.
+   end subroutine keeping_forget
+
+   !> Before a step: may a factor be kept in it, and does the one there is still serve, or is lost?
+   pure subroutine keeping_step(self, correction, base, start, h, increment, is_lost)
+      type(keeping_t), intent(inout) :: self         !! `is_allowed` is set
+      type(correction_t), intent(inout) :: correction
+      type(factor_base_t), intent(in) :: base        !! of the state
+      type(instant_t), intent(in) :: start           !! of the step
+      real(wp), intent(in) :: h                      !! > 0 [T]
+      integer, intent(in) :: increment               !! increments done
+      logical, intent(out) :: is_lost                !! and `self%base` says how to make it again
+
+      is_lost = .false.
+      if (self%is_allowed) self%is_allowed = correction%kept%solver%has_halves()
+      if (.not. self%is_allowed) return
+      if (.not. correction%kept%is_made) self%base = base
+      if (abs(h - self%base%h) > 0.0_wp .or. self%base%n_correction > most_corrections .or. &
+         (mod(increment, most_increments) == 0 .and. increment /= self%base%increment)) &
+         call keeping_forget(self, correction)
+      is_lost = self%base%is_set .and. .not. correction%kept%is_made
+      self%start = start
+      self%h = h
+      self%increment = increment
+      self%n_correction = 0
+      self%is_new = .false.
+   end subroutine keeping_step
+
+   !> A solve begins from `du`.
+   pure subroutine keeping_begin(self, n_unknown, du)
+      type(keeping_t), intent(inout) :: self
+      integer, intent(in) :: n_unknown           !! > 0
+      real(wp), intent(in) :: du(:, :)           !! (n_dim, n_node) [L]
+
+      self%guess = du
+      if (allocated(self%proposed)) then
+         if (size(self%proposed) /= n_unknown) deallocate(self%proposed)
+      end if
+      if (.not. allocated(self%proposed)) allocate(self%proposed(n_unknown))
+      self%knows_set = .false.
+      call mixing_begin(self%mixing, n_unknown)
+   end subroutine keeping_begin
+
+   !> Let there be a factor, of the present tangent if it is a new one, that knows the constraints.
+   subroutine keeping_make(self, correction, system, set, motion, is_fit, error)
+      type(keeping_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(motion_t), intent(in) :: motion       !! that the tangent is of
+      logical, intent(out) :: is_fit             !! there is one
+      type(error_t), allocatable, intent(out) :: error
+
+      is_fit = self%knows_set
+      if (.not. is_fit) then
+         if (set%n > 0 .and. .not. correction%uses_null_space) return
+         if (.not. correction%kept%is_made) then
+            call kept_factor_renew(correction%kept, system%matrix, error)
+            if (allocated(error)) return
+            self%base = factor_base_t(correction%kept%is_made, self%increment, 0, self%start, &
+               self%h, motion%u0, motion%du)
+            self%is_new = .true.
+         end if
+         call kept_factor_take(correction%kept, set, is_fit, error)
+         if (allocated(error)) return
+         self%knows_set = is_fit
+      end if
+      if (is_fit) is_fit = kept_factor_serves(correction%kept, set)
+   end subroutine keeping_make
+
+   !> The next factor is to be of the tangent at the present place.
+   pure subroutine keeping_renew(self, correction)
+      type(keeping_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+
+      call keeping_forget(self, correction)
+      self%knows_set = .false.
+      call mixing_begin(self%mixing, size(self%proposed))
+   end subroutine keeping_renew
+
+   !> The next correction, where the last one was `dq`.
+   subroutine keeping_correct(self, correction, set, residual, dq, error)
+      type(keeping_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in), contiguous :: residual(:)    !! (n_unknown) with contact forces
+      real(wp), intent(inout), contiguous :: dq(:)       !! (n_unknown) [L]
+      type(error_t), allocatable, intent(out) :: error
+
+      call kept_factor_correct(correction%kept, set, residual, self%proposed, error)
+      if (allocated(error)) return
+      call mixing_move(self%mixing, self%proposed, dq)
+      self%n_correction = self%n_correction + 1
+   end subroutine keeping_correct
+
+   !> The factor does not lead to an end: no more of it in this step, and back to the first guess.
+   pure subroutine keeping_give_up(self, correction, du)
+      type(keeping_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+      real(wp), intent(out) :: du(:, :)          !! (n_dim, n_node) [L]
+
+      call keeping_forget(self, correction)
+      self%is_allowed = .false.
+      du = self%guess
+   end subroutine keeping_give_up
+
+   !> After a step: what the state has to know of the factor.
+   pure subroutine keeping_commit(self, base)
+      type(keeping_t), intent(inout) :: self
+      type(factor_base_t), intent(inout) :: base     !! of the state
+
+      self%base%n_correction = self%n_correction
+      if (self%is_new .and. self%base%is_set) base = self%base
+      base%is_set = self%base%is_set
+      base%n_correction = self%n_correction
+   end subroutine keeping_commit
+
+end module emcon_keeping

@@ -1,0 +1,159 @@
+!> Corrections by a kept factor: those of the saddle point, for the matrix and rows it was made of.
+module test_kept_factor
+   use check, only : check_near, check_true, test_case_t
+   use emcon_csr, only : csr_from_entries, csr_t
+   use emcon_errors, only : error_t
+   use emcon_kept_factor, only : kept_factor_correct, kept_factor_renew, kept_factor_serves, &
+      kept_factor_t, kept_factor_take
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_solver_registry, only : solver_create, solver_default
+   use emcon_sparse_solver, only : matrix_definite
+   use random_constraints, only : make_problem, problem_t, tol_dp
+   use sparse_samples, only : dense_of
+   implicit none
+   private
+   public :: collect_kept_factor
+
+contains
+
+   subroutine collect_kept_factor(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("the correction of the saddle point", test_correction), &
+         test_case_t("no correction where nothing is left", test_fixed_point), &
+         test_case_t("no factor of a pattern that is not symmetric", test_pattern), &
+         test_case_t("no factor of what is not definite", test_indefinite), &
+         test_case_t("strong curvature is told", test_curvature)]
+   end subroutine collect_kept_factor
+
+   !> [K, G^T; G, 0] [dq; -mu] = -[r; c] by LAPACK, with K = (N + N^T)/2.
+   subroutine test_correction(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      real(dp), allocatable :: full(:, :), rhs(:, :), x(:, :)
+      real(wp), allocatable :: dq(:)
+      logical :: is_fit, is_singular
+      integer :: n, m
+
+      call prepare(problem, kept, is_fit, error)
+      if (allocated(error)) return
+      call check_true(error, kept%is_made .and. is_fit, "there is a factor")
+      n = problem%numbering%n_unknown
+      m = problem%set%n
+      allocate(dq(n))
+      call kept_factor_correct(kept, problem%set, problem%residual, dq, error)
+      if (allocated(error)) return
+      allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
+      full(:n, :n) = 0.5_dp*(dense_of(problem%base) + transpose(dense_of(problem%base)))
+      full(n + 1:, :n) = dense_of(problem%set%gap_rows)
+      full(:n, n + 1:) = transpose(full(n + 1:, :n))
+      rhs(:n, 1) = -real(problem%residual, dp)
+      rhs(n + 1:, 1) = -real(problem%set%defect, dp)
+      call dense_solve(full, rhs, x, is_singular)
+      call check_near(error, dq, real(x(:n, 1), wp), tol_dp, maxval(abs(dq)), "dq")
+      call kept%solver%free()
+   end subroutine test_correction
+
+   !> A residual that the constraints bear, and no defect.
+   subroutine test_fixed_point(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      real(wp), allocatable :: dq(:)
+      logical :: is_fit
+
+      call prepare(problem, kept, is_fit, error)
+      if (allocated(error)) return
+      allocate(dq(problem%numbering%n_unknown))
+      problem%set%defect = 0.0_wp
+      problem%residual = real(matmul(transpose(dense_of(problem%set%gap_rows)), &
+         real(problem%set%lam, dp)), wp)
+      call kept_factor_correct(kept, problem%set, problem%residual, dq, error)
+      if (allocated(error)) return
+      call check_near(error, dq, 0.0_wp*dq, tol_dp, maxval(abs(problem%residual)), "dq")
+      call kept%solver%free()
+   end subroutine test_fixed_point
+
+   subroutine test_pattern(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+
+      call make_problem(problem)
+      call solver_create(solver_default, matrix_definite, kept%solver)
+      call kept_factor_renew(kept, problem%base, error)
+      if (.not. allocated(error)) call check_true(error, .not. kept%is_made, "no factor")
+      call kept%solver%free()
+   end subroutine test_pattern
+
+   subroutine test_indefinite(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      logical :: is_fit
+
+      call make_symmetric(problem)
+      problem%base%value = -problem%base%value
+      call solver_create(solver_default, matrix_definite, kept%solver)
+      call kept_factor_renew(kept, problem%base, error)
+      if (allocated(error)) return
+      call check_true(error, .not. kept%is_made, "no factor")
+      call kept_factor_take(kept, problem%set, is_fit, error)
+      call check_true(error, .not. is_fit, "nothing to solve with")
+      call kept%solver%free()
+   end subroutine test_indefinite
+
+   !> At a kink the second derivative of a gap is as large as one likes.
+   subroutine test_curvature(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      logical :: is_fit
+
+      call prepare(problem, kept, is_fit, error)
+      if (allocated(error)) return
+      problem%set%lam = 0.01_wp
+      call check_true(error, kept_factor_serves(kept, problem%set), "it is small")
+      problem%set%item(3)%h = 1.0e6_wp*problem%set%item(3)%h
+      call check_true(error, .not. kept_factor_serves(kept, problem%set), "one is large")
+      call kept%solver%free()
+   end subroutine test_curvature
+
+   !> The factor of a problem, with its constraints.
+   subroutine prepare(problem, kept, is_fit, error)
+      type(problem_t), intent(out) :: problem
+      type(kept_factor_t), intent(inout) :: kept
+      logical, intent(out) :: is_fit
+      type(error_t), allocatable, intent(out) :: error
+
+      call make_symmetric(problem)
+      call solver_create(solver_default, matrix_definite, kept%solver)
+      call kept_factor_renew(kept, problem%base, error)
+      if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
+   end subroutine prepare
+
+   !> A problem whose matrix has a symmetric pattern: N and entries of zero.
+   subroutine make_symmetric(problem)
+      type(problem_t), intent(out) :: problem
+      type(csr_t) :: base
+      integer, allocatable :: slot(:), row(:)
+      integer :: i, k
+
+      call make_problem(problem)
+      base = problem%base
+      allocate(row(size(base%column)))
+      do i = 1, base%n_row
+         row(base%row_start(i) + 1:base%row_start(i + 1)) = i
+      end do
+      call csr_from_entries(problem%base, base%n_row, base%n_col, [row, base%column + 1], &
+         [base%column + 1, row], slot)
+      problem%base%value = 0.0_dp
+      do k = 1, size(row)
+         problem%base%value(slot(k)) = base%value(k)
+      end do
+   end subroutine make_symmetric
+
+end module test_kept_factor
