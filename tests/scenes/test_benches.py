@@ -7,6 +7,9 @@ import pytest
 from scene_tools import CRASH, DECKS, ROOT, emcon
 
 BENCH = ROOT / "tests" / "bench"
+sys.path.insert(0, str(BENCH))
+
+from bench_counts import rises  # noqa: E402
 
 
 def run(*command):
@@ -23,6 +26,20 @@ def test_bench(name, least):
     """Its tables are there; their figures are nothing to judge by."""
     lines = run(BENCH / f"{name}.py", "--short").splitlines()
     assert len([line for line in lines if line]) >= least
+
+
+def test_counts_that_rise_are_told():
+    """By more than three per cent, of those that are stored; new ones are none."""
+    stored = {"ring": {"newton": 100, "tangents": 100, "cuts": 0}}
+    found = {"ring": {"newton": 104, "tangents": 103, "cuts": 0, "new": 5}, "other": {"newton": 9}}
+    assert rises(stored, found) == (["ring: newton 100 -> 104"], [])
+    assert rises(found, stored) == ([], ["ring: newton 104 -> 100"])
+    assert rises(stored, {"ring": {"cuts": 1}})[0]
+
+
+def test_table_of_phases():
+    lines = run(BENCH / "bench_counts.py", "--phases", "--short").splitlines()
+    assert any(line.startswith("| factorise |") for line in lines)
 
 
 def test_chapter_of_the_book():

@@ -1,0 +1,131 @@
+"""What the program does, counted: against stored counts, and by phases for rings of three sizes.
+
+    .venv/bin/python tests/bench/bench_counts.py            # compare with tests/bench/counts.json
+    .venv/bin/python tests/bench/bench_counts.py --phases   # the table of docs/performance.md
+    ... --update                                            # write what was found into either
+
+Counts that are more than three per cent above those stored make it fail; seconds are printed, and
+nothing is judged by them. `--short` for the quickest scene. What increments allocate is counted by
+tests/scenes/test_off.py.
+"""
+
+import argparse
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+
+from scene_tools import DECKS, ROOT, run_deck  # noqa: E402
+from verification import update  # noqa: E402
+
+STORE = pathlib.Path(__file__).with_name("counts.json")
+PAGE = ROOT/"docs/performance.md"
+#: A count may rise by this factor.
+MOST = 1.03
+SCENES = {
+    "two_bodies": {"h": 0.05, "t_end": 2},
+    "ring": {"h": 0.04, "t_end": 4},
+    "ring, MORTAR": {"h": 0.04, "t_end": 4, "formulation": "MORTAR"},
+    "ring, massless": {"h": 0.04, "t_end": 4, "initiation": "MASSLESS"},
+    "spinning_ring": {"h": 0.05, "t_end": 2},
+    "tied_ring": {"h": 0.05, "t_end": 2},
+    "self_contact": {},
+    "press_fit": {},
+    "hertz": {},
+}
+#: Of the verdict, beside `counts`.
+OWN = ("increments", "newton", "cuts")
+RINGS = (("64x4", "60x5"), ("128x8", "120x10"), ("256x16", "240x20"))
+INCREMENTS = 50
+
+
+def count(name, folder):
+    """Counts of a scene, and the seconds it took."""
+    deck = DECKS/f"{name.split(',')[0]}.inp"
+    verdict = run_deck(deck, folder, **SCENES[name]).verdict
+    counts = {key: verdict[key] for key in OWN} | verdict["counts"]
+    return counts, sum(verdict["seconds"].values())
+
+
+def rises(stored, found):
+    """What is told of counts: those that rose by more than is allowed, those that fell by as much."""
+    above, below = [], []
+    for scene, counts in found.items():
+        for name, n in counts.items():
+            before = stored.get(scene, {}).get(name)
+            if before is None:
+                continue
+            text = f"{scene}: {name} {before} -> {n}"
+            if n > MOST*before:
+                above.append(text)
+            elif before > MOST*n:
+                below.append(text)
+    return above, below
+
+
+def compare(scenes, writes):
+    """Run `scenes`, print their counts; whether none has risen."""
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in scenes:
+            found[name], seconds = count(name, folder)
+            told = ", ".join(f"{n} {key}" for key, n in found[name].items())
+            print(f"{name}: {told}; {seconds:.2f} s", flush=True)
+    stored = json.loads(STORE.read_text()) if STORE.exists() else {}
+    above, below = rises(stored, found)
+    for text in below:
+        print("fallen:", text, "(--update keeps that)")
+    for text in above:
+        print("RISEN:", text)
+    if writes:
+        STORE.write_text(json.dumps(stored | found, indent=1) + "\n")
+    return writes or not above
+
+
+def phases(sizes):
+    """Lines of the table of phases: milliseconds per increment, and shares."""
+    columns = []
+    with tempfile.TemporaryDirectory() as folder:
+        for ring, block in sizes:
+            deck = pathlib.Path(folder)/f"ring_{ring}.inp"
+            subprocess.run([sys.executable, DECKS/"make_ring.py", "--ring", ring, "--block", block,
+                            "--output", deck], check=True)
+            run = run_deck(deck, folder, h=0.01, t_end=0.01*INCREMENTS, frame=1)
+            unknowns = int(re.search(r"(\d+) unknowns in step 1", run.log)[1])
+            columns.append((unknowns, run.verdict["seconds"], run.verdict["counts"]))
+    lines = ["| phase | " + " | ".join(f"{n} unknowns" for n, _, _ in columns) + " |",
+             "|---"*(len(columns) + 1) + "|"]
+    for name in columns[0][1]:
+        cells = []
+        for _, seconds, _ in columns:
+            per = 1e3*seconds[name]/INCREMENTS
+            cells.append(f"{per:.3g} ms, {100*seconds[name]/sum(seconds.values()):.1f} %")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    lines.append("| all | " + " | ".join(
+        f"{1e3*sum(seconds.values())/INCREMENTS:.3g} ms" for _, seconds, _ in columns) + " |")
+    for name in ("tangents", "residuals", "factorisations", "solutions", "searched", "measured"):
+        lines.append(f"| {name} per increment | " + " | ".join(
+            f"{counts[name]/INCREMENTS:.2f}" for _, _, counts in columns) + " |")
+    return lines
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    for name in ("phases", "update", "short"):
+        parser.add_argument(f"--{name}", action="store_true")
+    options = parser.parse_args()
+    if options.phases:
+        lines = phases(RINGS[:1] if options.short else RINGS)
+        print("\n".join(lines))
+        if options.update:
+            PAGE.write_text(update(PAGE.read_text(), "phases", lines))
+    elif not compare(["two_bodies"] if options.short else SCENES, options.update):
+        sys.exit("counts have risen by more than three per cent")
+
+
+if __name__ == "__main__":
+    main()
