@@ -281,11 +281,13 @@ contains
       associate (stencil => self%polygon(1, i), n => self%polygon(1, i)%n, &
             before => self%polygon(1, i)%before, after => self%polygon(1, i)%after)
          call stencil_gather(x, u0, du, n, stencil%node, local, dlocal)
-         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap0, xi0)
+         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap0, xi0, &
+            stencil%goes_around)
          do k = 1, n
             local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
          end do
-         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap1, xi1)
+         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap1, xi1, &
+            stencil%goes_around)
          state%gap0 = state%gap0 - self%offset
          state%gap1 = state%gap1 - self%offset
          state%size = stencil_length(x, stencil%node)
@@ -310,6 +312,7 @@ contains
 
       call polygon_stencil(stencil, self%master, self%node(i), edge, &
          self%rounding*[1.0_wp, merge(0.0_wp, 1.0_wp, self%is_sharp)], x, u0)
+      stencil%goes_around = self%offset > 0.0_wp
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then
             if (.not. bears(self, i, self%master%next(edge), x, u0)) then

@@ -59,7 +59,7 @@ contains
       associate (n => stencil%n, node => stencil%node)
          call stencil_gather(x, u0, du, n, node, local, dlocal)
          gap = nts_gap(local(:, :n), dlocal(:, :n), stencil%before, stencil%after, &
-            stencil%rounding)
+            stencil%rounding, stencil%goes_around)
          do k = 1, n
             at(2*k) = 2*findloc(item%node(:item%n_node), node(k), 1)
             at(2*k - 1) = at(2*k) - 1

@@ -26,6 +26,7 @@ module emcon_nts_stencil
       integer :: n = 0
       integer :: node(5) = 0
       integer :: before = 0, after = 0           !! local numbers of the neighbours' nodes; 0: none
+      logical :: goes_around = .false.           !! convex corners, as a circle does
       real(wp) :: rounding(2, 2) = 0.0_wp        !! (concave and convex; before and after) half
                                                  !! widths of the rounded corners [L]
    end type polygon_stencil_t

@@ -38,7 +38,8 @@ contains
          test_case_t("tiny steps", test_tiny), &
          test_case_t("momenta", test_momenta), &
          test_case_t("gradient and second derivatives", test_derivatives), &
-         test_case_t("rigid motions leave the gap", test_rigid)]
+         test_case_t("rigid motions leave the gap", test_rigid), &
+         test_case_t("around convex corners", test_around)]
    end subroutine collect_nts_gap
 
    !> Distance from a line, whichever neighbours there are, at any angle.
@@ -336,5 +337,66 @@ contains
          call check_near(error, a%f1, a%f0, tol, 20.0_wp, "values")
       end do
    end subroutine test_rigid
+
+   !> Around convex corners the gap is the distance; exact, with its derivatives, as elsewhere.
+   subroutine test_around(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), mid(2, 5), move(2, 5), way(2, 5), gap(2), xi, step
+      type(dg_t) :: a, up, down
+      integer :: i, k, j, n_beyond
+
+      step = eps**(1.0_wp/3.0_wp)
+      n_beyond = 0
+      do i = 1, 200
+         call shake(move, 0.05_wp)
+         call shake(dx, 0.15_wp)
+         x0 = flat + move
+         x0(2, 4:5) = x0(2, 4:5) - [0.9_wp, 0.7_wp]
+         call random_number(x0(:, 1))
+         x0(:, 1) = [-0.5_wp, 0.4_wp] + [2.0_wp, 0.3_wp]*x0(:, 1)
+         a = nts_gap(x0, dx, 4, 5, round, goes_around=.true.)
+         call nts_gap_value(x0, 4, 5, round, gap(1), xi, goes_around=.true.)
+         if (abs(xi - 0.5_wp) > 0.6_wp) n_beyond = n_beyond + 1
+         call nts_gap_value(x0 + dx, 4, 5, round, gap(2), xi, goes_around=.true.)
+         call check_near(error, [a%f0, a%f1], gap, tol, 2.0_wp, "values")
+         call check_near(error, gap, [distance(x0), distance(x0 + dx)], tol, 4.0_wp, "distances")
+         g = reshape(a%g, [2, 5])
+         mid = x0 + 0.5_wp*dx
+         call check_near(error, sum(g*dx), gap(2) - gap(1), tol, 8.0_wp*sum(abs(g*dx)), "identity")
+         call check_near(error, sum(g, dim=2), [0.0_wp, 0.0_wp], tol, sum(abs(g)), "linear")
+         call check_near(error, sum(mid(1, :)*g(2, :) - mid(2, :)*g(1, :)), 0.0_wp, tol, &
+            sum(abs(g))*maxval(abs(mid)), "angular")
+         do j = 1, 10
+            k = (j + 1)/2
+            way = 0.0_wp
+            way(j - 2*k + 2, k) = step
+            up = nts_gap(x0, dx + way, 4, 5, round, goes_around=.true.)
+            down = nts_gap(x0, dx - way, 4, 5, round, goes_around=.true.)
+            ! The curvature jumps where the corner begins to count.
+            call check_near(error, a%c(j), (up%f1 - down%f1)/(2.0_wp*step), 16.0_wp*step, 1.0_wp, &
+               "gradient")
+            if (maxval(abs(up%c + down%c - 2.0_wp*a%c)) > 1.0e3_wp*step**2) cycle
+            call check_near(error, a%h(:, j), (up%g - down%g)/(2.0_wp*step), 1.0e3_wp*step**2, &
+               1.0_wp + maxval(abs(a%h)), "column " // to_text(j))
+         end do
+      end do
+      call check_true(error, n_beyond > 30, "corners are gone around")
+   end subroutine test_around
+
+   !> Distance of the first node from the chain of the others.
+   pure real(wp) function distance(x)
+      real(wp), intent(in) :: x(2, 5)
+      integer, parameter :: chain(4) = [4, 2, 3, 5]
+      real(wp) :: a(2), b(2)
+      integer :: i
+
+      distance = huge(distance)
+      do i = 1, 3
+         a = x(:, chain(i + 1)) - x(:, chain(i))
+         b = x(:, 1) - x(:, chain(i))
+         b = b - max(0.0_wp, min(1.0_wp, dot_product(a, b)/dot_product(a, a)))*a
+         distance = min(distance, norm2(b))
+      end do
+   end function distance
 
 end module test_nts_gap

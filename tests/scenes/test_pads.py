@@ -147,3 +147,35 @@ def test_no_pad_is_nothing(tmp_path):
         deck.replace("NAME=SMOOTH", f"NAME=SMOOTH{pad}")
         bits.append(run_deck(deck, tmp_path/str(k), formulation="MORTAR").digits())
     assert bits[0] == bits[1]
+
+
+def over_the_edge(h, push):
+    """A rigid disc on a fixed table goes over its corner: a deck, and the corner."""
+    scene = Scene(h, 0.9, gravity=4.0)
+    scene.block("TABLE", (-2.0, -1.0), (2.0, 1.0), (4, 2)).hold("TABLE", lambda *_: True)
+    scene.disc("DISC", (-0.2, RADIUS + 1e-6), 0.9*RADIUS, (4, 2))
+    scene.pairs = [("CENTRE", "TABLE")]
+    text = scene.deck().text()
+    cards = (f"*NODE\n5000, -0.2, {RADIUS + 1e-6}\n*RIGID BODY, ELSET=DISC, REF NODE=5000\n"
+             "*SURFACE, NAME=CENTRE, TYPE=NODE\n5000\n*INITIAL CONDITIONS, TYPE=VELOCITY\n"
+             f"5000, 1, {push}\n")
+    text = text.replace("*SURFACE INTERACTION", cards + "*SURFACE INTERACTION", 1)
+    return with_pad(Deck(text), RADIUS)
+
+
+def test_a_disc_goes_around_a_corner(tmp_path):
+    """It pivots about the corner, at its radius, till it flies: where v^2 = g r cos(angle)."""
+    run = run_deck(over_the_edge(0.005, 0.5), tmp_path, formulation="NODE TO SURFACE")
+    history, fields = run.history, run.fields()
+    x = (fields.x + fields["displacement"])[:, -1]               # of the centre
+    beside = np.maximum(x, 0.0)
+    away = np.where(x[:, 0] < 0, x[:, 1], np.hypot(x[:, 0], beside[:, 1]))
+    assert away.min() > RADIUS
+    turning = (x[:, 0] > 0) & (history["active"] > 0)
+    assert turning.sum() > 20
+    assert np.abs(away[turning] - RADIUS).max() < 2e-6
+    assert balance(history) < 1e-12
+    # Energy: v^2 = v0^2 + 2 g r (1 - cos), so it flies at cos = (v0^2/(g r) + 2)/3.
+    leaves = (0.5**2/(4.0*RADIUS) + 2)/3
+    last = np.flatnonzero(turning)[-1]
+    assert x[last, 1]/RADIUS == pytest.approx(leaves, abs=0.01)
