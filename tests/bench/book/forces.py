@@ -202,9 +202,53 @@ def bowls(futures, _):
     return table(["surfaces", "formulation", "h", "start", "in contact", "period", "energy"], rows)
 
 
+# ---- a disc in a ring, for long -----------------------------------------------------------------
+
+PERIODS = 50
+
+
+def in_ring(h):
+    """A rigid disc, a circle, is let go in a rigid ring of arcs."""
+    way = BOWL - RADIUS - 1e-8
+    middle = way*math.sin(ANGLE), -way*math.cos(ANGLE)
+    scene = Scene(h, math.ceil(PERIODS*exact_period()/h + 1)*h, gravity=GRAVITY)
+    scene.disc("DISC", middle, RADIUS, (4, 2))
+    scene.pairs = [("CENTRE", "RING")]
+    arcs = "".join(f"CIRCL, {x}, {y}, 0., 0.\n" for x, y in ((0, -1), (1, 0), (0, 1), (-1, 0)))
+    cards = (f"*NODE\n90000, 0., 0.\n90001, {middle[0]!r}, {middle[1]!r}\n"
+             f"*SURFACE, NAME=RING, TYPE=SEGMENTS\nSTART, -1., 0.\n{arcs}"
+             "*RIGID BODY, ANALYTICAL SURFACE=RING, REF NODE=90000\n"
+             "*RIGID BODY, ELSET=DISC, REF NODE=90001\n*SURFACE, NAME=CENTRE, TYPE=NODE\n90001\n"
+             "*BOUNDARY\n90000, 1, 2\n90000, 6\n")
+    text = scene.deck("ONE").text().replace(
+        "*SURFACE INTERACTION, NAME=SMOOTH",
+        f"{cards}*SURFACE INTERACTION, NAME=SMOOTH, PAD THICKNESS={RADIUS}")
+    for request in ("*NODE FILE", "*CONTACT FILE", "*CONTACT PRINT"):
+        text = text.replace(request, f"{request}, FREQUENCY=1000000")
+    return Deck(text)
+
+
+def start_circle(runs):
+    return {h: runs.start(in_ring(h), initiation="PERSISTENT", formulation="NODE TO SURFACE",
+                          smoothing="HERMITE") for h in (0.02, 0.01, 0.005)}
+
+
+def circles(futures, _):
+    rows = []
+    for h, future in futures.items():
+        history = future.result().history
+        acts = history["active"][1:] > 0
+        longer = period(history["time"], history["px"])/exact_period() - 1
+        rows.append((f"{h:g}", str(len(acts)), f"{100*acts.mean():.0f} %", f"{100*longer:+.4f} %",
+                     f"{history['newton'][1:].mean():.1f}",
+                     size(np.abs(history["total"]).max()/history["kinetic"].max())))
+    return table(["h", "increments", "in contact", "mean period", "iterations", "energy"], rows)
+
+
 CHAPTERS = [
     Chapter("forces_bar", start_bar, bars),
     Chapter("forces_order", start_order, orders),
     Chapter("forces_ring", start_ring, rings),
     Chapter("forces_bowl", start_bowl, bowls),
+    Chapter("forces_circle", start_circle, circles),
 ]
