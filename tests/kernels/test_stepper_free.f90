@@ -14,7 +14,7 @@ module test_stepper_free
       stepper_set_load, stepper_set_prescribed
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
-   use emcon_steps, only : load_point, load_t
+   use emcon_steps, only : load_point, load_t, newton_full
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, prescribe, shake, young
    use stepper_scenes, only : check_same_state, drop_h, make_drop, make_tied_drop, open_scene
@@ -308,6 +308,7 @@ contains
       integer :: k
 
       call make_drop(scene, 20)
+      scene%step%newton = newton_full            ! a kept factor does not come along
       call open_scene(stepper, scene, error)
       if (.not. allocated(error)) call open_scene(fresh, scene, error)
       do k = 1, 10
