@@ -126,13 +126,16 @@ LDFLAGS_sanitize := $(SANITIZE) -static-libubsan
 FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(if $(GPL),-DEMCON_PERMISSIVE) \
 	$(FFLAGS)
 CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(MUMPS_CFLAGS) $(CFLAGS)
+# The vector unit of the loops over elements side by side: that of this machine's level, up to AVX2.
+# VECTOR= builds for all machines, -march=native -mprefer-vector-width=512 takes AVX-512 where it is.
+VECTOR ?= $(if $(shell grep -m1 -o -w avx2 /proc/cpuinfo 2> /dev/null),-march=x86-64-v3)
 LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS)
 
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
 # Read by cat: $(file <...) of GNU make 4.3 loses text when its buffer has to grow.
 ifdef COMPILER
 $(shell mkdir -p $(O) $(BUILD)/mod)
-FLAGS := $(strip $(COMPILER) $(FCOMPILE) $(CCOMPILE) $(LIBS))
+FLAGS := $(strip $(COMPILER) $(FCOMPILE) $(VECTOR) $(CCOMPILE) $(LIBS))
 ifneq ($(shell cat $(BUILD)/flags.txt 2> /dev/null),$(FLAGS))
 $(file >$(BUILD)/flags.txt,$(FLAGS))
 endif
@@ -181,6 +184,15 @@ $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 # time of the library. `private`: what is made on the way keeps its own flags.
 HOLDERS := $(addprefix emcon_,c c_by_hand model run stepper stepper_query)
 $(HOLDERS:%=$(O)/%.o): private FFLAGS_release := -O0 -g1
+
+# Loops over points side by side: a law in numbers that the compiler takes apart, so that it sees the
+# whole of it at once. No sum over lanes, no fused product: with any VECTOR=... the bits are the same.
+LANES := $(addprefix emcon_law_,linear neo_hooke coupled_neo_hooke mooney_rivlin yeoh) emcon_element_pack_plane
+$(LANES:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd -fno-trapping-math \
+	-fno-semantic-interposition -Wno-unused-function -finline-limit=1000000 \
+	$(addprefix --param ,inline-unit-growth=100000 large-function-growth=1000000 \
+	large-stack-frame=1000000 max-completely-peel-times=32 max-completely-peeled-insns=2000 \
+	sra-max-propagations=1000 sra-max-scalarization-size-Ospeed=2000) $(VECTOR)
 
 # The kernel tests are compiled once, with all checks: those of `debug` are these with its library.
 KERNEL_OBJ := $(call objects,$(KERNEL_SRC))

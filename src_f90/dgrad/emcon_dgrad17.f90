@@ -3,7 +3,8 @@
 !>
 !> Source: docs/theory.md, section 2.
 module emcon_dgrad17
-   use emcon_dgrad_series, only : atanh_excess, expm1_of, log1p_excess, log1p_of, sinh_ratio
+   use emcon_dgrad_series, only : atanh_excess, exp_of, expm1_of, log1p_excess, log1p_of, &
+      sinh_ratio
    use emcon_kinds, only : wp
    use emcon_rounded, only : above_negative, above_negative_chord, above_negative_slope, &
       rounded_chord, rounded_clip, rounded_negative, rounded_negative_chord, &

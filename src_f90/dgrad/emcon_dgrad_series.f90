@@ -5,7 +5,7 @@ module emcon_dgrad_series
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: atanh_excess, log1p_of, log1p_excess, expm1_of, sinh_ratio
+   public :: atanh_excess, log1p_of, log1p_excess, exp_of, expm1_of, sinh_ratio
    public :: cosh_excess, cosh_chord
 
    !> Below this the power series is used; 1/4 costs at most 14 terms in double precision.
@@ -85,6 +85,13 @@ contains
          log1p_excess = a*w - 2.0_wp*w*excess
       end if
    end function log1p_excess
+
+   !> exp(a)
+   elemental real(wp) function exp_of(a)
+      real(wp), intent(in) :: a
+
+      exp_of = exp(a)
+   end function exp_of
 
    !> exp(a) - 1
    elemental real(wp) function expm1_of(a)

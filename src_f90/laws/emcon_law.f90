@@ -5,14 +5,19 @@
 !> tangent follow here for all laws. In terms of E nothing cancels at small strains, as
 !> det C - 1 = 2 e1 + 4 e2 + 8 e3. Source: docs/theory.md, eq. (7).
 module emcon_law
-   use emcon_dgrad3, only : dg_excess, dg_log1p, dg_sqrt, dg_t, dg_variable, operator(+), &
-      operator(*), operator(-), operator(/)
+   use emcon_dgrad3, only : dg_t, dg_variable
+   use emcon_invariants, only : isochoric_excess, volume_energy, volume_excess
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
    implicit none
    private
-   public :: law_t, law_box_t, law_response_t, law_response_plane, volume_excess
+   public :: law_t, law_box_t, law_points_t, law_response_t, n_lane
+   public :: law_response_plane, law_respond_one, volume_excess
    public :: claim, isochoric_excess, lame_constants, take_elastic, volume_energy
+
+   !> Points that are computed side by side. No lane knows of another: the bits of a point depend
+   !> neither on its place nor on how many lanes the machine takes at a time.
+   integer, parameter :: n_lane = 8
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
@@ -21,6 +26,7 @@ module emcon_law
    contains
       procedure(take_interface), deferred :: take
       procedure(energy_interface), deferred :: energy
+      procedure :: respond => law_respond
    end type law_t
 
    !> For arrays of laws of different types.
@@ -54,6 +60,15 @@ module emcon_law
       real(wp) :: tangent(3, 3) = 0.0_wp         !! derivative of S_alg by E1
    end type law_response_t
 
+   !> The same for points side by side.
+   type :: law_points_t
+      real(wp) :: strain(n_lane, 3) = 0.0_wp     !! at the start: E11, E22, 2 E12
+      real(wp) :: dstrain(n_lane, 3) = 0.0_wp
+      real(wp) :: energy(n_lane) = 0.0_wp
+      real(wp) :: stress(n_lane, 3) = 0.0_wp
+      real(wp) :: tangent(n_lane, 3, 3) = 0.0_wp
+   end type law_points_t
+
 contains
 
    !> Response to a strain that goes from `strain` to `strain + dstrain` in plane strain:
@@ -62,73 +77,50 @@ contains
       class(law_t), intent(in) :: law
       real(wp), intent(in) :: strain(3), dstrain(3)   !! E11, E22, 2 E12
       type(law_response_t), intent(out) :: response
+      type(law_points_t) :: points
       type(dg_t) :: e1, e2, e3, w
-      real(wp) :: mean(3), last(3), g2(3), c2(3), t1(3), t2(3)
-      real(wp), parameter :: g1(3) = [1.0_wp, 1.0_wp, 0.0_wp]
 
-      mean = strain + 0.5_wp*dstrain
-      last = strain + dstrain
-      g2 = [mean(2), mean(1), -0.5_wp*mean(3)]
-      c2 = [last(2), last(1), -0.5_wp*last(3)]
-      e1 = dg_variable(1, strain(1) + strain(2), dstrain(1) + dstrain(2))
-      e2 = dg_variable(2, strain(1)*strain(2) - 0.25_wp*strain(3)**2, dot_product(g2, dstrain))
+      points%strain(1, :) = strain
+      points%dstrain(1, :) = dstrain
+      call plane_invariants(points, 1, e1, e2)
       e3 = dg_variable(3, 0.0_wp, 0.0_wp)
       w = law%energy(e1, e2, e3)
-
-      response%energy = w%f1
-      response%stress = w%g(1)*g1 + w%g(2)*g2
+      call plane_stress(w, 1, points)
+      call plane_tangent(w, 1, points)
+      response%energy = points%energy(1)
+      response%stress = points%stress(1, :)
       response%stress_33 = w%g(1) + w%g(2)*e1%f1 + w%g(3)*e2%f1
-      t1 = w%h(1, 1)*g1 + w%h(2, 1)*g2
-      t2 = w%h(1, 2)*g1 + w%h(2, 2)*g2
-      response%tangent(:, 1) = t1*g1(1) + t2*c2(1)
-      response%tangent(:, 2) = t1*g1(2) + t2*c2(2)
-      response%tangent(:, 3) = t2*c2(3)
-      response%tangent(1, 2) = response%tangent(1, 2) + 0.5_wp*w%g(2)
-      response%tangent(2, 1) = response%tangent(2, 1) + 0.5_wp*w%g(2)
-      response%tangent(3, 3) = response%tangent(3, 3) - 0.25_wp*w%g(2)
+      response%tangent = points%tangent(1, :, :)
    end subroutine law_response_plane
 
-   !> det C - 1 = 2 e1 + 4 e2 + 8 e3: docs/theory.md, eq. (7).
-   pure function volume_excess(e1, e2, e3) result(y)
-      type(dg_t), intent(in) :: e1, e2, e3
-      type(dg_t) :: y
+   !> Response of points side by side, one after the other. A law that can take several at a time
+   !> overrides this, as emcon_law_neo_hooke does: the same to round-off.
+   pure subroutine law_respond(self, points, with_tangent)
+      class(law_t), intent(in) :: self
+      type(law_points_t), intent(inout) :: points
+      logical, intent(in) :: with_tangent        !! else the tangent stays as it is
+      integer :: l
 
-      y = 2.0_wp*e1 + 4.0_wp*e2 + 8.0_wp*e3
-   end function volume_excess
-
-   !> z with 3 exp(z) = J^(-2k/3) I_k, an invariant of C without its change of volume:
-   !> z = ln(1 + a) - k/3 ln(1 + y), a = I_k/3 - 1. At small strains only second-order terms may be
-   !> left: z = k/3 phi(y) - phi(a) + rest, phi(x) = x - ln(1 + x); at large ones it is these that
-   !> would cancel. Source: docs/theory.md, eq. (8).
-   pure function isochoric_excess(part, a, y, rest) result(z)
-      real(wp), intent(in) :: part               !! k/3; k = 1: I_1 = tr C; k = 2: I_2 = tr cof C
-      type(dg_t), intent(in) :: a, y             !! y = det C - 1
-      type(dg_t), intent(in) :: rest             !! a - k y/3
-      type(dg_t) :: z
-      real(wp), parameter :: small = 0.5_wp
-
-      if (max(abs(a%f0), abs(a%f1), abs(y%f0), abs(y%f1)) < small) then
-         z = part*dg_excess(y) - dg_excess(a) + rest
-      else
-         z = dg_log1p(a) - part*dg_log1p(y)
-      end if
-   end function isochoric_excess
-
-   !> Sum of (J - 1)^(2 i)/D_i; a D_i of 0 has no term.
-   pure function volume_energy(d, y) result(w)
-      real(wp), intent(in) :: d(:)               !! [L T^2/M]
-      type(dg_t), intent(in) :: y                !! J^2 - 1
-      type(dg_t) :: w, volume, square, power
-      integer :: i
-
-      volume = y/(dg_sqrt(y + 1.0_wp) + 1.0_wp)
-      square = volume*volume
-      power = square
-      do i = 1, size(d)
-         if (i > 1) power = power*square
-         if (abs(d(i)) > 0.0_wp) w = w + (1.0_wp/d(i))*power
+      do l = 1, n_lane
+         call law_respond_one(self, l, with_tangent, points)
       end do
-   end function volume_energy
+   end subroutine law_respond
+
+   !> Response of the point in lane `l`, whatever its strain.
+   pure subroutine law_respond_one(law, l, with_tangent, points)
+      class(law_t), intent(in) :: law
+      integer, intent(in) :: l                   !! 1..n_lane
+      logical, intent(in) :: with_tangent        !! else the tangent stays as it is
+      type(law_points_t), intent(inout) :: points
+      type(dg_t) :: e1, e2, w
+
+      call plane_invariants(points, l, e1, e2)
+      w = law%energy(e1, e2, dg_variable(3, 0.0_wp, 0.0_wp))
+      call plane_stress(w, l, points)
+      if (with_tangent) call plane_tangent(w, l, points)
+   end subroutine law_respond_one
+
+   include "emcon_law_plane.inc"
 
    !> Lame's constants from Young's modulus and Poisson's ratio.
    pure subroutine lame_constants(young, nu, lam, mu)

@@ -1,8 +1,8 @@
 !> Coupled neo-Hookean law: W = mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2.
 module emcon_law_coupled_neo_hooke
-   use emcon_dgrad3, only : dg_t, dg_excess, dg_log1p, operator(*), operator(-), operator(+)
+   use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : law_t, take_elastic, volume_excess
+   use emcon_law, only : law_points_t, law_respond_one, law_t, n_lane, take_elastic
    implicit none
    private
    public :: law_coupled_neo_hooke_t
@@ -12,8 +12,12 @@ module emcon_law_coupled_neo_hooke
       real(wp) :: mu = 0.0_wp
    contains
       procedure :: take => coupled_neo_hooke_take
-      procedure :: energy => coupled_neo_hooke_energy
+      procedure :: energy
+      procedure :: respond
    end type law_coupled_neo_hooke_t
+
+   logical, parameter :: is_near = .true.
+   include "../dgrad/emcon_dgrad_operators.inc"
 
 contains
 
@@ -26,17 +30,28 @@ contains
       self%shear = self%mu
    end subroutine coupled_neo_hooke_take
 
-   !> With y = J^2 - 1 = 2 e1 + 4 e2 + 8 e3, so that no first-order terms are left to cancel:
-   !> W = mu/2 (y - ln(1+y)) - 2 mu e2 - 4 mu e3 + lam/8 ln^2(1+y).
-   pure function coupled_neo_hooke_energy(self, e1, e2, e3) result(w)
+   !> For strains of any size: emcon_law_coupled_neo_hooke.inc.
+   pure function energy(self, e1, e2, e3) result(w)
+      use emcon_dgrad3, only : dg_t, dg_excess, dg_log1p, operator(*), operator(-), operator(+)
+      use emcon_invariants, only : volume_excess
       class(law_coupled_neo_hooke_t), intent(in) :: self
-      type(dg_t), intent(in) :: e1, e2, e3
-      type(dg_t) :: w, y, logarithm
+      include "emcon_law_coupled_neo_hooke.inc"
+   end function energy
 
-      y = volume_excess(e1, e2, e3)
-      logarithm = dg_log1p(y)
-      w = (0.5_wp*self%mu)*dg_excess(y) - (2.0_wp*self%mu)*e2 - (4.0_wp*self%mu)*e3 &
-         + (0.125_wp*self%lam)*(logarithm*logarithm)
-   end function coupled_neo_hooke_energy
+   !> The same in numbers for loops over points.
+   pure function energy_near(self, e1, e2, e3) result(w)
+      class(law_coupled_neo_hooke_t), intent(in) :: self
+      include "emcon_law_coupled_neo_hooke.inc"
+   end function energy_near
+
+   pure subroutine respond(self, points, with_tangent)
+      class(law_coupled_neo_hooke_t), intent(in) :: self
+      include "emcon_law_lanes.inc"
+   end subroutine respond
+
+   include "../dgrad/emcon_dgrad_rules.inc"
+   include "../dgrad/emcon_dgrad_near.inc"
+   include "emcon_law_rules.inc"
+   include "emcon_law_plane.inc"
 
 end module emcon_law_coupled_neo_hooke

@@ -1,8 +1,8 @@
 !> Linear elasticity: W = lam/2 (tr E)^2 + mu E:E. Under NLGEOM this is St. Venant-Kirchhoff.
 module emcon_law_linear
-   use emcon_dgrad3, only : dg_t, operator(*), operator(-), operator(+)
+   use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : law_t, take_elastic
+   use emcon_law, only : law_points_t, law_respond_one, law_t, n_lane, take_elastic
    implicit none
    private
    public :: law_linear_t
@@ -12,8 +12,12 @@ module emcon_law_linear
       real(wp) :: mu = 0.0_wp
    contains
       procedure :: take => linear_take
-      procedure :: energy => linear_energy
+      procedure :: energy
+      procedure :: respond
    end type law_linear_t
+
+   logical, parameter :: is_near = .true.
+   include "../dgrad/emcon_dgrad_operators.inc"
 
 contains
 
@@ -27,13 +31,27 @@ contains
       self%has_volume = .false.
    end subroutine linear_take
 
-   !> E:E = e1^2 - 2 e2.
-   pure function linear_energy(self, e1, e2, e3) result(w)
+   !> For strains of any size: emcon_law_linear.inc.
+   pure function energy(self, e1, e2, e3) result(w)
+      use emcon_dgrad3, only : dg_t, operator(*), operator(-), operator(+)
       class(law_linear_t), intent(in) :: self
-      type(dg_t), intent(in) :: e1, e2, e3
-      type(dg_t) :: w
+      include "emcon_law_linear.inc"
+   end function energy
 
-      w = (0.5_wp*self%lam + self%mu)*(e1*e1) - (2.0_wp*self%mu)*e2 + 0.0_wp*e3
-   end function linear_energy
+   !> The same in numbers for loops over points.
+   pure function energy_near(self, e1, e2, e3) result(w)
+      class(law_linear_t), intent(in) :: self
+      include "emcon_law_linear.inc"
+   end function energy_near
+
+   pure subroutine respond(self, points, with_tangent)
+      class(law_linear_t), intent(in) :: self
+      include "emcon_law_lanes.inc"
+   end subroutine respond
+
+   include "../dgrad/emcon_dgrad_rules.inc"
+   include "../dgrad/emcon_dgrad_near.inc"
+   include "emcon_law_rules.inc"
+   include "emcon_law_plane.inc"
 
 end module emcon_law_linear

@@ -1,9 +1,9 @@
 !> Mooney and Rivlin's law with Abaqus' constants:
 !> W = C10 (J^(-2/3) I1 - 3) + C01 (J^(-4/3) I2 - 3) + (J - 1)^2/D1.
 module emcon_law_mooney_rivlin
-   use emcon_dgrad3, only : dg_expm1, dg_t, operator(*), operator(-), operator(+)
+   use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, isochoric_excess, law_t, volume_energy, volume_excess
+   use emcon_law, only : claim, law_points_t, law_respond_one, law_t, n_lane
    implicit none
    private
    public :: law_mooney_rivlin_t
@@ -14,8 +14,12 @@ module emcon_law_mooney_rivlin
       real(wp) :: d1 = 0.0_wp                    !! > 0 [L T^2/M]
    contains
       procedure :: take => mooney_rivlin_take
-      procedure :: energy => mooney_rivlin_energy
+      procedure :: energy
+      procedure :: respond
    end type law_mooney_rivlin_t
+
+   logical, parameter :: is_near = .true.
+   include "../dgrad/emcon_dgrad_operators.inc"
 
 contains
 
@@ -33,20 +37,28 @@ contains
       call claim(self%d1 >= 0.0_wp, "D1", self%d1, "must not be negative", fault)
    end subroutine mooney_rivlin_take
 
-   !> J^(-2/3) I1 = 3 exp(z1) and J^(-4/3) I2 = 3 exp(z2), with I2/3 - 1 = 4/3 (e1 + e2);
-   !> docs/theory.md, eq. (8).
-   pure function mooney_rivlin_energy(self, e1, e2, e3) result(w)
+   !> For strains of any size: emcon_law_mooney_rivlin.inc.
+   pure function energy(self, e1, e2, e3) result(w)
+      use emcon_dgrad3, only : dg_expm1, dg_t, operator(*), operator(-), operator(+)
+      use emcon_invariants, only : isochoric_excess, volume_energy, volume_excess
       class(law_mooney_rivlin_t), intent(in) :: self
-      type(dg_t), intent(in) :: e1, e2, e3
-      type(dg_t) :: w, y, z1, z2
-      real(wp), parameter :: third = 1.0_wp/3.0_wp
+      include "emcon_law_mooney_rivlin.inc"
+   end function energy
 
-      y = volume_excess(e1, e2, e3)
-      z1 = isochoric_excess(third, (2.0_wp*third)*e1, y, -((4.0_wp*third)*e2) - (8.0_wp*third)*e3)
-      z2 = isochoric_excess(2.0_wp*third, (4.0_wp*third)*(e1 + e2), y, &
-         -((4.0_wp*third)*e2) - (16.0_wp*third)*e3)
-      w = (3.0_wp*self%c10)*dg_expm1(z1) + (3.0_wp*self%c01)*dg_expm1(z2) &
-         + volume_energy([self%d1], y)
-   end function mooney_rivlin_energy
+   !> The same in numbers for loops over points.
+   pure function energy_near(self, e1, e2, e3) result(w)
+      class(law_mooney_rivlin_t), intent(in) :: self
+      include "emcon_law_mooney_rivlin.inc"
+   end function energy_near
+
+   pure subroutine respond(self, points, with_tangent)
+      class(law_mooney_rivlin_t), intent(in) :: self
+      include "emcon_law_lanes.inc"
+   end subroutine respond
+
+   include "../dgrad/emcon_dgrad_rules.inc"
+   include "../dgrad/emcon_dgrad_near.inc"
+   include "emcon_law_rules.inc"
+   include "emcon_law_plane.inc"
 
 end module emcon_law_mooney_rivlin

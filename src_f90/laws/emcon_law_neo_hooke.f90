@@ -1,8 +1,8 @@
 !> Neo-Hookean law with Abaqus' constants: W = C10 (J^(-2/3) I1 - 3) + (J - 1)^2/D1.
 module emcon_law_neo_hooke
-   use emcon_dgrad3, only : dg_expm1, dg_t, operator(*), operator(-), operator(+)
+   use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, isochoric_excess, law_t, volume_energy, volume_excess
+   use emcon_law, only : claim, law_points_t, law_respond_one, law_t, n_lane
    implicit none
    private
    public :: law_neo_hooke_t
@@ -12,8 +12,12 @@ module emcon_law_neo_hooke
       real(wp) :: d1 = 0.0_wp                    !! > 0 [L T^2/M]
    contains
       procedure :: take => neo_hooke_take
-      procedure :: energy => neo_hooke_energy
+      procedure :: energy
+      procedure :: respond
    end type law_neo_hooke_t
+
+   logical, parameter :: is_near = .true.
+   include "../dgrad/emcon_dgrad_operators.inc"
 
 contains
 
@@ -29,16 +33,28 @@ contains
       call claim(self%d1 >= 0.0_wp, "D1", self%d1, "must not be negative", fault)
    end subroutine neo_hooke_take
 
-   !> J^(-2/3) I1 = 3 exp(z); docs/theory.md, eq. (8).
-   pure function neo_hooke_energy(self, e1, e2, e3) result(w)
+   !> For strains of any size: emcon_law_neo_hooke.inc.
+   pure function energy(self, e1, e2, e3) result(w)
+      use emcon_dgrad3, only : dg_expm1, dg_t, operator(*), operator(-), operator(+)
+      use emcon_invariants, only : isochoric_excess, volume_energy, volume_excess
       class(law_neo_hooke_t), intent(in) :: self
-      type(dg_t), intent(in) :: e1, e2, e3
-      type(dg_t) :: w, y, z
-      real(wp), parameter :: third = 1.0_wp/3.0_wp
+      include "emcon_law_neo_hooke.inc"
+   end function energy
 
-      y = volume_excess(e1, e2, e3)
-      z = isochoric_excess(third, (2.0_wp*third)*e1, y, -((4.0_wp*third)*e2) - (8.0_wp*third)*e3)
-      w = (3.0_wp*self%c10)*dg_expm1(z) + volume_energy([self%d1], y)
-   end function neo_hooke_energy
+   !> The same in numbers for loops over points.
+   pure function energy_near(self, e1, e2, e3) result(w)
+      class(law_neo_hooke_t), intent(in) :: self
+      include "emcon_law_neo_hooke.inc"
+   end function energy_near
+
+   pure subroutine respond(self, points, with_tangent)
+      class(law_neo_hooke_t), intent(in) :: self
+      include "emcon_law_lanes.inc"
+   end subroutine respond
+
+   include "../dgrad/emcon_dgrad_rules.inc"
+   include "../dgrad/emcon_dgrad_near.inc"
+   include "emcon_law_rules.inc"
+   include "emcon_law_plane.inc"
 
 end module emcon_law_neo_hooke

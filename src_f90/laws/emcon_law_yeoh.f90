@@ -1,9 +1,9 @@
 !> Yeoh's law with Abaqus' constants:
 !> W = sum over i = 1..3 of C_i0 (J^(-2/3) I1 - 3)^i + (J - 1)^(2 i)/D_i.
 module emcon_law_yeoh
-   use emcon_dgrad3, only : dg_expm1, dg_t, operator(*), operator(-), operator(+)
+   use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, isochoric_excess, law_t, volume_energy, volume_excess
+   use emcon_law, only : claim, law_points_t, law_respond_one, law_t, n_lane
    implicit none
    private
    public :: law_yeoh_t
@@ -13,8 +13,12 @@ module emcon_law_yeoh
       real(wp) :: d(3) = 0.0_wp                  !! [L T^2/M]; the first > 0
    contains
       procedure :: take => yeoh_take
-      procedure :: energy => yeoh_energy
+      procedure :: energy
+      procedure :: respond
    end type law_yeoh_t
+
+   logical, parameter :: is_near = .true.
+   include "../dgrad/emcon_dgrad_operators.inc"
 
 contains
 
@@ -30,23 +34,28 @@ contains
       call claim(self%d(1) >= 0.0_wp, "D1", self%d(1), "must not be negative", fault)
    end subroutine yeoh_take
 
-   !> J^(-2/3) I1 = 3 exp(z); docs/theory.md, eq. (8).
-   pure function yeoh_energy(self, e1, e2, e3) result(w)
+   !> For strains of any size: emcon_law_yeoh.inc.
+   pure function energy(self, e1, e2, e3) result(w)
+      use emcon_dgrad3, only : dg_expm1, dg_t, operator(*), operator(-), operator(+)
+      use emcon_invariants, only : isochoric_excess, volume_energy, volume_excess
       class(law_yeoh_t), intent(in) :: self
-      type(dg_t), intent(in) :: e1, e2, e3
-      type(dg_t) :: w, y, excess, power
-      integer :: i
-      real(wp), parameter :: third = 1.0_wp/3.0_wp
+      include "emcon_law_yeoh.inc"
+   end function energy
 
-      y = volume_excess(e1, e2, e3)
-      excess = 3.0_wp*dg_expm1(isochoric_excess(third, (2.0_wp*third)*e1, y, &
-         -((4.0_wp*third)*e2) - (8.0_wp*third)*e3))
-      w = volume_energy(self%d, y)
-      power = excess
-      do i = 1, size(self%c)
-         if (i > 1) power = power*excess
-         w = w + self%c(i)*power
-      end do
-   end function yeoh_energy
+   !> The same in numbers for loops over points.
+   pure function energy_near(self, e1, e2, e3) result(w)
+      class(law_yeoh_t), intent(in) :: self
+      include "emcon_law_yeoh.inc"
+   end function energy_near
+
+   pure subroutine respond(self, points, with_tangent)
+      class(law_yeoh_t), intent(in) :: self
+      include "emcon_law_lanes.inc"
+   end subroutine respond
+
+   include "../dgrad/emcon_dgrad_rules.inc"
+   include "../dgrad/emcon_dgrad_near.inc"
+   include "emcon_law_rules.inc"
+   include "emcon_law_plane.inc"
 
 end module emcon_law_yeoh

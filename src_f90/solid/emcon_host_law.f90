@@ -5,7 +5,7 @@
 module emcon_host_law
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_law, only : law_response_t, law_t
+   use emcon_law, only : law_points_t, law_response_t, law_t, n_lane
    use emcon_materials, only : material_t
    use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
       point_response_t
@@ -14,7 +14,7 @@ module emcon_host_law
    implicit none
    private
    public :: host_law_t, host_points_t, host_response_t
-   public :: host_law_take, host_points_make_room, host_rest_stiffness, host_state
+   public :: host_law_take, host_points_make_room, host_rest_stiffness, host_answer, host_state
 
    !> One of two: the energy W(E11, E22, 2 E12) per reference volume [M/(L T^2)] of a material, or
    !> `law`, which takes the constants of its card. Without NLGEOM the strain is the small one.
@@ -96,6 +96,20 @@ contains
       state%stress = self%response%gradient(:, i)
       state%tangent = self%response%tangent(:, :, i)
    end function host_state
+
+   !> What the law has answered at the points `i`, side by side.
+   pure subroutine host_answer(self, i, points)
+      type(host_points_t), intent(in) :: self
+      integer, intent(in) :: i(n_lane)           !! 1 to the number of points
+      type(law_points_t), intent(inout) :: points
+      integer :: l
+
+      do l = 1, n_lane
+         points%energy(l) = self%response%energy(i(l))
+         points%stress(l, :) = self%response%gradient(:, i(l))
+         points%tangent(l, :, :) = self%response%tangent(:, :, i(l))
+      end do
+   end subroutine host_answer
 
    !> Largest second derivative at rest, as half of it: what a step of no size has as its tangent.
    subroutine host_rest_stiffness(law, stiffness, error)

@@ -1,12 +1,14 @@
 !> All elements of a scene: reference geometry, laws, mass; what one of them responds.
 module emcon_solid
-   use emcon_element, only : element_add_point, element_clear, element_geometry_t, &
-      element_motion_t, element_point, element_response_t, point_is_regular, point_motion_t
+   use emcon_element, only : element_geometry_t, element_motion_t, element_point, &
+      element_response_t, point_is_regular, point_motion_t
+   use emcon_element_pack_plane, only : element_pack_t, pack_add_point, pack_clear, pack_fill, &
+      pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_host_law, only : host_law_t, host_law_take, host_points_make_room, &
-      host_response_t, host_rest_stiffness, host_state
+   use emcon_host_law, only : host_answer, host_law_t, host_law_take, host_points_make_room, &
+      host_response_t, host_rest_stiffness
    use emcon_kinds, only : dp, wp
-   use emcon_law, only : law_box_t, law_response_plane, law_response_t
+   use emcon_law, only : law_box_t, law_response_plane, law_response_t, n_lane
    use emcon_law_registry, only : law_create, law_given, law_linearise
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_point_function, only : point_gradient, point_ok
@@ -15,7 +17,8 @@ module emcon_solid
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: solid_t, solid_init, solid_element_respond, solid_evaluate_given, solid_gather
+   public :: solid_t, solid_init, solid_element_respond, solid_pack_respond
+   public :: solid_evaluate_given, solid_gather
 
    !> How stress at the quadrature points of a kind of elements is carried to its nodes.
    type :: to_nodes_t
@@ -38,6 +41,7 @@ module emcon_solid
       real(wp), allocatable :: x(:, :)                   !! (n_dim, n_node) [L], for corotated ones
       logical, allocatable :: is_rigid(:)                !! (n_element) mass alone, no forces
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
+      type(element_pack_t), allocatable :: pack(:)         !! all but small and rigid ones
       !> One per material; behind them, if there are linear elements, those for these
       type(law_box_t), allocatable :: law(:)
       type(host_law_t), allocatable :: given(:)         !! like `law`, or one in its place
@@ -109,7 +113,35 @@ contains
          end if
       end do
       call number_points(self)
+      call make_packs(self)
    end subroutine solid_init
+
+   !> Pack the elements of each kind and law, as they come in the scene.
+   pure subroutine make_packs(self)
+      type(solid_t), intent(inout) :: self
+      integer :: list(self%n_element), e, i, k, law, n, n_pack, pass
+
+      do pass = 1, 2                             ! count, then fill
+         n_pack = 0
+         do k = 1, maxval([0, self%kind])
+            do law = 1, size(self%law)
+               n = 0
+               do e = 1, self%n_element
+                  if (self%is_small(e) .or. self%is_rigid(e)) cycle
+                  if (self%kind(e) /= k .or. self%law_of(e) /= law) cycle
+                  n = n + 1
+                  list(n) = e
+               end do
+               do i = 1, n, n_lane
+                  n_pack = n_pack + 1
+                  if (pass == 2) call pack_fill(self%pack(n_pack), list(i:min(n, i + n_lane - 1)), &
+                     law, self%node, self%geometry)
+               end do
+            end do
+         end do
+         if (pass == 1) allocate(self%pack(n_pack))
+      end do
+   end subroutine make_packs
 
    !> What the shapes of the kinds say, of those that elements have.
    subroutine init_kinds(self, scene, stiffness, mass, error)
@@ -272,7 +304,34 @@ contains
       end do
    end subroutine reference_gradient
 
-   !> Response of element `e` to a motion, which is that of `given` too.
+   !> Response of a pack to a motion, which is that of `given` too.
+   pure subroutine solid_pack_respond(self, pack, motion, given, with_tangent, part)
+      type(solid_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      type(pack_motion_t), intent(in) :: motion
+      type(host_response_t), intent(in) :: given
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(pack_response_t), intent(inout) :: part
+      type(pack_point_t) :: point
+      integer :: k
+
+      call pack_clear(pack%n_node, part, with_tangent)
+      do k = 1, pack%n_gp
+         call pack_point(pack, k, motion, point)
+         if (self%first_point(pack%element(1)) > 0) then
+            call host_answer(given%points(pack%law), self%first_point(pack%element) - 1 + k, &
+               point%law)
+         else
+            associate (law => self%law(pack%law)%law)
+               call pack_point_check(law%has_volume, point, part)
+               call law%respond(point%law, with_tangent)
+            end associate
+         end if
+         call pack_add_point(pack, k, point, with_tangent, part)
+      end do
+   end subroutine solid_pack_respond
+
+   !> Response of element `e` alone.
    pure subroutine solid_element_respond(self, e, motion, given, with_tangent, part)
       type(solid_t), intent(in) :: self
       integer, intent(in) :: e                   !! 1 to n_element
@@ -280,24 +339,25 @@ contains
       type(host_response_t), intent(in) :: given
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(element_response_t), intent(inout) :: part
-      type(point_motion_t) :: point
-      type(law_response_t) :: state
-      integer :: k
+      type(element_pack_t) :: pack
+      type(pack_motion_t) :: motions
+      type(pack_response_t) :: parts
+      integer :: i, n
 
-      call element_clear(self%geometry(e)%n_node, part, with_tangent)
-      do k = 1, self%geometry(e)%n_gp
-         call element_point(self%geometry(e), k, motion, point)
-         if (self%first_point(e) > 0) then
-            state = host_state(given%points(self%law_of(e)), self%first_point(e) - 1 + k)
-         else
-            associate (law => self%law(self%law_of(e))%law)
-               part%is_inverted = .not. point_is_regular(point, law%has_volume)
-               if (part%is_inverted) return
-               call law_response_plane(law, point%strain, point%dstrain, state)
-            end associate
-         end if
-         call element_add_point(self%geometry(e), k, point, state, with_tangent, part)
+      call pack_fill(pack, [e], self%law_of(e), self%node, self%geometry)
+      motions%nlgeom = motion%nlgeom
+      n = pack%n_node
+      do i = 1, n
+         motions%from(:, :, i) = spread(motion%from(:, i) - motion%from(:, 1), 1, n_lane)
+         motions%by(:, :, i) = spread(motion%by(:, i) - motion%by(:, 1), 1, n_lane)
       end do
+      call solid_pack_respond(self, pack, motions, given, with_tangent, parts)
+      part%energy = parts%energy(1)
+      part%force(:, :n) = parts%force(1, :, :n)
+      part%magnitude(:, :n) = parts%magnitude(1, :, :n)
+      if (with_tangent) part%tangent(:2*n, :2*n) = reshape(parts%tangent(1, :, :n, :, :n), &
+         [2*n, 2*n])
+      part%is_inverted = parts%is_inverted(1)
    end subroutine solid_element_respond
 
    !> Let the given laws answer to the step, each in one call for all its points.

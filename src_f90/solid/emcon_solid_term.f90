@@ -3,8 +3,8 @@
 !> Source: docs/theory.md, section 3.
 module emcon_solid_term
    use emcon_csr, only : csr_t
-   use emcon_element, only : element_motion_t, element_response_t
    use emcon_element_lists, only : element_lists
+   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_response_t
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
@@ -12,9 +12,7 @@ module emcon_solid_term
    use emcon_motion, only : motion_t
    use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_element_respond, solid_evaluate_given, solid_gather, &
-      solid_init, solid_t
-   use emcon_shape, only : max_element_nodes
+   use emcon_solid, only : solid_evaluate_given, solid_init, solid_pack_respond, solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_term, only : response_t, role_internal, term_t
    use emcon_text, only : to_text
@@ -28,6 +26,7 @@ module emcon_solid_term
       logical :: has_linear_laws = .false.       !! all materials of its elements are
       logical, private :: is_empty = .false.     !! no elements are left
       integer, allocatable, private :: slot(:)   !! element matrices by columns
+      integer, allocatable, private :: first(:)  !! (n_element) slot of each
       type(host_response_t), private :: given   !! what given laws answer
    contains
       procedure :: lay_out
@@ -78,9 +77,18 @@ contains
       type(space_t), intent(in) :: space
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! element matrices by columns
+      integer :: e, next
 
       self%nlgeom = scene%step(i_step)%nlgeom
       self%slot = slot
+      if (allocated(self%first)) deallocate(self%first)
+      allocate(self%first(self%solid%n_element), source=0)
+      next = 1
+      do e = 1, self%solid%n_element
+         if (self%solid%is_small(e)) cycle
+         self%first(e) = next
+         next = next + (size(scene%x, 1)*self%solid%geometry(e)%n_node)**2
+      end do
    end subroutine begin_step
 
    !> Forces of a motion. What displacements are rounded by, forces are too.
@@ -89,10 +97,9 @@ contains
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      type(element_response_t) :: part
-      type(element_motion_t) :: local
-      real(wp) :: largest
-      integer :: e, i, n, node, first
+      type(pack_response_t) :: part
+      type(pack_motion_t) :: local
+      integer :: k
 
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, &
@@ -102,40 +109,86 @@ contains
          if (self%given%inverted_element > 0) return
       end if
       local%nlgeom = self%nlgeom
-      first = 1
-      associate (solid => self%solid, total => response%part(self%role))
-         do e = 1, solid%n_element
-            if (solid%is_small(e)) cycle
-            n = solid%geometry(e)%n_node
-            if (solid%is_rigid(e)) then
-               first = first + 4*n*n
-               cycle
-            end if
-            call solid_gather(solid%node(:n, e), motion%from, motion%by, local)
-            call solid_element_respond(solid, e, local, self%given, present(value), part)
-            if (part%is_inverted) then
-               call refuse(self, e, response)
+      do k = 1, size(self%solid%pack)
+         associate (pack => self%solid%pack(k))
+            call pack_gather(pack, motion%from, motion%by, local)
+            call solid_pack_respond(self%solid, pack, local, self%given, present(value), part)
+            if (any(part%is_inverted)) then
+               call refuse(self, pack%element(findloc(part%is_inverted, .true., 1)), response)
                return
             end if
-            response%energy(e) = part%energy
-            largest = maxval(abs(local%from(:, :n) + local%by(:, :n)))
+            call add_forces(self, pack, motion, local, part, response)
+            if (present(value)) call add_tangents(self, pack, motion%weight, part, value, side)
+         end associate
+      end do
+   end subroutine respond
+
+   !> Add the forces of a pack, element by element, with what its displacements are rounded by.
+   pure subroutine add_forces(self, pack, motion, local, part, response)
+      type(solid_term_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      type(motion_t), intent(in) :: motion
+      type(pack_motion_t), intent(in) :: local   !! the same motion, of its nodes
+      type(pack_response_t), intent(in) :: part
+      type(response_t), intent(inout) :: response
+      real(wp) :: largest
+      integer :: a, e, i, l, node
+
+      associate (total => response%part(self%role), n => pack%n_node)
+         do l = 1, pack%n
+            e = pack%element(l)
+            response%energy(e) = part%energy(l)
+            largest = 0.0_wp
             do i = 1, n
-               largest = max(largest, maxval(motion%computed(:, solid%node(i, e))))
+               node = pack%node(l, i)
+               do a = 1, size(local%by, 2)
+                  largest = max(largest, abs(local%from(l, a, i) + local%by(l, a, i)), &
+                     motion%computed(a, node))
+               end do
             end do
             do i = 1, n
-               node = solid%node(i, e)
-               total%force(:, node) = total%force(:, node) + part%force(:, i)
-               total%magnitude(:, node) = total%magnitude(:, node) + part%magnitude(:, i)
-               response%rounding(:, node) = response%rounding(:, node) &
-                  + largest*solid%stiffness(i, e)
+               node = pack%node(l, i)
+               do a = 1, size(part%force, 2)
+                  total%force(a, node) = total%force(a, node) + part%force(l, a, i)
+                  total%magnitude(a, node) = total%magnitude(a, node) + part%magnitude(l, a, i)
+                  response%rounding(a, node) = response%rounding(a, node) &
+                     + largest*self%solid%stiffness(i, e)
+               end do
             end do
-            if (present(value)) then
-               call scatter(2*n, part%tangent, motion%weight, self%slot(first:), value, side)
-               first = first + 4*n*n
-            end if
          end do
       end associate
-   end subroutine respond
+   end subroutine add_forces
+
+   !> Add the tangents of a pack to their places; the slots of an element run down the columns.
+   pure subroutine add_tangents(self, pack, factor, part, value, side)
+      type(solid_term_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      real(wp), intent(in) :: factor
+      type(pack_response_t), intent(in) :: part
+      real(dp), intent(inout) :: value(:), side(:)
+      integer :: a, c, i, j, k, l, place
+
+      do l = 1, pack%n
+         k = self%first(pack%element(l))
+         do j = 1, pack%n_node
+            do c = 1, size(part%tangent, 4)
+               do i = 1, pack%n_node
+                  do a = 1, size(part%tangent, 2)
+                     place = self%slot(k)
+                     k = k + 1
+                     if (place > 0) then
+                        value(place) = value(place) &
+                           + real(factor*part%tangent(l, a, i, c, j), dp)
+                     else if (place < 0) then
+                        side(-place) = side(-place) &
+                           + real(factor*part%tangent(l, a, i, c, j), dp)
+                     end if
+                  end do
+               end do
+            end do
+         end do
+      end do
+   end subroutine add_tangents
 
    !> Why there is no response: element `e` is inverted, or a given law does not answer.
    subroutine refuse(self, e, response)
@@ -157,26 +210,6 @@ contains
       end if
    end subroutine refuse
 
-   !> Add a square element matrix of `n` unknowns to its places; `slot` runs down the columns.
-   pure subroutine scatter(n, tangent, factor, slot, value, side)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: tangent(2*max_element_nodes, 2*max_element_nodes), factor
-      integer, intent(in) :: slot(:)
-      real(dp), intent(inout) :: value(:), side(:)
-      integer :: i, j, k
-
-      do j = 1, n
-         do i = 1, n
-            k = slot(i + n*(j - 1))
-            if (k > 0) then
-               value(k) = value(k) + real(factor*tangent(i, j), dp)
-            else if (k < 0) then
-               side(-k) = side(-k) + real(factor*tangent(i, j), dp)
-            end if
-         end do
-      end do
-   end subroutine scatter
-
    !> Add the tangent of a motion times `direction` to `product`. Elements that `direction` does not
    !> touch are passed over.
    subroutine tangent_times(self, motion, direction, product)
@@ -184,10 +217,9 @@ contains
       type(motion_t), intent(in) :: motion                             !! placed
       real(wp), intent(in), contiguous :: direction(:, :)              !! (2, n_node) [L]
       real(wp), intent(inout), contiguous :: product(:, :)             !! (2, n_node) [M L/T^2]
-      type(element_response_t) :: part
-      type(element_motion_t) :: local
-      real(wp) :: image(2*max_element_nodes)
-      integer :: e, i, n, node
+      type(pack_response_t) :: part
+      type(pack_motion_t) :: local
+      integer :: k
 
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
@@ -195,28 +227,56 @@ contains
          if (self%given%inverted_element > 0) return
       end if
       local%nlgeom = self%nlgeom
-      associate (solid => self%solid)
-         do e = 1, solid%n_element
-            n = solid%geometry(e)%n_node
-            if (solid%is_small(e)) cycle
-            if (solid%is_rigid(e)) cycle
-            if (.not. any(abs(direction(:, solid%node(:n, e))) > 0.0_wp)) cycle
-            call solid_gather(solid%node(:n, e), motion%from, motion%by, local)
-            call solid_element_respond(solid, e, local, self%given, .true., part)
-            if (part%is_inverted) return
-            image = 0.0_wp
-            do i = 1, n
-               node = solid%node(i, e)
-               image(:2*n) = image(:2*n) + part%tangent(:2*n, 2*i - 1)*direction(1, node) &
-                  + part%tangent(:2*n, 2*i)*direction(2, node)
-            end do
-            do i = 1, n
-               node = solid%node(i, e)
-               product(:, node) = product(:, node) + motion%weight*image(2*i - 1:2*i)
+      do k = 1, size(self%solid%pack)
+         associate (pack => self%solid%pack(k))
+            if (.not. touches(pack, direction)) cycle
+            call pack_gather(pack, motion%from, motion%by, local)
+            call solid_pack_respond(self%solid, pack, local, self%given, .true., part)
+            if (any(part%is_inverted)) return
+            call add_image(pack, part, motion%weight, direction, product)
+         end associate
+      end do
+   end subroutine tangent_times
+
+   !> Does `direction` move a node of the pack?
+   pure logical function touches(pack, direction)
+      type(element_pack_t), intent(in) :: pack
+      real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node)
+      integer :: i, l
+
+      touches = .true.
+      do i = 1, pack%n_node
+         do l = 1, pack%n
+            if (any(abs(direction(:, pack%node(l, i))) > 0.0_wp)) return
+         end do
+      end do
+      touches = .false.
+   end function touches
+
+   !> Add `factor` times the tangents of a pack times `direction`.
+   pure subroutine add_image(pack, part, factor, direction, product)
+      type(element_pack_t), intent(in) :: pack
+      type(pack_response_t), intent(in) :: part
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node)
+      real(wp), intent(inout) :: product(:, :)   !! (n_dim, n_node)
+      real(wp) :: sum_of
+      integer :: a, c, i, j, l
+
+      do l = 1, pack%n
+         do i = 1, pack%n_node
+            do a = 1, size(product, 1)
+               sum_of = 0.0_wp
+               do j = 1, pack%n_node
+                  do c = 1, size(product, 1)
+                     sum_of = sum_of + part%tangent(l, a, i, c, j)*direction(c, pack%node(l, j))
+                  end do
+               end do
+               product(a, pack%node(l, i)) = product(a, pack%node(l, i)) + factor*sum_of
             end do
          end do
-      end associate
-   end subroutine tangent_times
+      end do
+   end subroutine add_image
 
    !> As `term_t` has it.
    pure subroutine add_stiffness(self, stiffness)

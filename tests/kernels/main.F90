@@ -20,6 +20,7 @@ program main
    use test_corotated, only : collect_corotated
    use test_csr, only : collect_csr
    use test_dgrad, only : collect_dgrad
+   use test_dgrad_near, only : collect_dgrad_near
    use test_dgrad_series, only : collect_dgrad_series
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
@@ -37,6 +38,7 @@ program main
    use test_lapack, only : collect_lapack
    use test_judge, only : collect_judge
    use test_law, only : collect_law
+   use test_law_points, only : collect_law_points
    use test_linear_rows, only : collect_linear_rows
    use test_line_search, only : collect_line_search
    use test_links, only : collect_links
@@ -115,6 +117,7 @@ program main
    call run("lapack", collect_lapack)
    call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)
+   call run("dgrad_near", collect_dgrad_near)
    call run("dgrad_series", collect_dgrad_series)
    call run("dgrad", collect_dgrad)
    call run("dgrad_wide", collect_dgrad_wide)
@@ -122,6 +125,7 @@ program main
    call run("shape", collect_shape)
    call run("judge", collect_judge)
    call run("law", collect_law)
+   call run("law_points", collect_law_points)
    call run("element", collect_element)
    call run("corotated", collect_corotated)
    call run("solid", collect_solid)
