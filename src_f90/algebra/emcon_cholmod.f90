@@ -21,7 +21,7 @@ module emcon_cholmod
 
    type, extends(sparse_solver_t) :: cholmod_t
       integer, private :: first_slot = 0                     !! of the entry (1, 1); 0: not there
-      type(csr_t), private :: scaled                         !! the pattern, and factor*value
+      type(csr_t), private :: scaled                         !! the pattern, and half_scale*value
       real(dp), allocatable, private :: rhs(:), x(:)
       logical, private :: is_factorised = .false.
       type(c_ptr), private :: handle = c_null_ptr
@@ -148,8 +148,8 @@ contains
       if (allocated(error)) return
       if (self%first_slot == 0 .or. .not. all(ieee_is_finite(value))) return
       if (value(self%first_slot) <= 0.0_dp) return
-      self%factor = power_of_two(-exponent(value(self%first_slot)))
-      self%scaled%value = self%factor*value
+      self%half_scale = power_of_two(-exponent(value(self%first_slot)))
+      self%scaled%value = self%half_scale*value
       call blas_enter(fp_status)
       associate (a => self%scaled)
          status = emcon_cholmod_factorise(self%handle, int(a%n_row, c_int), a%row_start, a%column, &
@@ -177,7 +177,7 @@ contains
          call raise(error, err_internal, "cholmod_solve: there is no factorisation")
          return
       end if
-      self%rhs = self%factor*real(rhs, dp)
+      self%rhs = self%half_scale*real(rhs, dp)
       call blas_enter(fp_status)
       status = emcon_cholmod_solve(self%handle, int(self%scaled%n_row, c_int), self%rhs, self%x)
       call blas_leave(fp_status)

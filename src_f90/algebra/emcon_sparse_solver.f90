@@ -31,7 +31,7 @@ module emcon_sparse_solver
       integer :: n_negative = -1              !! pivots < 0 of a symmetric matrix; < 0: not counted
       integer(int64) :: n_factor = 0_int64    !! nonzeros of the factors
       logical :: needs_halves = .false.       !! set before `analyse`, if it `has_halves`
-      real(dp) :: factor = 1.0_dp             !! > 0, what is factorised is factor*A: halves show it
+      real(dp) :: half_scale = 1.0_dp         !! > 0, L L^T of the halves is that times A
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
       integer, private :: of_analysis = 0     !! `n_analysis` when `factored` was factorised
       real(dp), allocatable, private :: factored(:)      !! values of the last `solver_renew`
@@ -89,7 +89,7 @@ module emcon_sparse_solver
 
 contains
 
-   !> Does it factorise definite matrices as factor*A = L L^T, and solve by each half alone?
+   !> Does it factorise definite matrices as half_scale*A = L L^T, and solve by each half alone?
    pure logical function has_halves(self)
       class(sparse_solver_t), intent(in) :: self
 

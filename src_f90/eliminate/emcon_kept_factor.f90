@@ -198,7 +198,7 @@ contains
       call self%solver%solve_half(.false., self%x, self%y, error)
       if (allocated(error)) return
       do k = 1, set%n
-         self%mu(k) = -real(set%defect(k), dp)/self%solver%factor
+         self%mu(k) = -real(set%defect(k), dp)/self%solver%half_scale
          do j = self%start(k) + 1, self%start(k + 1)
             self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
          end do
@@ -211,7 +211,7 @@ contains
       end do
       call self%solver%solve_half(.true., self%y, self%x, error)
       if (allocated(error)) return
-      dq = real(self%solver%factor*self%x, wp)
+      dq = real(self%solver%half_scale*self%x, wp)
    end subroutine kept_factor_correct
 
 end module emcon_kept_factor

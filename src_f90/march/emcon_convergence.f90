@@ -32,13 +32,13 @@ module emcon_convergence
 
    !> Corrections by a kept factor, which gain less each: so many without a new best residual are a
    !> stall, so many times the maximum of tangents are allowed, and after so many with one factor
-   !> it is too old. Within this multiple of epsilon a stall is convergence.
+   !> it is too old.
    integer, parameter :: kept_stalls = 4, kept_for_tangent = 2, too_old = 12
-   real(wp), parameter :: kept_floor = 32.0_wp*epsilon(1.0_wp)
 
    type :: convergence_t
       logical :: is_kept = .false.               !! corrections are by a kept factor
       integer :: n_kept = 0                      !! by the present one
+      integer :: n_fine = 0                      !! residuals of round-off: the next is the last
       integer :: n_renewal = 0                   !! factors made in the solve for that they stalled
       real(wp) :: tolerance = 0.0_wp             !! of the relative residual
       integer :: maximum = 0                     !! iterations
@@ -81,6 +81,7 @@ contains
       self%is_polish = .false.
       self%is_kept = .false.
       self%n_kept = 0
+      self%n_fine = 0
       self%n_renewal = 0
    end subroutine convergence_begin
 
@@ -113,9 +114,11 @@ contains
       if (size < stall_gain*self%best) self%n_stall = 0
       self%best = min(self%best, size)
       next = next_done
-      if (size <= round_off) return
-      is_stalled = self%n_stall >= kept_stalls .or. self%n_kept >= too_old
-      if (is_stalled .and. (size <= kept_floor .or. is_rounding)) return
+      if (size <= round_off) self%n_fine = self%n_fine + 1
+      if (size <= epsilon(size) .or. self%n_fine > 1) return
+      is_stalled = self%n_stall >= kept_stalls
+      if (is_stalled .and. (size <= round_off .or. is_rounding)) return
+      is_stalled = is_stalled .or. self%n_kept >= too_old
       next = next_give_up
       if (.not. size < huge(size) .or. self%n_history > kept_for_tangent*self%maximum) return
       if (is_stalled .and. self%n_renewal > 0) return

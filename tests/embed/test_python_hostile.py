@@ -41,7 +41,8 @@ def square(law: Law | None = None, host: Any = None, mass: Any = None) -> Model:
     else:
         model.material("M", elastic=(100.0, 0.3), density=1.0).section("M")
     model.initial("VELOCITY", 2, 1, 1.0)
-    model.step("DYNAMIC", h=0.1, duration=1.0, direct=True, nlgeom=True)
+    # A tangent in each iteration, or rubbish in one is noticed late.
+    model.step("DYNAMIC", h=0.1, duration=1.0, direct=True, nlgeom=True).newton("FULL")
     return model
 
 

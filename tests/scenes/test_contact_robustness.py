@@ -285,15 +285,13 @@ def test_tips_meet(tmp_path, shift, choice):
 
 @pytest.mark.parametrize("initiation", ["PERSISTENT", "ADMISSIBLE"])
 def test_contact_that_opens_and_closes_in_turn_is_told(tmp_path, initiation):
-    """Held closed, in one increment; without cuts also where that may pull, with a warning. On which
-    side of each other the tips go is a matter of roundings: with a kept factor of others."""
-    deck = tips(0.0).dynamic(0.02, 0.6)
-    deck.insert("*NEWTON, TYPE=FULL\n", before="*NODE FILE")
-    deck.data("*DYNAMIC")[:] = ["0.02, 0.6, 0.02"]
+    """Held closed, in two increments; without cuts also where that may pull, with a warning."""
+    deck = tips(2e-3).dynamic(0.03, 0.6)
+    deck.data("*DYNAMIC")[:] = ["0.03, 0.6, 0.03"]
     run = run_one_sided(deck, tmp_path, initiation=initiation, **CHOICES["edge"])
-    text = "contact opens and closes in turn at slave nodes 10: held closed in this step"
-    assert text in run.log and "held closed in 1 increments, 1 at most in one" in run.log
-    assert (run.verdict["held_increments"], run.verdict["held_contacts"]) == (1, 1)
+    text = "contact opens and closes in turn at slave nodes 11: held closed in this step"
+    assert text in run.log and "held closed in 2 increments, 1 at most in one" in run.log
+    assert (run.verdict["held_increments"], run.verdict["held_contacts"]) == (2, 1)
     may_pull = f"{text}, the smallest allowed, where they may pull"
     assert run.verdict["warnings"] == ([] if initiation == "PERSISTENT" else [may_pull])
 

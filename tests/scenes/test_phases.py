@@ -39,8 +39,9 @@ def test_phases_are_all_of_the_time(ring):
 def test_elements_and_factors_take_most_of_it(ring):
     """None of the phases that do hard work is charged to the rest."""
     rows = table(ring[0])
-    assert sum(rows[name][1] for name in ("residual", "assemble", "factorise", "solve")) > 50
-    assert rows["vectors"][1] < 20
+    march = sum(rows[name][0] for name in PHASES if name not in ("read", "output"))
+    assert sum(rows[name][0] for name in ("residual", "assemble", "factorise", "solve")) > 0.5*march
+    assert rows["vectors"][0] < 0.5*march
 
 
 def test_counts_are_those_of_newtons_method(tmp_path):
