@@ -65,8 +65,9 @@ contains
       if (.not. self%is_allowed) return
       if (.not. correction%kept%is_made) self%base = base
       if (abs(h - self%base%h) > 0.0_wp .or. self%base%n_correction > most_corrections .or. &
-         (mod(increment, most_increments) == 0 .and. increment /= self%base%increment)) &
+         (mod(increment, most_increments) == 0 .and. increment /= self%base%increment)) then
          call keeping_forget(self, correction)
+      end if
       is_lost = self%base%is_set .and. .not. correction%kept%is_made
       self%start = start
       self%h = h

@@ -107,8 +107,9 @@ contains
             keeping%base%u0, keeping%base%du)
          call system_respond(self%system, motion, .true.)
          if (.not. (allocated(self%system%response%refusal) .or. &
-            allocated(self%system%response%failure))) &
+            allocated(self%system%response%failure))) then
             call kept_factor_renew(correction%kept, self%system%matrix, error)
+         end if
          if (.not. correction%kept%is_made) call keeping_forget(keeping, correction)
       end associate
    end subroutine keep_factor
