@@ -89,11 +89,12 @@ module emcon_sparse_solver
 
 contains
 
-   !> Does it factorise definite matrices as half_scale*A = L L^T, and solve by each half alone?
+   !> Does it factorise definite matrices as half_scale*A = L L^T, and solve by each half alone? Not
+   !> unless overridden.
    pure logical function has_halves(self)
       class(sparse_solver_t), intent(in) :: self
 
-      has_halves = self%choice < -1           ! no solver but those that override it
+      has_halves = .false.
    end function has_halves
 
    !> x = L^-1 P rhs, or the second half x = P^T L^-T rhs, P an order of the unknowns; for who

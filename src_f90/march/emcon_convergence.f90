@@ -42,7 +42,8 @@ module emcon_convergence
       integer :: n_renewal = 0                   !! factors made in the solve for that they stalled
       real(wp) :: tolerance = 0.0_wp             !! of the relative residual
       integer :: maximum = 0                     !! iterations
-      integer :: n_iteration = 0                 !! tangents factorised so far
+      !> Tangents factorised so far, or corrections by a kept factor before the tolerance was met
+      integer :: n_iteration = 0
       integer :: n_history = 0
       real(wp), allocatable :: history(:)        !! relative residuals so far
       real(wp) :: last = 0.0_wp                  !! relative residual, the last and the best so far

@@ -13,6 +13,7 @@ program main
    use test_chain, only : collect_chain
    use test_check, only : collect_check
 #ifndef EMCON_PERMISSIVE
+   use test_kept_factor, only : collect_kept_factor
    use test_cholmod, only : collect_cholmod
 #endif
    use test_constraints, only : collect_constraints
@@ -61,7 +62,6 @@ program main
    use test_rigidity, only : collect_rigidity
    use test_rigid_bodies, only : collect_rigid_bodies
    use test_row_elimination, only : collect_row_elimination
-   use test_kept_factor, only : collect_kept_factor
    use test_mixing, only : collect_mixing
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
@@ -111,6 +111,7 @@ program main
 #endif
    call run("solvers", collect_solvers)
 #ifndef EMCON_PERMISSIVE
+   call run("kept_factor", collect_kept_factor)
    call run("cholmod", collect_cholmod)
 #endif
    call run("initial_contact", collect_initial_contact)
@@ -157,7 +158,6 @@ program main
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)
    call run("saddle_point", collect_saddle_point)
-   call run("kept_factor", collect_kept_factor)
    call run("mixing", collect_mixing)
    call run("correction", collect_correction)
    call run("reduction", collect_reduction)
