@@ -24,7 +24,8 @@ sys.path.append(str(ROOT/"tests"/"bench"))
 
 import numpy as np  # noqa: E402
 from bench_ring import (  # noqa: E402
-    DECKS, END, ENVIRONMENT, IS_SHORT, LENGTH, block_text, measure, overrides, table)  # fmt: skip
+    DECKS, END, IS_SHORT, LENGTH, block_text, measure, overrides, table)  # fmt: skip
+from timing import ENVIRONMENT  # noqa: E402
 
 RING = DECKS/"ring.inp"
 OUTPUT = ("*NODE FILE", "*EL FILE", "*CONTACT FILE", "*CONTACT PRINT", "*RESTART", "*TIME POINTS")

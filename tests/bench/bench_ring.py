@@ -2,12 +2,10 @@
 
 Prints tables; asserts nothing. `make bench`, or `.venv/bin/python tests/bench/bench_ring.py`;
 with `--short` a few increments of small scenes, to see that all of it runs.
-Orientation: 12 s of CPU and 100 MB for the ring at h = 0.01; other codes took 24 to 46 s.
+What to expect: docs/performance.md.
 """
 
-import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
@@ -17,8 +15,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
 from book.common import FORMULATIONS  # noqa: E402
 from scene_tools import DECKS, PROGRAM, Deck, Run, number, overrides  # noqa: E402
+from timing import usage  # noqa: E402
 
-ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 TREATMENTS = ("PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE")
 METHODS = ("NULL SPACE", "SADDLE POINT")
 IS_SHORT = "--short" in sys.argv
@@ -26,26 +24,12 @@ IS_SHORT = "--short" in sys.argv
 LENGTH = {"h": 0.1, "t_end": 0.5} if IS_SHORT else {}
 
 
-# Linux counts the memory of the caller as that of a child at first: a small caller, then.
-CALLER = """
-import os, sys, time
-start = time.monotonic()
-child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
-_, status, usage = os.wait4(child, 0)
-print(status, usage.ru_utime + usage.ru_stime, time.monotonic() - start, usage.ru_maxrss)
-"""
-
-
 def measure(*arguments):
     """Seconds of CPU, seconds on the clock and peak memory in MB of one call of the program."""
-    command = [sys.executable, "-I", "-S", "-c", CALLER, str(PROGRAM), *map(str, arguments)]
-    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
-    status, cpu, wall, memory = done.stdout.splitlines()[-1].split()
-    if int(status) != 0:
-        sys.exit(f"{' '.join(command[5:])}:\n{done.stderr}")
-    # In kB on Linux, in bytes on macOS.
-    unit = 1024**2 if sys.platform == "darwin" else 1024
-    return float(cpu), float(wall), float(memory)/unit
+    done = usage([PROGRAM, *arguments])
+    if done.code != 0:
+        sys.exit(f"{' '.join(map(str, arguments))}:\n{done.errors}")
+    return done.cpu, done.wall, done.memory
 
 
 def table(*names):

@@ -11,9 +11,10 @@ import statistics
 import subprocess
 import tempfile
 
-from bench_ring import ENVIRONMENT, IS_SHORT, measure, table
+from bench_ring import IS_SHORT, measure, table
 from book.tied_grid import DYNAMIC, STATIC, Grid
 from scene_tools import PROGRAM, Run, overrides
+from timing import ENVIRONMENT
 
 #: 2e5 unknowns each, unless short.
 PIECES = Grid(m=4, coarse=6, fine=8) if IS_SHORT else Grid(m=4, coarse=78, fine=80)

@@ -11,9 +11,7 @@ the first run of the scene in the same round; of three rounds the medians. Needs
 
 import argparse
 import dataclasses
-import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
@@ -25,6 +23,7 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "scenes")]
 from book.common import COLOURS, axes, save, size, table  # noqa: E402
 from plain_scenes import AUTO, Scene, below, bowl, gears  # noqa: E402
 from scene_tools import DECKS, PROGRAM, Deck, Run  # noqa: E402
+from timing import usage  # noqa: E402
 from verification import update  # noqa: E402
 
 PAGE = ROOT / "docs" / "trade.md"
@@ -120,16 +119,6 @@ CASES = (
 )
 
 
-#: Runs a command and prints its exit code, processor time and memory. A process begins with the
-#: memory of the one that starts it: this one is small.
-WATCH = """
-import os, sys
-pid = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ)
-_, status, usage = os.wait4(pid, 0)
-print(os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime, usage.ru_maxrss)
-"""
-
-
 # ---- runs ---------------------------------------------------------------------------------------
 
 
@@ -138,13 +127,9 @@ def measured(deck, folder, parameters):
     folder.mkdir(parents=True)
     path = deck.write(folder / "deck.inp")
     options = [f"--set={name}={value}" for name, value in parameters.items()]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    command = [PROGRAM, path, "--quiet", "--output", folder, *options]
-    done = subprocess.run([sys.executable, "-S", "-c", WATCH, *map(str, command)],
-                          capture_output=True, text=True, env=environment, check=True)
-    code, seconds, kilobytes = map(float, done.stdout.split())
-    assert code == 0 or "bodies overlap" in done.stderr, done.stderr
-    return Run(folder / "deck"), seconds, kilobytes/1024
+    done = usage([PROGRAM, path, "--quiet", "--output", folder, *options])
+    assert done.code == 0 or "bodies overlap" in done.errors, done.errors
+    return Run(folder / "deck"), done.cpu, done.memory
 
 
 def force_of(history, n=5):

@@ -1,0 +1,1 @@
+"""The ring on a foundation for other codes: decks, runs, energies."""
