@@ -31,12 +31,13 @@ module emcon_quantities
       integer :: n_component = 1
       character(len=16) :: field = ""            !! in the field file
       character(len=16) :: last = ""             !! name of a field for the last component
+      logical :: is_sparse = .false.             !! the same at most places
    end type row_t
 
    type(row_t), parameter :: rows(17) = [ &
       row_t("U", at_nodes, of_vector, "displacement"), &
       row_t("V", at_nodes, of_vector, "velocity"), &
-      row_t("RF", at_nodes, of_vector, "reaction_force"), &
+      row_t("RF", at_nodes, of_vector, "reaction_force", is_sparse=.true.), &
       row_t("S", at_nodes, 7, "cauchy_stress", "von_mises"), &
       row_t("S", at_elements, 6), &
       row_t("E", at_elements, 3, "strain"), &
@@ -44,9 +45,9 @@ module emcon_quantities
       row_t("ELSE", at_elements, 1, "strain_energy"), &
       row_t("ELKE", at_elements, 1, "kinetic_energy"), &
       row_t("EVOL", at_elements, 1, "volume"), &
-      row_t("CDIS", at_contacts, 1, "contact_gap"), &
-      row_t("CSTR", at_contacts, 2, "contact_pressure", "contact_active"), &
-      row_t("CF", at_contacts, of_vector, "contact_force"), &
+      row_t("CDIS", at_contacts, 1, "contact_gap", is_sparse=.true.), &
+      row_t("CSTR", at_contacts, 2, "contact_pressure", "contact_active", .true.), &
+      row_t("CF", at_contacts, of_vector, "contact_force", is_sparse=.true.), &
       row_t("CF", at_pairs, 3), &
       row_t("CF_MASTER", at_pairs, 3), &
       row_t("CONTACT_LENGTH", at_pairs), &
@@ -99,6 +100,7 @@ contains
       n = merge(2, 1, row%last /= "")
       allocate(fields(n))
       fields%is_cell = row%place == at_elements
+      fields%is_sparse = row%is_sparse
       fields(1)%name = row%field
       fields(1)%n_component = quantity_components(variable, row%place, n_dim) - (n - 1)
       if (n > 1) fields(n)%name = row%last

@@ -14,6 +14,7 @@ module emcon_run
       recorder_resume, recorder_t, recorder_write
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_restart_data, only : restart_check, restart_exchange, restart_list
+   use emcon_pace, only : pace_begin, pace_end, pace_is_due, pace_t
    use emcon_phases, only : n_phase, phase_eliminate, phase_gaps, phase_judge, phase_search, &
       phases_seconds, phases_start
    use emcon_probe, only : probe_cost
@@ -63,6 +64,7 @@ module emcon_run
       character(len=:), allocatable :: base
       real(dp) :: wall_start = 0.0_dp
       type(run_parts_t) :: parts                 !! of its time
+      type(pace_t) :: pace                       !! of restart files that *RESTART asks for
    end type run_t
 
 contains
@@ -332,15 +334,17 @@ contains
       end associate
    end subroutine pass_verdict
 
-   !> Does *RESTART ask for a restart file after this increment?
-   pure logical function is_save_due(run)
+   !> Does *RESTART ask for a restart file after this increment, and is the last one old enough, or
+   !> the run at its end?
+   logical function is_save_due(run)
       type(run_t), intent(in) :: run
 
       associate (state => run%stepper%march%state, &
             frequency => run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency)
          is_save_due = frequency /= 0
-         if (is_save_due) is_save_due = stepper_is_done(run%stepper) &
-            .or. mod(state%increment - state%n_before, frequency) == 0
+         if (.not. is_save_due .or. stepper_is_done(run%stepper)) return
+         is_save_due = mod(state%increment - state%n_before, frequency) == 0
+         if (is_save_due) is_save_due = pace_is_due(run%pace)
       end associate
    end function is_save_due
 
@@ -351,12 +355,14 @@ contains
       type(restart_t) :: restart
       type(string_t), allocatable :: build(:)
 
+      call pace_begin(run%pace)
       call recorder_publish(run%recorder, .true., error)
       if (allocated(error)) return
       call stepper_save(run%stepper, restart)
       call build_list(build)
       call exchange_files(restart, run%recorder%n_row, run%recorder%fields%n_frame, build)
       call restart_write(restart, run%base // ".rst.h5", error)
+      call pace_end(run%pace)
    end subroutine save
 
    !> What of the result files belongs to the state, and which program wrote them.

@@ -2,9 +2,10 @@
 !> Python sees them reversed.
 module emcon_hdf5_data
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_char, c_ptr
+   use, intrinsic :: iso_fortran_env, only : int8
    use emcon_errors, only : error_t, raise, err_file
    use emcon_hdf5, only : hdf5_fail, hdf5_file_t, hdf5_plan_object
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : dp, int64, wp
    use emcon_text, only : string_t
    use emcon_text_file, only : clear_system_reason
    use hdf5, only : hid_t, hsize_t, size_t, h5kind_to_type, &
@@ -15,7 +16,7 @@ module emcon_hdf5_data
       h5aclose_f, h5aexists_f, h5tcopy_f, h5tclose_f, h5tset_size_f, h5tget_size_f, &
       h5tset_strpad_f, h5tget_class_f, H5P_DATASET_CREATE_F, H5S_SCALAR_F, H5T_NATIVE_INTEGER, &
       H5T_NATIVE_DOUBLE, H5T_STD_I64LE, H5T_STD_U8LE, H5T_IEEE_F64LE, H5T_FORTRAN_S1, &
-      H5T_STR_NULLPAD_F, H5T_STRING_F, H5_REAL_KIND
+      H5T_STR_NULLPAD_F, H5T_STRING_F, H5_INTEGER_KIND, H5_REAL_KIND
    implicit none
    private
    public :: hdf5_plan, hdf5_write_attribute
@@ -30,7 +31,10 @@ module emcon_hdf5_data
 
    !> Largest number of values in one chunk of a data set written at once.
    integer(hsize_t), parameter :: max_chunk = 1048576_hsize_t
-   integer, parameter :: deflate_level = 4
+   !> Higher ones take twice the time, and what is worth packing is hardly smaller.
+   integer, parameter :: deflate_level = 1
+   !> Data sets written at once are packed from this size on.
+   integer(hsize_t), parameter :: least_packed = 512_hsize_t
 
    !> How values lie in the file and in memory: numbers of HDF5.
    type :: layout_t
@@ -40,9 +44,10 @@ module emcon_hdf5_data
 contains
 
    !> How a data set with chunks of shape `chunk` is stored. Close the list after use.
-   subroutine hdf5_plan(self, chunk, plan)
+   subroutine hdf5_plan(self, chunk, is_packed, plan)
       type(hdf5_file_t), intent(in) :: self
       integer(hsize_t), intent(in) :: chunk(:)       !! in Fortran's order; none: in one piece
+      logical, intent(in) :: is_packed
       integer(hid_t), intent(out) :: plan
       integer :: e
 
@@ -51,31 +56,37 @@ contains
       call h5pset_chunk_f(plan, size(chunk), chunk, e)
       if (self%is_checked) then
          call h5pset_fletcher32_f(plan, e)
-      else
+      else if (is_packed) then
          call h5pset_shuffle_f(plan, e)
          call h5pset_deflate_f(plan, deflate_level, e)
       end if
    end subroutine hdf5_plan
 
+   !> Stored with 64 bits. They are widened here: the library does so in a buffer of a megabyte that
+   !> it clears for each data set.
    subroutine hdf5_write_integers(self, name, values, error)
       type(hdf5_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name
-      integer, intent(in), contiguous, target :: values(:)
+      integer, intent(in) :: values(:)
       type(error_t), allocatable, intent(out) :: error
+      integer(int64), allocatable, target :: wide(:)
 
-      call write_block(self, name, [size(values, kind=hsize_t)], &
-         H5T_STD_I64LE, H5T_NATIVE_INTEGER, c_loc(values), error)
+      allocate(wide, source=int(values, int64))
+      call write_block(self, name, [size(values, kind=hsize_t)], H5T_STD_I64LE, &
+         h5kind_to_type(int64, H5_INTEGER_KIND), c_loc(wide), error)
    end subroutine hdf5_write_integers
 
-   !> Integers of 0..255, stored as bytes.
+   !> Integers of 0..127, stored as bytes.
    subroutine hdf5_write_bytes(self, name, values, error)
       type(hdf5_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name
-      integer, intent(in), contiguous, target :: values(:)
+      integer, intent(in) :: values(:)
       type(error_t), allocatable, intent(out) :: error
+      integer(int8), allocatable, target :: byte(:)
 
-      call write_block(self, name, [size(values, kind=hsize_t)], &
-         H5T_STD_U8LE, H5T_NATIVE_INTEGER, c_loc(values), error)
+      allocate(byte, source=int(values, int8))
+      call write_block(self, name, [size(values, kind=hsize_t)], H5T_STD_U8LE, H5T_STD_U8LE, &
+         c_loc(byte), error)
    end subroutine hdf5_write_bytes
 
    subroutine hdf5_write_reals(self, name, values, error)
@@ -148,15 +159,17 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer(hid_t) :: plan, space, dset
       integer(hsize_t) :: chunk(size(dims))
+      logical :: is_packed
       integer :: e, ignored
 
       chunk = dims
       chunk(size(dims)) = min(dims(size(dims)), max(1_hsize_t, max_chunk/max(dims(1), 1_hsize_t)))
       if (size(dims) == 1) chunk = min(dims, max_chunk)
-      if (product(dims) == 0) then
-         call hdf5_plan(self, chunk(:0), plan)
+      is_packed = file_type /= H5T_IEEE_F64LE .and. product(dims) >= least_packed
+      if (product(dims) > 0 .and. (is_packed .or. self%is_checked)) then
+         call hdf5_plan(self, chunk, is_packed, plan)
       else
-         call hdf5_plan(self, chunk, plan)
+         call hdf5_plan(self, chunk(:0), is_packed, plan)
       end if
       call h5screate_simple_f(size(dims), dims, space, e)
       call clear_system_reason()

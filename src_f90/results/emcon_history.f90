@@ -8,7 +8,8 @@ module emcon_history
    use emcon_files, only : file_close, file_open, file_put, file_remove, file_rename, file_t
    use emcon_hdf5, only : hdf5_has, hdf5_make_group
    use emcon_hdf5_data, only : hdf5_read_reals, hdf5_write_integers, hdf5_write_texts
-   use emcon_hdf5_series, only : hdf5_series_t, series_append, series_begin, series_truncate
+   use emcon_hdf5_series, only : hdf5_series_t, series_append, series_begin, series_chunk, &
+      series_flush, series_form_t, series_truncate
    use emcon_kinds, only : dp, int64
    use emcon_published, only : publication_is_due, published_abandon, published_close, &
       published_create, published_publish, published_resume, published_t
@@ -39,8 +40,6 @@ module emcon_history
       type(file_t), private :: csv
       type(column_t), allocatable, private :: column(:)
       type(hdf5_series_t), allocatable, private :: series(:)
-      real(dp), allocatable, private :: waiting(:, :)   !! (n_wait, n_column) not yet in NAME.h5
-      integer, private :: n_waiting = 0
       type(set_series_t), allocatable, private :: set(:)
       logical, private :: is_resumed = .false.
       real(dp), private :: time_resumed = 0.0_dp     !! of the last row that was kept [T]
@@ -51,7 +50,6 @@ module emcon_history
       module procedure put_integers, put_texts
    end interface history_set_put
 
-   integer, parameter :: n_wait = 64                 !! rows gathered before they go to NAME.h5
    integer, parameter :: chunk_rows = 256
    integer, parameter :: number_width = 24           !! of a real with 17 significant digits
    character(len=*), parameter :: line_end = achar(10)
@@ -110,10 +108,9 @@ contains
       end if
       self%column = columns
       allocate(self%series(size(columns)), self%set(0))
-      allocate(self%waiting(n_wait, size(columns)), source=0.0_dp)
       do i = 1, size(columns)
          call series_begin(self%series(i), self%store%file, column_path(columns(i)), one_value, &
-            chunk_rows, columns(i)%is_integer, error)
+            series_form_t(chunk_rows, is_integer=columns(i)%is_integer), error)
          if (allocated(error)) return
       end do
    end subroutine begin_series
@@ -192,6 +189,7 @@ contains
       real(dp), intent(in) :: values(:)              !! (n_column); whole numbers where integer
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: line
+      integer :: i
 
       if (size(values) /= size(self%column)) then
          call raise(error, err_internal, "history_append: wrong number of values")
@@ -200,10 +198,10 @@ contains
       call csv_row(self%column, values, line)
       call file_put(self%csv, line, error)
       if (allocated(error)) return
-      if (self%n_waiting == n_wait) call write_waiting(self, error)
-      if (allocated(error)) return
-      self%n_waiting = self%n_waiting + 1
-      self%waiting(self%n_waiting, :) = values
+      do i = 1, size(self%series)
+         call series_append(self%series(i), self%store%file, values(i:i), 1, error)
+         if (allocated(error)) return
+      end do
       self%n_row = self%n_row + 1
       self%store%is_changed = .true.
    end subroutine history_append
@@ -215,12 +213,15 @@ contains
       integer :: i
 
       do i = 1, size(self%series)
-         if (self%n_waiting == 0) exit
-         call series_append(self%series(i), self%store%file, self%waiting(:, i), self%n_waiting, &
-            error)
+         call series_flush(self%series(i), self%store%file, error)
          if (allocated(error)) return
       end do
-      self%n_waiting = 0
+      do i = 1, size(self%set)
+         call series_flush(self%set(i)%values, self%store%file, error)
+         if (allocated(error)) return
+         call series_flush(self%set(i)%time, self%store%file, error)
+         if (allocated(error)) return
+      end do
    end subroutine write_waiting
 
    !> Declare that `variable` of the set `set` will be written; `i_set` is what to append it by.
@@ -244,11 +245,11 @@ contains
       new%n_value = n_component*size(label)
       row_shape = [n_component, size(label)]
       if (n_component == 1) row_shape = [size(label)]
-      call series_begin(new%time, self%store%file, path // "_time", one_value, chunk_rows, &
-         .false., error)
+      call series_begin(new%time, self%store%file, path // "_time", one_value, &
+         series_form_t(chunk_rows), error)
       if (allocated(error)) return
       call series_begin(new%values, self%store%file, path, row_shape, &
-         rows_per_chunk(new%n_value), .false., error)
+         series_form_t(min(chunk_rows, series_chunk(new%n_value, 1))), error)
       if (allocated(error)) return
       if (self%is_resumed) call drop_later(self, new, path, error)
       if (allocated(error)) return
@@ -299,13 +300,6 @@ contains
          path = ""
       end if
    end subroutine find_place
-
-   !> Rows of `n_value` values that make up some 32 kilobytes.
-   pure integer function rows_per_chunk(n_value)
-      integer, intent(in) :: n_value
-
-      rows_per_chunk = max(1, min(chunk_rows, 4096/max(1, n_value)))
-   end function rows_per_chunk
 
    !> Drop what a set of a resumed history holds of times after the resumption.
    subroutine drop_later(self, set, path, error)

@@ -8,9 +8,8 @@ module emcon_published
    use emcon_files, only : file_close, file_copy, file_exists, file_open, file_remove, &
       file_rename, file_sync, file_t
    use emcon_hdf5, only : hdf5_close, hdf5_create, hdf5_file_t, hdf5_flush, hdf5_open
-   use emcon_kinds, only : dp
+   use emcon_pace, only : pace_begin, pace_end, pace_is_due, pace_t
    use emcon_sealed_file, only : seal_check, seal_put
-   use emcon_timer, only : wall_seconds
    implicit none
    private
    public :: published_t, published_create, published_resume, publication_is_due, published_publish
@@ -22,15 +21,8 @@ module emcon_published
       logical :: is_changed = .false.                !! since the last publication; set by the user
       character(len=:), allocatable :: run           !! the run that it is of; set by the user
       character(len=:), allocatable, private :: path
-      logical, private :: is_published = .false.
-      real(dp), private :: time_published = 0.0_dp   !! wall clock [s]
-      real(dp), private :: cost = 0.0_dp             !! of the last publication [s]
+      type(pace_t), private :: pace                  !! of publications
    end type published_t
-
-   !> Publications are at least so many seconds apart ...
-   real(dp), parameter :: min_interval = 2.0_dp
-   !> ... and at least so many times what the last one took: 5 percent of the run at most.
-   real(dp), parameter :: cost_interval = 20.0_dp
 
 contains
 
@@ -86,10 +78,7 @@ contains
       logical, intent(in) :: is_forced
 
       publication_is_due = self%is_changed .and. .not. self%file%has_failed
-      if (publication_is_due .and. self%is_published .and. .not. is_forced) then
-         publication_is_due = wall_seconds() - self%time_published &
-            >= max(min_interval, cost_interval*self%cost)
-      end if
+      if (publication_is_due .and. .not. is_forced) publication_is_due = pace_is_due(self%pace)
    end function publication_is_due
 
    !> Publish what was written.
@@ -97,9 +86,8 @@ contains
       type(published_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: ignored
-      real(dp) :: start
 
-      start = wall_seconds()
+      call pace_begin(self%pace)
       call hdf5_flush(self%file, error)
       if (.not. allocated(error)) call seal_put(self%path // ".part", self%run, error)
       if (.not. allocated(error)) then
@@ -109,9 +97,7 @@ contains
       end if
       if (allocated(error)) return
       self%is_changed = .false.
-      self%is_published = .true.
-      self%time_published = wall_seconds()
-      self%cost = self%time_published - start
+      call pace_end(self%pace)
    end subroutine published_publish
 
    !> Publish all and end; harmless if nothing is open. After a failure what was published stays.

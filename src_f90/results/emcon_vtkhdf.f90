@@ -6,7 +6,8 @@ module emcon_vtkhdf
    use emcon_hdf5, only : hdf5_file_t, hdf5_make_group
    use emcon_hdf5_data, only : hdf5_read_integers, hdf5_read_reals, hdf5_write_attribute, &
       hdf5_write_bytes, hdf5_write_integers, hdf5_write_reals
-   use emcon_hdf5_series, only : hdf5_series_t, series_append, series_begin, series_truncate
+   use emcon_hdf5_series, only : hdf5_series_t, series_append, series_begin, series_chunk, &
+      series_flush, series_form_t, series_truncate
    use emcon_kinds, only : dp, int64
    use emcon_published, only : publication_is_due, published_abandon, published_close, &
       published_create, published_publish, published_resume, published_t
@@ -20,6 +21,7 @@ module emcon_vtkhdf
       character(len=64) :: name = ""
       integer :: n_component = 1         !! 2: a vector of the plane, stored with a third zero
       logical :: is_cell = .false.       !! one value per cell, else per point
+      logical :: is_sparse = .false.     !! the same in most places: worth packing
    end type field_t
 
    !> A declared field and its data sets.
@@ -214,12 +216,13 @@ contains
 
       allocate(self%stored(size(fields)), self%vector(3, max(n_point, n_cell)))
       self%vector = 0.0_dp
-      call series_begin(self%times, self%store%file, steps // "/Values", one(:0), step_chunk, &
-         .false., error)
+      call series_begin(self%times, self%store%file, steps // "/Values", one(:0), &
+         series_form_t(step_chunk), error)
       do i = 1, size(self%counter)
          if (allocated(error)) return
          call series_begin(self%counter(i), self%store%file, steps // "/" &
-            // trim(counter_name(i)), one(:counter_rank(i)), step_chunk, .true., error)
+            // trim(counter_name(i)), one(:counter_rank(i)), &
+            series_form_t(step_chunk, is_integer=.true.), error)
       end do
       do i = 1, size(fields)
          if (allocated(error)) return
@@ -246,10 +249,12 @@ contains
       row_shape = stored_components(field)
       call values_path(field, path)
       call series_begin(self%values, file, path, &
-         row_shape(:merge(0, 1, field%n_component == 1)), self%n_item, .false., error)
+         row_shape(:merge(0, 1, field%n_component == 1)), &
+         series_form_t(series_chunk(row_shape(1), n_item), is_packed=field%is_sparse), error)
       if (allocated(error)) return
       call offset_path(field, path)
-      call series_begin(self%offset, file, path, one(:0), step_chunk, .true., error)
+      call series_begin(self%offset, file, path, one(:0), &
+         series_form_t(step_chunk, is_integer=.true.), error)
    end subroutine begin_field
 
    pure integer function stored_components(field)
@@ -342,12 +347,31 @@ contains
       end do
       call series_append(self%times, self%store%file, [self%time], 1, error)
       if (allocated(error)) return
-      ! Readers go by this number: it counts a frame when all of it is there.
-      call hdf5_write_attribute(self%store%file, steps, "NSteps", self%n_frame + 1, error)
-      if (allocated(error)) return
       self%n_frame = self%n_frame + 1
       self%store%is_changed = .true.
    end subroutine vtkhdf_end_frame
+
+   !> Move what was gathered of all frames to the file.
+   subroutine write_waiting(self, error)
+      type(vtkhdf_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 1, size(self%stored)
+         call series_flush(self%stored(i)%values, self%store%file, error)
+         if (allocated(error)) return
+         call series_flush(self%stored(i)%offset, self%store%file, error)
+         if (allocated(error)) return
+      end do
+      do i = 1, size(self%counter)
+         call series_flush(self%counter(i), self%store%file, error)
+         if (allocated(error)) return
+      end do
+      call series_flush(self%times, self%store%file, error)
+      if (allocated(error)) return
+      ! Readers go by this number: it counts a frame when all of it is there.
+      call hdf5_write_attribute(self%store%file, steps, "NSteps", self%n_frame, error)
+   end subroutine write_waiting
 
    !> Make the frames so far visible to readers, if it is time or `is_forced`; call it often.
    subroutine vtkhdf_publish(self, is_forced, error)
@@ -355,7 +379,9 @@ contains
       logical, intent(in) :: is_forced
       type(error_t), allocatable, intent(out) :: error
 
-      if (publication_is_due(self%store, is_forced)) call published_publish(self%store, error)
+      if (.not. publication_is_due(self%store, is_forced)) return
+      call write_waiting(self, error)
+      if (.not. allocated(error)) call published_publish(self%store, error)
    end subroutine vtkhdf_publish
 
    !> Complete the file; harmless if it is not open.
@@ -363,7 +389,14 @@ contains
       type(vtkhdf_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      call published_close(self%store, error)
+      if (self%store%file%id >= 0 .and. .not. self%store%file%has_failed) then
+         call write_waiting(self, error)
+      end if
+      if (allocated(error)) then
+         call published_abandon(self%store)
+      else
+         call published_close(self%store, error)
+      end if
    end subroutine vtkhdf_close
 
 end module emcon_vtkhdf

@@ -144,6 +144,20 @@ def test_nothing_is_computed_for_output_that_nobody_asks_for(plain):
     assert not [name for name in calls if name.endswith(("vtkhdf_write", "begin_frame"))]
 
 
+def test_rows_and_frames_are_gathered(tmp_path):
+    """They go to the library of files many at a time, and restart files are not written anew at
+    once: on its own pace this happens a few times in a run, however short the increments are."""
+    n = 60
+    text = block(3, "*RESTART, WRITE, FREQUENCY=1").replace("*NODE FILE, FREQUENCY=0\nU",
+                                                            "*NODE FILE\nU, V\n*EL FILE\nS")
+    calls, _ = run_counted(text, n, tmp_path)
+    assert calls["__emcon_vtkhdf_MOD_vtkhdf_end_frame"] == n + 1
+    assert 2 <= calls["__emcon_restart_MOD_restart_write"] < n/2
+    per_row = len(next((tmp_path/f"deck{n}.csv").open()).split(","))
+    assert calls["__emcon_hdf5_series_MOD_series_append"] > n*per_row
+    assert calls["__emcon_hdf5_series_MOD_write_rows"] < n*per_row/2
+
+
 def test_an_increment_allocates_for_its_record_alone(plain):
     """Rows of the history, lines of the log, and the residuals that the log tells. What is left is
     made by the libraries of solvers and files."""
