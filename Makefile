@@ -194,6 +194,10 @@ $(LANES:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd -fno-trappi
 	large-stack-frame=1000000 max-completely-peel-times=32 max-completely-peeled-insns=2000 \
 	sra-max-propagations=1000 sra-max-scalarization-size-Ospeed=2000) $(VECTOR)
 
+# Loops over all unknowns in each correction, several at a time: the bits are the same here too.
+STREAMS := $(addprefix emcon_,inertia kept_factor lane_sums mixing motion newton numbering system term vectors)
+$(STREAMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 $(VECTOR)
+
 # The kernel tests are compiled once, with all checks: those of `debug` are these with its library.
 KERNEL_OBJ := $(call objects,$(KERNEL_SRC))
 $(KERNEL_OBJ): private FFLAGS_release := $(FFLAGS_debug)

@@ -5,6 +5,7 @@
 !> dF gamma = f, the move is f - (dX + dF) gamma. D. G. Anderson, J. ACM 12 (1965) 547-560.
 module emcon_mixing
    use emcon_kinds, only : wp
+   use emcon_lane_sums, only : lane_dot
    implicit none
    private
    public :: mixing_t, mixing_begin, mixing_move
@@ -73,7 +74,7 @@ contains
       self%df(:, at) = f - self%f
       self%both(:, at) = move + self%df(:, at)
       do k = 1, self%n
-         self%gram(k, at) = dot_product(self%df(:, k), self%df(:, at))
+         self%gram(k, at) = lane_dot(self%df(:, k), self%df(:, at))
          self%gram(at, k) = self%gram(k, at)
       end do
    end subroutine remember
@@ -103,7 +104,7 @@ contains
       end do
       gamma = 0.0_wp
       do i = 1, size(order)
-         if (is_new(i)) gamma(i) = (dot_product(self%df(:, order(i)), f)/length(i) &
+         if (is_new(i)) gamma(i) = (lane_dot(self%df(:, order(i)), f)/length(i) &
             - dot_product(l(i, :i - 1), gamma(:i - 1)))/l(i, i)
       end do
       do i = size(order), 1, -1

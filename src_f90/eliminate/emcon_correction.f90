@@ -47,6 +47,7 @@ module emcon_correction
       type(kept_factor_t) :: kept                !! over increments
       type(saddle_point_t) :: saddle_point
       type(stopwatch_t), private :: clock        !! layouts and curvature of the constraints
+      logical, private :: is_merged = .false.    !! `merged` is laid out for these rows
       logical, private :: has_saddle_point = .false.    !! it is laid out for these rows
       logical, private :: is_reduced = .false.   !! last factorisation: by null space
    end type correction_t
@@ -92,12 +93,11 @@ contains
    end subroutine correction_free
 
    !> Prepare for the active constraints at their present gradients; `n_redundant` > 0: some of
-   !> them depend on others, and have to be dropped. Patterns are made anew where they have changed.
-   subroutine correction_lay_out(self, system, set, error)
+   !> them depend on others, and have to be dropped.
+   subroutine correction_lay_out(self, system, set)
       type(correction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
-      type(error_t), allocatable, intent(out) :: error
 
       self%n_redundant = 0
       if (set%n == 0) then
@@ -107,10 +107,9 @@ contains
       call stopwatch_start(self%clock)
       associate (null_space => self%null_space)
          if (.not. has_pattern(self, set)) then
-            call take_pattern(self, system, set)
+            call take_pattern(self, set)
             if (self%method == method_null_space) call null_space_init(null_space, set, &
-               self%merged, system%space%numbering, error)
-            if (allocated(error)) return
+               n_merged(system, set), system%space%numbering)
          else if (self%method == method_null_space) then
             call null_space_update(null_space, set, system%space%numbering)
          end if
@@ -142,14 +141,24 @@ contains
       if (has_pattern) has_pattern = all(self%column == set%force_rows%column(:n))
    end function has_pattern
 
-   subroutine take_pattern(self, system, set)
-      type(correction_t), intent(inout) :: self
+   !> Entries of N with the constraints, at most: those of a constraint meet in pairs.
+   pure integer function n_merged(system, set)
       type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+
+      associate (start => set%force_rows%row_start)
+         n_merged = size(system%matrix%column) + sum((start(2:set%n + 1) - start(:set%n))**2)
+      end associate
+   end function n_merged
+
+   !> The layout is for these constraints from here on; that of matrices waits until it is wanted.
+   subroutine take_pattern(self, set)
+      type(correction_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
 
       self%row_start = set%force_rows%row_start
       self%column = set%force_rows%column(:set%force_rows%row_start(set%n + 1))
-      call constraints_merge_pattern(set, system%matrix, self%merged, self%slot)
+      self%is_merged = .false.
       self%has_saddle_point = .false.
    end subroutine take_pattern
 
@@ -172,6 +181,9 @@ contains
       is_singular = .true.
       if (self%n_redundant > 0) return
       call stopwatch_start(self%clock)
+      if (.not. self%is_merged) call constraints_merge_pattern(set, system%matrix, self%merged, &
+         self%slot)
+      self%is_merged = .true.
       self%merged%value = 0.0_dp
       do k = 1, size(self%slot)
          self%merged%value(self%slot(k)) = system%matrix%value(k)

@@ -59,19 +59,17 @@ module emcon_null_space
 
 contains
 
-   !> Begin with constraints of a new pattern: choose the dependent unknowns, and if that is
-   !> possible lay out P, DF and P^T N DF.
-   subroutine null_space_init(self, set, matrix, numbering, error)
+   !> Begin with constraints of a new pattern: choose the dependent unknowns. P, DF and P^T N DF are
+   !> laid out when it is factorised.
+   subroutine null_space_init(self, set, n_entry, numbering)
       type(null_space_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
-      type(csr_t), intent(in) :: matrix                  !! pattern of N
+      integer, intent(in) :: n_entry                     !! of N, to compare with
       type(numbering_t), intent(in) :: numbering
-      type(error_t), allocatable, intent(out) :: error
 
-      call begin(self, matrix%n_row, set%n)
-      self%n_entry = size(matrix%column)
+      call begin(self, numbering%n_unknown, set%n)
+      self%n_entry = n_entry
       call null_space_update(self, set, numbering)
-      if (self%obstacle == obstacle_none) call lay_out(self, set%force_rows, matrix, error)
    end subroutine null_space_init
 
    !> Only P and DF, for the present gradients. Where there are none, `obstacle` tells why.

@@ -35,6 +35,10 @@ module emcon_convergence
    !> it is too old.
    integer, parameter :: kept_stalls = 4, kept_for_tangent = 2, too_old = 12
 
+   !> With a kept factor, forces whose residual is smaller than this part of their sizes change by
+   !> no more of them on the way to the end: the sizes need not be found again.
+   real(wp), parameter :: near = 1.0e-2_wp
+
    type :: convergence_t
       logical :: is_kept = .false.               !! corrections are by a kept factor
       integer :: n_kept = 0                      !! by the present one
@@ -52,6 +56,7 @@ module emcon_convergence
       real(wp) :: damping = 1.0_wp               !! part of a correction that is taken
       integer :: n_polish = 0                    !! corrections with the old tangent
       logical :: is_polish = .false.             !! within tolerance: down to round-off from here
+      logical :: knows_sizes = .false.           !! those of forces are known to a few digits
    end type convergence_t
 
 contains
@@ -84,6 +89,7 @@ contains
       self%n_kept = 0
       self%n_fine = 0
       self%n_renewal = 0
+      self%knows_sizes = .false.
    end subroutine convergence_begin
 
    !> What to do next, now that the largest relative residual is `size`.
@@ -111,6 +117,7 @@ contains
       self%n_history = self%n_history + 1
       self%history(self%n_history) = size
       self%last = size
+      self%knows_sizes = size < near
       self%n_stall = self%n_stall + 1
       if (size < stall_gain*self%best) self%n_stall = 0
       self%best = min(self%best, size)

@@ -75,9 +75,8 @@ contains
             correction => self%newton%correction)
          call constraints_evaluate(set, system, self%motion)
          call constraints_rows(set, system%space%numbering)
-         call correction_lay_out(correction, system, set, error)
-         if (.not. allocated(error)) call correction_factorise(correction, system, set, &
-            is_singular, error)
+         call correction_lay_out(correction, system, set)
+         call correction_factorise(correction, system, set, is_singular, error)
          if (allocated(error) .or. is_singular) return
          closed = pack([(k, k = 1, set%n)], abs(weight(set%id)) > 0.0_wp)
          n = size(closed)

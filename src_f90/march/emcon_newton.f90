@@ -14,6 +14,7 @@ module emcon_newton
    use emcon_keeping, only : keeping_begin, keeping_correct, keeping_give_up, keeping_make, &
       keeping_renew, keeping_t
    use emcon_kinds, only : int64, wp
+   use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
    use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
@@ -22,6 +23,7 @@ module emcon_newton
    use emcon_pose, only : pose_is_equilibrium
    use emcon_system, only : system_respond, system_tangent_times, system_t
    use emcon_term, only : role_external, role_inertia
+   use emcon_vectors, only : vector_sum
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
@@ -50,6 +52,8 @@ module emcon_newton
       type(convergence_t) :: convergence         !! how the last solve went
       integer :: n_solve = 0                     !! linear systems solved in the last solve
       real(wp), allocatable :: residual(:), scale(:)   !! (n_unknown)
+      type(yardstick_t) :: forces                !! of the contributions to the residual
+      type(yardstick_t) :: rounding              !! of what their own evaluation rounds
       real(wp), allocatable :: dq(:)             !! (n_unknown) the last correction
       real(wp), allocatable :: dlam(:)           !! (n) and that of the multipliers
       real(wp), allocatable :: way(:)            !! (n_unknown) the correction to search along
@@ -385,7 +389,7 @@ contains
       status = newton_refused
       do i = 0, most_halvings
          call motion_place(motion)
-         call system_respond(system, motion, with_tangent)
+         call system_respond(system, motion, with_tangent, .not. self%convergence%knows_sizes)
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(error)) return
          if (.not. allocated(system%response%refusal)) exit
@@ -402,7 +406,7 @@ contains
          call constraints_rows(set, system%space%numbering)
       end if
       call phase_leave(system%phases, phase_eliminate)
-      call correction_lay_out(self%correction, system, set, error)
+      call correction_lay_out(self%correction, system, set)
       call phase_leave(system%phases, left)
    end subroutine evaluate_damped
 
@@ -420,23 +424,39 @@ contains
       call phase_enter(system%phases, phase_eliminate, left)
       call correction_multipliers(self%correction, system, set, self%residual)
       call phase_leave(system%phases, left)
-      call constraints_force(set, 1, self%contact, system%response%magnitude)
+      if (system%response%with_sizes) then
+         call constraints_force(set, 1, self%contact, system%response%magnitude)
+         call take_sizes(self, system)
+      else
+         call constraints_force(set, 1, self%contact)
+      end if
       if (set%n > 0) then
-         self%left = system%response%residual - self%contact
+         call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, &
+            self%left)
          call pick_unknowns(system%space%numbering, self%left, self%residual)
       end if
-      call pick_magnitudes(system%space%numbering, system%response%magnitude, self%scale)
-      norm = relative_size(self%residual, self%scale)
+      norm = relative_size(self%residual, self%forces)
       defect = 0.0_wp
       do k = 1, set%n
          defect = max(defect, abs(set%defect(k))/set%item(k)%size)
       end do
-      call pick_magnitudes(system%space%numbering, system%response%rounding, self%scale)
-      is_rounding = relative_size(self%residual, self%scale) <= round_off .and. defect <= round_off
+      is_rounding = relative_size(self%residual, self%rounding) <= round_off &
+         .and. defect <= round_off
       ! A body that moves as a rigid one has no forces to compare its round-off with.
       self%is_idle = is_rounding .and. .not. has_load(system)
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
+
+   !> What the residual is to be measured by.
+   subroutine take_sizes(self, system)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+
+      call pick_magnitudes(system%space%numbering, system%response%magnitude, self%scale)
+      self%forces = yardstick_of(self%scale)
+      call pick_magnitudes(system%space%numbering, system%response%rounding, self%scale)
+      self%rounding = yardstick_of(self%scale)
+   end subroutine take_sizes
 
    !> Is there any force but those of elements and contact?
    pure logical function has_load(system)
@@ -447,20 +467,5 @@ contains
             .or. any(abs(part(role_inertia)%force) > 0.0_wp)
       end associate
    end function has_load
-
-   !> |v| / |scale|, 0 where v vanishes, huge where it is not finite; without overflow on the way.
-   pure real(wp) function relative_size(v, scale)
-      real(wp), intent(in) :: v(:), scale(:)
-      real(wp) :: largest
-
-      relative_size = 0.0_wp
-      if (all(abs(v) <= 0.0_wp)) return
-      relative_size = huge(relative_size)
-      largest = maxval(scale)
-      if (.not. (largest > 0.0_wp .and. maxval(abs(v)) <= huge(v))) return
-      if (any(v /= v)) return
-      largest = real(radix(largest), wp)**exponent(largest)
-      relative_size = sqrt(sum((v/largest)**2)/sum((scale/largest)**2))
-   end function relative_size
 
 end module emcon_newton

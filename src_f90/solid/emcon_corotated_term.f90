@@ -95,18 +95,24 @@ contains
             end if
             call corotated_force(self%frame(k), moved, force)
             response%energy(self%own%element(k)) = moved%energy
-            largest = maxval(abs(from + by))
-            do i = 1, self%own%n_node(k)
-               largest = max(largest, maxval(motion%computed(:, self%own%node(i, k))))
-            end do
             do i = 1, self%own%n_node(k)
                associate (node => self%own%node(i, k))
                   total%force(:, node) = total%force(:, node) + force(:, i)
-                  total%magnitude(:, node) = total%magnitude(:, node) + abs(force(:, i))
-                  response%rounding(:, node) = response%rounding(:, node) &
-                     + largest*self%own%rounding(i, k)
                end associate
             end do
+            if (response%with_sizes) then
+               largest = maxval(abs(from + by))
+               do i = 1, self%own%n_node(k)
+                  largest = max(largest, maxval(motion%computed(:, self%own%node(i, k))))
+               end do
+               do i = 1, self%own%n_node(k)
+                  associate (node => self%own%node(i, k))
+                     total%magnitude(:, node) = total%magnitude(:, node) + abs(force(:, i))
+                     response%rounding(:, node) = response%rounding(:, node) &
+                        + largest*self%own%rounding(i, k)
+                  end associate
+               end do
+            end if
             if (present(value)) call scatter(self, k, moved, motion%weight, s, value, side)
          end do
       end associate

@@ -46,6 +46,7 @@ module emcon_element_pack_plane
    type :: pack_response_t
       real(wp) :: energy(n_lane) = 0.0_wp                  !! strain energy at the end
       real(wp) :: force(n_lane, 2, max_node) = 0.0_wp
+      logical :: with_sizes = .true.                       !! there are magnitudes
       real(wp) :: magnitude(n_lane, 2, max_node) = 0.0_wp  !! sum of |contributions| to `force`
       !> Derivative of `force` by u1: (lane, component, node, component and node of u1)
       real(wp) :: tangent(n_lane, 2, max_node, 2, max_node) = 0.0_wp
@@ -107,7 +108,7 @@ contains
 
       response%energy = 0.0_wp
       response%force(:, :, :n) = 0.0_wp
-      response%magnitude(:, :, :n) = 0.0_wp
+      if (response%with_sizes) response%magnitude(:, :, :n) = 0.0_wp
       if (with_tangent) response%tangent(:, :, :n, :, :n) = 0.0_wp
       response%is_inverted = .false.
    end subroutine pack_clear
@@ -217,12 +218,29 @@ contains
             part = nominal(:, a, 1)*self%gradient(:, 1, i, k) &
                + nominal(:, a, 2)*self%gradient(:, 2, i, k)
             response%force(:, a, i) = response%force(:, a, i) + part
-            response%magnitude(:, a, i) = response%magnitude(:, a, i) + abs(part)
          end do
       end do
+      if (response%with_sizes) call add_sizes(self%n_node, nominal, self%gradient(:, :, :, k), &
+         response%magnitude)
       if (with_tangent) call add_tangent(self%n_node, self%gradient(:, :, :, k), &
          self%weight(:, k), point, s, response%tangent)
    end subroutine pack_add_point
+
+   !> Add the sizes of the forces of a point.
+   pure subroutine add_sizes(n, nominal, gradient, magnitude)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: nominal(n_lane, 2, 2)        !! stress, weighted
+      real(wp), intent(in) :: gradient(n_lane, 2, n)
+      real(wp), intent(inout) :: magnitude(n_lane, 2, max_node)
+      integer :: a, i
+
+      do i = 1, n
+         do a = 1, 2
+            magnitude(:, a, i) = magnitude(:, a, i) + abs(nominal(:, a, 1)*gradient(:, 1, i) &
+               + nominal(:, a, 2)*gradient(:, 2, i))
+         end do
+      end do
+   end subroutine add_sizes
 
    !> Add grad N_i . A . grad N_j, with A the derivative of the nominal stress by grad u at the end:
    !> docs/theory.md, eq. (11).

@@ -104,13 +104,18 @@ contains
                pull(:m) = pull(:m) + self%own%stiffness(:m, j, k)*last(j)
             end do
             response%energy(self%own%element(k)) = 0.5_wp*dot_product(last(:m), pull(:m))
+            do i = 1, self%own%n_node(k)
+               associate (node => self%own%node(i, k), part => force(n_dim*(i - 1) + 1:n_dim*i))
+                  total%force(:, node) = total%force(:, node) + part
+               end associate
+            end do
+            if (.not. response%with_sizes) cycle
             largest = maxval(abs(last(:m)))
             do i = 1, self%own%n_node(k)
                largest = max(largest, maxval(motion%computed(:, self%own%node(i, k))))
             end do
             do i = 1, self%own%n_node(k)
                associate (node => self%own%node(i, k), part => force(n_dim*(i - 1) + 1:n_dim*i))
-                  total%force(:, node) = total%force(:, node) + part
                   total%magnitude(:, node) = total%magnitude(:, node) + abs(part)
                   response%rounding(:, node) = response%rounding(:, node) &
                      + largest*self%own%rounding(i, k)

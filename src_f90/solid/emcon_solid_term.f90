@@ -109,6 +109,7 @@ contains
          if (self%given%inverted_element > 0) return
       end if
       local%nlgeom = self%nlgeom
+      part%with_sizes = response%with_sizes
       do k = 1, size(self%solid%pack)
          associate (pack => self%solid%pack(k))
             call pack_gather(pack, motion%from, motion%by, local)
@@ -138,6 +139,13 @@ contains
          do l = 1, pack%n
             e = pack%element(l)
             response%energy(e) = part%energy(l)
+            do i = 1, n
+               node = pack%node(l, i)
+               do a = 1, size(part%force, 2)
+                  total%force(a, node) = total%force(a, node) + part%force(l, a, i)
+               end do
+            end do
+            if (.not. response%with_sizes) cycle
             largest = 0.0_wp
             do i = 1, n
                node = pack%node(l, i)
@@ -149,7 +157,6 @@ contains
             do i = 1, n
                node = pack%node(l, i)
                do a = 1, size(part%force, 2)
-                  total%force(a, node) = total%force(a, node) + part%force(l, a, i)
                   total%magnitude(a, node) = total%magnitude(a, node) + part%magnitude(l, a, i)
                   response%rounding(a, node) = response%rounding(a, node) &
                      + largest*self%solid%stiffness(i, e)

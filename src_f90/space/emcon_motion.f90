@@ -7,6 +7,7 @@
 module emcon_motion
    use emcon_kinds, only : wp
    use emcon_pose, only : pose_t
+   use emcon_vectors, only : vector_product, vector_sizes, vector_sum
    implicit none
    private
    public :: motion_t, motion_init, motion_place, motion_of, at_rest
@@ -57,13 +58,13 @@ contains
             self%weight = 2.0_wp*place
          else
             self%from = self%u0
-            self%by = place*self%du
-            self%computed = abs(self%by)
+            call vector_product(size(self%du), place, self%du, self%by)
+            call vector_sizes(size(self%du), self%by, self%computed)
             self%weight = place
          end if
       end associate
       self%load_weight = self%pose%load_place
-      self%at = self%u0 + self%load_weight*self%du
+      call vector_sum(size(self%du), self%u0, self%load_weight, self%du, self%at)
    end subroutine motion_place
 
    !> The motion from `u0` by `du`, from rest unless `v0` is given, placed.

@@ -9,6 +9,7 @@ module emcon_term
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_t, space_t
+   use emcon_vectors, only : vector_zero
    implicit none
    private
    public :: term_t, term_box_t, forces_t, response_t, response_init, response_begin
@@ -25,6 +26,9 @@ module emcon_term
    !> What all terms give over one motion.
    type :: response_t
       type(forces_t) :: part(3)                  !! by role
+      !> Terms add to the sizes, `magnitude` and `rounding`; else these stay what they were found to
+      !> be before
+      logical :: with_sizes = .true.
       real(wp), allocatable :: rounding(:, :)    !! (n_dim, n_node) times epsilon: round-off
       real(wp), allocatable :: residual(:, :)    !! (n_dim, n_node) without constraint forces
       real(wp), allocatable :: magnitude(:, :)   !! (n_dim, n_node) sum of |contributions| to it
@@ -139,15 +143,18 @@ contains
    end subroutine response_init
 
    !> No term has given anything yet.
-   pure subroutine response_begin(self)
+   pure subroutine response_begin(self, with_sizes)
       type(response_t), intent(inout) :: self
+      logical, intent(in), optional :: with_sizes   !! else the sizes stay; .true.
       integer :: k
 
+      self%with_sizes = .true.
+      if (present(with_sizes)) self%with_sizes = with_sizes
       do k = 1, size(self%part)
-         self%part(k)%force = 0.0_wp
-         self%part(k)%magnitude = 0.0_wp
+         call vector_zero(size(self%rounding), self%part(k)%force)
+         if (self%with_sizes) call vector_zero(size(self%rounding), self%part(k)%magnitude)
       end do
-      self%rounding = 0.0_wp
+      if (self%with_sizes) call vector_zero(size(self%rounding), self%rounding)
       self%potential = 0.0_wp
       if (allocated(self%refusal)) deallocate(self%refusal)
       if (allocated(self%failure)) deallocate(self%failure)

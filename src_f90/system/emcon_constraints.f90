@@ -11,6 +11,7 @@ module emcon_constraints
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
    use emcon_system, only : system_t
+   use emcon_vectors, only : vector_zero
    implicit none
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
@@ -329,7 +330,7 @@ contains
       real(wp), intent(out), contiguous :: force(:, :)                   !! (2, n_node)
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (2, n_node), added to
 
-      force = 0.0_wp
+      call vector_zero(size(force), force)
       if (first <= self%n) call add_forces(self, first, force, magnitude)
    end subroutine constraints_force
 

@@ -24,6 +24,7 @@ module emcon_system
       role_inertia, role_internal, term_box_t
    use emcon_term_registry, only : terms_create, terms_mass, terms_mass_times
    use emcon_text, only : note_add, notes_t, to_text
+   use emcon_vectors, only : vector_add, vector_sum
    implicit none
    private
    public :: system_t, system_init, system_begin_step, system_renew, system_respond, &
@@ -242,14 +243,15 @@ contains
 
    !> Residual of a motion without constraint forces, and with `with_tangent` the tangent. `refusal`
    !> or `failure` of the response is allocated where there is none.
-   subroutine system_respond(self, motion, with_tangent)
+   subroutine system_respond(self, motion, with_tangent, with_sizes)
       type(system_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion       !! placed
       logical, intent(in) :: with_tangent        !! else the matrix is left as it is
-      integer :: k, left
+      logical, intent(in), optional :: with_sizes   !! else those of an earlier motion stay; .true.
+      integer :: k, n, left
 
       call phase_enter(self%phases, merge(phase_assemble, phase_residual, with_tangent), left)
-      call response_begin(self%response)
+      call response_begin(self%response, with_sizes)
       if (with_tangent) then
          self%phases%n_tangent = self%phases%n_tangent + 1
          self%is_symmetric = .true.
@@ -276,8 +278,13 @@ contains
       associate (response => self%response, inertia => self%response%part(role_inertia), &
             internal => self%response%part(role_internal), &
             external => self%response%part(role_external))
-         response%residual = inertia%force + (internal%force - external%force)
-         response%magnitude = inertia%magnitude + (internal%magnitude + external%magnitude)
+         n = size(response%residual)
+         call vector_sum(n, internal%force, -1.0_wp, external%force, response%residual)
+         call vector_add(n, 1.0_wp, inertia%force, response%residual)
+         if (response%with_sizes) then
+            call vector_sum(n, internal%magnitude, 1.0_wp, external%magnitude, response%magnitude)
+            call vector_add(n, 1.0_wp, inertia%magnitude, response%magnitude)
+         end if
       end associate
       call phase_leave(self%phases, left)
    end subroutine system_respond

@@ -126,12 +126,15 @@ contains
       call ask(self, motion, present(value))
       call judge(self, response)
       if (allocated(response%refusal) .or. allocated(response%failure)) return
-      self%position = abs(motion%x) + max(abs(motion%u0), abs(motion%u0 + motion%du))
-      call complete_magnitude(self%force%pattern, self%answer%force, self%answer%magnitude)
-      call add_rounding(self%force%pattern, self%answer%tangent, self%position, response%rounding)
       associate (total => response%part(self%role))
          total%force = total%force + self%answer%force
-         total%magnitude = total%magnitude + self%answer%magnitude
+         if (response%with_sizes) then
+            self%position = abs(motion%x) + max(abs(motion%u0), abs(motion%u0 + motion%du))
+            call complete_magnitude(self%force%pattern, self%answer%force, self%answer%magnitude)
+            call add_rounding(self%force%pattern, self%answer%tangent, self%position, &
+               response%rounding)
+            total%magnitude = total%magnitude + self%answer%magnitude
+         end if
       end associate
       response%potential = response%potential + self%answer%energy
       if (.not. present(value)) return

@@ -13,6 +13,7 @@ module emcon_inertia
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_term, only : response_t, role_inertia, term_t
+   use emcon_vectors, only : vector_add, vector_scale, vector_sum
    implicit none
    private
    public :: inertia_t, inertia_init, inertia_add, inertia_times
@@ -34,6 +35,8 @@ module emcon_inertia
 
    !> Nodes between which an entry of the mass stands.
    integer, parameter :: n_end = 2
+   !> Directions that the mass is multiplied in at a time.
+   integer, parameter :: n_way = 2
 
 contains
 
@@ -176,13 +179,18 @@ contains
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      integer :: n
 
       associate (pose => motion%pose, total => response%part(self%role))
          if (.not. pose%mass_scale > 0.0_wp) return
          if (present(value)) value = value + real(pose%mass_scale*pose%rate, dp)*self%value
-         self%rate = pose%rate*(motion%du + motion%offset) - pose%v_weight*motion%v0
+         n = size(self%rate)
+         call vector_sum(n, motion%du, 1.0_wp, motion%offset, self%rate)
+         call vector_scale(n, pose%rate, self%rate)
+         call vector_add(n, -pose%v_weight, motion%v0, self%rate)
          call inertia_times(self, self%rate, self%product)
-         total%force = total%force + pose%mass_scale*self%product
+         call vector_add(n, pose%mass_scale, self%product, total%force)
+         if (.not. response%with_sizes) return
          self%rate = abs(pose%rate*(motion%du + motion%offset)) + abs(pose%v_weight*motion%v0)
          call inertia_times(self, self%rate, self%product)
          total%magnitude = total%magnitude + pose%mass_scale*self%product
@@ -206,23 +214,28 @@ contains
       class(inertia_t), intent(in) :: self
       real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
-      real(wp) :: one, other
-      integer :: i, k, a, b
+      real(wp) :: total(n_way)
+      integer :: i, k, a
 
-      do i = 1, self%mass%n_row
-         do a = 1, size(field, 1), 2               ! two directions at a time
-            b = min(a + 1, size(field, 1))
-            one = 0.0_wp
-            other = 0.0_wp
+      do a = 1, size(field, 1) - n_way + 1, n_way
+         do i = 1, self%mass%n_row
+            total = 0.0_wp
             do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
                associate (m => real(self%mass%value(k), wp), j => self%mass%column(k) + 1)
-                  one = one + m*field(a, j)
-                  other = other + m*field(b, j)
+                  total = total + m*field(a:a + n_way - 1, j)
                end associate
             end do
-            product(a, i) = one
-            product(b, i) = other
+            product(a:a + n_way - 1, i) = total
          end do
+      end do
+      if (modulo(size(field, 1), n_way) == 0) return
+      a = size(field, 1)
+      do i = 1, self%mass%n_row
+         total(1) = 0.0_wp
+         do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
+            total(1) = total(1) + real(self%mass%value(k), wp)*field(a, self%mass%column(k) + 1)
+         end do
+         product(a, i) = total(1)
       end do
    end subroutine inertia_times
 

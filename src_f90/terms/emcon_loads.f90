@@ -198,7 +198,7 @@ contains
       end do
       associate (total => response%part(self%role))
          total%force = total%force + self%force
-         total%magnitude = total%magnitude + abs(self%force)
+         if (response%with_sizes) total%magnitude = total%magnitude + abs(self%force)
       end associate
    end subroutine respond
 

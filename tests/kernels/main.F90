@@ -62,6 +62,7 @@ program main
    use test_rigidity, only : collect_rigidity
    use test_rigid_bodies, only : collect_rigid_bodies
    use test_row_elimination, only : collect_row_elimination
+   use test_lane_sums, only : collect_lane_sums
    use test_mixing, only : collect_mixing
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
@@ -158,6 +159,7 @@ program main
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)
    call run("saddle_point", collect_saddle_point)
+   call run("lane_sums", collect_lane_sums)
    call run("mixing", collect_mixing)
    call run("correction", collect_correction)
    call run("reduction", collect_reduction)

@@ -44,7 +44,7 @@ contains
       system%matrix = problem%base
       allocate(dq, source=problem%residual)
       call make_rows(problem)
-      call correction_lay_out(correction, system, problem%set, error)
+      call correction_lay_out(correction, system, problem%set)
       if (allocated(error)) return
       call correction_multipliers(correction, system, problem%set, problem%residual)
       call correction_factorise(correction, system, problem%set, is_singular, error)
@@ -176,7 +176,7 @@ contains
                end if
             end do
          end do
-         call correction_lay_out(correction, system, problem%set, error)
+         call correction_lay_out(correction, system, problem%set)
          if (allocated(error)) return
          call correction_factorise(correction, system, problem%set, is_singular, error)
          if (allocated(error)) return

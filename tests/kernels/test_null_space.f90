@@ -75,7 +75,8 @@ contains
       logical :: is_singular
 
       call make_sample(i_sample, problem)
-      call null_space_init(null_space, problem%set, problem%matrix, problem%numbering, error)
+      call null_space_init(null_space, problem%set, size(problem%matrix%column), &
+         problem%numbering)
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle_none, "obstacle")
       if (allocated(error)) return
@@ -275,7 +276,8 @@ contains
          item(3)%c(:, 2) = [0.0_wp, 1.0_wp]
       end associate
       call make_rows(problem)
-      call null_space_init(null_space, problem%set, problem%matrix, problem%numbering, error)
+      call null_space_init(null_space, problem%set, size(problem%matrix%column), &
+         problem%numbering)
       if (allocated(error)) return
       call check_equal(error, null_space%present%dependent(1), problem%numbering%unknown(2, 1), &
          "dependent unknown of the first constraint")
@@ -321,7 +323,8 @@ contains
       if (allocated(error)) return
       call null_space_multipliers(null_space, problem%set, problem%numbering, problem%residual, &
          lam(:, 1))
-      call null_space_init(new, problem%set, problem%matrix, problem%numbering, error)
+      call null_space_init(new, problem%set, size(problem%matrix%column), &
+         problem%numbering)
       if (allocated(error)) return
       call null_space_factorise(new, problem%set, problem%matrix, is_singular, error)
       if (allocated(error)) return
@@ -370,7 +373,8 @@ contains
       logical :: is_singular
 
       call make_rows(problem)
-      call null_space_init(null_space, problem%set, problem%matrix, problem%numbering, error)
+      call null_space_init(null_space, problem%set, size(problem%matrix%column), &
+         problem%numbering)
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle, "obstacle")
       call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
@@ -399,7 +403,8 @@ contains
          end associate
       end do
       call make_rows(problem)
-      call null_space_init(null_space, problem%set, problem%matrix, problem%numbering, error)
+      call null_space_init(null_space, problem%set, size(problem%matrix%column), &
+         problem%numbering)
       if (allocated(error)) return
       call check_equal(error, null_space%obstacle, obstacle_none, "obstacle at first sight")
       call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)

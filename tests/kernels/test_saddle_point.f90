@@ -80,7 +80,8 @@ contains
          if (allocated(error)) return
          lam(:, 1) = problem%set%lam + lam(:, 1)
 
-         call null_space_init(null_space, problem%set, problem%matrix, problem%numbering, error)
+         call null_space_init(null_space, problem%set, size(problem%matrix%column), &
+         problem%numbering)
          if (allocated(error)) return
          call null_space_factorise(null_space, problem%set, problem%matrix, is_singular, error)
          if (allocated(error)) return
