@@ -23,7 +23,8 @@ module emcon_layer
    use emcon_scheme_registry, only : scheme_row
    use emcon_steps, only : initiation_admissible, load_point, load_t, method_saddle_point, &
       prescribed_t, step_t
-   use emcon_system, only : system_begin_step, system_init, system_renew, system_respond, system_t
+   use emcon_system, only : system_begin_step, system_find_energy, system_init, system_renew, &
+      system_respond, system_t
    implicit none
    private
    public :: layer_t, layer_init, layer_renew, layer_begin_step, layer_mark, layer_settle, &
@@ -233,6 +234,7 @@ contains
       if (.not. any(has_changed)) return
       call take_multipliers(self, active)
       call begin(self, motion, load)
+      call system_find_energy(self%system, self%motion)
       before = sum(self%system%response%energy)
       call find_apart(self, stays)
       has_changed = has_changed .and. .not. stays
@@ -253,6 +255,7 @@ contains
       call system_respond(self%system, self%motion, .true.)
       self%du = self%motion%du
       self%work = sum(load*self%du)
+      call system_find_energy(self%system, self%motion)
       self%released = before - sum(self%system%response%energy) + self%work
       weight = active%lam0(self%n_before + 1:) + self%lam
       where (.not. stays)

@@ -17,7 +17,7 @@ module emcon_march_begin
    use emcon_march_types, only : march_t
    use emcon_mass_return, only : mass_match
    use emcon_mechanism_text, only : free_motion_text
-   use emcon_motion, only : at_rest, motion_of
+   use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_newton, only : newton_init
    use emcon_numbering, only : spread_dependent
    use emcon_overclosure, only : overclosure_check
@@ -29,7 +29,8 @@ module emcon_march_begin
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_massless, initiation_persistent, method_saddle_point, &
       newton_kept, step_t
-   use emcon_system, only : system_begin_step, system_check_response, system_respond
+   use emcon_system, only : system_begin_step, system_check_response, system_find_energy, &
+      system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
@@ -189,14 +190,9 @@ contains
          if (allocated(error)) return
          call march_count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
-         call system_respond(self%system, motion_of(pose_at_end, scene%x, state%u, &
-            at_rest(state%u)), .false.)
-         call system_check_response(self%system, "at the start of the step", error)
-         if (allocated(error)) return
-         state%internal = self%system%response%part(role_internal)%force
-         state%energy = self%system%response%energy
-         state%potential = self%system%response%potential
       end associate
+      call measure_start(self, scene%x, error)
+      if (allocated(error)) return
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
       self%revision = self%revision + 1
 
@@ -212,6 +208,23 @@ contains
       end function options_of
 
    end subroutine prepare
+
+   !> Internal forces and energies at the displacements that the step starts from.
+   subroutine measure_start(self, x, error)
+      type(march_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)        !! (n_dim, n_node) [L]
+      type(error_t), allocatable, intent(inout) :: error
+      type(motion_t) :: place
+
+      place = motion_of(pose_at_end, x, self%state%u, at_rest(self%state%u))
+      call system_respond(self%system, place, .false.)
+      call system_check_response(self%system, "at the start of the step", error)
+      if (allocated(error)) return
+      call system_find_energy(self%system, place)
+      self%state%internal = self%system%response%part(role_internal)%force
+      self%state%energy = self%system%response%energy
+      self%state%potential = self%system%response%potential
+   end subroutine measure_start
 
    !> How contact begins and ends in a step.
    subroutine begin_active(active, step, has_rigid)

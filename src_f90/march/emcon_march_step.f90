@@ -22,7 +22,7 @@ module emcon_march_step
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_steps, only : method_null_space
-   use emcon_system, only : system_loads, system_respond
+   use emcon_system, only : system_find_energy, system_loads, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
    use emcon_travel, only : largest_motion
@@ -136,12 +136,18 @@ contains
       type(march_t), intent(inout) :: self
       integer, intent(inout) :: status           !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      type(motion_t) :: place
       logical :: is_elsewhere
 
       is_elsewhere = self%motion%pose%place < 1.0_wp .or. self%layer%is_settled
       associate (system => self%system, motion => self%motion, ending => self%ending)
-         if (is_elsewhere) call system_respond(system, motion_of(pose_at_end, motion%x, motion%u0, &
-            ending%du), .false.)
+         if (is_elsewhere) then
+            place = motion_of(pose_at_end, motion%x, motion%u0, ending%du)
+            call system_respond(system, place, .false.)
+            call system_find_energy(system, place)
+         else
+            call system_find_energy(system, motion)
+         end if
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(system%response%refusal)) status = step_refused
          if (status /= step_done .or. allocated(error)) return

@@ -1,10 +1,11 @@
 !> Elements of linear sections as one term: small strains in all steps, a stiffness that stays.
 !>
 !> The energy is u.K u/2, with K of the laws at rest, so that K at the mean of the ends of a span is
-!> its discrete gradient. Displacements count from the first node of an element: flight rounds
-!> nothing. Source: docs/theory.md, section 3.
+!> its discrete gradient: one product with the assembled K. Source: docs/theory.md, section 3.
 module emcon_linear_term
    use emcon_csr, only : csr_t
+   use emcon_element_lists, only : element_lists
+   use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_reduction, only : reduction_fold
@@ -12,6 +13,8 @@ module emcon_linear_term
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_stiff_elements, only : stiff_elements_gather, stiff_elements_init, stiff_elements_t
+   use emcon_stiff_product_plane, only : stiff_product_find_sizes, stiff_product_form, &
+      stiff_product_init, stiff_product_load, stiff_product_t
    use emcon_term, only : response_t, role_internal, term_t
    implicit none
    private
@@ -19,24 +22,40 @@ module emcon_linear_term
 
    type, extends(term_t) :: linear_term_t
       type(stiff_elements_t), private :: own
+      type(stiff_product_t), private :: product
+      real(wp), allocatable, private :: rounding(:)      !! (n_node) as `stiffness` of solid_t
       real(dp), allocatable, private :: value(:)         !! K/2 in the pattern of the matrix
    contains
       procedure :: lay_out
       procedure :: begin_step
       procedure :: respond
+      procedure :: find_energy
       procedure :: tangent_times
    end type linear_term_t
 
 contains
 
    !> The linear elements of `solid`.
-   subroutine linear_term_init(self, solid, n_dim)
+   subroutine linear_term_init(self, solid, n_dim, error)
       type(linear_term_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: n_dim               !! > 0
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: start(:), node(:)
+      integer :: i, k
 
       self%role = role_internal
       call stiff_elements_init(self%own, solid, n_dim, solid%is_linear)
+      call element_lists(solid, 1, start, node, solid%is_linear)
+      call stiff_product_init(self%product, solid%n_node, start, node, self%own%stiffness, error)
+      allocate(self%rounding(solid%n_node), source=0.0_wp)
+      do k = 1, size(self%own%element)
+         do i = 1, self%own%n_node(k)
+            associate (to => self%rounding(self%own%node(i, k)))
+               to = to + self%own%rounding(i, k)
+            end associate
+         end do
+      end do
    end subroutine linear_term_init
 
    !> The freedoms of each element.
@@ -78,52 +97,57 @@ contains
       call reduction_fold(space%reduction, matrix, self%value, side)
    end subroutine begin_step
 
-   !> Forces of a motion, K at the middle of its span, and the energy at its end.
+   !> Forces of a motion, K at the middle of its span.
    subroutine respond(self, motion, response, value, side)
       class(linear_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      real(wp), dimension(size(self%own%stiffness, 1)) :: last, middle, force, pull
-      real(wp) :: largest
-      integer :: i, j, k, m, n_dim
+      integer :: a, i
 
       if (present(value)) value = value + real(motion%weight, dp)*self%value
-      n_dim = size(motion%x, 1)
-      associate (total => response%part(self%role))
-         do k = 1, size(self%own%element)
-            m = n_dim*self%own%n_node(k)
-            call stiff_elements_gather(self%own, k, motion%from, last)
-            call stiff_elements_gather(self%own, k, motion%by, middle)
-            last(:m) = last(:m) + middle(:m)
-            middle(:m) = last(:m) - 0.5_wp*middle(:m)
-            force(:m) = 0.0_wp
-            pull(:m) = 0.0_wp
-            do j = 1, m
-               force(:m) = force(:m) + self%own%stiffness(:m, j, k)*middle(j)
-               pull(:m) = pull(:m) + self%own%stiffness(:m, j, k)*last(j)
-            end do
-            response%energy(self%own%element(k)) = 0.5_wp*dot_product(last(:m), pull(:m))
-            do i = 1, self%own%n_node(k)
-               associate (node => self%own%node(i, k), part => force(n_dim*(i - 1) + 1:n_dim*i))
-                  total%force(:, node) = total%force(:, node) + part
-               end associate
-            end do
-            if (.not. response%with_sizes) cycle
-            largest = maxval(abs(last(:m)))
-            do i = 1, self%own%n_node(k)
-               largest = max(largest, maxval(motion%computed(:, self%own%node(i, k))))
-            end do
-            do i = 1, self%own%n_node(k)
-               associate (node => self%own%node(i, k), part => force(n_dim*(i - 1) + 1:n_dim*i))
-                  total%magnitude(:, node) = total%magnitude(:, node) + abs(part)
-                  response%rounding(:, node) = response%rounding(:, node) &
-                     + largest*self%own%rounding(i, k)
-               end associate
-            end do
+      call stiff_product_load(self%product, motion%from, motion%by)
+      call stiff_product_form(self%product)
+      associate (total => response%part(self%role), product => self%product)
+         do i = 1, product%n
+            associate (node => product%node(i))
+               do a = 1, size(motion%x, 1)
+                  total%force(a, node) = total%force(a, node) + product%force(i, a)
+               end do
+            end associate
+         end do
+         if (.not. response%with_sizes) return
+         call stiff_product_find_sizes(product, motion%computed)
+         do i = 1, product%n
+            associate (node => product%node(i))
+               total%magnitude(:, node) = total%magnitude(:, node) + product%magnitude(i, :)
+               response%rounding(:, node) = response%rounding(:, node) &
+                  + product%largest(i)*self%rounding(node)
+            end associate
          end do
       end associate
    end subroutine respond
+
+   !> Energies at the end of a motion.
+   pure subroutine find_energy(self, motion, energy)
+      class(linear_term_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+      real(wp), intent(inout) :: energy(:)       !! (n_element) [M L^2/T^2]
+      real(wp), dimension(size(self%own%stiffness, 1)) :: last, way, pull
+      integer :: j, k, m
+
+      do k = 1, size(self%own%element)
+         m = size(motion%x, 1)*self%own%n_node(k)
+         call stiff_elements_gather(self%own, k, motion%from, last)
+         call stiff_elements_gather(self%own, k, motion%by, way)
+         last(:m) = last(:m) + way(:m)
+         pull(:m) = 0.0_wp
+         do j = 1, m
+            pull(:m) = pull(:m) + self%own%stiffness(:m, j, k)*last(j)
+         end do
+         energy(self%own%element(k)) = 0.5_wp*dot_product(last(:m), pull(:m))
+      end do
+   end subroutine find_energy
 
    !> Add the tangent of a motion times `direction` to `product`.
    subroutine tangent_times(self, motion, direction, product)
@@ -131,23 +155,14 @@ contains
       type(motion_t), intent(in) :: motion                             !! placed
       real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
       real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
-      real(wp), dimension(size(self%own%stiffness, 1)) :: way, force
-      integer :: i, j, k, m, n_dim
+      integer :: i
 
-      n_dim = size(direction, 1)
-      do k = 1, size(self%own%element)
-         m = n_dim*self%own%n_node(k)
-         call stiff_elements_gather(self%own, k, direction, way)
-         if (.not. any(abs(way(:m)) > 0.0_wp)) cycle
-         force(:m) = 0.0_wp
-         do j = 1, m
-            force(:m) = force(:m) + 0.5_wp*motion%weight*self%own%stiffness(:m, j, k)*way(j)
-         end do
-         do i = 1, self%own%n_node(k)
-            associate (node => self%own%node(i, k))
-               product(:, node) = product(:, node) + force(n_dim*(i - 1) + 1:n_dim*i)
-            end associate
-         end do
+      call stiff_product_load(self%product, direction)
+      call stiff_product_form(self%product)
+      do i = 1, self%product%n
+         associate (node => self%product%node(i))
+            product(:, node) = product(:, node) + 0.5_wp*motion%weight*self%product%force(i, :)
+         end associate
       end do
    end subroutine tangent_times
 

@@ -6,6 +6,7 @@
 module emcon_small_range
    use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t
    use emcon_kinds, only : wp
+   use emcon_small_widen_plane, only : small_widen
    use emcon_solid, only : solid_t
    implicit none
    private
@@ -39,11 +40,14 @@ contains
       type(small_range_t), intent(inout) :: self
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)        !! (n_dim, n_node) [L]
-      real(wp), dimension(size(u, 1), size(u, 1)) :: slope, skew
       real(wp), dimension(size(u, 1), size(solid%node, 1)) :: own, left
+      real(wp), dimension(size(self%section)) :: rotation, strain   ! squares
+      real(wp) :: turn(size(u, 1), size(u, 1))
       type(corotated_t) :: frame
-      integer :: e, i, k, a, s
+      integer :: e, i, s
 
+      rotation = 0.0_wp
+      strain = 0.0_wp
       do e = 1, solid%n_element
          if (.not. solid%is_small(e)) cycle
          s = findloc(self%section, solid%section(e), 1)
@@ -54,21 +58,13 @@ contains
             if (solid%is_corotated(e)) then
                call corotated_init(frame, geometry, solid%x(:, node(:geometry%n_node)))
                left = own
-               call corotated_strip(frame, left, own, skew)
+               call corotated_strip(frame, left, own, turn)
             end if
-            do k = 1, geometry%n_gp
-               slope = 0.0_wp
-               do i = 1, geometry%n_node
-                  do a = 1, size(u, 1)
-                     slope(:, a) = slope(:, a) + own(:, i)*geometry%gradient(a, i, k)
-                  end do
-               end do
-               skew = 0.5_wp*(slope - transpose(slope))
-               self%rotation(s) = max(self%rotation(s), sqrt(0.5_wp*sum(skew**2)))
-               self%strain(s) = max(self%strain(s), norm2(slope - skew))
-            end do
+            call small_widen(geometry, own, rotation(s), strain(s))
          end associate
       end do
+      self%rotation = max(self%rotation, sqrt(rotation))
+      self%strain = max(self%strain, sqrt(strain))
    end subroutine small_range_widen
 
 end module emcon_small_range

@@ -32,7 +32,8 @@ module emcon_term
       real(wp), allocatable :: rounding(:, :)    !! (n_dim, n_node) times epsilon: round-off
       real(wp), allocatable :: residual(:, :)    !! (n_dim, n_node) without constraint forces
       real(wp), allocatable :: magnitude(:, :)   !! (n_dim, n_node) sum of |contributions| to it
-      real(wp), allocatable :: energy(:)         !! (n_element) strain energy at the end
+      !> (n_element) strain energy at the end; that of some terms comes by `find_energy` alone
+      real(wp), allocatable :: energy(:)
       real(wp) :: potential = 0.0_wp             !! other energies at the end [M L^2/T^2]
       !> Why there are no forces: what "the displacements" did to what. Not allocated: there are
       character(len=:), allocatable :: refusal
@@ -49,6 +50,7 @@ module emcon_term
       procedure :: begin_step
       procedure :: renew
       procedure(respond_interface), deferred :: respond
+      procedure :: find_energy
       procedure :: tangent_times
       procedure :: add_stiffness
       procedure :: is_symmetric
@@ -100,6 +102,14 @@ contains
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_step              !! from 1
    end subroutine renew
+
+   !> Energies of elements at the end of a motion, of a term whose `respond` leaves them out. None
+   !> unless overridden.
+   pure subroutine find_energy(self, motion, energy)
+      class(term_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+      real(wp), intent(inout) :: energy(:)       !! (n_element) [M L^2/T^2]
+   end subroutine find_energy
 
    !> Add the tangent of a motion times `direction` to `product`, to first order in what a
    !> prescribed motion does. Nothing unless overridden.

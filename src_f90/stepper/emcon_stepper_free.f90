@@ -11,7 +11,7 @@ module emcon_stepper_free
       march_resume, &
       march_set_time
    use emcon_march_guess, only : follow_links
-   use emcon_motion, only : at_rest, motion_of
+   use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_pair_record, only : pair_record_init
    use emcon_pair_sums, only : pair_sums_begin
    use emcon_pose, only : pose_at_end
@@ -19,7 +19,7 @@ module emcon_stepper_free
    use emcon_stepper, only : stepper_check_solids, stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_number, check_size, &
       check_that, stepper_check_open
-   use emcon_system, only : system_check_response, system_respond
+   use emcon_system, only : system_check_response, system_find_energy, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
    use emcon_verdict, only : verdict_move, verdict_t, verdict_update
@@ -188,14 +188,16 @@ contains
       type(stepper_t), intent(inout) :: self
       type(state_t), intent(inout) :: next
       type(error_t), allocatable, intent(inout) :: error
+      type(motion_t) :: place
 
       if (allocated(error)) return
       associate (system => self%march%system)
-         call system_respond(system, motion_of(pose_at_end, self%scene%x, next%u, &
-            at_rest(next%u)), .false.)
+         place = motion_of(pose_at_end, self%scene%x, next%u, at_rest(next%u))
+         call system_respond(system, place, .false.)
          call system_check_response(system, "u", error)
          if (allocated(error)) return
          next%internal = system%response%part(role_internal)%force
+         call system_find_energy(system, place)
          next%energy = system%response%energy
          next%potential = system%response%potential
          next%contact = 0.0_wp

@@ -28,8 +28,8 @@ module emcon_system
    implicit none
    private
    public :: system_t, system_init, system_begin_step, system_renew, system_respond, &
-      system_check_response, system_stiffen, system_tangent_times, system_loads, &
-      system_may_hold, mass_times
+      system_find_energy, system_check_response, system_stiffen, system_tangent_times, &
+      system_loads, system_may_hold, mass_times
 
    type :: system_t
       type(term_box_t), allocatable :: term(:)
@@ -288,6 +288,17 @@ contains
       end associate
       call phase_leave(self%phases, left)
    end subroutine system_respond
+
+   !> Complete the energies of the elements of the last response, that to `motion`.
+   subroutine system_find_energy(self, motion)
+      type(system_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+      integer :: k
+
+      do k = 1, size(self%term)
+         call self%term(k)%term%find_energy(motion, self%response%energy)
+      end do
+   end subroutine system_find_energy
 
    !> The external forces of a motion.
    subroutine system_loads(self, motion, force)

@@ -97,10 +97,10 @@ contains
          call loads_init(part, scene, solid)
       end select
       do i = n_own + 1, size(term)
-         if (.not. allocated(term(i)%term)) exit
+         if (.not. allocated(term(i)%term) .or. allocated(error)) exit
          select type (part => term(i)%term)
          type is (linear_term_t)
-            call linear_term_init(part, solid, size(scene%x, 1))
+            call linear_term_init(part, solid, size(scene%x, 1), error)
          type is (corotated_term_t)
             call corotated_term_init(part, solid, size(scene%x, 1))
          end select

@@ -162,6 +162,25 @@ def test_small_vibrations_are_those_of_large_kinematics(tmp_path):
         rotation*other.history["kinetic"].max())
 
 
+def test_a_linear_body_in_fast_flight_vibrates(tmp_path):
+    """Its momentum is that of the start, and no flight, ten lengths far, rounds its energy away."""
+    scene = Scene(0.01, 1.0)
+    scene.block("BODY", (0, 0), (4, 1), (8, 2))
+    lines = [f"{n}, {a}, {number(v)}" for n, (x, y) in scene.part["BODY"].node.items()
+             for a, v in ((1, 30 + 0.1*(x - 2)*(y - 0.5)), (2, 20 + 0.03*math.cos(math.pi*x)))]
+    scene.cards += ["*INITIAL CONDITIONS, TYPE=VELOCITY", *lines]
+    deck = scene.deck(AUTO)
+    for card in ("*SURFACE INTERACTION", "*CONTACT FILE", "*CONTACT PRINT"):
+        deck.remove(card)
+    history = run_deck(linear(deck, "BODY"), tmp_path).history
+    inner = history["total"] - (history["px"]**2 + history["py"]**2)/8      # mass 4
+    assert history["strain"].max() > 0.3*inner[0] > 0
+    for column in ("px", "py"):
+        change = np.abs(history[column] - history[column][0]).max()
+        assert change < 1e-13*abs(history[column][0])    # 100 increments of round-off
+    assert np.abs(inner - inner[0]).max() < 100*EPS*history["total"][0]
+
+
 # ---- beside others ------------------------------------------------------------------------------
 
 
