@@ -86,17 +86,22 @@ def compare(scenes, writes):
     return writes or not above
 
 
+def ring_run(ring, block):
+    """Unknowns, seconds, counts and bytes of results of so many increments of the ring."""
+    with tempfile.TemporaryDirectory() as folder:
+        deck = pathlib.Path(folder)/f"ring_{ring}.inp"
+        subprocess.run([sys.executable, DECKS/"make_ring.py", "--ring", ring, "--block", block,
+                        "--output", deck], check=True)
+        run = run_deck(deck, folder, h=0.01, t_end=0.01*INCREMENTS, frame=1)
+        unknowns = int(re.search(r"(\d+) unknowns in step 1", run.log)[1])
+        deck.unlink()
+        written = sum(file.stat().st_size for file in pathlib.Path(folder).iterdir())
+        return unknowns, run.verdict["seconds"], run.verdict["counts"], written
+
+
 def phases(sizes):
     """Lines of the table of phases: milliseconds per increment, and shares."""
-    columns = []
-    with tempfile.TemporaryDirectory() as folder:
-        for ring, block in sizes:
-            deck = pathlib.Path(folder)/f"ring_{ring}.inp"
-            subprocess.run([sys.executable, DECKS/"make_ring.py", "--ring", ring, "--block", block,
-                            "--output", deck], check=True)
-            run = run_deck(deck, folder, h=0.01, t_end=0.01*INCREMENTS, frame=1)
-            unknowns = int(re.search(r"(\d+) unknowns in step 1", run.log)[1])
-            columns.append((unknowns, run.verdict["seconds"], run.verdict["counts"]))
+    columns = [ring_run(*size)[:3] for size in sizes]
     lines = ["| phase | " + " | ".join(f"{n} unknowns" for n, _, _ in columns) + " |",
              "|---"*(len(columns) + 1) + "|"]
     for name in columns[0][1]:

@@ -86,19 +86,29 @@ def codes(options):
     return found
 
 
-def rows_of(size, found, rounds, increments):
-    """Of the table, for one size: medians of all rounds; ratios are those of each round."""
+def told_by(size, found, rounds, increments):
+    """What the runs of each code tell, in turns."""
     told = {name: [] for name in found}
     for _ in range(rounds):
         for name, code in found.items():
             with tempfile.TemporaryDirectory() as folder:
                 told[name].append(code.run(size, H, increments, pathlib.Path(folder)))
+    return told
+
+
+def times_ours(told, name):
+    """The median of the ratios of each round."""
+    return statistics.median(a.user/b.user for a, b in zip(told[name], told[OURS], strict=True))
+
+
+def rows_of(size, found, rounds, increments):
+    """Of the table, for one size."""
+    told = told_by(size, found, rounds, increments)
     unknowns = ring_of(*map(cells, size)).unknowns
     for name, runs in told.items():
-        ratio = statistics.median(a.user/b.user for a, b in zip(runs, told[OURS], strict=True))
         error = runs[0].error
         yield (unknowns, name, f"{1e3*statistics.median(r.user for r in runs):.3g} ms",
-               f"{ratio:.3g}", f"{runs[0].iterations:.1f}",
+               f"{times_ours(told, name):.3g}", f"{runs[0].iterations:.1f}",
                f"{100*error:+.2f} %" if abs(error) > 1e-6 else f"{abs(error):.0e}")
 
 

@@ -9,7 +9,10 @@ from scene_tools import CRASH, DECKS, ROOT, emcon
 BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
 
+import bench_targets  # noqa: E402
 from bench_counts import rises  # noqa: E402
+from floors import factor_columns  # noqa: E402
+from peers.ring import ring_of  # noqa: E402
 
 
 def run(*command):
@@ -40,6 +43,32 @@ def test_counts_that_rise_are_told():
 def test_table_of_phases():
     lines = run(BENCH / "bench_counts.py", "--phases", "--short").splitlines()
     assert any(line.startswith("| factorise |") for line in lines)
+
+
+def test_targets(tmp_path):
+    """Runs of the table, a few increments each: their energy is exact, the rows say met or not."""
+    options = bench_targets.arguments().parse_args(["--short"])
+    rows = [*bench_targets.whole_runs(tmp_path, 1, options),
+            *bench_targets.decks(tmp_path, 1, options)]
+    assert len(rows) == 7 and all(row.found > 0 for row in rows)
+    assert all(row.error < 1e-10 for row in rows if row.error is not None)
+
+
+@pytest.mark.parametrize(("found", "is_least", "told"), [(0.5, False, "met"), (2, False, "missed"),
+                                                         (2, True, "met"), (0.5, True, "missed")])
+def test_targets_that_are_missed(found, is_least, told):
+    assert told in bench_targets.Row("scene", 1, " s", found, is_least=is_least).cells()
+
+
+def test_entries_of_the_factor():
+    """Not less than those of the matrix below its diagonal, which nodes of one element make."""
+    ring = ring_of((8, 1), (6, 1))
+    free = set(ring.node) - set(ring.bottom)
+    pairs = {(a, b) for nodes in ring.element.values() for a in nodes for b in nodes
+             if a <= b and {a, b} <= free}
+    column, n = factor_columns(ring), 2*len(free)
+    assert len(column) == n
+    assert sum(3 if a == b else 4 for a, b in pairs) <= column.sum() < n*(n + 1)/2
 
 
 def test_chapter_of_the_book():
