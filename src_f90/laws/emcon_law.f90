@@ -12,7 +12,7 @@ module emcon_law
    implicit none
    private
    public :: law_t, law_box_t, law_points_t, law_response_t, n_lane
-   public :: law_response_plane, law_respond_one, volume_excess
+   public :: law_response_plane, law_respond_one, law_hold_one, volume_excess
    public :: claim, isochoric_excess, lame_constants, take_elastic, volume_energy
 
    !> Points that are computed side by side. No lane knows of another: the bits of a point depend
@@ -27,6 +27,7 @@ module emcon_law
       procedure(take_interface), deferred :: take
       procedure(energy_interface), deferred :: energy
       procedure :: respond => law_respond
+      procedure :: hold => law_hold
    end type law_t
 
    !> For arrays of laws of different types.
@@ -66,6 +67,7 @@ module emcon_law
       real(wp) :: dstrain(n_lane, 3) = 0.0_wp
       real(wp) :: energy(n_lane) = 0.0_wp
       real(wp) :: stress(n_lane, 3) = 0.0_wp
+      real(wp) :: stress_33(n_lane) = 0.0_wp     !! set by `hold`
       real(wp) :: tangent(n_lane, 3, 3) = 0.0_wp
    end type law_points_t
 
@@ -119,6 +121,30 @@ contains
       call plane_stress(w, l, points)
       if (with_tangent) call plane_tangent(w, l, points)
    end subroutine law_respond_one
+
+   !> Stress of points side by side that do not move, with that normal to the plane. Overridden like
+   !> `respond`, by emcon_law_held.inc.
+   pure subroutine law_hold(self, points)
+      class(law_t), intent(in) :: self
+      type(law_points_t), intent(inout) :: points    !! `dstrain` is 0
+      integer :: l
+
+      do l = 1, n_lane
+         call law_hold_one(self, l, points)
+      end do
+   end subroutine law_hold
+
+   !> The same of the point in lane `l`.
+   pure subroutine law_hold_one(law, l, points)
+      class(law_t), intent(in) :: law
+      integer, intent(in) :: l                   !! 1..n_lane
+      type(law_points_t), intent(inout) :: points
+      type(law_response_t) :: response
+
+      call law_response_plane(law, points%strain(l, :), points%dstrain(l, :), response)
+      points%stress(l, :) = response%stress
+      points%stress_33(l) = response%stress_33
+   end subroutine law_hold_one
 
    include "emcon_law_plane.inc"
 

@@ -2,7 +2,7 @@
 module emcon_law_linear
    use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : law_points_t, law_respond_one, law_t, n_lane, take_elastic
+   use emcon_law, only : law_points_t, law_hold_one, law_respond_one, law_t, n_lane, take_elastic
    implicit none
    private
    public :: law_linear_t
@@ -14,6 +14,7 @@ module emcon_law_linear
       procedure :: take => linear_take
       procedure :: energy
       procedure :: respond
+      procedure :: hold
    end type law_linear_t
 
    logical, parameter :: is_near = .true.
@@ -48,6 +49,11 @@ contains
       class(law_linear_t), intent(in) :: self
       include "emcon_law_lanes.inc"
    end subroutine respond
+
+   pure subroutine hold(self, points)
+      class(law_linear_t), intent(in) :: self
+      include "emcon_law_held.inc"
+   end subroutine hold
 
    include "../dgrad/emcon_dgrad_rules.inc"
    include "../dgrad/emcon_dgrad_near.inc"

@@ -2,7 +2,7 @@
 module emcon_law_neo_hooke
    use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, law_points_t, law_respond_one, law_t, n_lane
+   use emcon_law, only : claim, law_points_t, law_hold_one, law_respond_one, law_t, n_lane
    implicit none
    private
    public :: law_neo_hooke_t
@@ -14,6 +14,7 @@ module emcon_law_neo_hooke
       procedure :: take => neo_hooke_take
       procedure :: energy
       procedure :: respond
+      procedure :: hold
    end type law_neo_hooke_t
 
    logical, parameter :: is_near = .true.
@@ -51,6 +52,11 @@ contains
       class(law_neo_hooke_t), intent(in) :: self
       include "emcon_law_lanes.inc"
    end subroutine respond
+
+   pure subroutine hold(self, points)
+      class(law_neo_hooke_t), intent(in) :: self
+      include "emcon_law_held.inc"
+   end subroutine hold
 
    include "../dgrad/emcon_dgrad_rules.inc"
    include "../dgrad/emcon_dgrad_near.inc"

@@ -167,18 +167,19 @@ contains
       character(len=:), allocatable, intent(out) :: line
       character(len=(number_width + 1)*size(values)) :: buffer
       character(len=number_width) :: word
-      integer :: i, n
+      character(len=number_width*size(values)) :: reals
+      integer :: i, n, n_word
 
+      write(reals, "(*(es24.16e3))") values
       n = 0
       do i = 1, size(values)
-         if (column(i)%is_integer) then
-            write(word, "(i0)") nint(values(i), int64)
-         else
-            write(word, "(es24.16e3)") values(i)
-         end if
+         word = reals(number_width*(i - 1) + 1:number_width*i)
+         if (column(i)%is_integer) write(word, "(i0)") nint(values(i), int64)
          word = adjustl(word)
-         buffer(n + 1:) = trim(word) // ","
-         n = n + len_trim(word) + 1
+         n_word = len_trim(word)
+         buffer(n + 1:n + n_word) = word(:n_word)
+         n = n + n_word + 1
+         buffer(n:n) = ","
       end do
       line = buffer(:n - 1) // line_end
    end subroutine csv_row

@@ -11,7 +11,7 @@ module emcon_stress
    use emcon_element, only : element_motion_t, element_point, point_motion_t
    use emcon_host_law, only : host_response_t, host_state
    use emcon_kinds, only : wp
-   use emcon_law, only : law_response_plane, law_response_t
+   use emcon_law, only : law_points_t, law_response_t, n_lane
    use emcon_solid, only : solid_evaluate_given, solid_t
    implicit none
    private
@@ -27,8 +27,10 @@ contains
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
       type(host_response_t) :: given
       type(element_motion_t) :: motion
+      type(law_points_t) :: points
       integer :: count_at(solid%n_node), e, i, k, node
-      real(wp) :: at_gp(6), strain(3), turn(size(u, 1), size(u, 1))
+      real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: at_gp, strain
+      real(wp) :: turn(size(u, 1), size(u, 1))
 
       call respond_at(solid, u, nlgeom, given)
       stress = 0.0_wp
@@ -37,13 +39,13 @@ contains
          if (solid%is_rigid(e)) cycle
          motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
          call place(solid, e, u, motion, turn)
+         call element_state(solid, e, motion, given, points, at_gp, strain)
          do k = 1, solid%geometry(e)%n_gp
-            call point_state(solid, e, k, motion, given, at_gp, strain)
-            if (solid%is_corotated(e)) call corotated_turn_stress(turn, at_gp)
+            if (solid%is_corotated(e)) call corotated_turn_stress(turn, at_gp(:, k))
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
                stress(:, node) = stress(:, node) &
-                  + solid%to_nodes(solid%kind(e))%weight(k, i)*at_gp
+                  + solid%to_nodes(solid%kind(e))%weight(k, i)*at_gp(:, k)
             end do
          end do
          do i = 1, solid%geometry(e)%n_node
@@ -94,33 +96,72 @@ contains
       end associate
    end subroutine place
 
-   !> Stress (6) and strain (E11, E22, 2 E12) at quadrature point `k` of element `e`.
-   pure subroutine point_state(solid, e, k, motion, given, stress, strain)
+   !> Stress and strain (E11, E22, 2 E12) at the quadrature points of element `e`.
+   pure subroutine element_state(solid, e, motion, given, points, stress, strain)
       type(solid_t), intent(in) :: solid
-      integer, intent(in) :: e, k
+      integer, intent(in) :: e
       type(element_motion_t), intent(in) :: motion       !! of no size
       type(host_response_t), intent(in) :: given
-      real(wp), intent(out) :: stress(6), strain(3)
-      type(law_response_t) :: state
+      type(law_points_t), intent(inout) :: points        !! workspace, `dstrain` is 0
+      real(wp), intent(inout) :: stress(:, :), strain(:, :)   !! (6 and 3, n_gp), and room
       type(point_motion_t) :: point
-      real(wp) :: s(2, 2), det
+      real(wp) :: f(2, 2, n_lane)
+      integer :: before, l, n
 
-      call element_point(solid%geometry(e), k, motion, point)
-      strain = point%strain
-      if (solid%first_point(e) == 0) then
-         call law_response_plane(solid%law(solid%law_of(e))%law, strain, point%dstrain, state)
-      else if (given%inverted_element == 0) then
-         state = host_state(given%points(solid%law_of(e)), solid%first_point(e) - 1 + k)
-      else
-         state%stress = ieee_value(strain, ieee_quiet_nan)
-      end if
-      s = reshape([state%stress(1), state%stress(3), state%stress(3), state%stress(2)], [2, 2])
-      associate (f => point%f_end)
-         det = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1)
-         s = matmul(matmul(f, s), transpose(f))/det
-      end associate
-      stress = [s(1, 1), s(2, 2), state%stress_33/det, s(1, 2), 0.0_wp, 0.0_wp]
-   end subroutine point_state
+      do before = 0, solid%geometry(e)%n_gp - 1, n_lane
+         n = min(n_lane, solid%geometry(e)%n_gp - before)
+         points%strain = 0.0_wp
+         do l = 1, n
+            call element_point(solid%geometry(e), before + l, motion, point)
+            points%strain(l, :) = point%strain
+            strain(:3, before + l) = point%strain
+            f(:, :, l) = point%f_end
+         end do
+         if (solid%first_point(e) == 0) then
+            call solid%law(solid%law_of(e))%law%hold(points)
+         else
+            call hold_given(given, solid%law_of(e), solid%first_point(e) + before, n, points)
+         end if
+         do l = 1, n
+            call push_forward(f(:, :, l), points%stress(l, :), points%stress_33(l), &
+               stress(:, before + l))
+         end do
+      end do
+   end subroutine element_state
+
+   !> What a given law has answered at `n` points from `first` on.
+   pure subroutine hold_given(given, law, first, n, points)
+      type(host_response_t), intent(in) :: given
+      integer, intent(in) :: law, first, n
+      type(law_points_t), intent(inout) :: points
+      type(law_response_t) :: state
+      integer :: l
+
+      points%stress = ieee_value(1.0_wp, ieee_quiet_nan)
+      points%stress_33 = 0.0_wp
+      if (given%inverted_element /= 0) return
+      do l = 1, n
+         state = host_state(given%points(law), first - 1 + l)
+         points%stress(l, :) = state%stress
+      end do
+   end subroutine hold_given
+
+   !> Cauchy stress F S F^T/det F.
+   pure subroutine push_forward(f, s, s33, stress)
+      real(wp), intent(in) :: f(2, 2)
+      real(wp), intent(in) :: s(3), s33          !! second Piola-Kirchhoff stress [M/(L T^2)]
+      real(wp), intent(out) :: stress(6)
+      real(wp) :: a(2, 2), det
+
+      det = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1)
+      a(:, 1) = f(:, 1)*s(1) + f(:, 2)*s(3)
+      a(:, 2) = f(:, 1)*s(3) + f(:, 2)*s(2)
+      stress(1) = (a(1, 1)*f(1, 1) + a(1, 2)*f(1, 2))/det
+      stress(2) = (a(2, 1)*f(2, 1) + a(2, 2)*f(2, 2))/det
+      stress(3) = s33/det
+      stress(4) = (a(1, 1)*f(2, 1) + a(1, 2)*f(2, 2))/det
+      stress(5:) = 0.0_wp
+   end subroutine push_forward
 
    !> Means over the reference volume of each element, and that volume.
    subroutine element_means(solid, u, nlgeom, stress, strain, volume)
@@ -132,7 +173,10 @@ contains
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
       type(host_response_t) :: given
       type(element_motion_t) :: motion
-      real(wp) :: stress_k(6), strain_k(3), weight, turn(size(u, 1), size(u, 1))
+      type(law_points_t) :: points
+      real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: stress_k, strain_k
+      real(wp) :: weight
+      real(wp) :: turn(size(u, 1), size(u, 1))
       integer :: e, k
 
       call respond_at(solid, u, nlgeom, given)
@@ -143,12 +187,12 @@ contains
          if (solid%is_rigid(e)) cycle
          motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
          call place(solid, e, u, motion, turn)
+         call element_state(solid, e, motion, given, points, stress_k, strain_k)
          do k = 1, solid%geometry(e)%n_gp
-            call point_state(solid, e, k, motion, given, stress_k, strain_k)
-            if (solid%is_corotated(e)) call corotated_turn_stress(turn, stress_k)
+            if (solid%is_corotated(e)) call corotated_turn_stress(turn, stress_k(:, k))
             weight = solid%geometry(e)%weight(k)/volume(e)
-            stress(:, e) = stress(:, e) + weight*stress_k
-            strain(:, e) = strain(:, e) + weight*strain_k
+            stress(:, e) = stress(:, e) + weight*stress_k(:, k)
+            strain(:, e) = strain(:, e) + weight*strain_k(:3, k)
          end do
       end do
    end subroutine element_means

@@ -21,7 +21,8 @@ contains
 
       tests = [ &
          test_case_t("as one by one", test_one_by_one), &
-         test_case_t("no lane knows of another", test_lanes)]
+         test_case_t("no lane knows of another", test_lanes), &
+         test_case_t("held strains", test_held)]
    end subroutine collect_law_points
 
    !> Constants of the order of 1, whatever they mean.
@@ -82,6 +83,36 @@ contains
          end do
       end do
    end subroutine test_one_by_one
+
+   !> What a strain that stays answers, with the stress normal to the plane, is that of one by one.
+   subroutine test_held(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(law_t), allocatable :: law
+      type(law_points_t) :: points
+      type(law_response_t) :: one
+      real(wp) :: extent
+      integer :: i, k, l
+
+      do i = 1, size(law_rows)
+         call make_law(i, law)
+         do k = 1, 20
+            extent = 0.15_wp
+            if (mod(k, 4) == 0) extent = 10.0_wp**(-k/4)
+            call draw(extent, points)
+            if (mod(k, 4) == 1) points%strain(k/4 + 1, :2) = 3.0_wp
+            points%dstrain = 0.0_wp
+            call law%hold(points)
+            do l = 1, n_lane
+               call law_response_plane(law, points%strain(l, :), points%dstrain(l, :), one)
+               if (points%strain(l, 1) > 2.0_wp) extent = 30.0_wp
+               call check_near(error, points%stress(l, :), one%stress, tol, 4.0_wp*extent, &
+                  law_rows(i)%name // ": stress in lane " // to_text(l))
+               call check_near(error, points%stress_33(l), one%stress_33, tol, 4.0_wp*extent, &
+                  law_rows(i)%name // ": normal stress in lane " // to_text(l))
+            end do
+         end do
+      end do
+   end subroutine test_held
 
    !> The same bits in each lane, with and without tangent, beside strains of any kind.
    subroutine test_lanes(error)
