@@ -91,7 +91,7 @@ contains
       call plane_tangent(w, 1, points)
       response%energy = points%energy(1)
       response%stress = points%stress(1, :)
-      response%stress_33 = w%g(1) + w%g(2)*e1%f1 + w%g(3)*e2%f1
+      response%stress_33 = plane_normal(w, w%g(3), e1, e2)
       response%tangent = points%tangent(1, :, :)
    end subroutine law_response_plane
 

@@ -12,6 +12,7 @@ module emcon_stress
    use emcon_host_law, only : host_response_t, host_state
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, law_response_t, n_lane
+   use emcon_push_forward_plane, only : push_forward
    use emcon_solid, only : solid_evaluate_given, solid_t
    implicit none
    private
@@ -105,7 +106,7 @@ contains
       type(law_points_t), intent(inout) :: points        !! workspace, `dstrain` is 0
       real(wp), intent(inout) :: stress(:, :), strain(:, :)   !! (6 and 3, n_gp), and room
       type(point_motion_t) :: point
-      real(wp) :: f(2, 2, n_lane)
+      real(wp) :: f(size(motion%from, 1), size(motion%from, 1), n_lane)
       integer :: before, l, n
 
       do before = 0, solid%geometry(e)%n_gp - 1, n_lane
@@ -145,23 +146,6 @@ contains
          points%stress(l, :) = state%stress
       end do
    end subroutine hold_given
-
-   !> Cauchy stress F S F^T/det F.
-   pure subroutine push_forward(f, s, s33, stress)
-      real(wp), intent(in) :: f(2, 2)
-      real(wp), intent(in) :: s(3), s33          !! second Piola-Kirchhoff stress [M/(L T^2)]
-      real(wp), intent(out) :: stress(6)
-      real(wp) :: a(2, 2), det
-
-      det = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1)
-      a(:, 1) = f(:, 1)*s(1) + f(:, 2)*s(3)
-      a(:, 2) = f(:, 1)*s(3) + f(:, 2)*s(2)
-      stress(1) = (a(1, 1)*f(1, 1) + a(1, 2)*f(1, 2))/det
-      stress(2) = (a(2, 1)*f(2, 1) + a(2, 2)*f(2, 2))/det
-      stress(3) = s33/det
-      stress(4) = (a(1, 1)*f(2, 1) + a(1, 2)*f(2, 2))/det
-      stress(5:) = 0.0_wp
-   end subroutine push_forward
 
    !> Means over the reference volume of each element, and that volume.
    subroutine element_means(solid, u, nlgeom, stress, strain, volume)
