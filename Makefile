@@ -107,7 +107,7 @@ $(BUILD)/made/stamp: src_f90/make_c.py src_f90/c_header.py $(BORDER)/emcon.h \
 # -Wno-unused-dummy-argument: an implementation of an abstract interface need not use all of it.
 STD = $(if $(filter 12.%,$(COMPILER)),f2008,f2018)
 FFLAGS_ALL = -std=$(STD) -fimplicit-none -pedantic -Wall -Wextra -Wno-maybe-uninitialized \
-	-Wno-compare-reals -Wno-unused-dummy-argument -fPIC -frecursive -ffp-contract=off -DEMCON_WP=$(WP)
+	-Wno-compare-reals -Wno-unused-dummy-argument -fPIC -fopenmp -frecursive -ffp-contract=off -DEMCON_WP=$(WP)
 FFLAGS_release := -O2 -g1
 FFLAGS_debug := -O0 -g -fcheck=all,no-array-temps -fbacktrace -ffpe-trap=invalid,zero,overflow \
 	-finit-real=snan -finit-integer=-99999 -Wconversion
@@ -129,7 +129,7 @@ CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(MUMPS_CFLAG
 # The vector unit of the loops over elements side by side: that of this machine's level, up to AVX2.
 # VECTOR= builds for all machines, -march=native -mprefer-vector-width=512 takes AVX-512 where it is.
 VECTOR ?= $(if $(shell grep -m1 -o -w avx2 /proc/cpuinfo 2> /dev/null),-march=x86-64-v3)
-LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS)
+LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS) -lgomp
 
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
 # Read by cat: $(file <...) of GNU make 4.3 loses text when its buffer has to grow.

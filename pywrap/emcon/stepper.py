@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _core
-from .arguments import number, path_bytes, positive, real_array
+from .arguments import labels, number, path_bytes, positive, real_array
 from .conditions import Conditions
 from .csr import Csr
 from .errors import AnalysisError, InputError
@@ -149,6 +149,17 @@ class Stepper(Queries, Conditions):
         self.close()
 
     # ---- steps ------------------------------------------------------------------------------
+
+    def set_threads(self, n: int) -> None:
+        """Let `n` threads work on the model from here on.
+
+        Before, as many do as `OMP_NUM_THREADS` says, or one if it is not set. Results are the same
+        to the last bit for any number.
+        """
+        count = labels(n, "n")
+        if count.size != 1:
+            raise InputError(f"n is to be one number, not {n!r}")
+        self._handle.call(_core.emcon_set_threads, int(count[0]))
 
     def step(self, h: float | None = None) -> Increment:
         """Advance: by one increment of the deck, beginning its next step where one is at its end.

@@ -1,8 +1,9 @@
 !> Sparse Cholesky factorisation by CHOLMOD, for symmetric positive definite matrices.
 !>
 !> The matrix is given in full; only its lower triangle is read. The values are first multiplied by
-!> the power of two that brings the first diagonal entry into [1/2, 1): without it a factor 2 on
-!> the matrix would become sqrt(2) in the factor, and units would change bits.
+!> the power of two that brings the first diagonal entry into [1/2, 1), unless that was done before:
+!> without it a factor 2 on the matrix would become sqrt(2) in the factor, and units would change
+!> bits.
 module emcon_cholmod
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_int, c_null_ptr, c_ptr
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
@@ -148,7 +149,7 @@ contains
       if (allocated(error)) return
       if (self%first_slot == 0 .or. .not. all(ieee_is_finite(value))) return
       if (value(self%first_slot) <= 0.0_dp) return
-      self%half_scale = power_of_two(-exponent(value(self%first_slot)))
+      if (.not. self%is_scaled) self%half_scale = power_of_two(-exponent(value(self%first_slot)))
       self%scaled%value = self%half_scale*value
       call blas_enter(fp_status)
       associate (a => self%scaled)

@@ -1,7 +1,9 @@
 !> The command line of the program.
 module emcon_command_line
+   use emcon_errors, only : error_t
    use emcon_run, only : run_options_t
    use emcon_text, only : nearest_word, string_t
+   use emcon_threads, only : threads_check
    implicit none
    private
    public :: command_t, command_read, usage
@@ -45,7 +47,7 @@ contains
          "--json is for emcon check; a run writes NAME.json"
       if (self%verb == "restart" .and. (size(self%options%override) > 0 .or. &
          len(self%options%folder) > 0 .or. self%options%is_lenient)) then
-         self%fault = "a restart goes on as it was: it takes --quiet and --strict only"
+         self%fault = "a restart goes on as it was: it takes --quiet, --strict and --threads only"
       end if
    end subroutine command_read
 
@@ -92,7 +94,7 @@ contains
          self%options%is_strict = .true.
       case ("--json")
          self%options%is_json = .true.
-      case ("--output", "--set")
+      case ("--output", "--set", "--threads")
          if (equals == 0) then
             i = i + 1
             if (i <= command_argument_count()) call argument(i, value)
@@ -100,6 +102,8 @@ contains
          if (len(value) == 0) self%fault = name // " needs a value"
          if (name == "--output") then
             call without_slash(value, self%options%folder)
+         else if (name == "--threads") then
+            call take_threads(self, value)
          else
             if (index(value, "=") < 2) self%fault = "--set takes NAME=VALUE, not '" // value // "'"
             override(1)%text = value
@@ -112,10 +116,28 @@ contains
       end select
    end subroutine take_option
 
+   !> Take a number of threads; what there cannot be is a fault.
+   subroutine take_threads(self, value)
+      type(command_t), intent(inout) :: self
+      character(len=*), intent(in) :: value
+      type(error_t), allocatable :: error
+      integer :: status
+
+      if (len(self%fault) > 0) return
+      status = verify(value, "0123456789")
+      if (status == 0) read(value, *, iostat=status) self%options%n_thread
+      if (status == 0) call threads_check(self%options%n_thread, error)
+      if (allocated(error)) then
+         self%fault = "--threads: " // error%message
+      else if (status /= 0) then
+         self%fault = "--threads takes a number, not '" // value // "'"
+      end if
+   end subroutine take_threads
+
    subroutine near_option(name, near)
       character(len=*), intent(in) :: name
       character(len=:), allocatable, intent(out) :: near
-      type(string_t) :: known(8)
+      type(string_t) :: known(9)
 
       known(1)%text = "--output"
       known(2)%text = "--set"
@@ -125,6 +147,7 @@ contains
       known(6)%text = "--version"
       known(7)%text = "--strict"
       known(8)%text = "--json"
+      known(9)%text = "--threads"
       call nearest_word(name, known, near)
    end subroutine near_option
 
@@ -151,7 +174,7 @@ contains
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(19)
+      character(len=72) :: line(21)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
@@ -164,6 +187,8 @@ contains
          "  --lenient          unsupported output is left out, with warnings", &
          "  --quiet            nothing but errors, warnings and a bad verdict", &
          "  --strict           a bad verdict is exit code 3", &
+         "  --threads N        N threads, not as many as OMP_NUM_THREADS says, or", &
+         "                     one: the same results, to the last bit", &
          "  --json             what check reports as one JSON object", &
          "  --version, --help", &
          "", &

@@ -284,6 +284,10 @@ int emcon_set_contact(emcon_model *model, const emcon_contact_settings *settings
 
 /* ---- the run of the deck --------------------------------------------------------------------- */
 
+/* Let n threads work on the model from here on. Before, as many do as OMP_NUM_THREADS says, or one
+ * if it is not set. Results are the same to the last bit for any number. */
+int emcon_set_threads(emcon_model *model, int n);
+
 /* One increment on the grid of the deck. An error after the last one. After a failed increment the
  * state is that of the last part before. */
 int emcon_advance(emcon_model *model, emcon_increment *increment);

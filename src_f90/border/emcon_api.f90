@@ -76,7 +76,7 @@ module emcon_api
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, &
       stepper_fraction, stepper_is_done, stepper_open, stepper_read, &
-      stepper_read_text, stepper_t
+      stepper_read_text, stepper_set_threads, stepper_t
    use emcon_stepper_conditions, only : conditions_exchange, stepper_add_prescribed, &
       stepper_find_load, stepper_prescribe, stepper_remove_prescribed, stepper_set_load, &
       stepper_set_prescribed

@@ -7,7 +7,7 @@ module emcon_correction
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find
-   use emcon_kept_factor, only : kept_factor_forget, kept_factor_t
+   use emcon_kept_factor, only : kept_factor_free, kept_factor_set_up, kept_factor_t
    use emcon_kinds, only : dp, int64, wp
    use emcon_null_space, only : null_space_factorise, null_space_init, null_space_multipliers, &
       null_space_solve, null_space_t, null_space_update, obstacle_fill, obstacle_none, &
@@ -74,8 +74,7 @@ contains
 
       call solver_create(self%choice, matrix_general, self%solver, self%given)
       call solver_create(self%choice, matrix_definite, self%definite_solver, self%given)
-      call solver_create(self%choice, matrix_definite, self%kept%solver, self%given)
-      call kept_factor_forget(self%kept)
+      call kept_factor_set_up(self%kept, self%choice, self%given)
       call solver_create(self%choice, matrix_general, self%null_space%solver, self%given)
       call saddle_point_reset(self%saddle_point, self%choice, self%given)
    end subroutine make_solvers
@@ -87,7 +86,7 @@ contains
       if (.not. allocated(self%solver)) return
       call self%solver%free()
       call self%definite_solver%free()
-      call self%kept%solver%free()
+      call kept_factor_free(self%kept)
       call self%null_space%solver%free()
       call saddle_point_free(self%saddle_point)
    end subroutine correction_free

@@ -9,15 +9,19 @@
 !> end another one. Source: docs/theory.md, section 8.
 module emcon_kept_factor
    use emcon_constraints, only : constraint_set_t
-   use emcon_csr, only : csr_find, csr_is_same, csr_t, csr_transpose
+   use emcon_csr, only : csr_find, csr_t
+   use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, blocks_reach, &
+      blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
-   use emcon_sparse_solver, only : solver_renew, sparse_solver_t
+   use emcon_solver_registry, only : solver_create
+   use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    implicit none
    private
-   public :: kept_factor_t, kept_factor_renew, kept_factor_take, kept_factor_serves, &
-      kept_factor_correct, kept_factor_forget
+   public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
+      kept_factor_serves, kept_factor_correct, kept_factor_forget, kept_factor_free, &
+      kept_factor_is_possible
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -28,11 +32,10 @@ module emcon_kept_factor
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
-      class(sparse_solver_t), allocatable :: solver
+      type(diagonal_blocks_t) :: blocks          !! one for each part that hangs together
       integer :: n_renewal = 0                   !! factors made so far
       integer :: n_forward = 0                   !! columns of W made so far
-      integer, allocatable, private :: mirror(:)     !! (n_slot) slot of the transposed entry
-      real(dp), allocatable, private :: value(:)     !! (n_slot) of the symmetric part
+      integer, private :: n_slot = 0                 !! of the matrix
       real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
       ! W of the constraints last taken, by its entries that are not zero:
       integer, allocatable, private :: start(:)      !! (n + 1) entries before each column
@@ -45,6 +48,26 @@ module emcon_kept_factor
 
 contains
 
+   !> Factors are to be made by solvers of `choice`; there is none any more.
+   subroutine kept_factor_set_up(self, choice, given)
+      type(kept_factor_t), intent(inout) :: self
+      integer, intent(in) :: choice              !! one of `solver_`, or above
+      class(sparse_solver_t), intent(in), optional :: given    !! as in `solver_create`
+
+      if (allocated(self%blocks%kind)) then
+         if (self%blocks%kind%choice /= choice) call blocks_free(self%blocks)
+      end if
+      call solver_create(choice, matrix_definite, self%blocks%kind, given)
+      call kept_factor_forget(self)
+   end subroutine kept_factor_set_up
+
+   !> Can the solver make such factors?
+   pure logical function kept_factor_is_possible(self)
+      type(kept_factor_t), intent(in) :: self    !! set up
+
+      kept_factor_is_possible = self%blocks%kind%has_halves()
+   end function kept_factor_is_possible
+
    !> There is no factor any more.
    pure subroutine kept_factor_forget(self)
       type(kept_factor_t), intent(inout) :: self
@@ -52,46 +75,46 @@ contains
       self%is_made = .false.
    end subroutine kept_factor_forget
 
+   !> Free what the solvers hold.
+   subroutine kept_factor_free(self)
+      type(kept_factor_t), intent(inout) :: self
+
+      call kept_factor_forget(self)
+      call blocks_free(self%blocks)
+   end subroutine kept_factor_free
+
    !> Factorise the symmetric part of `matrix`; `is_made` if it is definite, and the pattern is
    !> symmetric.
    subroutine kept_factor_renew(self, matrix, error)
       type(kept_factor_t), intent(inout) :: self
       type(csr_t), intent(in) :: matrix
       type(error_t), allocatable, intent(out) :: error
-      integer :: k, n
+      logical :: is_new, is_singular
+      integer :: k
 
       self%is_made = .false.
-      self%solver%needs_halves = .true.
-      n = self%solver%n_analysis
-      call self%solver%analyse(matrix, error)
+      call blocks_analyse(self%blocks, matrix, is_new, error)
       if (allocated(error)) return
-      if (self%solver%n_analysis /= n .or. .not. allocated(self%value)) call lay_out(self, matrix)
-      if (size(self%mirror) == 0) return
-      do k = 1, size(self%value)
-         self%value(k) = 0.5_dp*(matrix%value(k) + matrix%value(self%mirror(k)))
-      end do
+      if (.not. self%blocks%is_symmetric) return
+      if (is_new) call lay_out(self, matrix)
       do k = 1, matrix%n_row
          self%diagonal(k) = matrix%value(csr_find(matrix, k, k))
       end do
-      call solver_renew(self%solver, self%value, error)
+      call blocks_factorise(self%blocks, matrix, is_singular, error)
       if (allocated(error)) return
-      self%is_made = .not. self%solver%is_singular
+      self%is_made = .not. is_singular
       self%n_renewal = self%n_renewal + 1
    end subroutine kept_factor_renew
 
-   !> Room for matrices of the pattern of `matrix`; no mirror if it is not symmetric.
-   subroutine lay_out(self, matrix)
+   !> Room for matrices of the pattern of `matrix`.
+   pure subroutine lay_out(self, matrix)
       type(kept_factor_t), intent(inout) :: self
       type(csr_t), intent(in) :: matrix
-      type(csr_t) :: transposed
 
-      call csr_transpose(matrix, transposed, self%mirror)
-      if (.not. csr_is_same(matrix, transposed)) self%mirror = [integer ::]
-      if (allocated(self%y)) deallocate(self%y, self%x, self%value, self%diagonal, self%index, &
-         self%w)
+      self%n_slot = size(matrix%column)
+      if (allocated(self%y)) deallocate(self%y, self%x, self%diagonal, self%index, self%w)
       associate (n => matrix%n_row)
-         allocate(self%y(n), self%x(n), self%value(size(matrix%column)), self%diagonal(n))
-         allocate(self%index(n), self%w(n))
+         allocate(self%y(n), self%x(n), self%diagonal(n), self%index(n), self%w(n))
       end associate
    end subroutine lay_out
 
@@ -103,7 +126,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: k, n
 
-      is_fit = self%is_made .and. set%n**2 <= most_products*size(self%value)
+      is_fit = self%is_made .and. set%n**2 <= most_products*self%n_slot
       if (.not. is_fit) return
       if (allocated(self%l)) then
          if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start)
@@ -115,7 +138,7 @@ contains
          call make_room(self, self%start(k) + size(self%y))
          associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
                last => set%gap_rows%row_start(k + 1), at => self%start(k) + 1)
-            call self%solver%reach_half(rows%column(first:last), rows%value(first:last), n, &
+            call blocks_reach(self%blocks, rows%column(first:last), rows%value(first:last), n, &
                self%index(at:), self%w(at:), error)
          end associate
          if (allocated(error)) return
@@ -195,10 +218,10 @@ contains
       integer :: k, j
 
       self%x = -real(residual, dp)
-      call self%solver%solve_half(.false., self%x, self%y, error)
+      call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
       do k = 1, set%n
-         self%mu(k) = -real(set%defect(k), dp)/self%solver%half_scale
+         self%mu(k) = -real(set%defect(k), dp)/self%blocks%scale
          do j = self%start(k) + 1, self%start(k + 1)
             self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
          end do
@@ -209,9 +232,9 @@ contains
             self%y(self%index(j) + 1) = self%y(self%index(j) + 1) + self%mu(k)*self%w(j)
          end do
       end do
-      call self%solver%solve_half(.true., self%y, self%x, error)
+      call blocks_solve(self%blocks, .true., self%y, self%x, error)
       if (allocated(error)) return
-      dq = real(self%solver%half_scale*self%x, wp)
+      dq = real(self%blocks%scale*self%x, wp)
    end subroutine kept_factor_correct
 
 end module emcon_kept_factor

@@ -9,8 +9,8 @@ module emcon_keeping
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
    use emcon_factor_base, only : factor_base_t
-   use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, kept_factor_renew, &
-      kept_factor_serves, kept_factor_take
+   use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
+      kept_factor_is_possible, kept_factor_renew, kept_factor_serves, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
    use emcon_motion, only : motion_t
@@ -61,7 +61,7 @@ contains
       logical, intent(out) :: is_lost                !! and `self%base` says how to make it again
 
       is_lost = .false.
-      if (self%is_allowed) self%is_allowed = correction%kept%solver%has_halves()
+      if (self%is_allowed) self%is_allowed = kept_factor_is_possible(correction%kept)
       if (.not. self%is_allowed) return
       if (.not. correction%kept%is_made) self%base = base
       if (abs(h - self%base%h) > 0.0_wp .or. self%base%n_correction > most_corrections .or. &

@@ -33,7 +33,7 @@ module emcon_march
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
       march_resume, march_renumber, march_go_back, march_free, march_free_increment, &
-      march_set_time, march_watch
+      march_set_threads, march_set_time, march_watch
 
 contains
 
@@ -166,6 +166,15 @@ contains
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine march_increment
+
+   !> Let `n` threads work on the model: the bits are the same for any number.
+   pure subroutine march_set_threads(self, n)
+      type(march_t), intent(inout) :: self       !! set up
+      integer, intent(in) :: n                   !! > 0
+
+      self%system%response%n_thread = n
+      self%newton%correction%kept%blocks%n_thread = n
+   end subroutine march_set_threads
 
    !> Put a state of before in place of the present one; the kept factor is made again as it was.
    subroutine march_go_back(self, state, ledger)

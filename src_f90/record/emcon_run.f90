@@ -24,7 +24,7 @@ module emcon_run
       run_phases_json, run_phases_lines
    use emcon_scene_report, only : scene_report
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_fraction, &
-      stepper_is_done, stepper_open, stepper_t
+      stepper_is_done, stepper_open, stepper_set_threads, stepper_t
    use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_text, only : note_add, notes_t, string_t, to_text
    use emcon_timer, only : wall_seconds
@@ -40,6 +40,7 @@ module emcon_run
    type :: run_options_t
       type(string_t), allocatable :: override(:) !! parameters, NAME=VALUE
       character(len=:), allocatable :: folder    !! of the results; empty: beside the deck
+      integer :: n_thread = 0                    !! that work; 0: as OMP_NUM_THREADS says, or one
       logical :: is_lenient = .false.
       logical :: is_quiet = .false.
       logical :: is_strict = .false.             !! a bad verdict is an error
@@ -248,6 +249,8 @@ contains
       logical :: has_stopped
 
       has_stopped = .false.
+      if (options%n_thread > 0 .and. .not. allocated(error)) call stepper_set_threads(run%stepper, &
+         options%n_thread, error)
       call march_watch(run%stepper%march, is_interrupted)
       call phases_start(run%stepper%march%system%phases)
       call progress_start(run%progress, real(stepper_fraction(run%stepper), dp), options%is_quiet)

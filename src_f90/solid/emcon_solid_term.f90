@@ -8,8 +8,10 @@ module emcon_solid_term
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
+   use emcon_law, only : n_lane
    use emcon_law_registry, only : law_linear
    use emcon_motion, only : motion_t
+   use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
    use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_evaluate_given, solid_init, solid_pack_respond, solid_t
@@ -28,6 +30,7 @@ module emcon_solid_term
       integer, allocatable, private :: slot(:)   !! element matrices by columns
       integer, allocatable, private :: first(:)  !! (n_element) slot of each
       type(host_response_t), private :: given   !! what given laws answer
+      type(pack_shares_t), private :: shares    !! of the threads
    contains
       procedure :: lay_out
       procedure :: begin_step
@@ -97,9 +100,7 @@ contains
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      type(pack_response_t) :: part
-      type(pack_motion_t) :: local
-      integer :: k
+      integer :: t
 
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, &
@@ -108,87 +109,159 @@ contains
             response)
          if (self%given%inverted_element > 0) return
       end if
+      call shares_lay_out(self%shares, self%solid%pack, size(motion%by, 2), response%n_thread)
+      !$omp parallel default(none) shared(self, motion, response, value, side) &
+      !$omp num_threads(response%n_thread)
+      !$omp do schedule(static, 1)
+      do t = 1, self%shares%n
+         call respond_share(self, t, motion, response, value, side)
+      end do
+      !$omp end do
+      !$omp do schedule(static, 1)
+      do t = 1, self%shares%n
+         call add_borders(self, t, motion%weight, response, value, side)
+      end do
+      !$omp end do
+      !$omp end parallel
+      t = findloc(self%shares%inverted > 0, .true., 1)
+      if (t > 0) call refuse(self, self%shares%inverted(t), response)
+   end subroutine respond
+
+   !> The packs of a share: those nodes of theirs that no other share has.
+   subroutine respond_share(self, share, motion, response, value, side)
+      type(solid_term_t), intent(inout) :: self
+      integer, intent(in) :: share               !! from 1
+      type(motion_t), intent(in) :: motion       !! placed
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      type(pack_response_t) :: part
+      type(pack_motion_t) :: local
+      real(wp) :: largest(n_lane)
+      integer :: k, l
+
       local%nlgeom = self%nlgeom
       part%with_sizes = response%with_sizes
-      do k = 1, size(self%solid%pack)
-         associate (pack => self%solid%pack(k))
+      self%shares%inverted(share) = 0
+      do k = self%shares%first(share) + 1, self%shares%first(share + 1)
+         associate (pack => self%solid%pack(k), place => self%shares%place(k))
             call pack_gather(pack, motion%from, motion%by, local)
             call solid_pack_respond(self%solid, pack, local, self%given, present(value), part)
             if (any(part%is_inverted)) then
-               call refuse(self, pack%element(findloc(part%is_inverted, .true., 1)), response)
+               self%shares%inverted(share) = pack%element(findloc(part%is_inverted, .true., 1))
                return
             end if
-            call add_forces(self, pack, motion, local, part, response)
-            if (present(value)) call add_tangents(self, pack, motion%weight, part, value, side)
+            do l = 1, pack%n
+               response%energy(pack%element(l)) = part%energy(l)
+            end do
+            if (part%with_sizes) call find_largest(pack, motion, local, largest)
+            if (place > 0) call border_keep(self%shares%border(place), part, largest, &
+               present(value))
+            call add_forces(self, pack, 0, part%force, part%magnitude, largest, response)
+            if (present(value)) call add_tangents(self, pack, 0, motion%weight, &
+               part%tangent, value, side)
          end associate
       end do
-   end subroutine respond
+   end subroutine respond_share
 
-   !> Add the forces of a pack, element by element, with what its displacements are rounded by.
-   pure subroutine add_forces(self, pack, motion, local, part, response)
+   !> The nodes that share `share` sums for all shares.
+   subroutine add_borders(self, share, factor, response, value, side)
       type(solid_term_t), intent(in) :: self
+      integer, intent(in) :: share               !! from 1
+      real(wp), intent(in) :: factor             !! of the tangents
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      integer :: k
+
+      if (any(self%shares%inverted > 0)) return
+      do k = 1, size(self%shares%border)
+         associate (border => self%shares%border(k))
+            associate (pack => self%solid%pack(border%pack))
+               if (.not. shares_has(self%shares, pack, share, share)) cycle
+               call add_forces(self, pack, share, border%force, border%magnitude, &
+                  border%largest, response)
+               if (present(value)) call add_tangents(self, pack, share, factor, &
+                  border%tangent, value, side)
+            end associate
+         end associate
+      end do
+   end subroutine add_borders
+
+   !> The largest displacement of each element.
+   pure subroutine find_largest(pack, motion, local, largest)
       type(element_pack_t), intent(in) :: pack
       type(motion_t), intent(in) :: motion
       type(pack_motion_t), intent(in) :: local   !! the same motion, of its nodes
-      type(pack_response_t), intent(in) :: part
+      real(wp), intent(out) :: largest(n_lane)   !! [L]
+      integer :: a, i, l
+
+      largest = 0.0_wp
+      do i = 1, pack%n_node
+         do a = 1, size(local%by, 2)
+            do l = 1, pack%n
+               largest(l) = max(largest(l), abs(local%from(l, a, i) + local%by(l, a, i)), &
+                  motion%computed(a, pack%node(l, i)))
+            end do
+         end do
+      end do
+   end subroutine find_largest
+
+   !> Add the forces of a pack, element by element, with what its displacements are rounded by, to
+   !> the nodes whose turn it is.
+   pure subroutine add_forces(self, pack, turn, force, magnitude, largest, response)
+      type(solid_term_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      integer, intent(in) :: turn                !! as in pack_shares_t
+      real(wp), intent(in), contiguous :: force(:, :, :)       !! (n_lane, n_dim, >= n_node)
+      real(wp), intent(in), contiguous :: magnitude(:, :, :)   !! (n_lane, n_dim, >= n_node)
+      real(wp), intent(in) :: largest(n_lane)    !! displacement [L]
       type(response_t), intent(inout) :: response
-      real(wp) :: largest
       integer :: a, e, i, l, node
 
-      associate (total => response%part(self%role), n => pack%n_node)
+      associate (total => response%part(self%role))
          do l = 1, pack%n
             e = pack%element(l)
-            response%energy(e) = part%energy(l)
-            do i = 1, n
+            do i = 1, pack%n_node
                node = pack%node(l, i)
-               do a = 1, size(part%force, 2)
-                  total%force(a, node) = total%force(a, node) + part%force(l, a, i)
+               if (self%shares%turn(node) /= turn) cycle
+               do a = 1, size(force, 2)
+                  total%force(a, node) = total%force(a, node) + force(l, a, i)
                end do
-            end do
-            if (.not. response%with_sizes) cycle
-            largest = 0.0_wp
-            do i = 1, n
-               node = pack%node(l, i)
-               do a = 1, size(local%by, 2)
-                  largest = max(largest, abs(local%from(l, a, i) + local%by(l, a, i)), &
-                     motion%computed(a, node))
-               end do
-            end do
-            do i = 1, n
-               node = pack%node(l, i)
-               do a = 1, size(part%force, 2)
-                  total%magnitude(a, node) = total%magnitude(a, node) + part%magnitude(l, a, i)
+               if (.not. response%with_sizes) cycle
+               do a = 1, size(force, 2)
+                  total%magnitude(a, node) = total%magnitude(a, node) + magnitude(l, a, i)
                   response%rounding(a, node) = response%rounding(a, node) &
-                     + largest*self%solid%stiffness(i, e)
+                     + largest(l)*self%solid%stiffness(i, e)
                end do
             end do
          end do
       end associate
    end subroutine add_forces
 
-   !> Add the tangents of a pack to their places; the slots of an element run down the columns.
-   pure subroutine add_tangents(self, pack, factor, part, value, side)
+   !> Add the tangents of a pack to their places, in the rows of the nodes whose turn it is; the
+   !> slots of an element run down the columns.
+   pure subroutine add_tangents(self, pack, turn, factor, tangent, value, side)
       type(solid_term_t), intent(in) :: self
       type(element_pack_t), intent(in) :: pack
-      real(wp), intent(in) :: factor
-      type(pack_response_t), intent(in) :: part
-      real(dp), intent(inout) :: value(:), side(:)
+      integer, intent(in) :: turn                !! as in pack_shares_t
+      real(wp), intent(in) :: factor             !! of the tangents
+      !> (n_lane, n_dim, >= n_node, n_dim, >= n_node)
+      real(wp), intent(in), contiguous :: tangent(:, :, :, :, :)
+      real(dp), intent(inout) :: value(:), side(:)             !! slots > 0, slots < 0
       integer :: a, c, i, j, k, l, place
 
       do l = 1, pack%n
-         k = self%first(pack%element(l))
+         k = self%first(pack%element(l)) - 1
          do j = 1, pack%n_node
-            do c = 1, size(part%tangent, 4)
+            do c = 1, size(tangent, 4)
                do i = 1, pack%n_node
-                  do a = 1, size(part%tangent, 2)
-                     place = self%slot(k)
+                  do a = 1, size(tangent, 2)
                      k = k + 1
+                     if (self%shares%turn(pack%node(l, i)) /= turn) cycle
+                     place = self%slot(k)
                      if (place > 0) then
-                        value(place) = value(place) &
-                           + real(factor*part%tangent(l, a, i, c, j), dp)
+                        value(place) = value(place) + real(factor*tangent(l, a, i, c, j), dp)
                      else if (place < 0) then
-                        side(-place) = side(-place) &
-                           + real(factor*part%tangent(l, a, i, c, j), dp)
+                        side(-place) = side(-place) + real(factor*tangent(l, a, i, c, j), dp)
                      end if
                   end do
                end do

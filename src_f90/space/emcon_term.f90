@@ -25,6 +25,7 @@ module emcon_term
 
    !> What all terms give over one motion.
    type :: response_t
+      integer :: n_thread = 1                    !! that may work on it, to the same bits
       type(forces_t) :: part(3)                  !! by role
       !> Terms add to the sizes, `magnitude` and `rounding`; else these stay what they were found to
       !> be before

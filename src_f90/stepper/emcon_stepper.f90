@@ -11,9 +11,10 @@ module emcon_stepper
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
-      march_is_done, march_t
+      march_is_done, march_set_threads, march_t
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_append, notes_t, string_t
+   use emcon_threads, only : threads_check, threads_default
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_ties, only : ties_prepare
    use emcon_verdict, only : verdict_start, verdict_t, verdict_update
@@ -21,7 +22,7 @@ module emcon_stepper
    private
    public :: stepper_t, stepper_open, stepper_read, stepper_read_text, stepper_read_source, &
       stepper_build, stepper_advance, stepper_is_done
-   public :: stepper_check_solids, stepper_close, stepper_fraction
+   public :: stepper_check_solids, stepper_close, stepper_fraction, stepper_set_threads
 
    type :: stepper_t
       type(scene_t) :: scene
@@ -139,11 +140,23 @@ contains
       if (allocated(error)) return
       call march_init(self%march, self%scene, error, self%given)
       if (allocated(error)) return
+      call march_set_threads(self%march, threads_default())
       call march_begin_step(self%march, self%scene, 1, error)
       if (allocated(error)) return
       call notes_append(self%notes, self%march%system%notes)
       call verdict_start(self%verdict, self%march)
    end subroutine build
+
+   !> Let `n` threads work on the model from here on; before, OMP_NUM_THREADS do, or one if that is
+   !> not set. The bits are the same for any number.
+   subroutine stepper_set_threads(self, n, error)
+      type(stepper_t), intent(inout) :: self     !! built
+      integer, intent(in) :: n
+      type(error_t), allocatable, intent(out) :: error
+
+      call threads_check(n, error)
+      if (.not. allocated(error)) call march_set_threads(self%march, n)
+   end subroutine stepper_set_threads
 
    subroutine prepare_contact(self, error)
       type(stepper_t), intent(inout) :: self

@@ -43,6 +43,7 @@ static void without_model(void)
    TELL(emcon_give_force(m, NULL, NULL, NULL, NULL));
    TELL(emcon_give_mass(m, NULL));
    TELL(emcon_build(m));
+   TELL(emcon_set_threads(m, 1));
    TELL(emcon_advance(m, NULL));
    TELL(emcon_is_done(m) - 1 + EMCON_ERROR_INPUT);
    TELL(emcon_run(m, 1, NULL, NULL, NULL));
@@ -168,6 +169,7 @@ static void with_rubbish(double *x, const emcon_sizes *sizes)
    TELL(emcon_set_prescribed(m, 0, 1, 0));
    TELL(emcon_add_prescribed(m, 1, 3, 0));
    TELL(emcon_remove_prescribed(m, 1, 2));
+   TELL(emcon_set_threads(m, 0));
    TELL(emcon_save(m, "no/such/folder/file"));
    x[2*n - 1] = NAN;
    TELL(emcon_set_state(m, n, x, NULL, 0, NULL, NULL, NULL));

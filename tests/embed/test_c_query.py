@@ -31,7 +31,7 @@ RUBBISH = [
     "without tangent", "n_unknown is 203, but the model has 204", "finite", "not -0.1", "finite",
     "finite", "last one of the deck", "built already", "time -1 is before", "no load 51: .* has 50",
     "no load 0", "not finite", "no load of this kind", "no node 0", "1 to 2, not 3",
-    "is not prescribed", "cannot create no/such/folder", "u is not finite at node 106",
+    "is not prescribed", "0 threads", "cannot create no/such/folder", "u is not finite at node 106",
     "u1 is not finite", "u0 is not finite",
 ]
 # Codes other than 2.

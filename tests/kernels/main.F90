@@ -13,6 +13,7 @@ program main
    use test_chain, only : collect_chain
    use test_check, only : collect_check
 #ifndef EMCON_PERMISSIVE
+   use test_diagonal_blocks, only : collect_diagonal_blocks
    use test_kept_factor, only : collect_kept_factor
    use test_cholmod, only : collect_cholmod
 #endif
@@ -112,6 +113,7 @@ program main
 #endif
    call run("solvers", collect_solvers)
 #ifndef EMCON_PERMISSIVE
+   call run("diagonal_blocks", collect_diagonal_blocks)
    call run("kept_factor", collect_kept_factor)
    call run("cholmod", collect_cholmod)
 #endif

@@ -3,12 +3,11 @@ module test_kept_factor
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
-   use emcon_kept_factor, only : kept_factor_correct, kept_factor_renew, kept_factor_serves, &
-      kept_factor_t, kept_factor_take
+   use emcon_kept_factor, only : kept_factor_correct, kept_factor_free, kept_factor_renew, &
+      kept_factor_serves, kept_factor_set_up, kept_factor_t, kept_factor_take
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
-   use emcon_solver_registry, only : solver_create, solver_default
-   use emcon_sparse_solver, only : matrix_definite
+   use emcon_solver_registry, only : solver_default
    use random_constraints, only : make_problem, problem_t, tol_dp
    use sparse_samples, only : dense_of
    implicit none
@@ -54,7 +53,7 @@ contains
       rhs(n + 1:, 1) = -real(problem%set%defect, dp)
       call dense_solve(full, rhs, x, is_singular)
       call check_near(error, dq, real(x(:n, 1), wp), tol_dp, maxval(abs(dq)), "dq")
-      call kept%solver%free()
+      call kept_factor_free(kept)
    end subroutine test_correction
 
    !> A residual that the constraints bear, and no defect.
@@ -74,7 +73,7 @@ contains
       call kept_factor_correct(kept, problem%set, problem%residual, dq, error)
       if (allocated(error)) return
       call check_near(error, dq, 0.0_wp*dq, tol_dp, maxval(abs(problem%residual)), "dq")
-      call kept%solver%free()
+      call kept_factor_free(kept)
    end subroutine test_fixed_point
 
    subroutine test_pattern(error)
@@ -83,10 +82,10 @@ contains
       type(kept_factor_t) :: kept
 
       call make_problem(problem)
-      call solver_create(solver_default, matrix_definite, kept%solver)
+      call kept_factor_set_up(kept, solver_default)
       call kept_factor_renew(kept, problem%base, error)
       if (.not. allocated(error)) call check_true(error, .not. kept%is_made, "no factor")
-      call kept%solver%free()
+      call kept_factor_free(kept)
    end subroutine test_pattern
 
    subroutine test_indefinite(error)
@@ -97,13 +96,13 @@ contains
 
       call make_symmetric(problem)
       problem%base%value = -problem%base%value
-      call solver_create(solver_default, matrix_definite, kept%solver)
+      call kept_factor_set_up(kept, solver_default)
       call kept_factor_renew(kept, problem%base, error)
       if (allocated(error)) return
       call check_true(error, .not. kept%is_made, "no factor")
       call kept_factor_take(kept, problem%set, is_fit, error)
       call check_true(error, .not. is_fit, "nothing to solve with")
-      call kept%solver%free()
+      call kept_factor_free(kept)
    end subroutine test_indefinite
 
    !> At a kink the second derivative of a gap is as large as one likes.
@@ -119,7 +118,7 @@ contains
       call check_true(error, kept_factor_serves(kept, problem%set), "it is small")
       problem%set%item(3)%h = 1.0e6_wp*problem%set%item(3)%h
       call check_true(error, .not. kept_factor_serves(kept, problem%set), "one is large")
-      call kept%solver%free()
+      call kept_factor_free(kept)
    end subroutine test_curvature
 
    !> The factor of a problem, with its constraints.
@@ -130,7 +129,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call make_symmetric(problem)
-      call solver_create(solver_default, matrix_definite, kept%solver)
+      call kept_factor_set_up(kept, solver_default)
       call kept_factor_renew(kept, problem%base, error)
       if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
    end subroutine prepare

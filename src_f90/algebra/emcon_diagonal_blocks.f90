@@ -1,0 +1,416 @@
+!> Factors L L^T of a symmetric definite matrix that falls apart into blocks on its diagonal, one
+!> for each: blocks whose values stay the same keep theirs, and blocks share the threads.
+!>
+!> Blocks are the parts in which the pattern hangs together; small ones are taken together. The
+!> order of the unknowns in L is block by block, so that the bits do not depend on who works on
+!> which of them.
+module emcon_diagonal_blocks
+   use emcon_csr, only : csr_find, csr_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp
+   use emcon_power_scaling, only : power_of_two
+   use emcon_sort, only : sort_order
+   use emcon_sparse_solver, only : sparse_solver_t
+   implicit none
+   private
+   public :: diagonal_blocks_t, blocks_analyse, blocks_factorise, blocks_solve, blocks_reach, &
+      blocks_free
+
+   !> Parts of fewer than the n-th part of the unknowns are put together.
+   integer, parameter :: smallest_part = 64
+
+   type :: block_t
+      integer :: first = 0                       !! unknowns of the blocks before it
+      integer, allocatable :: unknown(:)         !! (n) ascending
+      logical :: is_range = .false.              !! which follow each other
+      type(csr_t) :: matrix                      !! scale times the symmetric part
+      integer, allocatable :: upper(:)           !! (n) work space: places in the rows
+      real(dp), allocatable :: b(:)              !! (n) work space
+      class(sparse_solver_t), allocatable :: solver
+      logical :: has_factor = .false.            !! of these values
+      integer :: n_factor = 0                    !! factors made so far
+      type(error_t), allocatable :: error        !! of the last call
+   end type block_t
+
+   type :: diagonal_blocks_t
+      class(sparse_solver_t), allocatable :: kind      !! solvers are copies of it; it has halves
+      integer :: n_thread = 1                    !! that may work on the blocks
+      integer :: n_block = 0
+      integer :: n_factor = 0                    !! factors of blocks made of this pattern
+      logical :: is_symmetric = .false.          !! the pattern is, with all of the diagonal
+      real(dp) :: scale = 1.0_dp                 !! > 0, a power of two: L L^T = scale A
+      type(block_t), allocatable, private :: block(:)
+      integer, allocatable, private :: of(:)     !! (n) block of each unknown
+      integer, allocatable, private :: place(:)  !! (n) and its number in there
+   end type diagonal_blocks_t
+
+contains
+
+   !> Find the blocks of a square pattern, and order each; nothing is done if it is the last one.
+   subroutine blocks_analyse(self, matrix, is_new, error)
+      type(diagonal_blocks_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      logical, intent(out) :: is_new             !! it is another pattern
+      type(error_t), allocatable, intent(out) :: error
+      integer :: b
+
+      is_new = .not. is_known(self, matrix)
+      if (.not. is_new) return
+      call blocks_free(self)
+      call find_blocks(self, matrix)
+      self%is_symmetric = .true.
+      do b = 1, self%n_block
+         call extract(self, self%block(b), matrix)
+         self%is_symmetric = self%is_symmetric .and. has_symmetric_pattern(self%block(b))
+         if (.not. self%is_symmetric) return
+         allocate(self%block(b)%solver, source=self%kind)
+         self%block(b)%solver%needs_halves = .true.
+         self%block(b)%solver%is_scaled = .true.
+         call self%block(b)%solver%analyse(self%block(b)%matrix, error)
+         if (allocated(error)) return
+      end do
+   end subroutine blocks_analyse
+
+   !> Is it the pattern of the blocks?
+   pure logical function is_known(self, matrix)
+      type(diagonal_blocks_t), intent(in) :: self
+      type(csr_t), intent(in) :: matrix
+      integer :: b, i, from, to
+
+      is_known = allocated(self%block) .and. allocated(self%of)
+      if (is_known) is_known = size(self%of) == matrix%n_row
+      do b = 1, self%n_block
+         if (.not. is_known) return
+         associate (block => self%block(b), rows => self%block(b)%matrix)
+            do i = 1, rows%n_row
+               from = matrix%row_start(block%unknown(i)) + 1
+               to = matrix%row_start(block%unknown(i) + 1)
+               is_known = to - from + 1 == rows%row_start(i + 1) - rows%row_start(i)
+               if (is_known) is_known = all(matrix%column(from:to) + 1 &
+                  == block%unknown(rows%column(rows%row_start(i) + 1:rows%row_start(i + 1)) + 1))
+               if (.not. is_known) return
+            end do
+         end associate
+      end do
+   end function is_known
+
+   !> Which unknowns hang together: `of`, `place`, and the unknowns of the blocks, the largest one
+   !> first.
+   subroutine find_blocks(self, matrix)
+      type(diagonal_blocks_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      integer :: number(matrix%n_row), b, i, k
+      integer, allocatable :: extent(:), order(:)
+
+      call number_parts(matrix, number, extent)
+      call join_small(number, extent, matrix%n_row/smallest_part)
+      self%n_block = size(extent)
+      order = sort_order(-extent)
+      allocate(self%block(self%n_block), self%of(matrix%n_row), self%place(matrix%n_row))
+      k = 0
+      do b = 1, self%n_block
+         self%block(b)%first = k
+         allocate(self%block(b)%unknown(extent(order(b))), source=0)
+         k = k + extent(order(b))
+      end do
+      extent(order) = [(b, b = 1, self%n_block)]
+      self%of = extent(number)
+      extent = 0
+      do i = 1, matrix%n_row
+         b = self%of(i)
+         extent(b) = extent(b) + 1
+         self%place(i) = extent(b)
+         self%block(b)%unknown(extent(b)) = i
+      end do
+   end subroutine find_blocks
+
+   !> Number the parts of a pattern in the order of their first unknowns.
+   pure subroutine number_parts(matrix, number, extent)
+      type(csr_t), intent(in) :: matrix
+      integer, intent(out) :: number(:)                !! (n)
+      integer, allocatable, intent(out) :: extent(:)   !! (parts) unknowns of each
+      integer :: root(matrix%n_row), i, j, k, n
+
+      root = [(i, i = 1, matrix%n_row)]
+      do i = 1, matrix%n_row
+         do k = matrix%row_start(i) + 1, matrix%row_start(i + 1)
+            j = root_of(root, i)
+            n = root_of(root, matrix%column(k) + 1)
+            root(max(j, n)) = min(j, n)
+            root(i) = min(j, n)
+         end do
+      end do
+      n = 0
+      do i = 1, matrix%n_row
+         root(i) = root_of(root, i)
+         if (root(i) == i) n = n + 1
+         if (root(i) == i) number(i) = n
+         number(i) = number(root(i))
+      end do
+      allocate(extent(n), source=0)
+      do i = 1, matrix%n_row
+         extent(number(i)) = extent(number(i)) + 1
+      end do
+   end subroutine number_parts
+
+   pure integer function root_of(root, i)
+      integer, intent(in) :: root(:), i
+
+      root_of = i
+      do while (root(root_of) /= root_of)
+         root_of = root(root_of)
+      end do
+   end function root_of
+
+   !> Put parts of fewer than `least` unknowns together, in their order, until there are so many.
+   pure subroutine join_small(number, extent, least)
+      integer, intent(inout) :: number(:)                !! (n)
+      integer, allocatable, intent(inout) :: extent(:)   !! (parts)
+      integer, intent(in) :: least
+      integer :: joined(size(extent)), size_of(size(extent)), open_one, n, b
+
+      n = 0
+      open_one = 0
+      size_of = 0
+      do b = 1, size(extent)
+         if (extent(b) >= least .or. open_one == 0) then
+            n = n + 1
+            joined(b) = n
+            if (extent(b) < least) open_one = n
+         else
+            joined(b) = open_one
+         end if
+         size_of(joined(b)) = size_of(joined(b)) + extent(b)
+         if (joined(b) == open_one .and. size_of(joined(b)) >= least) open_one = 0
+      end do
+      number = joined(number)
+      extent = size_of(:n)
+   end subroutine join_small
+
+   !> The pattern of a block, and its work space.
+   pure subroutine extract(self, block, matrix)
+      type(diagonal_blocks_t), intent(in) :: self
+      type(block_t), intent(inout) :: block      !! `unknown` is set
+      type(csr_t), intent(in) :: matrix
+      integer :: i, k, n, m
+
+      n = size(block%unknown)
+      block%is_range = block%unknown(n) - block%unknown(1) == n - 1
+      block%matrix%n_row = n
+      block%matrix%n_col = n
+      allocate(block%matrix%row_start(n + 1), source=0)
+      do i = 1, n
+         block%matrix%row_start(i + 1) = block%matrix%row_start(i) &
+            + matrix%row_start(block%unknown(i) + 1) - matrix%row_start(block%unknown(i))
+      end do
+      m = block%matrix%row_start(n + 1)
+      allocate(block%matrix%column(m), source=0)
+      allocate(block%matrix%value(m), source=0.0_dp)
+      do i = 1, n
+         m = block%matrix%row_start(i) - matrix%row_start(block%unknown(i))
+         do k = matrix%row_start(block%unknown(i)) + 1, matrix%row_start(block%unknown(i) + 1)
+            block%matrix%column(k + m) = self%place(matrix%column(k) + 1) - 1
+         end do
+      end do
+      allocate(block%upper(n), source=0)
+      if (.not. block%is_range) allocate(block%b(n), source=0.0_dp)
+   end subroutine extract
+
+   !> Has each entry of the block one across the diagonal, which has no gaps?
+   pure logical function has_symmetric_pattern(block)
+      type(block_t), intent(in) :: block
+      integer :: i, j, k, next(size(block%unknown))
+
+      associate (rows => block%matrix)
+         has_symmetric_pattern = .false.
+         do i = 1, rows%n_row
+            next(i) = csr_find(rows, i, i) + 1
+            if (next(i) == 1) return
+            do k = rows%row_start(i) + 1, next(i) - 2
+               j = rows%column(k) + 1
+               if (next(j) > rows%row_start(j + 1)) return
+               if (rows%column(next(j)) + 1 /= i) return
+               next(j) = next(j) + 1
+            end do
+         end do
+         has_symmetric_pattern = all(next == rows%row_start(2:) + 1)
+      end associate
+   end function has_symmetric_pattern
+
+   !> Factorise the symmetric part of the matrix whose pattern was analysed, and is symmetric.
+   subroutine blocks_factorise(self, matrix, is_singular, error)
+      type(diagonal_blocks_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      logical, intent(out) :: is_singular        !! it is not definite: there are no factors
+      type(error_t), allocatable, intent(out) :: error
+      integer :: b
+
+      is_singular = .not. matrix%value(csr_find(matrix, 1, 1)) > 0.0_dp
+      if (is_singular) return
+      self%scale = power_of_two(-exponent(matrix%value(csr_find(matrix, 1, 1))))
+      !$omp parallel do default(none) shared(self, matrix) num_threads(self%n_thread) &
+      !$omp schedule(dynamic, 1)
+      do b = 1, self%n_block
+         call factorise(self%block(b), matrix, self%scale)
+      end do
+      !$omp end parallel do
+      call take_error(self, error)
+      self%n_factor = 0
+      do b = 1, self%n_block
+         is_singular = is_singular .or. .not. self%block(b)%has_factor
+         self%n_factor = self%n_factor + self%block(b)%n_factor
+      end do
+   end subroutine blocks_factorise
+
+   !> Factorise a block if its values have changed.
+   subroutine factorise(block, matrix, scale)
+      type(block_t), intent(inout) :: block
+      type(csr_t), intent(in) :: matrix
+      real(dp), intent(in) :: scale
+      logical :: is_changed
+
+      call take_values(block, matrix, scale, is_changed)
+      if (block%has_factor .and. .not. is_changed) return
+      block%has_factor = .false.
+      block%n_factor = block%n_factor + 1
+      call block%solver%factorise(block%matrix%value, block%error)
+      block%has_factor = .not. (block%solver%is_singular .or. allocated(block%error))
+   end subroutine factorise
+
+   !> The values of a block: entries meet those across the diagonal in the order of the rows.
+   pure subroutine take_values(block, matrix, scale, is_changed)
+      type(block_t), intent(inout) :: block
+      type(csr_t), intent(in) :: matrix
+      real(dp), intent(in) :: scale
+      logical, intent(out) :: is_changed
+      real(dp) :: mean
+      integer :: i, j, k, m, start
+
+      is_changed = .false.
+      associate (rows => block%matrix, upper => block%upper)
+         do i = 1, rows%n_row
+            start = matrix%row_start(block%unknown(i)) - rows%row_start(i)
+            do k = rows%row_start(i) + 1, rows%row_start(i + 1)
+               j = rows%column(k) + 1
+               if (j > i) exit
+               m = k
+               if (j < i) m = upper(j)
+               upper(j) = m + 1
+               mean = scale*0.5_dp*(matrix%value(start + k) + matrix%value(m &
+                  + matrix%row_start(block%unknown(j)) - rows%row_start(j)))
+               is_changed = is_changed .or. abs(mean - rows%value(k)) > 0.0_dp &
+                  .or. mean /= mean
+               rows%value(k) = mean
+               rows%value(m) = mean
+            end do
+         end do
+      end associate
+   end subroutine take_values
+
+   !> The first error of the blocks.
+   subroutine take_error(self, error)
+      type(diagonal_blocks_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      integer :: b
+
+      do b = 1, self%n_block
+         if (.not. allocated(self%block(b)%error)) cycle
+         if (.not. allocated(error)) allocate(error, source=self%block(b)%error)
+         deallocate(self%block(b)%error)
+      end do
+   end subroutine take_error
+
+   !> x = L^-1 P rhs, or x = P^T L^-T rhs.
+   subroutine blocks_solve(self, is_second, rhs, x, error)
+      type(diagonal_blocks_t), intent(inout) :: self
+      logical, intent(in) :: is_second
+      real(dp), intent(in), contiguous :: rhs(:)       !! (n)
+      real(dp), intent(inout), contiguous :: x(:)      !! (n)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: b
+
+      !$omp parallel do default(none) shared(self, is_second, rhs, x) &
+      !$omp num_threads(self%n_thread) schedule(static, 1)
+      do b = 1, self%n_block
+         call solve(self%block(b), is_second, rhs, x)
+      end do
+      !$omp end parallel do
+      call take_error(self, error)
+   end subroutine blocks_solve
+
+   !> The part of a block of one half.
+   subroutine solve(block, is_second, rhs, x)
+      type(block_t), intent(inout) :: block
+      logical, intent(in) :: is_second
+      real(dp), intent(in), contiguous :: rhs(:)
+      real(dp), intent(inout), contiguous :: x(:)
+      integer :: n, from, at
+
+      n = size(block%unknown)
+      from = block%unknown(1) - 1                ! of the unknowns, where they are a range
+      at = block%first
+      if (block%is_range .and. is_second) then
+         call block%solver%solve_half(is_second, rhs(at + 1:at + n), x(from + 1:from + n), &
+            block%error)
+      else if (block%is_range) then
+         call block%solver%solve_half(is_second, rhs(from + 1:from + n), x(at + 1:at + n), &
+            block%error)
+      else if (is_second) then
+         call block%solver%solve_half(is_second, rhs(at + 1:at + n), block%b, block%error)
+         x(block%unknown) = block%b
+      else
+         block%b = rhs(block%unknown)
+         call block%solver%solve_half(is_second, block%b, x(at + 1:at + n), block%error)
+      end if
+   end subroutine solve
+
+   !> L^-1 P rhs of a sparse right-hand side: what of it is not zero.
+   subroutine blocks_reach(self, column, value, n_reached, index, x, error)
+      type(diagonal_blocks_t), intent(inout) :: self
+      integer, intent(in), contiguous :: column(:)     !! (m) places of the entries, from 0
+      real(dp), intent(in), contiguous :: value(:)     !! (m)
+      integer, intent(out) :: n_reached                !! entries of the solution
+      integer, intent(inout), contiguous :: index(:)   !! (n) their places, from 0
+      real(dp), intent(inout), contiguous :: x(:)      !! (n) and values, the first n_reached
+      type(error_t), allocatable, intent(out) :: error
+      integer :: local(size(column)), b, m, n
+      real(dp) :: part(size(column))
+      integer :: k
+
+      n_reached = 0
+      b = 0
+      do
+         b = minval(self%of(column + 1), mask=self%of(column + 1) > b)
+         if (b > self%n_block) return
+         m = 0
+         do k = 1, size(column)
+            if (self%of(column(k) + 1) /= b) cycle
+            m = m + 1
+            local(m) = self%place(column(k) + 1) - 1
+            part(m) = value(k)
+         end do
+         call self%block(b)%solver%reach_half(local(:m), part(:m), n, index(n_reached + 1:), &
+            x(n_reached + 1:), error)
+         if (allocated(error)) return
+         index(n_reached + 1:n_reached + n) = index(n_reached + 1:n_reached + n) &
+            + self%block(b)%first
+         n_reached = n_reached + n
+      end do
+   end subroutine blocks_reach
+
+   !> Free what the solvers hold, and forget the pattern.
+   subroutine blocks_free(self)
+      type(diagonal_blocks_t), intent(inout) :: self
+      integer :: b
+
+      if (allocated(self%block)) then
+         do b = 1, self%n_block
+            if (allocated(self%block(b)%solver)) call self%block(b)%solver%free()
+         end do
+         deallocate(self%block)
+      end if
+      if (allocated(self%of)) deallocate(self%of, self%place)
+      self%n_block = 0
+   end subroutine blocks_free
+
+end module emcon_diagonal_blocks

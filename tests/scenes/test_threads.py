@@ -1,0 +1,89 @@
+"""Threads share the work of a model, and no bit of a result depends on how many there are."""
+
+import os
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from emcon import InputError, Stepper
+from scene_tools import DECKS, emcon, run_deck
+
+SCENES = {
+    "ring": {"h": 0.04, "t_end": 0.4, "frame": 0.4},
+    "ring, MORTAR": {"h": 0.04, "t_end": 0.4, "frame": 0.4, "formulation": "MORTAR"},
+    "ring, Newton": {"h": 0.04, "t_end": 0.2, "frame": 0.2, "method": "SADDLE POINT"},
+    "tied_ring": {"h": 0.05, "t_end": 0.2},
+    "press_fit": {},
+}
+RING = DECKS/"ring.inp"
+
+
+def arrays(file):
+    """The numbers that a file holds, without times of the processor."""
+    found = {}
+
+    def take(name, item):
+        if isinstance(item, h5py.Dataset) and "cpu" not in name and "SECONDS" not in name:
+            found[name] = item[()]
+
+    with h5py.File(file) as content:
+        content.visititems(take)
+    return found
+
+
+def results(scene, folder, *options):
+    run = run_deck(DECKS/f"{scene.split(',')[0]}.inp", folder, options=options, **SCENES[scene])
+    return run.digits(), arrays(run.file(".vtkhdf"))
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_bits_do_not_depend_on_threads(scene, tmp_path):
+    history, fields = results(scene, tmp_path/"1", "--threads", "1")
+    assert fields, "there is something to compare"
+    for n in (2, 3, 4, 7):
+        other_history, other_fields = results(scene, tmp_path/str(n), f"--threads={n}")
+        assert other_history == history, f"{n} threads"
+        assert other_fields.keys() == fields.keys()
+        for name, values in fields.items():
+            same = np.asarray(other_fields[name]).tobytes() == np.asarray(values).tobytes()
+            assert same, f"{n} threads: {name}"
+
+
+def script_of(code):
+    """Take a step of the ring after `code`, and print how many threads the process has then."""
+    return f"""
+import os
+from emcon import Stepper
+with Stepper({str(RING)!r}, h=0.04) as stepper:
+    {code}
+    stepper.step()
+    print(len(os.listdir("/proc/self/task")))
+"""
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="counted by Linux")
+@pytest.mark.parametrize(("code", "asked", "more"), [
+    ("pass", None, 0), ("pass", "3", 2), ("stepper.set_threads(4)", "3", 3),
+    ("pass", "none", 0), ("pass", "2,4", 1)])
+def test_as_many_threads_as_are_asked_for(code, asked, more):
+    environment = {k: v for k, v in os.environ.items() if k != "OMP_NUM_THREADS"}
+    environment["OPENBLAS_NUM_THREADS"] = "1"
+    if asked:
+        environment["OMP_NUM_THREADS"] = asked
+    done = subprocess.run([sys.executable, "-c", script_of(code)], env=environment, check=True,
+                          capture_output=True, text=True, timeout=60)
+    assert int(done.stdout) == 1 + more
+
+
+@pytest.mark.parametrize("value", ["0", "-2", "two", "1000000", "99999999999"])
+def test_no_such_number_of_threads(value):
+    done = emcon(RING, f"--threads={value}")
+    assert done.returncode == 2
+    assert "--threads" in done.stderr
+
+
+def test_no_such_number_of_threads_in_python():
+    with Stepper(RING) as stepper, pytest.raises(InputError, match="0 threads"):
+        stepper.set_threads(0)
