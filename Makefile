@@ -107,7 +107,7 @@ $(BUILD)/made/stamp: src_f90/make_c.py src_f90/c_header.py $(BORDER)/emcon.h \
 # -Wno-unused-dummy-argument: an implementation of an abstract interface need not use all of it.
 STD = $(if $(filter 12.%,$(COMPILER)),f2008,f2018)
 FFLAGS_ALL = -std=$(STD) -fimplicit-none -pedantic -Wall -Wextra -Wno-maybe-uninitialized \
-	-Wno-compare-reals -Wno-unused-dummy-argument -fPIC -fopenmp -frecursive -ffp-contract=off -DEMCON_WP=$(WP)
+	-Wno-compare-reals -Wno-unused-dummy-argument -fPIC -frecursive -ffp-contract=off -DEMCON_WP=$(WP)
 FFLAGS_release := -O2 -g1
 FFLAGS_debug := -O0 -g -fcheck=all,no-array-temps -fbacktrace -ffpe-trap=invalid,zero,overflow \
 	-finit-real=snan -finit-integer=-99999 -Wconversion
@@ -129,7 +129,9 @@ CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(MUMPS_CFLAG
 # The vector unit of the loops over elements side by side: that of this machine's level, up to AVX2.
 # VECTOR= builds for all machines, -march=native -mprefer-vector-width=512 takes AVX-512 where it is.
 VECTOR ?= $(if $(shell grep -m1 -o -w avx2 /proc/cpuinfo 2> /dev/null),-march=x86-64-v3)
-LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS) -lgomp
+LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS)
+# Of the compiler: threads.
+THREAD_LIBS := -lgomp
 
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
 # Read by cat: $(file <...) of GNU make 4.3 loses text when its buffer has to grow.
@@ -173,17 +175,21 @@ $(BUILD)/libemcon.a: $(LIB_OBJ)
 
 $(BUILD)/$(SHARED): $(LIB_OBJ)
 	@echo "  LINK  $@"
-	$(Q)$(FC) $(LDFLAGS_$(MODE)) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $^ $(LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $^ $(LIBS) $(THREAD_LIBS)
 	$(Q)ln -sf $(@F) $(BUILD)/libemcon.so
 
 $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
-	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS) $(THREAD_LIBS)
 
 # What holds whole models and computes nothing: optimising how those are freed takes half of the
 # time of the library. `private`: what is made on the way keeps its own flags.
 HOLDERS := $(addprefix emcon_,c c_by_hand model run stepper stepper_query)
 $(HOLDERS:%=$(O)/%.o): private FFLAGS_release := -O0 -g1
+
+# Loops that threads share: with what these need, nothing else is compiled.
+THREADED := $(notdir $(basename $(shell grep -l '!$$omp parallel' $(LIB_SRC))))
+$(THREADED:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
 
 # Loops over points side by side: a law in numbers that the compiler takes apart, so that it sees the
 # whole of it at once. No sum over lanes, no fused product: with any VECTOR=... the bits are the same.
@@ -213,7 +219,7 @@ endif
 
 $(BUILD)/kernels: $(KERNEL_OBJ) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
-	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS) $(THREAD_LIBS)
 
 lib: $(BUILD)/libemcon.a $(BUILD)/$(SHARED)  ## the library, build/release/libemcon.{a,so}
 app: $(BUILD)/emcon  ## the program, build/release/emcon
@@ -221,7 +227,7 @@ app: $(BUILD)/emcon  ## the program, build/release/emcon
 BENCHES := $(patsubst tests/bench/%.f90,$(BUILD)/%,$(wildcard tests/bench/*.f90))
 $(BENCHES): $(BUILD)/%: tests/bench/%.f90 $(BUILD)/libemcon.a
 	@echo "  FC    $<"
-	$(Q)$(FCOMPILE) -I$(BUILD)/mod -o $@ $^ $(LIBS)
+	$(Q)$(FCOMPILE) -I$(BUILD)/mod -o $@ $^ $(LIBS) $(THREAD_LIBS)
 
 benches: $(BENCHES)  ## the programs of tests/bench
 kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/kernels [SUITE [TEST]]
@@ -320,7 +326,7 @@ install: app lib  ## program, library, modules, header and emcon.pc below PREFIX
 		'Description: energy-momentum conserving contact dynamics' \
 		'Cflags: -I$${prefix}/include/emcon' \
 		'$(strip Libs: -L$${prefix}/lib -lemcon $(LDFLAGS_$(MODE)))' \
-		'Libs.private: $(LIBS) -lgfortran -lm' > $(TO)/lib/pkgconfig/emcon.pc
+		'Libs.private: $(LIBS) $(THREAD_LIBS) -lgfortran -lm' > $(TO)/lib/pkgconfig/emcon.pc
 
 status:  ## compiler, libraries and Python packages that were found
 	@$(SETUP) status
