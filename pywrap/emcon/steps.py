@@ -129,13 +129,16 @@ class Step(Cards):
         return self._card("SURFACE SMOOTHING", {"TYPE": type, "FEATURE ANGLE": feature_angle})
 
     def newton(self, type: str = "KEPT", *, tolerance: Number | None = None,
-               maximum: int | str | None = None) -> Step:
+               maximum: int | str | None = None, polish: bool | None = None) -> Step:
         """`*NEWTON`: KEPT (default), a factor over many increments of dynamics, or FULL.
 
         tolerance       relative residual, below 1 (default 1e-10)
         maximum         tangents in a step at most (20), and twice as many corrections of KEPT
+        polish          False: no corrections below the tolerance
         """
-        return self._card("NEWTON", {"TYPE": type, "TOLERANCE": tolerance, "MAXIMUM": maximum})
+        ends = None if polish is None else "YES" if polish else "NO"
+        return self._card("NEWTON", {"TYPE": type, "TOLERANCE": tolerance, "MAXIMUM": maximum,
+                                     "POLISH": ends})
 
     def time_integration(self, scheme: str) -> Step:
         """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), or a name by which a program gives one."""

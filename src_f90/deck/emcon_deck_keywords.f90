@@ -99,7 +99,7 @@ module emcon_deck_keywords
       keyword_t("MORTAR", in_step, "INTEGRATION=,POINTS=,MULTIPLIER=,NORMAL=,FEATUREANGLE=", &
          has_data=.false.), &
       keyword_t("SURFACE SMOOTHING", in_step, "TYPE=,FEATUREANGLE=", has_data=.false.), &
-      keyword_t("NEWTON", in_step, "TYPE=,TOLERANCE=,MAXIMUM=", has_data=.false.), &
+      keyword_t("NEWTON", in_step, "TYPE=,TOLERANCE=,MAXIMUM=,POLISH=", has_data=.false.), &
       keyword_t("TIME INTEGRATION", in_step, "SCHEME=,!TOLERANCE", has_data=.false.), &
       keyword_t("NODE FILE", in_step, "NSET=," // filed), &
       keyword_t("EL FILE", in_step, "ELSET=," // filed), &

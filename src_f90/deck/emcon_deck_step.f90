@@ -92,6 +92,7 @@ contains
       step%newton = last%newton
       step%newton_tolerance = last%newton_tolerance
       step%newton_maximum = last%newton_maximum
+      step%polishes = last%polishes
       step%restart_frequency = last%restart_frequency
       step%choice = last%choice
    end subroutine inherit
@@ -308,6 +309,14 @@ contains
          call card_error(reader, card, "TOLERANCE is relative and must be below 1")
       end if
       call option_count(reader, card, "MAXIMUM", 1, step%newton_maximum)
+      select case (option_name(card, "POLISH"))
+      case ("", "YES")
+         step%polishes = .true.
+      case ("NO")
+         step%polishes = .false.
+      case default
+         call refuse_option(reader, card, "POLISH", "YES, NO", "")
+      end select
    end subroutine read_newton
 
    !> *TIME INTEGRATION: the scheme of dynamic steps from this one on, or the name of one that a

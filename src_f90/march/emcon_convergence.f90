@@ -32,8 +32,9 @@ module emcon_convergence
 
    !> Corrections by a kept factor, which gain less each: so many without a new best residual are a
    !> stall, so many times the maximum of tangents are allowed, and after so many with one factor
-   !> it is too old.
+   !> it is too old, unless little is left.
    integer, parameter :: kept_stalls = 4, kept_for_tangent = 2, too_old = 12
+   real(wp), parameter :: nearly_done = 1.0e4_wp*epsilon(1.0_wp)
 
    !> With a kept factor, forces whose residual is smaller than this part of their sizes change by
    !> no more of them on the way to the end: the sizes need not be found again.
@@ -42,10 +43,10 @@ module emcon_convergence
    type :: convergence_t
       logical :: is_kept = .false.               !! corrections are by a kept factor
       integer :: n_kept = 0                      !! by the present one
-      integer :: n_fine = 0                      !! residuals of round-off: the next is the last
       integer :: n_renewal = 0                   !! factors made in the solve for that they stalled
       real(wp) :: tolerance = 0.0_wp             !! of the relative residual
       integer :: maximum = 0                     !! iterations
+      logical :: polishes = .true.               !! else the tolerance is the end
       !> Tangents factorised so far, or corrections by a kept factor before the tolerance was met
       integer :: n_iteration = 0
       integer :: n_history = 0
@@ -87,7 +88,6 @@ contains
       self%is_polish = .false.
       self%is_kept = .false.
       self%n_kept = 0
-      self%n_fine = 0
       self%n_renewal = 0
       self%knows_sizes = .false.
    end subroutine convergence_begin
@@ -122,11 +122,11 @@ contains
       if (size < stall_gain*self%best) self%n_stall = 0
       self%best = min(self%best, size)
       next = next_done
-      if (size <= round_off) self%n_fine = self%n_fine + 1
-      if (size <= epsilon(size) .or. self%n_fine > 1) return
+      if (size <= self%tolerance .and. .not. self%polishes) return
+      if (size <= round_off) return
       is_stalled = self%n_stall >= kept_stalls
-      if (is_stalled .and. (size <= round_off .or. is_rounding)) return
-      is_stalled = is_stalled .or. self%n_kept >= too_old
+      if (is_stalled .and. is_rounding) return
+      is_stalled = is_stalled .or. (self%n_kept >= too_old .and. self%best > nearly_done)
       next = next_give_up
       if (.not. size < huge(size) .or. self%n_history > kept_for_tangent*self%maximum) return
       if (is_stalled .and. self%n_renewal > 0) return
@@ -156,6 +156,7 @@ contains
       self%last = size
       next = next_done
       if (size <= round_off) return
+      if (size <= self%tolerance .and. .not. self%polishes) return
       if (self%is_polish .and. (self%n_polish == most_polish .or. .not. has_gained)) then
          if (size > max(self%tolerance, most_rounding) .and. .not. is_rounding) next = next_give_up
          return

@@ -9,7 +9,9 @@ module emcon_factor_base
    type :: factor_base_t
       logical :: is_set = .false.                !! there is a factor
       integer :: increment = -1                  !! increments done before it was made
-      integer :: n_correction = 0                !! of the last step
+      !> Corrections of a short solve: of the shortest one, and one more for each factor since
+      integer :: n_least = 7
+      integer :: n_excess = 0                    !! that its solves have taken more, in sum
       type(instant_t) :: start                   !! of the step that it was made in
       real(wp) :: h = 0.0_wp                     !! and its size [T]
       real(wp), allocatable :: u0(:, :)          !! (n_dim, n_node) displacement at its start [L]

@@ -1,9 +1,10 @@
 !> Solves of a step whose corrections come from a factor that is kept over many steps: when there
 !> may be one, when it is made anew, and how its corrections are mixed.
 !>
-!> It is made anew on fixed increments, for another size of the step, and after a step that it has
-!> led through slowly. The state knows of which motion it was made, so that a run that was resumed
-!> makes the same one and has the bits of one that was not. Source: docs/theory.md, section 8.
+!> It is made anew after so many increments, once it has cost as many corrections as a new one is
+!> worth, and for another size of the step, of the last motion that was found: that of a first guess
+!> is a worse one. The state knows of which motion it was made, so that a run that was resumed makes
+!> the same one and has the bits of one that was not. Source: docs/theory.md, section 8.
 module emcon_keeping
    use emcon_constraints, only : constraint_set_t
    use emcon_correction, only : correction_t
@@ -21,8 +22,9 @@ module emcon_keeping
    public :: keeping_t, keeping_step, keeping_begin, keeping_make, keeping_renew, &
       keeping_correct, keeping_give_up, keeping_commit, keeping_forget
 
-   !> A factor serves so many increments at most, and none after a step of more corrections.
-   integer, parameter :: most_increments = 20, most_corrections = 16
+   !> A factor serves so many increments at most, and until its solves have taken so many
+   !> corrections more than short ones: about as many as a new one costs.
+   integer, parameter :: most_increments = 20, most_excess = 6
 
    type :: keeping_t
       logical :: is_wanted = .true.              !! in steps that it may serve
@@ -33,7 +35,8 @@ module emcon_keeping
       type(instant_t), private :: start          !! of the present step
       real(wp), private :: h = 0.0_wp            !! and its size [T]
       integer, private :: increment = 0          !! increments done before it
-      integer, private :: n_correction = 0       !! in it
+      integer, private :: n_correction = 0       !! in the present solve
+      integer, private :: n_least = 0, n_excess = 0      !! as in the base, with it
       type(mixing_t), private :: mixing
       real(wp), allocatable, private :: guess(:, :)      !! (n_dim, n_node) the solve's first [L]
       real(wp), allocatable, private :: proposed(:)      !! (n_unknown) correction before mixing
@@ -64,17 +67,31 @@ contains
       if (self%is_allowed) self%is_allowed = kept_factor_is_possible(correction%kept)
       if (.not. self%is_allowed) return
       if (.not. correction%kept%is_made) self%base = base
-      if (abs(h - self%base%h) > 0.0_wp .or. self%base%n_correction > most_corrections .or. &
-         (mod(increment, most_increments) == 0 .and. increment /= self%base%increment)) then
-         call keeping_forget(self, correction)
+      self%is_new = self%base%is_set .and. abs(h - self%base%h) > 0.0_wp
+      if (self%is_new) then
+         call kept_factor_forget(correction%kept)
+         self%base%du = (h/self%base%h)*self%base%du
+         self%base%h = h
       end if
       is_lost = self%base%is_set .and. .not. correction%kept%is_made
       self%start = start
       self%h = h
       self%increment = increment
+      self%n_least = self%base%n_least
+      self%n_excess = self%base%n_excess
       self%n_correction = 0
-      self%is_new = .false.
    end subroutine keeping_step
+
+   !> The last solve is over: how many corrections has it taken, beside the shortest one?
+   pure subroutine count_solve(self)
+      type(keeping_t), intent(inout) :: self
+
+      if (self%n_correction > 0) then
+         self%n_least = min(self%n_least, self%n_correction)
+         self%n_excess = self%n_excess + self%n_correction - self%n_least
+      end if
+      self%n_correction = 0
+   end subroutine count_solve
 
    !> A solve begins from `du`.
    pure subroutine keeping_begin(self, n_unknown, du)
@@ -83,6 +100,7 @@ contains
       real(wp), intent(in) :: du(:, :)           !! (n_dim, n_node) [L]
 
       self%guess = du
+      call count_solve(self)
       if (allocated(self%proposed)) then
          if (size(self%proposed) /= n_unknown) deallocate(self%proposed)
       end if
@@ -107,9 +125,12 @@ contains
          if (.not. correction%kept%is_made) then
             call kept_factor_renew(correction%kept, system%matrix, error)
             if (allocated(error)) return
-            self%base = factor_base_t(correction%kept%is_made, self%increment, 0, self%start, &
-               self%h, motion%u0, motion%du)
+            self%n_least = self%n_least + 1
+            self%base = factor_base_t(correction%kept%is_made, self%increment, self%n_least, 0, &
+               self%start, self%h, motion%u0, motion%du)
             self%is_new = .true.
+            self%n_correction = 0
+            self%n_excess = 0
          end if
          call kept_factor_take(correction%kept, set, is_fit, error)
          if (allocated(error)) return
@@ -154,15 +175,29 @@ contains
       du = self%guess
    end subroutine keeping_give_up
 
-   !> After a step: what the state has to know of the factor.
-   pure subroutine keeping_commit(self, base)
+   !> After a step by `motion`: what the state has to know of the factor, or of the next one.
+   pure subroutine keeping_commit(self, correction, motion, base, is_due)
       type(keeping_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+      type(motion_t), intent(in) :: motion
       type(factor_base_t), intent(inout) :: base     !! of the state
+      logical, intent(out) :: is_due                 !! a new factor is to be made
 
-      self%base%n_correction = self%n_correction
-      if (self%is_new .and. self%base%is_set) base = self%base
+      call count_solve(self)
+      is_due = self%base%is_set .and. (self%n_excess > most_excess &
+         .or. self%increment + 1 - self%base%increment >= most_increments)
+      if (is_due) then
+         call kept_factor_forget(correction%kept)
+         self%base = factor_base_t(.true., self%increment + 1, self%n_least + 1, 0, self%start, &
+            self%h, motion%u0, motion%du)
+      else
+         self%base%n_least = self%n_least
+         self%base%n_excess = self%n_excess
+      end if
+      if (self%base%is_set .and. (is_due .or. self%is_new)) base = self%base
       base%is_set = self%base%is_set
-      base%n_correction = self%n_correction
+      base%n_least = self%base%n_least
+      base%n_excess = self%base%n_excess
    end subroutine keeping_commit
 
 end module emcon_keeping

@@ -165,6 +165,7 @@ contains
          call choose_scheme(self, step)
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
             scene%x, step%newton_tolerance, step%newton_maximum)
+         self%newton%convergence%polishes = step%polishes
          self%newton%is_interrupted => self%is_interrupted
          call choose_solver(self, step)
          state%base = factor_base_t()

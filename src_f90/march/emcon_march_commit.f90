@@ -35,6 +35,7 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
+      logical :: is_due
       integer :: i, a
 
       if (.not. increment%done > 0.0_wp) call pair_sums_begin(self%state%sums%sum)
@@ -83,7 +84,9 @@ contains
          end associate
       end associate
       call keep_constraints(self)
-      call keeping_commit(self%newton%keeping, self%state%base)
+      call keeping_commit(self%newton%keeping, self%newton%correction, self%motion, &
+         self%state%base, is_due)
+      if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
 
    !> The velocities that impacts and what has no mass call for.

@@ -17,7 +17,8 @@ module emcon_march_step
    use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
-   use emcon_phases, only : phase_enter, phase_judge, phase_leave, phase_restitution
+   use emcon_phases, only : phase_enter, phase_factorise, phase_judge, phase_leave, &
+      phase_restitution
    use emcon_pose, only : instant_later, pose_at_end
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
@@ -96,6 +97,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(motion_t) :: motion
       logical :: is_lost
+      integer :: left
 
       associate (keeping => self%newton%keeping, correction => self%newton%correction)
          keeping%is_allowed = keeping%is_wanted .and. self%scheme%row%masses_resist .and. &
@@ -108,7 +110,9 @@ contains
          call system_respond(self%system, motion, .true.)
          if (.not. (allocated(self%system%response%refusal) .or. &
             allocated(self%system%response%failure))) then
+            call phase_enter(self%system%phases, phase_factorise, left)
             call kept_factor_renew(correction%kept, self%system%matrix, error)
+            call phase_leave(self%system%phases, left)
          end if
          if (.not. correction%kept%is_made) call keeping_forget(keeping, correction)
       end associate

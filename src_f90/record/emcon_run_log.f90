@@ -106,6 +106,8 @@ contains
          call note_add(notes, "step " // to_text(k) // ": duration " // to_text(step%duration) // &
             ", h = " // to_text(step%h) // trim(merge(", NLGEOM", "        ", step%nlgeom)) // &
             ", " // scheme // ", solver " // solver)
+         if (.not. step%polishes) call note_add(notes, "corrections end where the residual is " // &
+            "within " // to_text(step%newton_tolerance) // ": the energy is kept no better")
       end associate
       if (k == 1) return
       do i = 1, size(scene%pair)

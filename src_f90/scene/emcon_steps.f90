@@ -89,6 +89,7 @@ module emcon_steps
       integer :: newton = newton_kept                !! one of `newton_`
       real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
       integer :: newton_maximum = 20
+      logical :: polishes = .true.                   !! within it, corrections go on to round-off
       integer :: restart_frequency = 0               !! 0: no restart file
       type(prescribed_t), allocatable :: prescribed(:)   !! all that hold in this step
       type(turn_t), allocatable :: turn(:)               !! of rigid bodies, in this step

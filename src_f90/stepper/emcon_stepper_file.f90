@@ -129,7 +129,8 @@ contains
          allocate(base%du, source=u)
       end if
       call restart_exchange(restart, "factor_made", base%increment)
-      call restart_exchange(restart, "factor_made", base%n_correction)
+      call restart_exchange(restart, "factor_least", base%n_least)
+      call restart_exchange(restart, "factor_excess", base%n_excess)
       call restart_exchange(restart, "factor_time", base%start%step_time)
       call restart_exchange(restart, "factor_time", base%start%total_time)
       call restart_exchange(restart, "factor_time", base%h)

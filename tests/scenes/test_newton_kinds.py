@@ -27,3 +27,19 @@ def test_both_end_at_the_same_step(tmp_path, deck, parameters):
         assert np.abs(one[name] - other[name]).max() <= 16*EPSILON*len(one)*total
     factorisations = [run.verdict["counts"]["factorisations"] for run in (kept, full)]
     assert factorisations[0] < 0.2*factorisations[1]
+
+
+@pytest.mark.parametrize("kind", ["KEPT", "FULL"])
+def test_without_polish_it_ends_at_the_tolerance(tmp_path, kind):
+    """An increment may leave the energy the tolerance, of forces that move no farther than bodies."""
+    tolerance = 1e-8
+    rough, fine = (run("ring.inp", f"{kind}, POLISH={polish}", tmp_path, **RING,
+                       tolerance=tolerance) for polish in ("NO", "YES"))
+    solutions = [run.verdict["counts"]["solutions"] for run in (rough, fine)]
+    assert solutions[0] < 0.85*solutions[1]
+    assert rough.verdict["unconverged"] == 0
+    n = len(rough.history)
+    errors = [run.verdict["largest_energy_error"]/run.verdict["largest_energy"]
+              for run in (rough, fine)]
+    assert errors[1] < 16*EPSILON*n < errors[0] < tolerance*n
+    assert "corrections end where the residual is within 1.00000E-08" in rough.log
