@@ -1,12 +1,12 @@
-"""What the program does, counted: against stored counts, and by phases for rings of three sizes.
+"""What the program does, counted: against stored counts, and by phases for rings of several sizes.
 
     .venv/bin/python tests/bench/bench_counts.py            # compare with tests/bench/counts.json
     .venv/bin/python tests/bench/bench_counts.py --phases   # the table of docs/performance.md
     ... --update                                            # write what was found into either
 
 Counts that are more than three per cent above those stored make it fail; seconds are printed, and
-nothing is judged by them. `--short` for the quickest scene. What increments allocate is counted by
-tests/scenes/test_off.py.
+nothing is judged by them. `--short` for the quickest scene, `--long` for a fourth ring. What
+increments allocate is counted by tests/scenes/test_off.py.
 """
 
 import argparse
@@ -40,6 +40,8 @@ SCENES = {
 #: Of the verdict, beside `counts`.
 OWN = ("increments", "newton", "cuts")
 RINGS = (("64x4", "60x5"), ("128x8", "120x10"), ("256x16", "240x20"))
+#: With `--long`.
+BIG = (("512x32", "480x40"), ("1024x64", "960x80"))
 INCREMENTS = 50
 
 
@@ -120,11 +122,11 @@ def phases(sizes):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name in ("phases", "update", "short"):
+    for name in ("phases", "update", "short", "long"):
         parser.add_argument(f"--{name}", action="store_true")
     options = parser.parse_args()
     if options.phases:
-        lines = phases(RINGS[:1] if options.short else RINGS)
+        lines = phases(RINGS[:1] if options.short else RINGS + BIG[:1]*options.long)
         print("\n".join(lines))
         if options.update:
             PAGE.write_text(update(PAGE.read_text(), "phases", lines))

@@ -23,7 +23,7 @@ import tempfile
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
 import bench_peers  # noqa: E402
-from bench_counts import PAGE, RINGS  # noqa: E402
+from bench_counts import BIG, PAGE, RINGS  # noqa: E402
 from book.common import size as digits  # noqa: E402
 from book.common import table  # noqa: E402
 from floors import floors  # noqa: E402
@@ -34,7 +34,6 @@ from verification import update  # noqa: E402
 
 H = 0.01
 BEFORE = bench_peers.BEFORE
-BIG = (("512x32", "480x40"), ("1024x64", "960x80"))
 #: At most, of a size of the ring: seconds per increment.
 PER_INCREMENT = {4724: 0.006, 18344: 0.03, 72272: 0.12, 286880: 0.6}
 #: At most, of decks with their own parameters: seconds.
@@ -222,7 +221,7 @@ def main():
     targets = table(["scene", "target", "found", "found / target", "", "energy error"],
                     [row.cells() for row in rows_of(options)])
     print("\nTargets", *targets, sep="\n")
-    least = floors(RINGS[:1] if options.short else RINGS)
+    least = floors(RINGS[:1] if options.short else RINGS + BIG[:1]*options.long)
     print("\nPhases of the ring: what they take, and at least", *least, sep="\n")
     if options.update:
         text = update(PAGE.read_text(), "targets", targets)
