@@ -50,7 +50,7 @@ def test_targets(tmp_path):
     options = bench_targets.arguments().parse_args(["--short"])
     rows = [*bench_targets.whole_runs(tmp_path, 1, options),
             *bench_targets.decks(tmp_path, 1, options)]
-    assert len(rows) == 7 and all(row.found > 0 for row in rows)
+    assert len(rows) == 9 and all(row.found > 0 for row in rows)
     assert all(row.error < 1e-10 for row in rows if row.error is not None)
 
 
