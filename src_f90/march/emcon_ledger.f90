@@ -8,7 +8,7 @@ module emcon_ledger
    use emcon_term_registry, only : terms_mass
    implicit none
    private
-   public :: ledger_t, ledger_init, ledger_measure, body_momenta, body_masses
+   public :: ledger_t, ledger_init, ledger_measure, ledger_momenta, body_momenta, body_masses
 
    !> Dimensions of space, at most.
    integer, parameter :: most_dim = 3
@@ -65,27 +65,49 @@ contains
       end do
    end subroutine ledger_measure
 
-   !> Linear and angular momentum of each body: rows px, py, lz.
+   !> Linear and angular momentum of each body, rows px, py, lz, in the state last measured.
+   pure subroutine ledger_momenta(self, system, x, state, momenta)
+      type(ledger_t), intent(in) :: self         !! of a measured state
+      type(system_t), intent(in) :: system
+      real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
+      type(state_t), intent(in) :: state         !! the same
+      real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
+
+      call add_up(system%space%body, x, state%u, self%work, momenta)
+   end subroutine ledger_momenta
+
+   !> The same in any state.
    subroutine body_momenta(system, x, state, momenta)
       type(system_t), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state
       real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
-      real(wp) :: momentum(size(x, 1), size(x, 2)), place(size(x, 1))   ! of each node
-      integer :: i, n_dim
+      real(wp) :: momentum(size(x, 1), size(x, 2))
 
-      n_dim = size(x, 1)
       call mass_times(system, state%v, momentum)
+      call add_up(system%space%body, x, state%u, momentum, momenta)
+   end subroutine body_momenta
+
+   !> Sums over the nodes of each body.
+   pure subroutine add_up(body, x, u, momentum, momenta)
+      integer, intent(in) :: body(:)             !! (n_node) of each node; 0: none
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(in), contiguous :: momentum(:, :)     !! (n_dim, n_node) [M L/T]
+      real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
+      real(wp) :: place(most_dim)
+      integer :: i, n
+
+      n = size(x, 1)
       momenta = 0.0_wp
       do i = 1, size(x, 2)
-         if (system%space%body(i) == 0) cycle
-         associate (to => momenta(:, system%space%body(i)))
-            place = x(:, i) + state%u(:, i)
-            to(:n_dim) = to(:n_dim) + momentum(:, i)
-            to(n_dim + 1) = to(n_dim + 1) + moment_of(place, momentum(:, i))
+         if (body(i) == 0) cycle
+         associate (to => momenta(:, body(i)))
+            place(:n) = x(:, i) + u(:, i)
+            to(:n) = to(:n) + momentum(:, i)
+            to(n + 1) = to(n + 1) + moment_of(place(:n), momentum(:, i))
          end associate
       end do
-   end subroutine body_momenta
+   end subroutine add_up
 
    !> Mass of each body.
    subroutine body_masses(system, mass)

@@ -7,7 +7,7 @@ module emcon_recorder
       history_publish, history_put_run, history_resume, history_set_append, history_set_define, &
       history_set_once, history_t
    use emcon_kinds, only : dp, wp
-   use emcon_ledger, only : body_masses, body_momenta
+   use emcon_ledger, only : body_masses, ledger_momenta
    use emcon_march, only : increment_t
    use emcon_print_series, only : is_due, print_series_define, print_series_write, series_t
    use emcon_pair_columns, only : pair_columns, pair_values
@@ -203,7 +203,7 @@ contains
             real(increment%stand_off%largest, dp), cpu, pair_values(stepper)], error)
          if (allocated(error)) return
          self%n_row = self%n_row + 1
-         call body_momenta(stepper%march%system, stepper%scene%x, state, momenta)
+         call ledger_momenta(ledger, stepper%march%system, stepper%scene%x, state, momenta)
          call history_set_append(self%history, self%momentum_set, real(state%time, dp), &
             real(momenta, dp), error)
       end associate

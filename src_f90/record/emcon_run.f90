@@ -66,6 +66,7 @@ module emcon_run
       real(dp) :: wall_start = 0.0_dp
       type(run_parts_t) :: parts                 !! of its time
       type(pace_t) :: pace                       !! of restart files that *RESTART asks for
+      logical :: saves_end = .false.             !! one is to be written behind the results
    end type run_t
 
 contains
@@ -265,6 +266,7 @@ contains
          call log_increment(run%log, run%stepper, increment)
          if (allocated(error)) exit
          call recorder_write(run%recorder, run%stepper, increment, run%parts%marked, error)
+         run%saves_end = stepper_is_done(run%stepper) .and. saves(run)
          if (is_save_due(run) .and. .not. allocated(error)) call save(run, error)
          if (.not. allocated(error)) call recorder_publish(run%recorder, .false., error)
          associate (state => run%stepper%march%state)
@@ -300,6 +302,7 @@ contains
       end if
       call recorder_close(run%recorder, second)
       if (.not. allocated(error)) call move_alloc(second, error)
+      if (run%saves_end .and. .not. allocated(error)) call save_state(run, error)
       if (allocated(error)) call log_line(run%log, error%message)
       call pass_verdict(run, is_strict, report, lines, error)
       call log_lines(run%log, "", lines)
@@ -337,36 +340,48 @@ contains
       end associate
    end subroutine pass_verdict
 
-   !> Does *RESTART ask for a restart file after this increment, and is the last one old enough, or
-   !> the run at its end?
+   !> Does *RESTART ask for restart files in this step?
+   pure logical function saves(run)
+      type(run_t), intent(in) :: run
+
+      saves = run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency /= 0
+   end function saves
+
+   !> Does it after this increment, before the end of the run, and is the last one old enough?
    logical function is_save_due(run)
       type(run_t), intent(in) :: run
 
+      is_save_due = saves(run) .and. .not. run%saves_end
+      if (.not. is_save_due) return
       associate (state => run%stepper%march%state, &
             frequency => run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency)
-         is_save_due = frequency /= 0
-         if (.not. is_save_due .or. stepper_is_done(run%stepper)) return
          is_save_due = mod(state%increment - state%n_before, frequency) == 0
-         if (is_save_due) is_save_due = pace_is_due(run%pace)
       end associate
+      if (is_save_due) is_save_due = pace_is_due(run%pace)
    end function is_save_due
 
    !> Publish the results and write the restart file, in this order: it may not be ahead of them.
    subroutine save(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(out) :: error
-      type(restart_t) :: restart
-      type(string_t), allocatable :: build(:)
 
       call pace_begin(run%pace)
       call recorder_publish(run%recorder, .true., error)
-      if (allocated(error)) return
+      if (.not. allocated(error)) call save_state(run, error)
+      call pace_end(run%pace)
+   end subroutine save
+
+   subroutine save_state(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(out) :: error
+      type(restart_t) :: restart
+      type(string_t), allocatable :: build(:)
+
       call stepper_save(run%stepper, restart)
       call build_list(build)
       call exchange_files(restart, run%recorder%n_row, run%recorder%fields%n_frame, build)
       call restart_write(restart, run%base // ".rst.h5", error)
-      call pace_end(run%pace)
-   end subroutine save
+   end subroutine save_state
 
    !> What of the result files belongs to the state, and which program wrote them.
    subroutine exchange_files(restart, n_row, n_frame, build)

@@ -13,6 +13,7 @@ module emcon_history
    use emcon_kinds, only : dp, int64
    use emcon_published, only : publication_is_due, published_abandon, published_close, &
       published_create, published_publish, published_resume, published_t
+   use emcon_table_row, only : table_row_begin, table_row_line, table_row_t
    use emcon_text, only : string_t
    implicit none
    private
@@ -39,6 +40,7 @@ module emcon_history
       type(published_t), private :: store
       type(file_t), private :: csv
       type(column_t), allocatable, private :: column(:)
+      type(table_row_t), private :: row              !! of NAME.csv
       type(hdf5_series_t), allocatable, private :: series(:)
       type(set_series_t), allocatable, private :: set(:)
       logical, private :: is_resumed = .false.
@@ -51,7 +53,6 @@ module emcon_history
    end interface history_set_put
 
    integer, parameter :: chunk_rows = 256
-   integer, parameter :: number_width = 24           !! of a real with 17 significant digits
    character(len=*), parameter :: line_end = achar(10)
    integer, parameter :: one_value(0) = [integer ::] !! shape of a row of one value
 
@@ -136,6 +137,7 @@ contains
       do i = 2, size(self%column)
          header = header // "," // trim(self%column(i)%name)
       end do
+      call table_row_begin(self%row, self%column%is_integer)
       allocate(kept(self%n_row, size(self%column)))
       do i = 1, size(self%column)
          if (.not. self%is_resumed) exit
@@ -151,38 +153,14 @@ contains
       if (.not. allocated(error)) call file_put(self%csv, header // line_end, error)
       do i = 1, self%n_row
          if (allocated(error)) exit
-         call csv_row(self%column, kept(i, :), line)
-         call file_put(self%csv, line, error)
+         call table_row_line(self%row, kept(i, :), line)
+         call file_put(self%csv, line // line_end, error)
       end do
       if (.not. allocated(error)) call file_rename(base // ".csv.tmp", base // ".csv", error)
       if (.not. allocated(error)) return
       call file_close(self%csv, ignored)
       call file_remove(base // ".csv.tmp", ignored)
    end subroutine begin_csv
-
-   !> A line of NAME.csv: reals that read back to the same bits, integers as such.
-   subroutine csv_row(column, values, line)
-      type(column_t), intent(in) :: column(:)
-      real(dp), intent(in) :: values(:)
-      character(len=:), allocatable, intent(out) :: line
-      character(len=(number_width + 1)*size(values)) :: buffer
-      character(len=number_width) :: word
-      character(len=number_width*size(values)) :: reals
-      integer :: i, n, n_word
-
-      write(reals, "(*(es24.16e3))") values
-      n = 0
-      do i = 1, size(values)
-         word = reals(number_width*(i - 1) + 1:number_width*i)
-         if (column(i)%is_integer) write(word, "(i0)") nint(values(i), int64)
-         word = adjustl(word)
-         n_word = len_trim(word)
-         buffer(n + 1:n + n_word) = word(:n_word)
-         n = n + n_word + 1
-         buffer(n:n) = ","
-      end do
-      line = buffer(:n - 1) // line_end
-   end subroutine csv_row
 
    !> Append a row; it is in NAME.csv when this returns.
    subroutine history_append(self, values, error)
@@ -196,8 +174,8 @@ contains
          call raise(error, err_internal, "history_append: wrong number of values")
          return
       end if
-      call csv_row(self%column, values, line)
-      call file_put(self%csv, line, error)
+      call table_row_line(self%row, values, line)
+      call file_put(self%csv, line // line_end, error)
       if (allocated(error)) return
       do i = 1, size(self%series)
          call series_append(self%series(i), self%store%file, values(i:i), 1, error)

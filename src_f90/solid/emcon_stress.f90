@@ -80,22 +80,32 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)
       type(element_motion_t), intent(inout) :: motion
       real(wp), intent(inout) :: turn(:, :)              !! set for corotated elements
+      integer :: i
+
+      do i = 1, solid%geometry(e)%n_node
+         motion%from(:, i) = u(:, solid%node(i, e))
+      end do
+      if (solid%is_corotated(e)) call place_in_frame(solid, e, u, motion, turn)
+   end subroutine place
+
+   pure subroutine place_in_frame(solid, e, u, motion, turn)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: u(:, :)
+      type(element_motion_t), intent(inout) :: motion
+      real(wp), intent(inout) :: turn(:, :)
       type(corotated_t) :: frame
       real(wp) :: u_left(size(u, 1), size(solid%node, 1))
       integer :: i
 
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
-         do i = 1, size(node)
-            motion%from(:, i) = u(:, node(i))
-         end do
-         if (.not. solid%is_corotated(e)) return
          call corotated_init(frame, solid%geometry(e), solid%x(:, node))
          do i = 1, size(node)
             u_left(:, i) = u(:, node(i)) - u(:, node(1))
          end do
          call corotated_strip(frame, u_left, motion%from, turn)
       end associate
-   end subroutine place
+   end subroutine place_in_frame
 
    !> Stress and strain (E11, E22, 2 E12) at the quadrature points of element `e`.
    pure subroutine element_state(solid, e, motion, given, points, stress, strain)
