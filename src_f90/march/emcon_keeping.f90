@@ -30,7 +30,8 @@ module emcon_keeping
       logical :: is_wanted = .true.              !! in steps that it may serve
       logical :: is_allowed = .false.            !! in the present step
       type(factor_base_t) :: base                !! of the present factor
-      logical, private :: is_new = .false.       !! made in the present step
+      logical, private :: is_tried = .false.     !! in the present step
+      logical, private :: is_new = .false.       !! made in it
       logical, private :: knows_set = .false.    !! it has taken the solve's constraints
       type(instant_t), private :: start          !! of the present step
       real(wp), private :: h = 0.0_wp            !! and its size [T]
@@ -65,6 +66,7 @@ contains
 
       is_lost = .false.
       if (self%is_allowed) self%is_allowed = kept_factor_is_possible(correction%kept)
+      self%is_tried = self%is_allowed
       if (.not. self%is_allowed) return
       if (.not. correction%kept%is_made) self%base = base
       self%is_new = self%base%is_set .and. abs(h - self%base%h) > 0.0_wp
@@ -165,12 +167,14 @@ contains
    end subroutine keeping_correct
 
    !> The factor does not lead to an end: no more of it in this step, and back to the first guess.
-   pure subroutine keeping_give_up(self, correction, du)
+   !> One that is not fit for the step's constraints may be for those of the next.
+   pure subroutine keeping_give_up(self, correction, is_fit, du)
       type(keeping_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
+      logical, intent(in) :: is_fit              !! it was, and has failed
       real(wp), intent(out) :: du(:, :)          !! (n_dim, n_node) [L]
 
-      call keeping_forget(self, correction)
+      if (is_fit) call keeping_forget(self, correction)
       self%is_allowed = .false.
       du = self%guess
    end subroutine keeping_give_up
@@ -184,7 +188,7 @@ contains
       logical, intent(out) :: is_due                 !! a new factor is to be made
 
       call count_solve(self)
-      is_due = self%base%is_set .and. (self%n_excess > most_excess &
+      is_due = self%is_tried .and. (.not. self%base%is_set .or. self%n_excess > most_excess &
          .or. self%increment + 1 - self%base%increment >= most_increments)
       if (is_due) then
          call kept_factor_forget(correction%kept)

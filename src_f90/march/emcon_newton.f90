@@ -128,6 +128,7 @@ contains
       self%convergence%is_kept = .true.
       call keeping_begin(self%keeping, size(self%residual), motion%du)
       is_done = .true.
+      is_fit = .true.
       do
          call check_interrupt(self, status, error)
          if (.not. allocated(error)) call evaluate_damped(self, system, set, motion, &
@@ -151,7 +152,7 @@ contains
          if (allocated(error)) return
       end do
       is_done = .false.
-      call keeping_give_up(self%keeping, self%correction, motion%du)
+      call keeping_give_up(self%keeping, self%correction, is_fit, motion%du)
    end subroutine solve_by_kept_factor
 
    !> Let there be a factor that knows the constraints.
