@@ -26,6 +26,8 @@ module emcon_kept_factor
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
    real(dp), parameter :: most_curved = 0.5_dp
+   !> Multipliers of a first guess may be several times too large.
+   real(dp), parameter :: most_curved_far = 4.0_dp*most_curved
 
    !> W^T W may have so many times the entries of the matrix.
    integer, parameter :: most_products = 4
@@ -190,18 +192,20 @@ contains
    end subroutine fill_products
 
    !> Is what the factor does not know, the curvature of the constraints, small beside it?
-   pure logical function kept_factor_serves(self, set)
+   pure logical function kept_factor_serves(self, set, is_near)
       type(kept_factor_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
-      real(dp) :: curved
+      logical, intent(in) :: is_near             !! the multipliers are about those of the solution
+      real(dp) :: curved, most
       integer :: k, n
 
       kept_factor_serves = .true.
+      most = merge(most_curved, most_curved_far, is_near)
       do k = set%n_linear + 1, set%n
          associate (item => set%item(k), rows => set%force_rows)
             n = size(item%g, 1)*item%n_node
             curved = real(abs(set%lam(k))*maxval(abs(item%h(:n, :n))), dp)
-            if (any(curved > most_curved*self%diagonal(rows%column(rows%row_start(k) + 1: &
+            if (any(curved > most*self%diagonal(rows%column(rows%row_start(k) + 1: &
                rows%row_start(k + 1)) + 1))) kept_factor_serves = .false.
          end associate
       end do

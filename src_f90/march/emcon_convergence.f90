@@ -34,6 +34,9 @@ module emcon_convergence
    !> stall, so many times the maximum of tangents are allowed, and after so many with one factor
    !> it is too old, unless little is left.
    integer, parameter :: kept_stalls = 4, kept_for_tangent = 2, too_old = 12
+   !> Below this multiple of epsilon a correction that does not gain has met round-off, which large
+   !> scenes have more of.
+   real(wp), parameter :: kept_floor = 64.0_wp*epsilon(1.0_wp)
    real(wp), parameter :: nearly_done = 1.0e4_wp*epsilon(1.0_wp)
 
    !> With a kept factor, forces whose residual is smaller than this part of their sizes change by
@@ -112,10 +115,11 @@ contains
       real(wp), intent(in) :: size
       logical, intent(in) :: is_rounding
       integer, intent(out) :: next
-      logical :: is_stalled
+      logical :: is_stalled, has_gained
 
       self%n_history = self%n_history + 1
       self%history(self%n_history) = size
+      has_gained = size <= polish_gain*self%last
       self%last = size
       self%knows_sizes = size < near
       self%n_stall = self%n_stall + 1
@@ -123,7 +127,7 @@ contains
       self%best = min(self%best, size)
       next = next_done
       if (size <= self%tolerance .and. .not. self%polishes) return
-      if (size <= round_off) return
+      if (size <= round_off .or. (size <= kept_floor .and. .not. has_gained)) return
       is_stalled = self%n_stall >= kept_stalls
       if (is_stalled .and. is_rounding) return
       is_stalled = is_stalled .or. (self%n_kept >= too_old .and. self%best > nearly_done)

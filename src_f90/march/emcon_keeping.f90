@@ -2,8 +2,8 @@
 !> may be one, when it is made anew, and how its corrections are mixed.
 !>
 !> It is made anew after so many increments, once it has cost as many corrections as a new one is
-!> worth, and for another size of the step, of the last motion that was found: that of a first guess
-!> is a worse one. The state knows of which motion it was made, so that a run that was resumed makes
+!> worth, and for another size of the step: of the place that was found last, as that of a first
+!> guess is a worse one. The state knows of which motion it was made, so that a run that was resumed makes
 !> the same one and has the bits of one that was not. Source: docs/theory.md, section 8.
 module emcon_keeping
    use emcon_constraints, only : constraint_set_t
@@ -11,10 +11,10 @@ module emcon_keeping
    use emcon_errors, only : error_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_is_possible, kept_factor_renew, kept_factor_serves, kept_factor_take
+      kept_factor_is_possible, kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
-   use emcon_motion, only : motion_t
+   use emcon_motion, only : at_rest, motion_t
    use emcon_pose, only : instant_t
    use emcon_system, only : system_t
    implicit none
@@ -138,7 +138,6 @@ contains
          if (allocated(error)) return
          self%knows_set = is_fit
       end if
-      if (is_fit) is_fit = kept_factor_serves(correction%kept, set)
    end subroutine keeping_make
 
    !> The next factor is to be of the tangent at the present place.
@@ -193,7 +192,7 @@ contains
       if (is_due) then
          call kept_factor_forget(correction%kept)
          self%base = factor_base_t(.true., self%increment + 1, self%n_least + 1, 0, self%start, &
-            self%h, motion%u0, motion%du)
+            self%h, motion%u0 + motion%du, at_rest(motion%du))
       else
          self%base%n_least = self%n_least
          self%base%n_excess = self%n_excess

@@ -13,6 +13,7 @@ module emcon_newton
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_keeping, only : keeping_begin, keeping_correct, keeping_give_up, keeping_make, &
       keeping_renew, keeping_t
+   use emcon_kept_factor, only : kept_factor_serves
    use emcon_kinds, only : int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
@@ -170,6 +171,8 @@ contains
       end if
       call phase_enter(system%phases, phase_factorise, left)
       call keeping_make(self%keeping, self%correction, system, set, motion, is_fit, error)
+      if (is_fit) is_fit = kept_factor_serves(self%correction%kept, set, &
+         self%convergence%knows_sizes)
       call phase_leave(system%phases, left)
    end subroutine make_factor
 
