@@ -10,7 +10,6 @@ typedef struct {
    cholmod_sparse *reached;       /* and the entries that a sparse right-hand side reaches */
    int *place;                    /* of each unknown in the order of the factor */
    double *zero;                  /* n zeros between calls */
-   double *half;                  /* n, work space */
 } emcon_cholmod_t;
 
 /* View of a full symmetric matrix: CSR is CSC here; CHOLMOD reads the lower triangle only. */
@@ -52,9 +51,7 @@ int emcon_cholmod_analyse(void *handle, int n, int *ap, int *ai)
    cholmod_free_factor(&h->l, &h->c);
    h->l = cholmod_analyze(&a, &h->c);
    free(h->place);
-   free(h->half);
    h->place = NULL;
-   h->half = NULL;
    return h->c.status;
 }
 
@@ -88,124 +85,30 @@ int emcon_cholmod_solve(void *handle, int n, double *b, double *x)
    return h->c.status;
 }
 
-/* Entries of a factor that are called for before they are needed. */
-enum { ahead = 512 };
-
-/* Let the entries from `p` to `end` come into the cache. */
-static void call_for(const double *lx, const int *li, int p, int end)
-{
-   for (; p < end; p += 8) {
-      __builtin_prefetch(lx + p);
-      __builtin_prefetch(li + p);
-   }
-}
-
-/* Both halves of a substitution, with CHOLMOD's own bits: up to three columns that have the same
-   rows below them are taken together. What comes next is called for, without which a factor that
-   does not fit the cache takes twice as long. Column j has lnz[j] entries from lp[j] on. */
-
-/* x = L^-1 x */
-static void substitute(int n, const int *lp, const int *lnz, const int *li, const double *lx,
-                       double *x)
-{
-   int j = 0;
-   while (j < n) {
-      int p = lp[j], end = p + lnz[j];
-      if (lnz[j] < 4 || lnz[j] != lnz[j + 1] + 1 || li[p + 1] != j + 1) {
-         double y = x[j] /= lx[p];
-         call_for(lx, li, p + ahead, end + ahead);
-         for (p++; p < end; p++) x[li[p]] -= lx[p]*y;
-         j++;
-      } else if (lnz[j] != lnz[j + 2] + 2 || li[p + 2] != j + 2) {
-         int q = lp[j + 1];
-         double y0 = x[j]/lx[p], y1 = (x[j + 1] - lx[p + 1]*y0)/lx[q];
-         call_for(lx, li, p + ahead, end + lnz[j] + ahead);
-         x[j] = y0;
-         x[j + 1] = y1;
-         for (p += 2, q++; p < end; p++, q++) x[li[p]] -= lx[p]*y0 + lx[q]*y1;
-         j += 2;
-      } else {
-         int q = lp[j + 1], r = lp[j + 2];
-         double y0 = x[j]/lx[p], y1 = (x[j + 1] - lx[p + 1]*y0)/lx[q];
-         double y2 = (x[j + 2] - lx[p + 2]*y0 - lx[q + 1]*y1)/lx[r];
-         call_for(lx, li, p + ahead, end + 2*lnz[j] + ahead);
-         x[j] = y0;
-         x[j + 1] = y1;
-         x[j + 2] = y2;
-         for (p += 3, q += 2, r++; p < end; p++, q++, r++)
-            x[li[p]] -= lx[p]*y0 + lx[q]*y1 + lx[r]*y2;
-         j += 3;
-      }
-   }
-}
-
-/* x = L^-T x */
-static void substitute_back(int n, const int *lp, const int *lnz, const int *li, const double *lx,
-                            double *x)
-{
-   int j = n - 1;
-   while (j >= 0) {
-      int p = lp[j], end = p + lnz[j];
-      double d0 = lx[p];
-      if (j < 4 || lnz[j] != lnz[j - 1] - 1 || li[lp[j - 1] + 1] != j) {
-         double y = x[j];
-         call_for(lx, li, p - ahead, end - ahead);
-         for (p++; p < end; p++) y -= lx[p]*x[li[p]];
-         x[j] = y/d0;
-         j--;
-      } else if (lnz[j] != lnz[j - 2] - 2 || li[lp[j - 2] + 2] != j) {
-         int q = lp[j - 1];
-         double d1 = lx[q], t = lx[q + 1], y0 = x[j], y1 = x[j - 1];
-         call_for(lx, li, q - ahead, end - ahead);
-         for (p++, q += 2; p < end; p++, q++) {
-            double y = x[li[p]];
-            y0 -= lx[p]*y;
-            y1 -= lx[q]*y;
-         }
-         y0 /= d0;
-         x[j - 1] = (y1 - t*y0)/d1;
-         x[j] = y0;
-         j -= 2;
-      } else {
-         int q = lp[j - 1], r = lp[j - 2];
-         double d1 = lx[q], d2 = lx[r], t = lx[q + 1], u = lx[r + 1], v = lx[r + 2];
-         double y0 = x[j], y1 = x[j - 1], y2 = x[j - 2];
-         call_for(lx, li, r - ahead, end - ahead);
-         for (p++, q += 2, r += 3; p < end; p++, q++, r++) {
-            double y = x[li[p]];
-            y0 -= lx[p]*y;
-            y1 -= lx[q]*y;
-            y2 -= lx[r]*y;
-         }
-         y0 /= d0;
-         y1 = (y1 - t*y0)/d1;
-         y2 = (y2 - v*y0 - u*y1)/d2;
-         x[j - 2] = y2;
-         x[j - 1] = y1;
-         x[j] = y0;
-         j -= 3;
-      }
-   }
-}
-
 /* x = L^-1 P b, or x = P^T L^-T b. */
 int emcon_cholmod_half(void *handle, int n, int is_second, double *b, double *x)
 {
    emcon_cholmod_t *h = handle;
-   const cholmod_factor *l = h->l;
-   const int *perm = l->Perm;
+   const int *perm = h->l->Perm;
+   cholmod_dense rhs = {0};
+   const double *y;
    int i;
-   if (!is_second) {
+   if (!is_second)
       for (i = 0; i < n; i++) x[i] = b[perm[i]];
-      substitute(n, l->p, l->nz, l->i, l->x, x);
-      return CHOLMOD_OK;
-   }
-   if (h->half == NULL) h->half = malloc((size_t)n*sizeof *h->half);
-   if (h->half == NULL) return CHOLMOD_OUT_OF_MEMORY;
-   for (i = 0; i < n; i++) h->half[i] = b[i];
-   substitute_back(n, l->p, l->nz, l->i, l->x, h->half);
-   for (i = 0; i < n; i++) x[perm[i]] = h->half[i];
-   return CHOLMOD_OK;
+   rhs.nrow = rhs.d = rhs.nzmax = (size_t)n;
+   rhs.ncol = 1;
+   rhs.x = is_second ? b : x;
+   rhs.xtype = CHOLMOD_REAL;
+   rhs.dtype = CHOLMOD_DOUBLE;
+   if (!cholmod_solve2(is_second ? CHOLMOD_Lt : CHOLMOD_L, h->l, &rhs, NULL, &h->x, NULL, &h->y,
+                       &h->e, &h->c))
+      return h->c.status == CHOLMOD_OK ? CHOLMOD_INVALID : h->c.status;
+   y = h->x->x;
+   if (is_second)
+      for (i = 0; i < n; i++) x[perm[i]] = y[i];
+   else
+      for (i = 0; i < n; i++) x[i] = y[i];
+   return h->c.status;
 }
 
 static int places(emcon_cholmod_t *h, int n)
@@ -275,7 +178,6 @@ void emcon_cholmod_free(void *handle)
    cholmod_free_sparse(&h->reached, &h->c);
    free(h->place);
    free(h->zero);
-   free(h->half);
    cholmod_finish(&h->c);
    free(h);
 }
