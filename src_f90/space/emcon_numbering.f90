@@ -22,6 +22,7 @@ module emcon_numbering
       integer, allocatable :: dof(:)             !! (n_unknown) place in an (n_dim, n_node) array
       integer :: n_dependent = 0
       integer, allocatable :: dependent(:)       !! (n_dependent) their places, ascending
+      integer, allocatable :: following(:)       !! those of them that follow unknowns
       ! The terms of each freedom, those of freedom d from start(d) + 1 to start(d + 1):
       integer, allocatable :: start(:)           !! (degrees of freedom + 1)
       integer, allocatable :: term(:)            !! place of an unknown or prescribed freedom
@@ -197,6 +198,7 @@ contains
    pure subroutine collect_terms(self, sums)
       type(numbering_t), intent(inout) :: self
       type(sums_t), intent(in) :: sums           !! by dependent freedom
+      logical, allocatable :: follows(:)
       integer :: d, k, n, t
 
       self%n_dependent = size(self%dependent)
@@ -220,6 +222,13 @@ contains
          self%start(d + 1) = n
       end do
       self%column = unknown_of(self, self%term)
+      allocate(follows(self%n_dependent))
+      do k = 1, self%n_dependent
+         associate (from => self%start(self%dependent(k)), to => self%start(self%dependent(k) + 1))
+            follows(k) = any(self%column(from + 1:to) > 0)
+         end associate
+      end do
+      self%following = pack(self%dependent, follows)
 
    contains
 
@@ -262,8 +271,8 @@ contains
       do k = 1, self%n_unknown
          vector(k) = field(self%dof(k))
       end do
-      do k = 1, self%n_dependent
-         associate (d => self%dependent(k))
+      do k = 1, size(self%following)
+         associate (d => self%following(k))
             do t = self%start(d) + 1, self%start(d + 1)
                if (self%column(t) == 0) cycle
                weight = merge(abs(self%weight(t)), self%weight(t), is_magnitude)
@@ -285,7 +294,7 @@ contains
       do k = 1, self%n_unknown
          field(self%dof(k)) = field(self%dof(k)) + factor*vector(k)
       end do
-      call spread_dependent(self, field)
+      call spread(self, self%following, field)
    end subroutine add_to_dofs
 
    !> T as a matrix: a row for each of the degrees of freedom `dof`, a column for each unknown.
@@ -327,11 +336,20 @@ contains
    pure subroutine spread_dependent(self, field)
       type(numbering_t), intent(in) :: self
       real(wp), intent(inout) :: field(size(self%start) - 1) !! (n_dim, n_node)
+
+      call spread(self, self%dependent, field)
+   end subroutine spread_dependent
+
+   !> The entries `dependent` from those that they follow.
+   pure subroutine spread(self, dependent, field)
+      type(numbering_t), intent(in) :: self
+      integer, intent(in) :: dependent(:)                    !! their places
+      real(wp), intent(inout), contiguous :: field(:)
       real(wp) :: total
       integer :: k, t
 
-      do k = 1, self%n_dependent
-         associate (d => self%dependent(k))
+      do k = 1, size(dependent)
+         associate (d => dependent(k))
             total = 0.0_wp
             do t = self%start(d) + 1, self%start(d + 1)
                total = total + self%weight(t)*field(self%term(t))
@@ -339,7 +357,7 @@ contains
             field(d) = total
          end associate
       end do
-   end subroutine spread_dependent
+   end subroutine spread
 
    !> Dependent entries of a force go to the freedoms that they follow.
    pure subroutine gather_dependent(self, field)
