@@ -1,14 +1,18 @@
 """Contact surfaces without mass: smooth forces, closed balances, bodies that stay in contact."""
 
 import math
+import sys
 
 import numpy as np
 import pytest
 import scipy.linalg
 from plain_scenes import AUTO, SCENES, Scene
-from scene_tools import DECKS, Deck, run_deck
+from scene_tools import DECKS, ROOT, Deck, run_deck
 
 from emcon import Stepper
+
+sys.path.insert(0, str(ROOT / "tests" / "bench"))
+from book import forces  # noqa: E402
 
 MASSLESS = {"initiation": "MASSLESS"}
 NTS = {"formulation": "NODE TO SURFACE", "sides": "AUTO"}
@@ -80,6 +84,21 @@ def test_what_lies_on_a_body_does_not_hop(name, tmp_path):
     assert switches(history) == 1
     assert balances(history) < 1e-12
     assert history["penetration"].max() < 1e-12
+
+
+def test_an_elastic_disc_slides_in_a_ring(tmp_path):
+    """A part of the fifty periods of the book: it presses on the ring all the way, and swings as a
+    pendulum, but for its indentation."""
+    deck = forces.elastic_in_ring(2000.0, 0.01, n_period=1.6)
+    history = run_deck(deck, tmp_path, initiation="MASSLESS", formulation="NODE TO SURFACE",
+                       smoothing="HERMITE").history
+    history = history[history["time"] > 1]
+    force = np.hypot(history["pair1_force_x"], history["pair1_force_y"])
+    assert force.min() > 0.3*math.pi*forces.RADIUS**2*forces.GRAVITY
+    total = history["total"]
+    assert np.abs(total - total[0]).max() < 1e-12*history["kinetic"].max()
+    period = forces.period(history["time"], history["px"])
+    assert period == pytest.approx(forces.exact_period(), rel=3e-3)
 
 
 def test_a_ring_in_mortar_contact(tmp_path):

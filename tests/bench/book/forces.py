@@ -5,7 +5,7 @@ import math
 import numpy as np
 import scipy.special
 from plain_scenes import Scene, add_grid
-from scene_tools import DECKS, Deck
+from scene_tools import DECKS, Deck, number
 
 from . import bar
 from .common import COLOURS, Chapter, axes, drift, mortar, node, save, size, table, with_print
@@ -207,6 +207,12 @@ def bowls(futures, _):
 PERIODS = 50
 
 
+#: A rigid ring of arcs, held.
+CIRCLE = "*NODE\n90000, 0., 0.\n*SURFACE, NAME=RING, TYPE=SEGMENTS\nSTART, -1., 0.\n" + "".join(
+    f"CIRCL, {x}, {y}, 0., 0.\n" for x, y in ((0, -1), (1, 0), (0, 1), (-1, 0))) + (
+    "*RIGID BODY, ANALYTICAL SURFACE=RING, REF NODE=90000\n*BOUNDARY\n90000, 1, 2\n90000, 6\n")
+
+
 def in_ring(h):
     """A rigid disc, a circle, is let go in a rigid ring of arcs."""
     way = BOWL - RADIUS - 1e-8
@@ -214,12 +220,9 @@ def in_ring(h):
     scene = Scene(h, math.ceil(PERIODS*exact_period()/h + 1)*h, gravity=GRAVITY)
     scene.disc("DISC", middle, RADIUS, (4, 2))
     scene.pairs = [("CENTRE", "RING")]
-    arcs = "".join(f"CIRCL, {x}, {y}, 0., 0.\n" for x, y in ((0, -1), (1, 0), (0, 1), (-1, 0)))
-    cards = (f"*NODE\n90000, 0., 0.\n90001, {middle[0]!r}, {middle[1]!r}\n"
-             f"*SURFACE, NAME=RING, TYPE=SEGMENTS\nSTART, -1., 0.\n{arcs}"
-             "*RIGID BODY, ANALYTICAL SURFACE=RING, REF NODE=90000\n"
+    cards = (f"*NODE\n90001, {middle[0]!r}, {middle[1]!r}\n"
              "*RIGID BODY, ELSET=DISC, REF NODE=90001\n*SURFACE, NAME=CENTRE, TYPE=NODE\n90001\n"
-             "*BOUNDARY\n90000, 1, 2\n90000, 6\n")
+             f"{CIRCLE}")
     text = scene.deck("ONE").text().replace(
         "*SURFACE INTERACTION, NAME=SMOOTH",
         f"{cards}*SURFACE INTERACTION, NAME=SMOOTH, PAD THICKNESS={RADIUS}")
@@ -245,10 +248,58 @@ def circles(futures, _):
     return table(["h", "increments", "in contact", "mean period", "iterations", "energy"], rows)
 
 
+def elastic_in_ring(stiffness, h, n_period=PERIODS, rim=64):
+    """An elastic disc is let go in a rigid ring of arcs. It rests there first, under the part of
+    its weight that presses it on the ring: what is added afterwards accelerates all of it alike."""
+    down = math.sin(ANGLE), -math.cos(ANGLE)
+    middle = [(BOWL - RADIUS)*x for x in down]
+    scene = Scene(h, n_period*exact_period(), gravity=GRAVITY)
+    scene.disc("DISC", middle, RADIUS, (rim//4, 4), stiffness=stiffness)
+    scene.side("RIM", "DISC", lambda x, y: math.dist((x, y), middle) > RADIUS - 1e-6)
+    scene.pairs = [("RIM", "RING")]
+    part = scene.part["DISC"]
+    centre = min(part.node, key=lambda k: math.dist(part.node[k], middle))
+    text = scene.deck("ONE").text().replace(
+        "*SURFACE INTERACTION", f"{CIRCLE}*SURFACE INTERACTION", 1)
+    for request in ("*NODE FILE", "*CONTACT FILE", "*CONTACT PRINT"):
+        text = text.replace(request, f"{request}, FREQUENCY=1000000")
+    first = text.index("*STEP")
+    rests = text[first:].replace("*DYNAMIC, DIRECT\n<h>, <t_end>", "*STATIC\n1., 1.").replace(
+        "*DLOAD", f"*BOUNDARY\n{centre}, 1\n*DLOAD", 1).replace(
+        f"GRAV, {number(GRAVITY)}, 0., -1.",
+        f"GRAV, {GRAVITY*math.cos(ANGLE)!r}, {down[0]!r}, {down[1]!r}")
+    goes = text[first:].replace("*DLOAD", "*BOUNDARY, OP=NEW\n90000, 1, 2\n90000, 6\n*DLOAD", 1)
+    return Deck(text[:first] + rests + goes)
+
+
+def start_disc(runs):
+    return {stiffness: runs.start(elastic_in_ring(stiffness, 0.01), initiation="MASSLESS",
+                                  formulation="NODE TO SURFACE", smoothing="HERMITE")
+            for stiffness in (10000.0, 2000.0)}
+
+
+def discs(futures, _):
+    rows = []
+    for stiffness, future in futures.items():
+        history = future.result().history
+        history = history[history["time"] > 1]
+        weight = math.pi*RADIUS**2*GRAVITY
+        force = np.hypot(history["pair1_force_x"], history["pair1_force_y"])
+        longer = period(history["time"], history["px"])/exact_period() - 1
+        total = history["total"]
+        rows.append((f"{stiffness:g}", str(len(history)),
+                     f"{100*(history['active'] > 0).mean():.2f} %", f"{force.min()/weight:.2f}",
+                     f"{force.max()/weight:.2f}", f"{100*longer:+.3f} %",
+                     size(np.abs(total - total[0]).max()/history["kinetic"].max())))
+    return table(["stiffness", "increments", "in contact", "smallest force/weight", "largest",
+                  "mean period", "energy"], rows)
+
+
 CHAPTERS = [
     Chapter("forces_bar", start_bar, bars),
     Chapter("forces_order", start_order, orders),
     Chapter("forces_ring", start_ring, rings),
     Chapter("forces_bowl", start_bowl, bowls),
     Chapter("forces_circle", start_circle, circles),
+    Chapter("forces_disc", start_disc, discs),
 ]
