@@ -194,7 +194,7 @@ $(THREADED:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
 # Loops over points side by side: a law in numbers that the compiler takes apart, so that it sees the
 # whole of it at once. No sum over lanes, no fused product: with any VECTOR=... the bits are the same.
 LANES := $(addprefix emcon_law_,linear neo_hooke coupled_neo_hooke mooney_rivlin yeoh) emcon_element_pack_plane \
-	emcon_stiff_product_plane
+	emcon_stiff_product_plane emcon_corotated_pack_plane
 $(LANES:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd -fno-trapping-math \
 	-fno-semantic-interposition -Wno-unused-function -finline-limit=1000000 \
 	$(addprefix --param ,inline-unit-growth=100000 large-function-growth=1000000 \

@@ -3,14 +3,15 @@
 !> d = R^T y - X with R of the mean deformation gradient, whose (F11 + F22, F21 - F12) = g is linear
 !> in the positions y, and R = (g, J g)/|g|. So d has the components (g.y)/|g| and (g x y)/|g|, less
 !> those of X: invariants, whose discrete gradients are exact and without force and moment. The
-!> energy is d.K d/2. Source: docs/theory.md, section 3.
+!> energy is d.K d/2. Here are energy and tangent, forces are in `emcon_corotated_pack_plane`.
+!> Source: docs/theory.md, section 3.
 module emcon_corotated_plane
    use emcon_element, only : element_geometry_t
    use emcon_kinds, only : wp
    use emcon_shape, only : max_element_nodes
    implicit none
    private
-   public :: corotated_t, corotated_motion_t, corotated_init, corotated_move, corotated_force, &
+   public :: corotated_t, corotated_motion_t, corotated_init, corotated_move, corotated_energy, &
       corotated_image, corotated_strip, corotated_turn_stress
 
    !> An element at rest, its positions from those of its first node.
@@ -18,7 +19,7 @@ module emcon_corotated_plane
       integer :: n_node = 0
       real(wp) :: x(2, max_element_nodes) = 0.0_wp       !! positions [L]
       real(wp) :: slope(2, max_element_nodes) = 0.0_wp   !! mean gradients of shape functions [1/L]
-      real(wp) :: stiffness(2*max_element_nodes, 2*max_element_nodes) = 0.0_wp   !! K [M/T^2]
+      real(wp), allocatable :: stiffness(:, :)   !! (2*n_node, 2*n_node) K [M/T^2]
    end type corotated_t
 
    !> At one end of a motion.
@@ -32,7 +33,6 @@ module emcon_corotated_plane
    !> From one end to the other.
    type :: corotated_motion_t
       type(end_t) :: first, last
-      real(wp) :: energy = 0.0_wp                        !! at the last end [M L^2/T^2]
       real(wp) :: y(2, max_element_nodes) = 0.0_wp       !! means of the ends
       real(wp) :: g(2) = 0.0_wp
       real(wp) :: k(2, max_element_nodes) = 0.0_wp       !! K at the mean d [M L/T^2]
@@ -145,6 +145,16 @@ contains
       spread_over = a(1)*b + a(2)*quarter(b)
    end function spread_over
 
+   !> d.K d/2 at the displacements `u`.
+   pure real(wp) function corotated_energy(self, u)
+      type(corotated_t), intent(in) :: self
+      real(wp), intent(in) :: u(:, :)                    !! (2, n_node) from the first node's [L]
+      type(end_t) :: place
+
+      call set_end(self, u, place)
+      corotated_energy = 0.5_wp*sum(place%d(:, :self%n_node)*times(self, place%d))
+   end function corotated_energy
+
    !> From displacements `from` by `by`.
    pure subroutine corotated_move(self, from, by, motion)
       type(corotated_t), intent(in) :: self
@@ -158,7 +168,6 @@ contains
       call set_end(self, from + by, motion%last)
       associate (first => motion%first, last => motion%last)
          if (.not. (first%rho > 0.0_wp .and. last%rho > 0.0_wp)) return
-         motion%energy = 0.5_wp*sum(last%d(:, :n)*times(self, last%d))
          mean(:, :n) = 0.5_wp*(first%d(:, :n) + last%d(:, :n))
          motion%k(:, :n) = times(self, mean)
          motion%y = 0.5_wp*(first%y + last%y)
@@ -197,17 +206,6 @@ contains
          end do
       end do
    end function times
-
-   !> The discrete gradient of the energy.
-   pure subroutine corotated_force(self, motion, force)
-      type(corotated_t), intent(in) :: self
-      type(corotated_motion_t), intent(in) :: motion
-      real(wp), intent(out) :: force(:, :)               !! (2, n_node) [M L/T^2]
-      real(wp) :: q(2)
-
-      q = motion%alpha*lever(self, motion%k, motion%y) - motion%beta*motion%g
-      call add_force(self, motion%alpha*motion%g, motion%k, q, force)
-   end subroutine corotated_force
 
    !> What k.(g.y, g x y) changes by with g: sum of k1 y - k2 J y.
    pure function lever(self, k, y) result(q)

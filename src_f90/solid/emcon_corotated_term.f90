@@ -2,10 +2,13 @@
 !>
 !> Source: docs/theory.md, section 3.
 module emcon_corotated_term
-   use emcon_corotated_plane, only : corotated_force, corotated_image, corotated_init, &
+   use emcon_corotated_pack_plane, only : corotated_pack_fill, corotated_pack_gather, &
+      corotated_pack_motion_t, corotated_pack_respond, corotated_pack_t
+   use emcon_corotated_plane, only : corotated_energy, corotated_image, corotated_init, &
       corotated_motion_t, corotated_move, corotated_t
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
+   use emcon_law, only : n_lane
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -20,12 +23,14 @@ module emcon_corotated_term
    type, extends(term_t) :: corotated_term_t
       type(stiff_elements_t), private :: own
       type(corotated_t), allocatable, private :: frame(:)    !! (n)
+      type(corotated_pack_t), allocatable, private :: pack(:)
       integer, allocatable, private :: label(:)              !! (n) of the elements
       integer, allocatable, private :: slot(:)   !! element matrices by columns
    contains
       procedure :: lay_out
       procedure :: begin_step
       procedure :: respond
+      procedure :: find_energy
       procedure :: tangent_times
       procedure :: is_symmetric
    end type corotated_term_t
@@ -47,9 +52,32 @@ contains
          m = n_dim*self%own%n_node(k)
          call corotated_init(self%frame(k), solid%geometry(self%own%element(k)), &
             solid%x(:, self%own%node(:self%own%n_node(k), k)))
-         self%frame(k)%stiffness(:m, :m) = self%own%stiffness(:m, :m, k)
+         allocate(self%frame(k)%stiffness, source=self%own%stiffness(:m, :m, k))
       end do
+      call fill_packs(self)
    end subroutine corotated_term_init
+
+   !> Put elements with as many nodes side by side, in the order of the list.
+   pure subroutine fill_packs(self)
+      type(corotated_term_t), intent(inout) :: self
+      integer, allocatable :: like(:)
+      integer :: first, n, n_node
+
+      n = 0
+      do n_node = 1, size(self%own%node, 1)
+         n = n + (count(self%own%n_node == n_node) + n_lane - 1)/n_lane
+      end do
+      allocate(self%pack(n))
+      n = 0
+      do n_node = 1, size(self%own%node, 1)
+         like = pack([(first, first = 1, size(self%frame))], self%own%n_node == n_node)
+         do first = 1, size(like), n_lane
+            n = n + 1
+            call corotated_pack_fill(self%pack(n), like(first:min(first + n_lane - 1, &
+               size(like))), self%own%node, self%frame)
+         end do
+      end do
+   end subroutine fill_packs
 
    !> The freedoms of each element.
    pure subroutine lay_out(self, lists)
@@ -79,44 +107,87 @@ contains
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      type(corotated_motion_t) :: moved
-      real(wp), dimension(size(motion%x, 1), size(self%own%node, 1)) :: from, by, force
-      real(wp) :: largest
-      integer :: i, k, s
+      type(corotated_pack_motion_t) :: local
+      integer :: p
 
-      s = 0
-      associate (total => response%part(self%role))
-         do k = 1, size(self%frame)
-            call gather(self, k, motion, from, by)
-            call corotated_move(self%frame(k), from, by, moved)
-            if (.not. min(moved%first%rho, moved%last%rho) > 0.0_wp) then
-               response%refusal = "element " // to_text(self%label(k)) // " is inverted"
+      do p = 1, size(self%pack)
+         associate (pack => self%pack(p))
+            call corotated_pack_gather(pack, motion%from, motion%by, local)
+            call corotated_pack_respond(pack, local)
+            if (any(local%is_inverted)) then
+               response%refusal = "element " // to_text(self%label(pack%element( &
+                  findloc(local%is_inverted, .true., 1)))) // " is inverted"
                return
             end if
-            call corotated_force(self%frame(k), moved, force)
-            response%energy(self%own%element(k)) = moved%energy
-            do i = 1, self%own%n_node(k)
-               associate (node => self%own%node(i, k))
-                  total%force(:, node) = total%force(:, node) + force(:, i)
-               end associate
+            call add_forces(self, pack, motion, local, response)
+         end associate
+      end do
+      if (present(value)) call add_tangents(self, motion, value, side)
+   end subroutine respond
+
+   !> Add the forces of a pack, element by element, with what its displacements are rounded by.
+   pure subroutine add_forces(self, pack, motion, local, response)
+      type(corotated_term_t), intent(in) :: self
+      type(corotated_pack_t), intent(in) :: pack
+      type(motion_t), intent(in) :: motion
+      type(corotated_pack_motion_t), intent(in) :: local       !! the same motion, of its nodes
+      type(response_t), intent(inout) :: response
+      real(wp) :: largest
+      integer :: a, i, l, node
+
+      associate (total => response%part(self%role), n => pack%n_node)
+         do l = 1, pack%n
+            do i = 1, n
+               node = pack%node(l, i)
+               do a = 1, size(local%force, 2)
+                  total%force(a, node) = total%force(a, node) + local%force(l, a, i)
+               end do
             end do
-            if (response%with_sizes) then
-               largest = maxval(abs(from + by))
-               do i = 1, self%own%n_node(k)
-                  largest = max(largest, maxval(motion%computed(:, self%own%node(i, k))))
-               end do
-               do i = 1, self%own%n_node(k)
-                  associate (node => self%own%node(i, k))
-                     total%magnitude(:, node) = total%magnitude(:, node) + abs(force(:, i))
-                     response%rounding(:, node) = response%rounding(:, node) &
-                        + largest*self%own%rounding(i, k)
-                  end associate
-               end do
-            end if
-            if (present(value)) call scatter(self, k, moved, motion%weight, s, value, side)
+            if (.not. response%with_sizes) cycle
+            largest = maxval(abs(local%from(l, :, :n) + local%by(l, :, :n)))
+            do i = 1, n
+               largest = max(largest, maxval(motion%computed(:, pack%node(l, i))))
+            end do
+            do i = 1, n
+               node = pack%node(l, i)
+               total%magnitude(:, node) = total%magnitude(:, node) + abs(local%force(l, :, i))
+               response%rounding(:, node) = response%rounding(:, node) &
+                  + largest*self%own%rounding(i, pack%element(l))
+            end do
          end do
       end associate
-   end subroutine respond
+   end subroutine add_forces
+
+   !> Add the tangents of all elements, none of which is inverted, to their places.
+   subroutine add_tangents(self, motion, value, side)
+      type(corotated_term_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion
+      real(dp), intent(inout) :: value(:), side(:)
+      type(corotated_motion_t) :: moved
+      real(wp), dimension(size(motion%x, 1), size(self%own%node, 1)) :: from, by
+      integer :: k, s
+
+      s = 0
+      do k = 1, size(self%frame)
+         call gather(self, k, motion, from, by)
+         call corotated_move(self%frame(k), from, by, moved)
+         call scatter(self, k, moved, motion%weight, s, value, side)
+      end do
+   end subroutine add_tangents
+
+   !> Energies at the end of a motion.
+   pure subroutine find_energy(self, motion, energy)
+      class(corotated_term_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+      real(wp), intent(inout) :: energy(:)       !! (n_element) [M L^2/T^2]
+      real(wp), dimension(size(motion%x, 1), size(self%own%node, 1)) :: from, by
+      integer :: k
+
+      do k = 1, size(self%frame)
+         call gather(self, k, motion, from, by)
+         energy(self%own%element(k)) = corotated_energy(self%frame(k), from + by)
+      end do
+   end subroutine find_energy
 
    !> Displacements of the nodes of element `k` of the list, from those of its first node.
    pure subroutine gather(self, k, motion, from, by)

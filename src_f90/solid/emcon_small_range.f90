@@ -19,6 +19,7 @@ module emcon_small_range
       integer, allocatable :: section(:)         !! (n) linear sections
       real(wp), allocatable :: rotation(:)       !! (n) largest so far [rad]
       real(wp), allocatable :: strain(:)         !! (n) largest so far
+      type(corotated_t), allocatable, private :: frame(:)    !! (n_element) of corotated ones
    end type small_range_t
 
 contains
@@ -33,6 +34,15 @@ contains
       self%section = pack([(i, i = 1, most)], [(any(solid%section == i .and. solid%is_small), &
          i = 1, most)])
       allocate(self%rotation(size(self%section)), self%strain(size(self%section)), source=0.0_wp)
+      if (.not. any(solid%is_corotated)) return
+      allocate(self%frame(solid%n_element))
+      do i = 1, solid%n_element
+         if (.not. solid%is_corotated(i)) cycle
+         associate (geometry => solid%geometry(i))
+            call corotated_init(self%frame(i), geometry, &
+               solid%x(:, solid%node(:geometry%n_node, i)))
+         end associate
+      end do
    end subroutine small_range_init
 
    !> Look at the displacements `u`.
@@ -43,7 +53,6 @@ contains
       real(wp), dimension(size(u, 1), size(solid%node, 1)) :: own, left
       real(wp), dimension(size(self%section)) :: rotation, strain   ! squares
       real(wp) :: turn(size(u, 1), size(u, 1))
-      type(corotated_t) :: frame
       integer :: e, i, s
 
       rotation = 0.0_wp
@@ -56,9 +65,8 @@ contains
                own(:, i) = u(:, node(i)) - u(:, node(1))
             end do
             if (solid%is_corotated(e)) then
-               call corotated_init(frame, geometry, solid%x(:, node(:geometry%n_node)))
                left = own
-               call corotated_strip(frame, left, own, turn)
+               call corotated_strip(self%frame(e), left, own, turn)
             end if
             call small_widen(geometry, own, rotation(s), strain(s))
          end associate
