@@ -205,6 +205,11 @@ $(LANES:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd -fno-trappi
 STREAMS := $(addprefix emcon_,inertia kept_factor lane_sums mixing motion newton numbering system term vectors)
 $(STREAMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 $(VECTOR)
 
+# Numbers with many derivatives, added and multiplied term by term: several terms at a time.
+# -Wno-zerotrip: those without second derivatives have loops over none.
+TERMS := $(addprefix emcon_dgrad,10 13 15 17 10_first 13_first 15_first 17_first _wide)
+$(TERMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -Wno-zerotrip $(VECTOR)
+
 # The kernel tests are compiled once, with all checks: those of `debug` are these with its library.
 KERNEL_OBJ := $(call objects,$(KERNEL_SRC))
 $(KERNEL_OBJ): private FFLAGS_release := $(FFLAGS_debug)

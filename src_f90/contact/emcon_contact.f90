@@ -100,7 +100,8 @@ module emcon_contact
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       end subroutine measure_interface
 
-      !> The constraints `wanted` with all their derivatives; `target` are the mean gaps to hold.
+      !> The constraints `wanted` with their derivatives, as `constraint_t` has it; `target` are the
+      !> mean gaps to hold.
       pure subroutine evaluate_interface(self, wanted, x, u0, du, target, item)
          import :: condition_t, contact_t, wp
          class(contact_t), intent(inout) :: self
@@ -155,7 +156,7 @@ contains
       if (pose_is_equilibrium(motion%pose)) then
          call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
          do k = 1, size(item)
-            item(k)%h = motion%weight*item(k)%h
+            if (.not. item(k)%leaves_second) item(k)%h = motion%weight*item(k)%h
          end do
       else
          call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, item)

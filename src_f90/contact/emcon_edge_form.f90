@@ -37,10 +37,11 @@ module emcon_edge_form
 contains
 
    !> Begin to sum moments over the nodes `node`.
-   pure subroutine form_begin(self, node, n_slave)
+   pure subroutine form_begin(self, node, n_slave, leaves_second)
       type(edge_form_t), intent(inout) :: self
       integer, intent(in) :: node(:)             !! (n) distinct, slave nodes first
       integer, intent(in) :: n_slave             !! number of these
+      logical, intent(in) :: leaves_second       !! without second derivatives
       integer :: i
 
       if (allocated(self%node)) then
@@ -51,7 +52,7 @@ contains
       self%n_slave = n_slave
       self%node(:self%n_node) = node
       do i = 1, n_moment
-         call wide_clear(self%moment(i), 2*self%n_node)
+         call wide_clear(self%moment(i), 2*self%n_node, leaves_second)
       end do
    end subroutine form_begin
 
@@ -119,7 +120,7 @@ contains
       item%dgap = 0.0_wp
       item%g = 0.0_wp
       item%c = 0.0_wp
-      item%h = 0.0_wp
+      if (.not. item%leaves_second) item%h = 0.0_wp
       do k = 1, 2
          if (gap%edge(k) == 0) cycle
          associate (edge => form(gap%edge(k)))
@@ -154,9 +155,10 @@ contains
       type(wide_t), intent(inout) :: skew, theta         !! work space
       real(wp) :: sign_skew
 
-      associate (moment => edge%moment, n => 2*edge%n_node)
-         call wide_clear(part, n)
-         call wide_clear(skew, n)
+      associate (moment => edge%moment, n => 2*edge%n_node, &
+            leaves_second => edge%moment(1)%n_second == 0)
+         call wide_clear(part, n, leaves_second)
+         call wide_clear(skew, n, leaves_second)
          call wide_add(skew, 1.0_wp, moment(moment_gap))
          call wide_add(skew, -2.0_wp, moment(moment_gap_xi))
          call wide_add(skew, -target, moment(moment_area))
@@ -169,7 +171,7 @@ contains
          if (all(abs([moment(moment_cover)%f0, moment(moment_cover)%f1] - 1.0_wp) <= whole)) then
             call wide_add(part, sign_skew, skew)
          else
-            call wide_clear(theta, n)
+            call wide_clear(theta, n, leaves_second)
             call wide_add_product(theta, 1.0_wp, moment(moment_cover), moment(moment_cover))
             call wide_add_product(part, sign_skew, theta, skew)
          end if
@@ -192,6 +194,7 @@ contains
             column = 2*(place(j) - 1) + b
             item%g(b, place(j)) = item%g(b, place(j)) + factor*part%g(2*(j - 1) + b)
             item%c(b, place(j)) = item%c(b, place(j)) + factor*part%c(2*(j - 1) + b)
+            if (item%leaves_second) cycle
             do i = 1, size(place)
                do a = 1, 2
                   row = 2*(place(i) - 1) + a

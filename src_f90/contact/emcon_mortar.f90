@@ -5,9 +5,6 @@
 !> paper eqs. (2) and (3).
 module emcon_mortar
    use emcon_chain, only : chain_corners, chain_distance, chain_shorter
-   use emcon_dgrad13, only : dg13_t => dg_t
-   use emcon_dgrad17, only : dg17_t => dg_t, operator(*)
-   use emcon_dgrad_wide, only : change_t, wide_add_part
    use emcon_edge_form, only : form_begin
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
@@ -19,8 +16,11 @@ module emcon_mortar
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_moments, frame_point, frame_t, &
       moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, n_place, &
       pair_stencil_t, place_after, place_before, place_master
-   use emcon_mortar_pair2, only : segment_moments2 => segment_moments
-   use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
+   use emcon_mortar_pair2, only : segment_add2 => segment_add
+   use emcon_mortar_pair2_first, only : segment_add2_first => segment_add
+   use emcon_mortar_pair4, only : point_add, segment_add4 => segment_add
+   use emcon_mortar_pair4_first, only : point_add_first => point_add, &
+      segment_add4_first => segment_add
    use emcon_mortar_stencil, only : stencil_gather, stencil_master, stencil_slave
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_scene, only : scene_t
@@ -238,10 +238,8 @@ contains
          end associate
          if (self%options%integration == integration_elements) then
             call add_points(self, e, k, local, dlocal, variable)
-         else if (self%pair(k)%n_master == 2) then
-            call add_segment2(self, e, k, local, dlocal, variable(:12))
          else
-            call add_segment4(self, e, k, local, dlocal, variable)
+            call add_segment(self, e, k, local, dlocal, variable)
          end if
       end do
    end subroutine mortar_form_edge
@@ -261,7 +259,7 @@ contains
       do k = self%start(e), self%start(e + 1) - 1
          call collect(self%pair(k)%node(place_master), list, n)
       end do
-      call form_begin(self%form(e), list(:n), n_slave)
+      call form_begin(self%form(e), list(:n), n_slave, self%leaves_second)
    end subroutine begin_form
 
    !> Append those of `node` that are there and not on the list yet.
@@ -278,76 +276,44 @@ contains
    end subroutine collect
 
    !> Add the moments of the segment of pair `k` to those of slave edge `e`.
-   pure subroutine add_segment2(self, e, k, local, dlocal, variable)
+   pure subroutine add_segment(self, e, k, local, dlocal, variable)
       type(mortar_t), intent(inout) :: self
       integer, intent(in) :: e, k, variable(:)
       real(wp), intent(in) :: local(:, :), dlocal(:, :)
-      type(dg13_t) :: moment(n_moment)
-      logical :: is_covering
-      integer :: i
 
-      call segment_moments2(self%pair(k), local, dlocal, self%point, self%weight, moment, &
-         is_covering)
-      if (.not. is_covering) return
-      do i = 1, n_moment
-         associate (part => moment(i))
-            call wide_add_part(self%form(e)%moment(i), 1.0_wp, &
-               change_t(part%f0, part%f1, part%df), part%g, part%c, part%h, variable)
-         end associate
-      end do
-   end subroutine add_segment2
-
-   pure subroutine add_segment4(self, e, k, local, dlocal, variable)
-      type(mortar_t), intent(inout) :: self
-      integer, intent(in) :: e, k, variable(:)
-      real(wp), intent(in) :: local(:, :), dlocal(:, :)
-      type(dg17_t) :: moment(n_moment)
-      logical :: is_covering
-      integer :: i
-
-      call segment_moments4(self%pair(k), local, dlocal, self%point, self%weight, moment, &
-         is_covering)
-      if (.not. is_covering) return
-      do i = 1, n_moment
-         call add_part(self, e, i, 1.0_wp, moment(i), variable)
-      end do
-   end subroutine add_segment4
+      associate (pair => self%pair(k), point => self%point, weight => self%weight, &
+            moment => self%form(e)%moment, is_short => self%pair(k)%n_master == 2)
+         if (is_short .and. self%leaves_second) then
+            call segment_add2_first(pair, local, dlocal, point, weight, variable, moment)
+         else if (is_short) then
+            call segment_add2(pair, local, dlocal, point, weight, variable, moment)
+         else if (self%leaves_second) then
+            call segment_add4_first(pair, local, dlocal, point, weight, variable, moment)
+         else
+            call segment_add4(pair, local, dlocal, point, weight, variable, moment)
+         end if
+      end associate
+   end subroutine add_segment
 
    !> Add the moments of the Gauss points of slave edge `e` that look at pair `k`.
    pure subroutine add_points(self, e, k, local, dlocal, variable)
       type(mortar_t), intent(inout) :: self
       integer, intent(in) :: e, k, variable(:)
       real(wp), intent(in) :: local(:, :), dlocal(:, :)
-      type(dg17_t) :: gap, length
       real(wp) :: weight
       integer :: i
 
       do i = 1, size(self%point)
          weight = share(self, i, e, k)
          if (.not. weight > 0.0_wp) cycle
-         call point_gap(self%pair(k), local, dlocal, self%point(i), gap, length)
-         associate (xi => self%point(i))
-            gap = gap*length
-            call add_part(self, e, moment_gap, weight, gap, variable)
-            call add_part(self, e, moment_gap_xi, weight*xi, gap, variable)
-            call add_part(self, e, moment_area, weight, length, variable)
-            call add_part(self, e, moment_area_xi, weight*xi, length, variable)
-            associate (cover => self%form(e)%moment(moment_cover))
-               cover%f0 = cover%f0 + weight
-               cover%f1 = cover%f1 + weight
-            end associate
+         associate (pair => self%pair(k), xi => self%point(i), moment => self%form(e)%moment)
+            if (self%leaves_second) then
+               call point_add_first(pair, local, dlocal, xi, weight, variable, moment)
+            else
+               call point_add(pair, local, dlocal, xi, weight, variable, moment)
+            end if
          end associate
       end do
    end subroutine add_points
-
-   pure subroutine add_part(self, e, i, factor, part, variable)
-      type(mortar_t), intent(inout) :: self
-      integer, intent(in) :: e, i, variable(:)
-      real(wp), intent(in) :: factor
-      type(dg17_t), intent(in) :: part
-
-      call wide_add_part(self%form(e)%moment(i), factor, &
-         change_t(part%f0, part%f1, part%df), part%g, part%c, part%h, variable)
-   end subroutine add_part
 
 end module emcon_mortar

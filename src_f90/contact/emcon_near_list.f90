@@ -22,6 +22,7 @@ module emcon_near_list
       integer, allocatable :: node(:)            !! distinct nodes of both
       real(wp), allocatable :: u(:, :)           !! (2, size of `node`) when the list was made
       type(candidates_t) :: candidates
+      integer :: n_list = 0                      !! lists made so far
       !> Up to this distance the list is complete, whenever it was made [L].
       real(wp) :: depth = 0.0_wp
       !> As long as no node has moved farther since the last update, the list is empty and stays so
@@ -76,6 +77,7 @@ contains
       real(wp) :: apart
 
       self%u = u0(:, self%node)
+      self%n_list = 1 + mod(self%n_list, huge(self%n_list) - 1)
       call boxes(x, u0, self%item, item)
       call boxes(x, u0, self%edge, edge)
       apart = box_distance(minval(item(:, :, 1), 2), maxval(item(:, :, 2), 2), &

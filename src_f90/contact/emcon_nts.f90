@@ -9,19 +9,20 @@ module emcon_nts
    use emcon_contact, only : contact_t, gap_state_t
    use emcon_errors, only : error_t
    use emcon_facing, only : facing_allows
-   use emcon_hermite_gap, only : hermite_gap_value
+   use emcon_hermite_gap_value, only : hermite_gap_value
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
       smoothing_none
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
-   use emcon_nts_gap, only : nts_gap_value
+   use emcon_nts_gap_value, only : nts_gap_value
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, most_nodes, &
       polygon_stencil, polygon_stencil_t, smooth_stencil, smooth_stencil_t, stencil_gather, &
       stencil_length
    use emcon_scene, only : scene_t
    use emcon_self_contact, only : self_contact_is_apart
+   use emcon_stance, only : stance_holds, stance_t, stance_take
    use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_sees, touch_rule_t
    implicit none
    private
@@ -32,6 +33,12 @@ module emcon_nts
    real(wp), parameter :: end_tol = 1.0e-3_wp
    !> A node counts as outside at the start of a step down to this fraction of a master edge.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
+
+   !> A gap over a polygon as a step begins.
+   type :: start_t
+      type(gap_state_t) :: state                      !! without what the end of the step tells
+      real(wp) :: xi = 0.0_wp                         !! projection on the edge
+   end type start_t
 
    type, extends(contact_t) :: nts_t
       type(chain_t) :: slave
@@ -52,6 +59,10 @@ module emcon_nts
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
                                                       !! first node
       type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
+      type(stance_t) :: stance                        !! of the nodes as stencils were chosen:
+      integer :: n_list = 0                           !! by which list of candidates,
+      logical :: were_sharp = .false.                 !! with which corners,
+      type(start_t), allocatable :: start(:)          !! (n_constraint) and gaps if not smoothed
       logical, allocatable :: is_lost(:)              !! (n_constraint) no unique closest point when
                                                       !! last evaluated, since the last measurement
    contains
@@ -96,6 +107,7 @@ contains
       self%n_constraint = size(self%node)
       allocate(self%edge(self%n_constraint), self%other(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint), self%polygon(2, self%n_constraint))
+      allocate(self%start(self%n_constraint))
       self%deepest_start = touch_tol
       self%slack = pair%slack
       self%offset = pair%offset
@@ -129,6 +141,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
 
+      self%stance%is_known = .false.
       self%smoothing = options%smoothing
       if (self%slack > 0.0_wp) self%smoothing = smoothing_none       ! guards watch the mesh
       self%may_sharpen = self%smoothing /= smoothing_hermite
@@ -140,7 +153,8 @@ contains
       call chain_corners(self%master, x, options%smoothing_angle, self%is_corner)
    end subroutine nts_configure
 
-   !> Choose for each slave node the nearest master edge at the start of the step.
+   !> Choose for each slave node the nearest master edge at the start of the step. From the same
+   !> start and the same candidates the choice is the same.
    pure subroutine nts_begin_step(self, x, u0, du)
       class(nts_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
@@ -149,6 +163,12 @@ contains
 
       call near_list_update(self%near, x, u0, du, self%reach)
       call self%has_looked(self%near%clearance)
+      if (self%n_list == self%near%n_list .and. (self%were_sharp .eqv. self%is_sharp)) then
+         if (stance_holds(self%stance, self%near%node, x, u0)) return
+      end if
+      call stance_take(self%stance, self%near%node, x, u0)
+      self%n_list = self%near%n_list
+      self%were_sharp = self%is_sharp
       do i = 1, self%n_constraint
          self%edge(i) = 0
          best = huge(best)
@@ -158,6 +178,7 @@ contains
             end do
          end associate
          call settle(self, i, x, u0)
+         if (self%smoothing /= smoothing_hermite) self%start(i) = polygon_start(self, i, x, u0)
       end do
    end subroutine nts_begin_step
 
@@ -244,6 +265,12 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: i
 
+      if (.not. stance_holds(self%stance, self%near%node, x, u0)) then
+         self%stance%is_known = .false.
+         do i = 1, self%n_constraint
+            if (self%smoothing /= smoothing_hermite) self%start(i) = polygon_start(self, i, x, u0)
+         end do
+      end if
       do i = 1, self%n_constraint
          self%state(i) = gap_state(self, i, x, u0, du)
       end do
@@ -251,6 +278,26 @@ contains
       self%state%is_covered = self%state%is_covered .and. .not. self%is_lost
       self%is_lost = .false.
    end subroutine nts_measure
+
+   !> What a gap over a polygon is as a step begins.
+   pure function polygon_start(self, i, x, u0) result(start)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      type(start_t) :: start
+      real(wp) :: local(2, 5), dlocal(2, 5)
+
+      if (self%edge(i) == 0) return
+      associate (stencil => self%polygon(1, i), state => start%state)
+         call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
+         call nts_gap_value(local(:, :stencil%n), stencil%before, stencil%after, &
+            stencil%rounding, state%gap0, start%xi, stencil%goes_around)
+         state%gap0 = state%gap0 - self%offset
+         state%size = stencil_length(x, stencil%node)
+         state%closed = -self%slack*min(state%size, self%own_size(i))
+         state%is_near = .true.
+      end associate
+   end function polygon_start
 
    !> Where the smoothed surface has no unique closest point its polygon gives the gap, and the
    !> stencil does not hold: a step in which the node is to act is cut.
@@ -266,35 +313,35 @@ contains
          call smooth_state(self, i, x, u0, du, state, is_found)
          if (is_found) return
       end if
-      state = polygon_state(self, i, x, u0, du)
-      if (self%smoothing == smoothing_hermite) state%is_covered = .false.
+      if (self%smoothing == smoothing_hermite) then
+         state = polygon_state(self, i, polygon_start(self, i, x, u0), x, u0, du)
+         state%is_covered = .false.
+      else
+         state = polygon_state(self, i, self%start(i), x, u0, du)
+      end if
    end function gap_state
 
-   pure function polygon_state(self, i, x, u0, du) result(state)
+   pure function polygon_state(self, i, start, x, u0, du) result(state)
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
+      type(start_t), intent(in) :: start
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
-      real(wp) :: local(2, 5), dlocal(2, 5), xi0, xi1
+      real(wp) :: local(2, 5), dlocal(2, 5), xi1
       integer :: k
 
+      state = start%state
       associate (stencil => self%polygon(1, i), n => self%polygon(1, i)%n, &
             before => self%polygon(1, i)%before, after => self%polygon(1, i)%after)
          call stencil_gather(x, u0, du, n, stencil%node, local, dlocal)
-         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap0, xi0, &
-            stencil%goes_around)
          do k = 1, n
             local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
          end do
          call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap1, xi1, &
             stencil%goes_around)
-         state%gap0 = state%gap0 - self%offset
          state%gap1 = state%gap1 - self%offset
-         state%size = stencil_length(x, stencil%node)
-         state%is_over = is_over(state, xi0, xi1, [before > 0, after > 0])
+         state%is_over = is_over(state, start%xi, xi1, [before > 0, after > 0])
       end associate
-      state%closed = -self%slack*min(state%size, self%own_size(i))
-      state%is_near = .true.
       state%is_covered = .true.
       if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, self%edge(i), x, &
          u0, du)
@@ -482,6 +529,8 @@ contains
          call choose_nearer(self, i, e, x, u, best)
       end do
       call settle(self, i, x, u)
+      self%stance%is_known = .false.
+      self%start(i) = polygon_start(self, i, x, u)
       zero = 0.0_wp
       state = gap_state(self, i, x, u, zero)
       gap = state%gap0

@@ -1,14 +1,20 @@
-!> Contact constraints made of the gaps of one slave node, with all their derivatives.
+!> Contact constraints made of the gaps of one slave node, with their derivatives: without the
+!> second ones where nobody asks for these.
 !>
 !> Source: docs/theory.md, sections 4.2 and 4.3.
 module emcon_nts_constraint
    use emcon_constraint, only : condition_t
    use emcon_contact, only : condition_resize
    use emcon_dgrad10, only : dg10_t => dg_t
+   use emcon_dgrad10_first, only : dg10_first_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
+   use emcon_dgrad15_first, only : dg15_first_t => dg_t
+   use emcon_dgrad_wide, only : change_t
    use emcon_hermite_gap, only : hermite_gap
+   use emcon_hermite_gap_first, only : hermite_gap_first => hermite_gap
    use emcon_kinds, only : wp
    use emcon_nts_gap, only : nts_gap
+   use emcon_nts_gap_first, only : nts_gap_first => nts_gap
    use emcon_nts_stencil, only : most_nodes, polygon_stencil_t, smooth_stencil_t, stencil_gather, &
       stencil_length
    implicit none
@@ -40,7 +46,7 @@ contains
       item%dgap = 0.0_wp
       item%g(:, :n) = 0.0_wp
       item%c(:, :n) = 0.0_wp
-      item%h(:2*n, :2*n) = 0.0_wp
+      if (.not. item%leaves_second) item%h(:2*n, :2*n) = 0.0_wp
       do i = 1, size(stencil)
          call add_polygon(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
       end do
@@ -54,30 +60,52 @@ contains
       type(condition_t), intent(inout) :: item
       real(wp) :: local(2, 5), dlocal(2, 5)
       type(dg10_t) :: gap
+      type(dg10_first_t) :: first
+
+      associate (n => stencil%n, before => stencil%before, after => stencil%after, &
+            rounding => stencil%rounding)
+         call stencil_gather(x, u0, du, n, stencil%node, local, dlocal)
+         if (item%leaves_second) then
+            first = nts_gap_first(local(:, :n), dlocal(:, :n), before, after, rounding, &
+               stencil%goes_around)
+            call add_gap(stencil, share, change_t(first%f0, first%f1, first%df), first%g, first%c, &
+               first%h, item)
+         else
+            gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, rounding, &
+               stencil%goes_around)
+            call add_gap(stencil, share, change_t(gap%f0, gap%f1, gap%df), gap%g, gap%c, gap%h, &
+               item)
+         end if
+      end associate
+   end subroutine add_polygon
+
+   !> Add `share` of a gap over the nodes of `stencil` to a constraint.
+   pure subroutine add_gap(stencil, share, change, g, c, h, item)
+      type(polygon_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: share
+      type(change_t), intent(in) :: change
+      real(wp), intent(in) :: g(:), c(:), h(:, :)
+      type(condition_t), intent(inout) :: item
       integer :: k, j, at(10)
 
-      associate (n => stencil%n, node => stencil%node)
-         call stencil_gather(x, u0, du, n, node, local, dlocal)
-         gap = nts_gap(local(:, :n), dlocal(:, :n), stencil%before, stencil%after, &
-            stencil%rounding, stencil%goes_around)
-         do k = 1, n
-            at(2*k) = 2*findloc(item%node(:item%n_node), node(k), 1)
-            at(2*k - 1) = at(2*k) - 1
-            associate (place => at(2*k)/2)
-               item%g(:, place) = item%g(:, place) + share*gap%g(2*k - 1:2*k)
-               item%c(:, place) = item%c(:, place) + share*gap%c(2*k - 1:2*k)
-            end associate
+      item%gap0 = item%gap0 + share*change%f0
+      item%gap1 = item%gap1 + share*change%f1
+      item%dgap = item%dgap + share*change%df
+      do k = 1, stencil%n
+         at(2*k) = 2*findloc(item%node(:item%n_node), stencil%node(k), 1)
+         at(2*k - 1) = at(2*k) - 1
+         associate (place => at(2*k)/2)
+            item%g(:, place) = item%g(:, place) + share*g(2*k - 1:2*k)
+            item%c(:, place) = item%c(:, place) + share*c(2*k - 1:2*k)
+         end associate
+      end do
+      if (item%leaves_second) return
+      do j = 1, 2*stencil%n
+         do k = 1, 2*stencil%n
+            item%h(at(k), at(j)) = item%h(at(k), at(j)) + share*h(k, j)
          end do
-         do j = 1, 2*n
-            do k = 1, 2*n
-               item%h(at(k), at(j)) = item%h(at(k), at(j)) + share*gap%h(k, j)
-            end do
-         end do
-      end associate
-      item%gap0 = item%gap0 + share*gap%f0
-      item%gap1 = item%gap1 + share*gap%f1
-      item%dgap = item%dgap + share*gap%df
-   end subroutine add_polygon
+      end do
+   end subroutine add_gap
 
    !> The gap over a smoothed surface; `is_found`: there is a unique closest point.
    pure subroutine smooth_constraint(smooth, x, u0, du, target, item, is_found)
@@ -88,20 +116,40 @@ contains
       logical, intent(out) :: is_found           !! else `item` is left as it is
       real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
       type(dg15_t) :: gap
+      type(dg15_first_t) :: first
 
-      associate (n => smooth%n, node => smooth%node)
-         call stencil_gather(x, u0, du, n, node, local, dlocal)
-         call hermite_gap(smooth%curve, local(:, :n), dlocal(:, :n), smooth%place, gap, is_found)
-         if (.not. is_found) return
-         call begin_constraint(item, x, node(:n))
-         item%gap0 = gap%f0 - target
-         item%gap1 = gap%f1 - target
-         item%dgap = gap%df
-         item%g(:, :n) = reshape(gap%g(:2*n), [2, n])
-         item%c(:, :n) = reshape(gap%c(:2*n), [2, n])
-         item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+      associate (n => smooth%n, curve => smooth%curve, place => smooth%place)
+         call stencil_gather(x, u0, du, n, smooth%node, local, dlocal)
+         if (item%leaves_second) then
+            call hermite_gap_first(curve, local(:, :n), dlocal(:, :n), place, first, is_found)
+            if (.not. is_found) return
+            call begin_constraint(item, x, smooth%node(:n))
+            call take_gap(change_t(first%f0 - target, first%f1 - target, first%df), first%g, &
+               first%c, item)
+         else
+            call hermite_gap(curve, local(:, :n), dlocal(:, :n), place, gap, is_found)
+            if (.not. is_found) return
+            call begin_constraint(item, x, smooth%node(:n))
+            call take_gap(change_t(gap%f0 - target, gap%f1 - target, gap%df), gap%g, gap%c, item)
+            item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+         end if
       end associate
    end subroutine smooth_constraint
+
+   !> A gap and its first derivatives as those of a constraint.
+   pure subroutine take_gap(change, g, c, item)
+      type(change_t), intent(in) :: change
+      real(wp), intent(in) :: g(:), c(:)
+      type(condition_t), intent(inout) :: item
+
+      item%gap0 = change%f0
+      item%gap1 = change%f1
+      item%dgap = change%df
+      associate (n => item%n_node, n_dim => size(item%g, 1))
+         item%g(:, :n) = reshape(g(:n_dim*n), [n_dim, n])
+         item%c(:, :n) = reshape(c(:n_dim*n), [n_dim, n])
+      end associate
+   end subroutine take_gap
 
    !> Nodes and size of a constraint over `node`: slave node, edge, further ones.
    pure subroutine begin_constraint(item, x, node)

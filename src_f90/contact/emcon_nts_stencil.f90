@@ -2,7 +2,7 @@
 module emcon_nts_stencil
    use emcon_chain, only : chain_shorter, chain_t, chain_touches
    use emcon_hermite, only : hermite_stencil_t
-   use emcon_hermite_gap, only : hermite_begin
+   use emcon_hermite_gap_value, only : hermite_begin
    use emcon_kinds, only : wp
    implicit none
    private

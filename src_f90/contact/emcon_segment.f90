@@ -168,6 +168,7 @@ contains
       w = weights(is_there)
       do k = 1, 2
          self%nodal(k)%n_node = 0
+         self%nodal(k)%leaves_second = self%leaves_second
          if (is_there(k)) call self%nts%evaluate([self%end_node(k, e)], x, u0, du, [0.0_wp], &
             self%nodal(k:k))
       end do
@@ -202,7 +203,7 @@ contains
             list(n) = self%nodal(k)%node(i)
          end do
       end do
-      call form_begin(self%form(e), list(:n), 2)
+      call form_begin(self%form(e), list(:n), 2, self%leaves_second)
    end subroutine begin_form
 
    !> Length of edge `e` into the first work space.
@@ -219,7 +220,7 @@ contains
          length = dg_sqrt(dg_dot(difference(2, 1, local, du(:, node)), &
             difference(2, 1, local, du(:, node))))
       end associate
-      call wide_clear(self%work(1), 2*self%form(e)%n_node)
+      call wide_clear(self%work(1), 2*self%form(e)%n_node, self%leaves_second)
       call wide_add_part(self%work(1), 1.0_wp, &
          change_t(length%f0, length%f1, length%df), length%g, length%c, length%h, [1, 2, 3, 4])
    end subroutine edge_length
@@ -231,7 +232,7 @@ contains
       integer :: i
 
       associate (form => self%form(e), gap => self%nodal(k))
-         call wide_clear(self%work(2), 2*form%n_node)
+         call wide_clear(self%work(2), 2*form%n_node, self%leaves_second)
          associate (place => [(findloc(form%node(:form%n_node), gap%node(i), 1), &
                i = 1, gap%n_node)])
             call wide_add_part(self%work(2), 1.0_wp, change_t(gap%gap0, gap%gap1, gap%dgap), &

@@ -35,6 +35,7 @@ module emcon_weighted
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end [L]
       type(edge_form_t), allocatable :: form(:)       !! (n_edge)
       logical, allocatable :: is_formed(:)            !! (n_edge)
+      logical :: leaves_second = .false.              !! of `form`: no second derivatives
       type(wide_t) :: work(3)
    contains
       procedure :: measure => weighted_measure
@@ -53,7 +54,7 @@ module emcon_weighted
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       end subroutine measure_interface
 
-      !> Fill `form(e)` with nodes and moments in the arithmetic.
+      !> Fill `form(e)` with nodes and moments in the arithmetic; `leaves_second` says which.
       pure subroutine form_interface(self, e, x, u0, du)
          import :: weighted_t, wp
          class(weighted_t), intent(inout) :: self
@@ -168,6 +169,7 @@ contains
       integer :: i, k, n
 
       self%is_formed = .false.
+      self%leaves_second = all(item%leaves_second)
       do n = 1, size(wanted)
          i = wanted(n)
          do k = 1, 2

@@ -11,7 +11,7 @@ module emcon_dgrad1
    implicit none
    private
 
-   integer, parameter :: n_var = 1
+   integer, parameter :: n_var = 1, n_second = n_var
 
    include "emcon_dgrad.inc"
 

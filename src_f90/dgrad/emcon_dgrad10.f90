@@ -11,7 +11,7 @@ module emcon_dgrad10
    implicit none
    private
 
-   integer, parameter :: n_var = 10
+   integer, parameter :: n_var = 10, n_second = n_var
 
    include "emcon_dgrad.inc"
 

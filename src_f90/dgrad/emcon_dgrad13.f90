@@ -12,7 +12,7 @@ module emcon_dgrad13
    implicit none
    private
 
-   integer, parameter :: n_var = 13
+   integer, parameter :: n_var = 13, n_second = n_var
 
    include "emcon_dgrad.inc"
 

@@ -12,7 +12,7 @@ module emcon_dgrad15
    implicit none
    private
 
-   integer, parameter :: n_var = 15
+   integer, parameter :: n_var = 15, n_second = n_var
 
    include "emcon_dgrad.inc"
 

@@ -12,7 +12,7 @@ module emcon_dgrad17
    implicit none
    private
 
-   integer, parameter :: n_var = 17
+   integer, parameter :: n_var = 17, n_second = n_var
 
    include "emcon_dgrad.inc"
 

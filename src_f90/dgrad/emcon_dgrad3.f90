@@ -11,7 +11,7 @@ module emcon_dgrad3
    implicit none
    private
 
-   integer, parameter :: n_var = 3
+   integer, parameter :: n_var = 3, n_second = n_var
 
    include "emcon_dgrad.inc"
 

@@ -10,7 +10,7 @@ module emcon_dgrad_near
    implicit none
    private
 
-   integer, parameter :: n_var = 2
+   integer, parameter :: n_var = 2, n_second = n_var
 
    include "emcon_dgrad_number.inc"
 

@@ -20,8 +20,8 @@ module emcon_kept_factor
    implicit none
    private
    public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
-      kept_factor_serves, kept_factor_correct, kept_factor_forget, kept_factor_free, &
-      kept_factor_is_possible
+      kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
+      kept_factor_free, kept_factor_is_possible
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -46,6 +46,7 @@ module emcon_kept_factor
       real(dp), allocatable, private :: l(:, :)      !! (n, n) Cholesky factor of W^T W
       real(dp), allocatable, private :: y(:), x(:)   !! (n_unknown)
       real(dp), allocatable, private :: mu(:)        !! (n)
+      real(dp), allocatable, private :: bend(:)      !! (n) largest second derivative of each [1/L]
    end type kept_factor_t
 
 contains
@@ -131,10 +132,10 @@ contains
       is_fit = self%is_made .and. set%n**2 <= most_products*self%n_slot
       if (.not. is_fit) return
       if (allocated(self%l)) then
-         if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start)
+         if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start, self%bend)
       end if
       if (.not. allocated(self%l)) allocate(self%l(set%n, set%n), self%mu(set%n), &
-         self%start(set%n + 1))
+         self%start(set%n + 1), self%bend(set%n))
       self%start(1) = 0
       do k = 1, set%n
          call make_room(self, self%start(k) + size(self%y))
@@ -191,20 +192,34 @@ contains
       end do
    end subroutine fill_products
 
-   !> Is what the factor does not know, the curvature of the constraints, small beside it?
+   !> Look at the second derivatives of the constraints last taken.
+   pure subroutine kept_factor_look(self, set)
+      type(kept_factor_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      self%bend = 0.0_dp
+      do k = set%n_linear + 1, set%n
+         associate (item => set%item(k), m => size(set%item(k)%g, 1)*set%item(k)%n_node)
+            self%bend(k) = real(maxval(abs(item%h(:m, :m))), dp)
+         end associate
+      end do
+   end subroutine kept_factor_look
+
+   !> Is what the factor does not know, the curvature of the constraints as last looked at, small
+   !> beside it, by their present multipliers?
    pure logical function kept_factor_serves(self, set, is_near)
       type(kept_factor_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: is_near             !! the multipliers are about those of the solution
       real(dp) :: curved, most
-      integer :: k, n
+      integer :: k
 
       kept_factor_serves = .true.
       most = merge(most_curved, most_curved_far, is_near)
       do k = set%n_linear + 1, set%n
-         associate (item => set%item(k), rows => set%force_rows)
-            n = size(item%g, 1)*item%n_node
-            curved = real(abs(set%lam(k))*maxval(abs(item%h(:n, :n))), dp)
+         associate (rows => set%force_rows)
+            curved = real(abs(set%lam(k)), dp)*self%bend(k)
             if (any(curved > most*self%diagonal(rows%column(rows%row_start(k) + 1: &
                rows%row_start(k + 1)) + 1))) kept_factor_serves = .false.
          end associate

@@ -3,15 +3,15 @@
 !>
 !> It is made anew after so many increments, once it has cost as many corrections as a new one is
 !> worth, and for another size of the step: of the place that was found last, as that of a first
-!> guess is a worse one. The state knows of which motion it was made, so that a run that was resumed makes
-!> the same one and has the bits of one that was not. Source: docs/theory.md, section 8.
+!> guess is a worse one. The state knows of which motion it was made, so that a run that was resumed
+!> makes the same one and has the bits of one that was not. Source: docs/theory.md, section 8.
 module emcon_keeping
    use emcon_constraints, only : constraint_set_t
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_is_possible, kept_factor_renew, kept_factor_take
+      kept_factor_is_possible, kept_factor_look, kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
    use emcon_motion, only : at_rest, motion_t
@@ -20,11 +20,14 @@ module emcon_keeping
    implicit none
    private
    public :: keeping_t, keeping_step, keeping_begin, keeping_make, keeping_renew, &
-      keeping_correct, keeping_give_up, keeping_commit, keeping_forget
+      keeping_correct, keeping_give_up, keeping_commit, keeping_forget, keeping_looks
 
    !> A factor serves so many increments at most, and until its solves have taken so many
    !> corrections more than short ones: about as many as a new one costs.
    integer, parameter :: most_increments = 20, most_excess = 6
+
+   !> Looks at the second derivatives of constraints in a solve.
+   integer, parameter :: most_looks = 2
 
    type :: keeping_t
       logical :: is_wanted = .true.              !! in steps that it may serve
@@ -33,6 +36,7 @@ module emcon_keeping
       logical, private :: is_tried = .false.     !! in the present step
       logical, private :: is_new = .false.       !! made in it
       logical, private :: knows_set = .false.    !! it has taken the solve's constraints
+      integer, private :: n_look = 0             !! looks at their second derivatives since then
       type(instant_t), private :: start          !! of the present step
       real(wp), private :: h = 0.0_wp            !! and its size [T]
       integer, private :: increment = 0          !! increments done before it
@@ -108,8 +112,17 @@ contains
       end if
       if (.not. allocated(self%proposed)) allocate(self%proposed(n_unknown))
       self%knows_set = .false.
+      self%n_look = 0
       call mixing_begin(self%mixing, n_unknown)
    end subroutine keeping_begin
+
+   !> Are second derivatives of the constraints to be looked at? They are as a solve begins and
+   !> after its first correction, which takes it most of the way.
+   pure logical function keeping_looks(self)
+      type(keeping_t), intent(in) :: self
+
+      keeping_looks = self%n_look < most_looks
+   end function keeping_looks
 
    !> Let there be a factor, of the present tangent if it is a new one, that knows the constraints.
    subroutine keeping_make(self, correction, system, set, motion, is_fit, error)
@@ -138,6 +151,11 @@ contains
          if (allocated(error)) return
          self%knows_set = is_fit
       end if
+      if (.not. is_fit) return
+      if (keeping_looks(self)) then
+         call kept_factor_look(correction%kept, set)
+         self%n_look = self%n_look + 1
+      end if
    end subroutine keeping_make
 
    !> The next factor is to be of the tangent at the present place.
@@ -147,6 +165,7 @@ contains
 
       call keeping_forget(self, correction)
       self%knows_set = .false.
+      self%n_look = 0
       call mixing_begin(self%mixing, size(self%proposed))
    end subroutine keeping_renew
 

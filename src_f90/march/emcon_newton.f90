@@ -11,8 +11,8 @@ module emcon_newton
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t, correction_ticks
    use emcon_errors, only : err_interrupt, error_t, raise
-   use emcon_keeping, only : keeping_begin, keeping_correct, keeping_give_up, keeping_make, &
-      keeping_renew, keeping_t
+   use emcon_keeping, only : keeping_begin, keeping_correct, keeping_give_up, keeping_looks, &
+      keeping_make, keeping_renew, keeping_t
    use emcon_kept_factor, only : kept_factor_serves
    use emcon_kinds, only : int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
@@ -388,6 +388,7 @@ contains
       logical, intent(in) :: with_tangent        !! else the matrix is left as it is
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
+      logical :: leaves_second
       integer :: i, left
 
       status = newton_refused
@@ -406,7 +407,9 @@ contains
       status = newton_converged
       call phase_enter(system%phases, phase_gaps, left)
       if (set%n > 0) then
-         call constraints_evaluate(set, system, motion)
+         leaves_second = .not. with_tangent
+         if (self%convergence%is_kept) leaves_second = .not. keeping_looks(self%keeping)
+         call constraints_evaluate(set, system, motion, leaves_second)
          call constraints_rows(set, system%space%numbering)
       end if
       call phase_leave(system%phases, phase_eliminate)

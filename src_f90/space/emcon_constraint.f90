@@ -23,6 +23,7 @@ module emcon_constraint
       real(wp), allocatable :: c(:, :)                !! (n_dim, >= n_node) gradient at the end
       !> (i, j): derivative of g(i) by end coordinate j, coordinates node by node
       real(wp), allocatable :: h(:, :)
+      logical :: leaves_second = .false.              !! nobody asks for `h`
    end type condition_t
 
    type, abstract :: constraint_t
@@ -43,7 +44,8 @@ module emcon_constraint
 
    abstract interface
 
-      !> The conditions `wanted` with all their derivatives over a motion that is placed.
+      !> The conditions `wanted` with their derivatives over a motion that is placed. Of those that
+      !> leave the second derivatives `h` may be anything.
       pure subroutine linearise_interface(self, wanted, motion, target, item)
          import :: condition_t, constraint_t, motion_t, wp
          class(constraint_t), intent(inout) :: self

@@ -75,15 +75,18 @@ contains
    end subroutine constraint_place
 
    !> Values and derivatives of all active constraints over a motion.
-   subroutine constraints_evaluate(self, system, motion)
+   subroutine constraints_evaluate(self, system, motion, leaves_second)
       type(constraint_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
+      logical, intent(in), optional :: leaves_second       !! no second derivatives
       integer :: k, last, before
 
       if (self%n == 0) return
       self%n_linear = count(self%id <= system%space%linear%n)
       self%n_held = count(self%id <= system%first_constraint(1))
+      self%item%leaves_second = .false.
+      if (present(leaves_second)) self%item%leaves_second = leaves_second
       last = 0
       before = 0
       do k = 1, size(system%held)

@@ -1,4 +1,4 @@
-!> Time per contact kernel: one pair of edges with first and second derivatives.
+!> Time per contact kernel: one pair of edges with first derivatives, and with second ones too.
 !>
 !> Prints a table; asserts nothing. The time is the least of several runs over random pairs, all of
 !> them covered in part. Orientation: a smoothed segment takes some 20 times as long as a node.
@@ -6,18 +6,28 @@ program bench_pair
    use, intrinsic :: iso_fortran_env, only : output_unit
    use emcon_chain, only : chain_t
    use emcon_dgrad10, only : dg10_t => dg_t
+   use emcon_dgrad10_first, only : dg10_first_t => dg_t
    use emcon_dgrad13, only : dg13_t => dg_t
+   use emcon_dgrad13_first, only : dg13_first_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
+   use emcon_dgrad15_first, only : dg15_first_t => dg_t
    use emcon_dgrad17, only : dg17_t => dg_t
+   use emcon_dgrad17_first, only : dg17_first_t => dg_t
    use emcon_gauss, only : gauss_points
    use emcon_hermite, only : hermite_stencil_t
-   use emcon_hermite_gap, only : hermite_begin, hermite_gap
+   use emcon_hermite_gap, only : hermite_gap
+   use emcon_hermite_gap_first, only : hermite_gap_first => hermite_gap
+   use emcon_hermite_gap_value, only : hermite_begin
    use emcon_kinds, only : dp, int64, wp
    use emcon_mortar_frame, only : n_moment, n_place, pair_stencil_t
    use emcon_mortar_pair2, only : segment_moments2 => segment_moments
+   use emcon_mortar_pair2_first, only : segment_moments2_first => segment_moments
    use emcon_mortar_pair4, only : point_gap, segment_moments4 => segment_moments
+   use emcon_mortar_pair4_first, only : point_gap_first => point_gap, &
+      segment_moments4_first => segment_moments
    use emcon_mortar_stencil, only : stencil_master, stencil_slave
    use emcon_nts_gap, only : nts_gap
+   use emcon_nts_gap_first, only : nts_gap_first => nts_gap
    implicit none
    real(wp), parameter :: sharp(2, 2) = 0.0_wp
    integer, parameter :: n_case = 200, n_run = 15, n_kind = 9
@@ -36,8 +46,8 @@ program bench_pair
    integer :: kind
 
    call gauss_points(point, weight)
-   write(output_unit, "(/, a)") "Contact kernels with first and second derivatives"
-   write(output_unit, "(a40, a12)") "kernel", "ns/call"
+   write(output_unit, "(/, a)") "Contact kernels with first derivatives, and with second ones too"
+   write(output_unit, "(a40, 2a12)") "kernel", "first [ns]", "both [ns]"
    do kind = 1, n_kind
       call bench(kind)
    end do
@@ -48,9 +58,9 @@ contains
       integer, intent(in) :: kind
       real(wp) :: x0(2, n_place, n_case), dx(2, n_place, n_case), total
       type(pair_stencil_t) :: stencil
-      real(dp) :: seconds
+      real(dp) :: seconds(2)
       integer(int64) :: begin, end, rate
-      integer :: run, i
+      integer :: run, i, way
 
       call random_number(x0)
       call random_number(dx)
@@ -64,15 +74,17 @@ contains
       seconds = huge(seconds)
       total = 0.0_wp
       do run = 1, n_run
-         call system_clock(begin, rate)
-         do i = 1, n_case
-            call evaluate(kind, stencil, x0(:, :, i), dx(:, :, i), total)
+         do way = 1, 2
+            call system_clock(begin, rate)
+            do i = 1, n_case
+               call evaluate(kind, way == 1, stencil, x0(:, :, i), dx(:, :, i), total)
+            end do
+            call system_clock(end)
+            seconds(way) = min(seconds(way), real(end - begin, dp)/real(rate, dp))
          end do
-         call system_clock(end)
-         seconds = min(seconds, real(end - begin, dp)/real(rate, dp))
       end do
       if (total > huge(total)) write(output_unit, "(a)") "not finite"
-      write(output_unit, "(a40, f12.0)") name(kind), 1.0e9_dp*seconds/real(n_case, dp)
+      write(output_unit, "(a40, 2f12.0)") name(kind), 1.0e9_dp*seconds/real(n_case, dp)
    end subroutine bench
 
    function stencil_of(kind) result(stencil)
@@ -97,83 +109,113 @@ contains
       allocate(chain%length, source=abs(pair_x(1, node(2:)) - pair_x(1, node(:3))))
    end subroutine make_chain
 
-   subroutine evaluate(kind, stencil, x0, dx, total)
+   subroutine evaluate(kind, is_first, stencil, x0, dx, total)
       integer, intent(in) :: kind
+      logical, intent(in) :: is_first            !! first derivatives only
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total           !! so that nothing is left out as unused
 
       select case (kind)
       case (1)
-         call evaluate_node(x0, dx, total)
+         call evaluate_node(is_first, x0, dx, total)
       case (2)
-         call evaluate_smooth_node(x0, dx, total)
+         call evaluate_smooth_node(is_first, x0, dx, total)
       case (3:4)
-         call evaluate_segment2(stencil, x0, dx, total)
+         call evaluate_segment2(is_first, stencil, x0, dx, total)
       case (5:6)
-         call evaluate_segment4(stencil, x0, dx, total)
+         call evaluate_segment4(is_first, stencil, x0, dx, total)
       case default
-         call evaluate_point(stencil, x0, dx, total)
+         call evaluate_point(is_first, stencil, x0, dx, total)
       end select
    end subroutine evaluate
 
-   subroutine evaluate_node(x0, dx, total)
+   subroutine evaluate_node(is_first, x0, dx, total)
+      logical, intent(in) :: is_first
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
       type(dg10_t) :: gap
+      type(dg10_first_t) :: first
 
-      gap = nts_gap(x0(:, :5), dx(:, :5), 5, 4, sharp)
-      total = total + gap%h(1, 1)
+      if (is_first) then
+         first = nts_gap_first(x0(:, :5), dx(:, :5), 5, 4, sharp)
+         total = total + first%g(1)
+      else
+         gap = nts_gap(x0(:, :5), dx(:, :5), 5, 4, sharp)
+         total = total + gap%h(1, 1)
+      end if
    end subroutine evaluate_node
 
-   subroutine evaluate_smooth_node(x0, dx, total)
+   subroutine evaluate_smooth_node(is_first, x0, dx, total)
+      logical, intent(in) :: is_first
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
       type(hermite_stencil_t) :: stencil
       type(dg15_t) :: gap
+      type(dg15_first_t) :: first
       real(wp) :: start(3)
       logical :: is_there
 
       stencil%node = [6, 4, 2, 3, 5, 7]
       stencil%length = 1.0_wp
       call hermite_begin(stencil, x0(:, :7), start)
-      call hermite_gap(stencil, x0(:, :7), dx(:, :7), start, gap, is_there)
+      if (is_first) call hermite_gap_first(stencil, x0(:, :7), dx(:, :7), start, first, is_there)
+      if (.not. is_first) call hermite_gap(stencil, x0(:, :7), dx(:, :7), start, gap, is_there)
       if (.not. is_there) write(output_unit, "(a)") "no closest point"
-      total = total + gap%h(1, 1)
+      total = total + first%g(1) + gap%h(1, 1)
    end subroutine evaluate_smooth_node
 
-   subroutine evaluate_segment2(stencil, x0, dx, total)
+   subroutine evaluate_segment2(is_first, stencil, x0, dx, total)
+      logical, intent(in) :: is_first
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
       type(dg13_t) :: moment(n_moment)
+      type(dg13_first_t) :: first(n_moment)
       logical :: is_there
 
-      call segment_moments2(stencil, x0, dx, point, weight, moment, is_there)
+      if (is_first) then
+         call segment_moments2_first(stencil, x0, dx, point, weight, first, is_there)
+      else
+         call segment_moments2(stencil, x0, dx, point, weight, moment, is_there)
+      end if
       if (.not. is_there) write(output_unit, "(a)") "no overlap"
-      total = total + moment(1)%h(1, 1)
+      total = total + first(1)%g(1) + moment(1)%h(1, 1)
    end subroutine evaluate_segment2
 
-   subroutine evaluate_segment4(stencil, x0, dx, total)
+   subroutine evaluate_segment4(is_first, stencil, x0, dx, total)
+      logical, intent(in) :: is_first
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
       type(dg17_t) :: moment(n_moment)
+      type(dg17_first_t) :: first(n_moment)
       logical :: is_there
 
-      call segment_moments4(stencil, x0, dx, point, weight, moment, is_there)
+      if (is_first) then
+         call segment_moments4_first(stencil, x0, dx, point, weight, first, is_there)
+      else
+         call segment_moments4(stencil, x0, dx, point, weight, moment, is_there)
+      end if
       if (.not. is_there) write(output_unit, "(a)") "no overlap"
-      total = total + moment(1)%h(1, 1)
+      total = total + first(1)%g(1) + moment(1)%h(1, 1)
    end subroutine evaluate_segment4
 
-   subroutine evaluate_point(stencil, x0, dx, total)
+   subroutine evaluate_point(is_first, stencil, x0, dx, total)
+      logical, intent(in) :: is_first
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
       type(dg17_t) :: gap, length
+      type(dg17_first_t) :: first(2)
 
-      call point_gap(stencil, x0, dx, 0.5_wp, gap, length)
-      total = total + gap%h(1, 1) + length%h(1, 1)
+      if (is_first) then
+         call point_gap_first(stencil, x0, dx, 0.5_wp, first(1), first(2))
+         total = total + first(1)%g(1) + first(2)%g(1)
+      else
+         call point_gap(stencil, x0, dx, 0.5_wp, gap, length)
+         total = total + gap%h(1, 1) + length%h(1, 1)
+      end if
    end subroutine evaluate_point
 
 end program bench_pair

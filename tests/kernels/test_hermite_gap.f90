@@ -5,7 +5,8 @@ module test_hermite_gap
    use emcon_errors, only : error_t
    use emcon_hermite, only : hermite_curve, hermite_point, hermite_point_t, hermite_stencil_t, &
       joined_pieces
-   use emcon_hermite_gap, only : hermite_begin, hermite_gap, hermite_gap_value
+   use emcon_hermite_gap, only : hermite_gap
+   use emcon_hermite_gap_value, only : hermite_begin, hermite_gap_value
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
    use small_scenes, only : shake

@@ -47,7 +47,8 @@ contains
          test_case_t("nodes a little apart", test_apart), &
          test_case_t("forces of a uniform pressure", test_pressure), &
          test_case_t("identity and momenta, nodes apart", test_momenta), &
-         test_case_t("gradient and second derivatives, nodes apart", test_derivatives)]
+         test_case_t("gradient and second derivatives, nodes apart", test_derivatives), &
+         test_case_t("no second derivatives, the same bits", test_first)]
    end subroutine collect_joints
 
    ! ---- chains ---------------------------------------------------------------------------------
@@ -645,5 +646,49 @@ contains
       end subroutine compare_column
 
    end subroutine test_derivatives
+
+   !> Where second derivatives are left out, all else has the bits that it has with them.
+   subroutine test_first(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact
+      type(condition_t) :: item(1), first(1)
+      real(wp) :: u(2, 20), du(2, 20)
+      integer :: i, j, k, n_bent
+
+      first%leaves_second = .true.
+      do i = 1, n_variant
+         n_bent = 0
+         do k = 1, 12
+            call draw_apart(i, 0.15_wp*real(k - 6, wp), scene, contact, u, du, error)
+            if (allocated(error)) return
+            do j = 1, 3
+               if (.not. contact%state(j)%is_near) cycle
+               call contact%evaluate([j], scene%x, u, du, [0.02_wp], item)
+               call contact%evaluate([j], scene%x, u, du, [0.02_wp], first)
+               call compare_bits(item(1), first(1))
+               if (allocated(error)) return
+               if (any(abs(item(1)%h) > 0.0_wp)) n_bent = n_bent + 1
+            end do
+         end do
+         call check_true(error, n_bent > 12, "second derivatives, variant " // to_text(i))
+         call check_true(error, all(abs(first(1)%h) <= 0.0_wp), "left out, variant " // to_text(i))
+      end do
+
+   contains
+
+      subroutine compare_bits(a, b)
+         type(condition_t), intent(in) :: a, b
+
+         call check_equal(error, a%node(:a%n_node), b%node(:b%n_node), "nodes")
+         call check_near(error, [b%gap0, b%gap1, b%dgap], [a%gap0, a%gap1, a%dgap], 0.0_wp, &
+            0.0_wp, "value, variant " // to_text(i))
+         call check_near(error, b%g(:, :a%n_node), a%g(:, :a%n_node), 0.0_wp, 0.0_wp, &
+            "discrete gradient, variant " // to_text(i))
+         call check_near(error, b%c(:, :a%n_node), a%c(:, :a%n_node), 0.0_wp, 0.0_wp, &
+            "gradient at the end, variant " // to_text(i))
+      end subroutine compare_bits
+
+   end subroutine test_first
 
 end module test_joints

@@ -4,7 +4,8 @@ module test_nts_gap
    use emcon_dgrad10, only : dg_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_nts_gap, only : nts_gap, nts_gap_value
+   use emcon_nts_gap, only : nts_gap
+   use emcon_nts_gap_value, only : nts_gap_value
    use emcon_text, only : to_text
    use referee, only : qp
    use small_scenes, only : shake

@@ -1,0 +1,19 @@
+!> What emcon_mortar_pair4 gives, without second derivatives.
+module emcon_mortar_pair4_first
+   use emcon_dgrad17_first, only : dg_clip, dg_constant, dg_cross, dg_dot, dg_negative_part, &
+      dg_root, dg_sqrt, dg_t, dg_variable, difference, difference_t, operator(*), operator(+), &
+      operator(-), operator(/)
+   use emcon_dgrad_wide, only : change_t, wide_add_part, wide_t
+   use emcon_kinds, only : wp
+   use emcon_mortar_frame, only : end_rounding, frame_hit, frame_init, frame_meet, frame_t, &
+      moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, &
+      pair_stencil_t, place_first, place_last, place_master
+   use emcon_rounded, only : rounded_clip
+   implicit none
+   private
+
+   integer, parameter :: n_master = 4, k_root = 17
+
+   include "emcon_mortar_pair.inc"
+
+end module emcon_mortar_pair4_first

@@ -1,0 +1,14 @@
+!> Gap of a slave node over a step, without second derivatives.
+!>
+!> Source: docs/theory.md, eqs. (12) to (14). Sign: gap > 0 is open.
+module emcon_nts_gap_first
+   use emcon_dgrad10_first, only : dg_above_negative, dg_cross, dg_dot, dg_negative_part, dg_sqrt, &
+      dg_t, difference, difference_t, operator(*), operator(+), operator(-), operator(/)
+   use emcon_kinds, only : wp
+   use emcon_nts_gap_value, only : first, flat, has_arc, last, slave
+   implicit none
+   private
+
+   include "emcon_nts_gap.inc"
+
+end module emcon_nts_gap_first

@@ -1,0 +1,18 @@
+!> The numbers of emcon_dgrad17 without second derivatives: values and gradients, bit by bit.
+!>
+!> Source: docs/theory.md, section 2.
+module emcon_dgrad17_first
+   use emcon_dgrad_series, only : atanh_excess, exp_of, expm1_of, log1p_excess, log1p_of, &
+      sinh_ratio
+   use emcon_kinds, only : wp
+   use emcon_rounded, only : above_negative, above_negative_chord, above_negative_slope, &
+      rounded_chord, rounded_clip, rounded_negative, rounded_negative_chord, &
+      rounded_negative_slope, rounded_part, rounded_part_slope
+   implicit none
+   private
+
+   integer, parameter :: n_var = 17, n_second = 0
+
+   include "emcon_dgrad.inc"
+
+end module emcon_dgrad17_first
