@@ -15,6 +15,7 @@ module emcon_kept_factor
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
+   use emcon_numbering, only : numbering_t
    use emcon_solver_registry, only : solver_create
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    implicit none
@@ -193,17 +194,36 @@ contains
    end subroutine fill_products
 
    !> Look at the second derivatives of the constraints last taken.
-   pure subroutine kept_factor_look(self, set)
+   pure subroutine kept_factor_look(self, set, numbering)
       type(kept_factor_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
-      integer :: k
+      type(numbering_t), intent(in) :: numbering
+      integer :: i, j, k, n
 
       self%bend = 0.0_dp
       do k = set%n_linear + 1, set%n
-         associate (item => set%item(k), m => size(set%item(k)%g, 1)*set%item(k)%n_node)
-            self%bend(k) = real(maxval(abs(item%h(:m, :m))), dp)
+         associate (item => set%item(k))
+            n = size(item%g, 1)
+            do j = 1, item%n_node
+               if (.not. moves(item%node(j))) cycle
+               do i = 1, item%n_node
+                  if (moves(item%node(i))) self%bend(k) = max(self%bend(k), &
+                     real(maxval(abs(item%h(n*(i - 1) + 1:n*i, n*(j - 1) + 1:n*j))), dp))
+               end do
+            end do
          end associate
       end do
+
+   contains
+
+      !> Does a node follow any unknown?
+      pure logical function moves(node)
+         integer, intent(in) :: node
+
+         moves = any(numbering%column(numbering%start(n*(node - 1) + 1) + 1: &
+            numbering%start(n*node + 1)) > 0)
+      end function moves
+
    end subroutine kept_factor_look
 
    !> Is what the factor does not know, the curvature of the constraints as last looked at, small

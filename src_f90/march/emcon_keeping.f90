@@ -153,7 +153,7 @@ contains
       end if
       if (.not. is_fit) return
       if (keeping_looks(self)) then
-         call kept_factor_look(correction%kept, set)
+         call kept_factor_look(correction%kept, set, system%space%numbering)
          self%n_look = self%n_look + 1
       end if
    end subroutine keeping_make

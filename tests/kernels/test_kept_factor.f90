@@ -3,8 +3,8 @@ module test_kept_factor
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
-   use emcon_kept_factor, only : kept_factor_correct, kept_factor_free, kept_factor_renew, &
-      kept_factor_serves, kept_factor_set_up, kept_factor_t, kept_factor_take
+   use emcon_kept_factor, only : kept_factor_correct, kept_factor_free, kept_factor_look, &
+      kept_factor_renew, kept_factor_serves, kept_factor_set_up, kept_factor_t, kept_factor_take
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_default
@@ -115,12 +115,16 @@ contains
       call prepare(problem, kept, is_fit, error)
       if (allocated(error)) return
       problem%set%lam = 0.01_wp
+      call kept_factor_look(kept, problem%set, problem%numbering)
       call check_true(error, kept_factor_serves(kept, problem%set, .true.), "it is small")
       do while (kept_factor_serves(kept, problem%set, .true.))
          problem%set%item(3)%h = 2.0_wp*problem%set%item(3)%h
+         call kept_factor_look(kept, problem%set, problem%numbering)
       end do
       call check_true(error, kept_factor_serves(kept, problem%set, .false.), "far from the end")
       problem%set%item(3)%h = 8.0_wp*problem%set%item(3)%h
+      call check_true(error, kept_factor_serves(kept, problem%set, .false.), "nobody has looked")
+      call kept_factor_look(kept, problem%set, problem%numbering)
       call check_true(error, .not. kept_factor_serves(kept, problem%set, .false.), "far too large")
       call kept_factor_free(kept)
    end subroutine test_curvature
