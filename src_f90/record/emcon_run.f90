@@ -347,7 +347,8 @@ contains
       saves = run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency /= 0
    end function saves
 
-   !> Does it after this increment, before the end of the run, and is the last one old enough?
+   !> Does it after this increment, before the end of the run? Within a step the last one has to be
+   !> old enough.
    logical function is_save_due(run)
       type(run_t), intent(in) :: run
 
@@ -356,8 +357,10 @@ contains
       associate (state => run%stepper%march%state, &
             frequency => run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency)
          is_save_due = mod(state%increment - state%n_before, frequency) == 0
+         if (is_save_due .and. state%n_grid < run%stepper%march%n_grid) then
+            is_save_due = pace_is_due(run%pace)
+         end if
       end associate
-      if (is_save_due) is_save_due = pace_is_due(run%pace)
    end function is_save_due
 
    !> Publish the results and write the restart file, in this order: it may not be ahead of them.

@@ -165,7 +165,7 @@ def test_everything_of_a_closed_stepper_says_so(one: Path) -> None:
         "null_space": (ZERO, 0.1), "guess": (0.1,), "constraint": (ZERO, ZERO),
         "restore": (saved,), "write_restart": ("closed.rst.h5",), "prescribe": (1, 1, 0.0),
         "release": (1, 1), "set_point_load": (1, 1, 0.0), "set_pressure": (1, 1, 0.0),
-        "set_gravity": (1, 0.0), "node_set": ("ALL",)}
+        "set_gravity": (1, 0.0), "set_threads": (1,), "node_set": ("ALL",)}
     free = {"close", "from_restart"}
     for name in dir(Stepper):
         if name.startswith("_") or name in free:
