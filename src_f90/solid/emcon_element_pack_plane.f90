@@ -187,6 +187,7 @@ contains
          terms = noise*((1.0_wp + 2.0_wp*abs(e(:, 1)))*(1.0_wp + 2.0_wp*abs(e(:, 2))) + e(:, 3)**2)
          det = min(det, ((1.0_wp + 2.0_wp*e(:, 1))*(1.0_wp + 2.0_wp*e(:, 2)) - e(:, 3)**2) - terms)
       end if
+      if (all(extent < largest .and. det > 0.0_wp)) return
       do l = 1, n_lane
          if (extent(l) < largest .and. det(l) > 0.0_wp) cycle
          response%is_inverted(l) = .true.

@@ -305,14 +305,14 @@ contains
    end subroutine reference_gradient
 
    !> Response of a pack to a motion, which is that of `given` too.
-   pure subroutine solid_pack_respond(self, pack, motion, given, with_tangent, part)
+   pure subroutine solid_pack_respond(self, pack, motion, given, with_tangent, point, part)
       type(solid_t), intent(in) :: self
       type(element_pack_t), intent(in) :: pack
       type(pack_motion_t), intent(in) :: motion
       type(host_response_t), intent(in) :: given
       logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(pack_point_t), intent(inout) :: point         !! work space
       type(pack_response_t), intent(inout) :: part
-      type(pack_point_t) :: point
       integer :: k
 
       call pack_clear(pack%n_node, part, with_tangent)
@@ -341,6 +341,7 @@ contains
       type(element_response_t), intent(inout) :: part
       type(element_pack_t) :: pack
       type(pack_motion_t) :: motions
+      type(pack_point_t) :: point
       type(pack_response_t) :: parts
       integer :: i, n
 
@@ -351,7 +352,7 @@ contains
          motions%from(:, :, i) = spread(motion%from(:, i) - motion%from(:, 1), 1, n_lane)
          motions%by(:, :, i) = spread(motion%by(:, i) - motion%by(:, 1), 1, n_lane)
       end do
-      call solid_pack_respond(self, pack, motions, given, with_tangent, parts)
+      call solid_pack_respond(self, pack, motions, given, with_tangent, point, parts)
       part%energy = parts%energy(1)
       part%force(:, :n) = parts%force(1, :, :n)
       part%magnitude(:, :n) = parts%magnitude(1, :, :n)

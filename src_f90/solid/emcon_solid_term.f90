@@ -4,7 +4,8 @@
 module emcon_solid_term
    use emcon_csr, only : csr_t
    use emcon_element_lists, only : element_lists
-   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_response_t
+   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_point_t, &
+      pack_response_t
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
@@ -134,6 +135,7 @@ contains
       type(motion_t), intent(in) :: motion       !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      type(pack_point_t) :: point
       type(pack_response_t) :: part
       type(pack_motion_t) :: local
       real(wp) :: largest(n_lane)
@@ -145,7 +147,8 @@ contains
       do k = self%shares%first(share) + 1, self%shares%first(share + 1)
          associate (pack => self%solid%pack(k), place => self%shares%place(k))
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%given, present(value), part)
+            call solid_pack_respond(self%solid, pack, local, self%given, present(value), point, &
+               part)
             if (any(part%is_inverted)) then
                self%shares%inverted(share) = pack%element(findloc(part%is_inverted, .true., 1))
                return
@@ -297,6 +300,7 @@ contains
       type(motion_t), intent(in) :: motion                             !! placed
       real(wp), intent(in), contiguous :: direction(:, :)              !! (2, n_node) [L]
       real(wp), intent(inout), contiguous :: product(:, :)             !! (2, n_node) [M L/T^2]
+      type(pack_point_t) :: point
       type(pack_response_t) :: part
       type(pack_motion_t) :: local
       integer :: k
@@ -311,7 +315,7 @@ contains
          associate (pack => self%solid%pack(k))
             if (.not. touches(pack, direction)) cycle
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%given, .true., part)
+            call solid_pack_respond(self%solid, pack, local, self%given, .true., point, part)
             if (any(part%is_inverted)) return
             call add_image(pack, part, motion%weight, direction, product)
          end associate
