@@ -50,7 +50,8 @@ contains
             way = element%x(:, j) - element%x(:, i)
             along(2*i - 1:2*i) = -way/norm2(way)
             along(2*j - 1:2*j) = way/norm2(way)
-            element%stiffness = element%stiffness + real(i + j, wp)*spread(along, 2, 2*n)*spread(along, 1, 2*n)
+            element%stiffness = element%stiffness + &
+               real(i + j, wp)*spread(along, 2, 2*n)*spread(along, 1, 2*n)
          end do
       end do
       element%slope = element%slope/area
