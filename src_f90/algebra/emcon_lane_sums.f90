@@ -12,7 +12,7 @@ module emcon_lane_sums
    integer, parameter :: n_sum = 8               !! partial sums
    !> What is larger than its yardstick by so many powers of two is not measured any more: its
    !> square may not be a number.
-   integer, parameter :: far = int(0.3*maxexponent(1.0_wp))
+   integer, parameter :: far = int(0.3_wp*maxexponent(1.0_wp))
 
    !> What sizes of vectors are measured by.
    type :: yardstick_t
