@@ -13,7 +13,8 @@ module emcon_element_pack_plane
    implicit none
    private
    public :: element_pack_t, pack_motion_t, pack_point_t, pack_response_t
-   public :: pack_fill, pack_gather, pack_clear, pack_point, pack_point_check, pack_add_point
+   public :: pack_fill, pack_gather, pack_scatter, pack_clear, pack_point, pack_point_check
+   public :: pack_add_point
 
    !> Elements of one kind and one law. Lanes that are left over repeat the first one.
    type :: element_pack_t
@@ -48,8 +49,8 @@ module emcon_element_pack_plane
       real(wp) :: force(n_lane, 2, max_node) = 0.0_wp
       logical :: with_sizes = .true.                       !! there are magnitudes
       real(wp) :: magnitude(n_lane, 2, max_node) = 0.0_wp  !! sum of |contributions| to `force`
-      !> Derivative of `force` by u1: (lane, component, node, component and node of u1)
-      real(wp) :: tangent(n_lane, 2, max_node, 2, max_node) = 0.0_wp
+      !> Where asked for, derivative of `force` by u1: (lane, component, node, those of u1)
+      real(wp) :: tangent(n_lane, 2, max_node, 2, max_node)
       !> det F <= 0 at some point at the end, or a strain that the law has no energy for.
       logical :: is_inverted(n_lane) = .false.
    end type pack_response_t
@@ -99,6 +100,25 @@ contains
          end do
       end do
    end subroutine pack_gather
+
+   !> Add what the nodes of each element get, element by element, to those whose turn it is.
+   pure subroutine pack_scatter(self, turn_of, turn, part, total)
+      type(element_pack_t), intent(in) :: self
+      integer, intent(in), contiguous :: turn_of(:)          !! (n_node)
+      integer, intent(in) :: turn
+      real(wp), intent(in) :: part(n_lane, 2, self%n_node)
+      real(wp), intent(inout), contiguous :: total(:, :)     !! (2, n_node)
+      integer :: i, l, node
+
+      do l = 1, self%n
+         do i = 1, self%n_node
+            node = self%node(l, i)
+            if (turn_of(node) /= turn) cycle
+            total(1, node) = total(1, node) + part(l, 1, i)
+            total(2, node) = total(2, node) + part(l, 2, i)
+         end do
+      end do
+   end subroutine pack_scatter
 
    !> Nothing, before points are added.
    pure subroutine pack_clear(n, response, with_tangent)

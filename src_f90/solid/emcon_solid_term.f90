@@ -5,7 +5,7 @@ module emcon_solid_term
    use emcon_csr, only : csr_t
    use emcon_element_lists, only : element_lists
    use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_point_t, &
-      pack_response_t
+      pack_response_t, pack_scatter
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
@@ -218,25 +218,19 @@ contains
       real(wp), intent(in), contiguous :: magnitude(:, :, :)   !! (n_lane, n_dim, >= n_node)
       real(wp), intent(in) :: largest(n_lane)    !! displacement [L]
       type(response_t), intent(inout) :: response
-      integer :: a, e, i, l, node
+      real(wp) :: rounding(n_lane, size(force, 2), pack%n_node)
+      integer :: i, l
 
-      associate (total => response%part(self%role))
-         do l = 1, pack%n
-            e = pack%element(l)
-            do i = 1, pack%n_node
-               node = pack%node(l, i)
-               if (self%shares%turn(node) /= turn) cycle
-               do a = 1, size(force, 2)
-                  total%force(a, node) = total%force(a, node) + force(l, a, i)
-               end do
-               if (.not. response%with_sizes) cycle
-               do a = 1, size(force, 2)
-                  total%magnitude(a, node) = total%magnitude(a, node) + magnitude(l, a, i)
-                  response%rounding(a, node) = response%rounding(a, node) &
-                     + largest(l)*self%solid%stiffness(i, e)
-               end do
+      associate (total => response%part(self%role), turn_of => self%shares%turn)
+         call pack_scatter(pack, turn_of, turn, force, total%force)
+         if (.not. response%with_sizes) return
+         call pack_scatter(pack, turn_of, turn, magnitude, total%magnitude)
+         do i = 1, pack%n_node
+            do l = 1, n_lane
+               rounding(l, :, i) = largest(l)*self%solid%stiffness(i, pack%element(l))
             end do
          end do
+         call pack_scatter(pack, turn_of, turn, rounding, response%rounding)
       end associate
    end subroutine add_forces
 

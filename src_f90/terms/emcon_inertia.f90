@@ -214,29 +214,36 @@ contains
       class(inertia_t), intent(in) :: self
       real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
-      real(wp) :: total(n_way)
-      integer :: i, k, a
 
-      do a = 1, size(field, 1) - n_way + 1, n_way
-         do i = 1, self%mass%n_row
-            total = 0.0_wp
-            do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
-               associate (m => real(self%mass%value(k), wp), j => self%mass%column(k) + 1)
-                  total = total + m*field(a:a + n_way - 1, j)
-               end associate
-            end do
-            product(a:a + n_way - 1, i) = total
-         end do
-      end do
-      if (modulo(size(field, 1), n_way) == 0) return
-      a = size(field, 1)
-      do i = 1, self%mass%n_row
-         total(1) = 0.0_wp
-         do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
-            total(1) = total(1) + real(self%mass%value(k), wp)*field(a, self%mass%column(k) + 1)
-         end do
-         product(a, i) = total(1)
-      end do
+      call rows_times(size(field, 1), self%mass%row_start, self%mass%column, self%mass%value, &
+         field, product)
    end subroutine inertia_times
+
+   !> Rows of a sparse matrix times vectors, two directions at a time: the rows are read once.
+   pure subroutine rows_times(n_dim, row_start, column, value, field, product)
+      integer, intent(in) :: n_dim
+      integer, intent(in), contiguous :: row_start(:)        !! (n_row + 1) from 0
+      integer, intent(in), contiguous :: column(:)           !! from 0
+      real(dp), intent(in), contiguous :: value(:)
+      real(wp), intent(in) :: field(n_dim, 0:*)
+      real(wp), intent(out) :: product(n_dim, *)
+      real(wp) :: m, first, second
+      integer :: i, k, a, b
+
+      do a = 1, n_dim, n_way
+         b = min(a + n_way - 1, n_dim)
+         do i = 1, size(row_start) - 1
+            first = 0.0_wp
+            second = 0.0_wp
+            do k = row_start(i) + 1, row_start(i + 1)
+               m = real(value(k), wp)
+               first = first + m*field(a, column(k))
+               second = second + m*field(b, column(k))
+            end do
+            product(a, i) = first
+            product(b, i) = second
+         end do
+      end do
+   end subroutine rows_times
 
 end module emcon_inertia
