@@ -105,8 +105,8 @@ contains
    pure subroutine pack_scatter(self, turn_of, turn, part, total)
       type(element_pack_t), intent(in) :: self
       integer, intent(in), contiguous :: turn_of(:)          !! (n_node)
-      integer, intent(in) :: turn
-      real(wp), intent(in) :: part(n_lane, 2, self%n_node)
+      integer, intent(in) :: turn                            !! as `turn_of` has them
+      real(wp), intent(in) :: part(n_lane, 2, self%n_node)   !! forces, sizes or roundings
       real(wp), intent(inout), contiguous :: total(:, :)     !! (2, n_node)
       integer :: i, l, node
 

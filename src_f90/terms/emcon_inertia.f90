@@ -215,24 +215,25 @@ contains
       real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
 
-      call rows_times(size(field, 1), self%mass%row_start, self%mass%column, self%mass%value, &
-         field, product)
+      call rows_times(size(field, 1), self%mass%n_row, self%mass%row_start, self%mass%column, &
+         self%mass%value, field, product)
    end subroutine inertia_times
 
    !> Rows of a sparse matrix times vectors, two directions at a time: the rows are read once.
-   pure subroutine rows_times(n_dim, row_start, column, value, field, product)
+   pure subroutine rows_times(n_dim, n_row, row_start, column, value, field, product)
       integer, intent(in) :: n_dim
-      integer, intent(in), contiguous :: row_start(:)        !! (n_row + 1) from 0
+      integer, intent(in) :: n_row                           !! as many as columns
+      integer, intent(in) :: row_start(n_row + 1)            !! from 0
       integer, intent(in), contiguous :: column(:)           !! from 0
       real(dp), intent(in), contiguous :: value(:)
-      real(wp), intent(in) :: field(n_dim, 0:*)
-      real(wp), intent(out) :: product(n_dim, *)
+      real(wp), intent(in) :: field(n_dim, 0:n_row - 1)
+      real(wp), intent(out) :: product(n_dim, n_row)
       real(wp) :: m, first, second
       integer :: i, k, a, b
 
       do a = 1, n_dim, n_way
          b = min(a + n_way - 1, n_dim)
-         do i = 1, size(row_start) - 1
+         do i = 1, n_row
             first = 0.0_wp
             second = 0.0_wp
             do k = row_start(i) + 1, row_start(i + 1)

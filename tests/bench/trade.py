@@ -33,6 +33,8 @@ SECTION = {"elastic": "", "corotated": ", KINEMATICS=COROTATED",
            "linear": ", KINEMATICS=LINEAR", "quasi-static": ", MASSLESS",
            "quasi-static, linear": ", KINEMATICS=LINEAR, MASSLESS"}
 KINDS = (*SECTION, "rigid")
+#: A rigid body of which only its surface is left.
+PROFILE = "rigid profile"
 DRAWN = ("elastic", "linear", "quasi-static", "rigid")
 NODE = 99999
 #: In place of the stiffness of plain scenes, 100, for a body that others meet.
@@ -50,6 +52,7 @@ def rigid(body, place, held):
 
 
 def simplified(deck, body, kind):
+    """The section of a body that is not rigid, as `kind` has it."""
     if kind != "rigid":
         deck.replace(f"ELSET={body}, MATERIAL", f"ELSET={body}{SECTION[kind]}, MATERIAL")
     return deck
@@ -57,9 +60,20 @@ def simplified(deck, body, kind):
 
 def ring(kind):
     deck = Deck.read(DECKS / "ring.inp")
-    if kind == "rigid":
-        deck.replace("*BOUNDARY\nBOTTOM, 1, 2\n", rigid("BLOCK", (0, -5), True))
-    return simplified(deck, "BLOCK", kind)
+    if kind not in ("rigid", PROFILE):
+        return simplified(deck, "BLOCK", kind)
+    body = rigid("BLOCK", (0, -5), True)
+    if kind == PROFILE:
+        for keyword in ("*NODE", "*ELEMENT", "*SOLID SECTION"):
+            deck.remove(keyword, "ELSET=BLOCK" if keyword != "*NODE" else "NSET=BLOCK")
+        deck.remove("*NSET", "NSET=BOTTOM")
+        deck.remove("*ELSET", "ELSET=BLOCK_TOP")
+        deck.remove("*SURFACE", "NAME=BLOCK_TOP")
+        body = body.replace("*RIGID BODY, ELSET=BLOCK", "*SURFACE, TYPE=SEGMENTS, NAME=BLOCK_TOP\n"
+                            "START, -25., 0.\nLINE, 35., 0.\n"
+                            "*RIGID BODY, ANALYTICAL SURFACE=BLOCK_TOP")
+    deck.replace("*BOUNDARY\nBOTTOM, 1, 2\n", body)
+    return deck
 
 
 def bar(kind):
@@ -109,7 +123,7 @@ class Case:
 
 NTS = {"formulation": "NODE TO SURFACE"}
 CASES = (
-    Case("ring on a foundation", ring, KINDS, {**NTS, "h": 0.02, "t_end": 4.0, "frame": 4}),
+    Case("ring on a foundation", ring, (*KINDS, PROFILE), {**NTS, "h": 0.02, "t_end": 4.0, "frame": 4}),
     Case("bar on a floor, the bar", bar, ("elastic", "linear"),
          {**NTS, "h": 0.0025, "t_end": 2.0, "frame": 2}),
     Case("ball on a block", drawn(ball, "BLOCK", (0, -0.4)), KINDS, NTS),
