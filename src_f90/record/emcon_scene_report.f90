@@ -245,6 +245,9 @@ contains
             " is # times stiffer than the softest one: as *RIGID BODY ")
          call row_put(row, "fewer_percent", nint(100.0_wp*real(body(i)%n_unknown, wp) &
             /real(sum(body%n_unknown), wp)), "# % fewer unknowns")
+         ! Of the strain energy of a contact it stores no more than this.
+         call row_put(row, "rebound_percent", 100.0_wp*softest/body(i)%modulus, &
+            "; expected change of rebound below # %")
          call rows_add(rows, row)
       end do
    end subroutine advise_rigid

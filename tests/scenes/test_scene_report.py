@@ -53,6 +53,21 @@ def test_pairs_parts_and_advice(ring):
     assert math.isclose(step["courant_number"]*step["recommended_h"], step["h"], rel_tol=1e-8)
 
 
+def test_a_rigid_body_changes_the_rebound_by_less_than_is_told(ring, tmp_path):
+    """The impulse of contact is what the rebound takes."""
+    (advice,) = ring["advice"]
+    assert math.isclose(advice["rebound_percent"], 0.1, rel_tol=1e-8)
+    impulse = []
+    for cards in ("", "*NODE\n9999, 0, -5\n*RIGID BODY, ELSET=BLOCK, REF NODE=9999\n"):
+        deck = Deck.read(DECKS/"ring.inp")
+        if cards:
+            deck.replace("*BOUNDARY\nBOTTOM, 1, 2\n", cards + "*BOUNDARY\n9999, 1, 2\n9999, 6\n")
+        last = run_deck(deck, tmp_path/f"{len(impulse)}", h=0.02, t_end=4).history[-1]
+        impulse.append(np.array([last["pair1_impulse_x"], last["pair1_impulse_y"]]))
+    change = np.linalg.norm(impulse[1] - impulse[0])/np.linalg.norm(impulse[0])
+    assert 0 < 100*change < advice["rebound_percent"]
+
+
 def test_what_locks_and_what_makes_a_comb_is_told(tmp_path):
     deck = Deck.read(DECKS/"bouncing_bar.inp").text()
     assert "TYPE=MASSLESS" in report(DECKS/"bouncing_bar.inp")["advice"][0]["text"]
