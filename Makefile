@@ -1,21 +1,22 @@
 # EMCON. `make help` lists what can be made.
 #
-# MODE=release|debug|sanitize, WP=real64|real128|real32 (kind of the state), LICENSE=permissive
-# (without SuiteSparse, whose solvers are under the GPL): a folder for each.
+# MODE=release|debug|sanitize, PRECISION=single|double|quad (of the state; matrices are double),
+# LICENSE=permissive (without SuiteSparse, whose solvers are under the GPL): a folder for each.
 # V=1 shows commands, FFLAGS=... and CFLAGS=... are added to the flags below.
 # Compiler and libraries are looked up once, by .ci/setup, into build/config.mk.
 
 MODE ?= release
-WP ?= real64
+PRECISION ?= double
 LICENSE ?= gpl
 PREFIX ?= /usr/local
-BUILD := build/$(MODE)$(if $(filter-out real64,$(WP)),-$(WP))$(if $(filter-out gpl,$(LICENSE)),-$(LICENSE))
+BUILD := build/$(MODE)$(if $(filter-out double,$(PRECISION)),-$(PRECISION))$(if $(filter-out gpl,$(LICENSE)),-$(LICENSE))
 O := $(BUILD)/obj
 ifeq ($(filter $(MODE),release debug sanitize),)
 $(error MODE is release, debug or sanitize, not '$(MODE)')
 endif
-ifeq ($(filter $(WP),real32 real64 real128),)
-$(error WP is real32, real64 or real128, not '$(WP)')
+WP := $(patsubst single,real32,$(patsubst double,real64,$(patsubst quad,real128,$(PRECISION))))
+ifeq ($(filter $(PRECISION),single double quad),)
+$(error PRECISION is single, double or quad, not '$(PRECISION)')
 endif
 ifeq ($(filter gpl permissive,$(LICENSE)),)
 $(error LICENSE is gpl or permissive, not '$(LICENSE)')
@@ -287,8 +288,8 @@ run:  ## set up, build, run the ring impact, draw build/run/ring.png
 	@$(PY) -m emcon summary build/run/ring
 
 test:  ## set up, build, run all tests
-	$(BUILDING) MODE=release WP=real64 .venv/test.stamp app lib pywrap kernels
-	$(BUILDING) MODE=debug WP=real64 kernels
+	$(BUILDING) MODE=release PRECISION=double .venv/test.stamp app lib pywrap kernels
+	$(BUILDING) MODE=debug PRECISION=double kernels
 	@$(PY) -m pytest -n $(shell nproc) tests
 
 lint: .venv/lint.stamp  ## check the Fortran sources against the written rules
@@ -311,7 +312,7 @@ soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, ca
 	@EMCON_OPENS=20000 $(PY) -m pytest -q tests/embed/test_threads.py
 
 sanitize: .venv/test.stamp  ## build and run under the address and undefined-behaviour sanitizers
-	$(BUILDING) MODE=sanitize WP=real64 app lib kernels
+	$(BUILDING) MODE=sanitize PRECISION=double app lib kernels
 	@$(PY) tests/soak/sanitize.py
 
 docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html

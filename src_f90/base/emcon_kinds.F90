@@ -1,6 +1,6 @@
 !> The real kinds of the code.
 !>
-!> `wp` carries state, residual and energies; build with `make WP=real128` for a referee.
+!> `wp` carries state, residual and energies; build with `make PRECISION=quad` for a referee.
 !> `dp` carries matrices and everything that C or a file sees. `hp` is the finer of the two.
 module emcon_kinds
    use, intrinsic :: iso_fortran_env, only : int64, dp => real64, wp => EMCON_WP

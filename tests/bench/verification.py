@@ -5,7 +5,7 @@
 
 Runs the decks of input_decks/ and a few made here, in a temporary folder, two at a time; the
 chapters are the modules of tests/bench/book/. Needs the program (`make app`), and for one table
-the program in quadruple precision (`make app WP=real128`), for another the program of condition
+the program in quadruple precision (`make app PRECISION=quad`), for another the program of condition
 numbers (`make build/release/ties_condition`); a table is left out where its program is missing.
 """
 

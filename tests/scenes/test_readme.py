@@ -88,7 +88,7 @@ def test_files_and_folders(page):
 @EACH_PAGE
 def test_make_targets(page):
     targets = re.findall(r"^([a-z]\w*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    variables = "MODE WP LICENSE V PREFIX FC CC FFLAGS CFLAGS SECONDS VECTOR".split()
+    variables = "MODE PRECISION LICENSE V PREFIX FC CC FFLAGS CFLAGS SECONDS VECTOR".split()
     for words in commands(page):
         for word in words[1:] if words[0] == "make" else []:
             name, equals, _ = word.partition("=")

@@ -8,7 +8,7 @@ from scene_tools import DECKS, ROOT, Deck
 
 from .common import Chapter, drift, size, table
 
-QUADRUPLE = ROOT / "build" / "release-real128" / "emcon"
+QUADRUPLE = ROOT / "build" / "release-quad" / "emcon"
 
 
 def start_units(runs):
@@ -90,7 +90,7 @@ def referee(started, _):
             )
         )
     if not rows:
-        return ["*(left out: no `build/release-real128/emcon`; make app WP=real128)*"]
+        return ["*(left out: no `build/release-quad/emcon`; make app PRECISION=quad)*"]
     return table(
         ["state", "method", "energy balance", "last residual", "kinetic energy, t = 0.5"], rows
     )
