@@ -130,7 +130,10 @@ contains
          is_bare(scene%rigid(i)%node) = .false.
       end do
       do i = 1, size(scene%surface)
-         if (scene%surface(i)%is_profile) is_bare([scene%surface(i)%edge]) = .false.
+         associate (surface => scene%surface(i))
+            if (surface%is_profile) is_bare([surface%edge]) = .false.
+            if (surface%inner_node > 0) is_bare(surface%inner_node) = .false.
+         end associate
       end do
       if (.not. any(is_bare) .or. all(is_bare)) return
       call mark_coupled(scene, is_coupled)

@@ -116,6 +116,7 @@ contains
             "surface of elements becomes rigid with these, by ELSET=")
       else
          node = reshape(scene%surface(i)%edge, [size(scene%surface(i)%edge)])
+         if (scene%surface(i)%inner_node > 0) node = [node, scene%surface(i)%inner_node]
       end if
    end subroutine find_profile
 

@@ -137,9 +137,38 @@ contains
       if (n < size(place, 2)) node = [node, n_before + 1]
       surface%edge = reshape([(node(i + 1), node(i), i = 1, size(node) - 1)], &
          [2, size(node) - 1])
+      scene%x = reshape([scene%x, place(:, :n)], [2, n_before + n])
+      if (is_straight(place)) then
+         n = n + 1
+         surface%inner_node = n_before + n
+         scene%x = reshape([scene%x, inner_place(place)], [2, n_before + n])
+      end if
       scene%node_label = [scene%node_label, [(last + i, i = 1, n)]]
       scene%node_origin = [scene%node_origin, [(origin, i = 1, n)]]
-      scene%x = reshape([scene%x, place(:, :n)], [2, n_before + n])
    end subroutine add_nodes
+
+   !> Do all points lie on one line? Then they do not tell how the body is turned.
+   pure logical function is_straight(place)
+      real(wp), intent(in) :: place(:, :)        !! (2, n) n > 1
+      real(wp) :: way(2), arm(2)
+      integer :: i
+
+      way = place(:, size(place, 2)) - place(:, 1)
+      is_straight = .false.
+      do i = 2, size(place, 2) - 1
+         arm = place(:, i) - place(:, 1)
+         if (abs(way(1)*arm(2) - way(2)*arm(1)) > rounding*dot_product(way, way)) return
+      end do
+      is_straight = .true.
+   end function is_straight
+
+   !> In the body, as far from a straight profile as half of its length.
+   pure function inner_place(place)
+      real(wp), intent(in) :: place(:, :)        !! (2, n) n > 1
+      real(wp) :: inner_place(2), half(2)
+
+      half = 0.5_wp*(place(:, size(place, 2)) - place(:, 1))
+      inner_place = place(:, 1) + half + [half(2), -half(1)]
+   end function inner_place
 
 end module emcon_deck_segments_plane

@@ -18,6 +18,7 @@ module emcon_mesh
       type(origin_t) :: origin
       logical :: is_nodal = .false.
       logical :: is_profile = .false.                !! of edges between nodes of its own
+      integer :: inner_node = 0                      !! one beside a straight profile, in its body
       logical :: is_exterior = .false.               !! every free face that no tie covers
       integer, allocatable :: element(:)             !! (n_face)
       integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind
