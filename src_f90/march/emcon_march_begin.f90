@@ -271,18 +271,25 @@ contains
          "prescribed, tied, or given mass, or as an element has no other nodes")
    end subroutine begin_massless
 
-   !> Tell of pairs whose surfaces were to be massless and are not.
+   !> Tell of pairs whose surfaces were to be massless and are not; one side of two is enough.
    subroutine warn_of_mass(self, scene)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
+      logical :: sheds(self%system%n_pair)
       integer :: i
 
       do i = 1, self%system%n_pair
-         if (scene%pair(i)%initiation == initiation_persistent) cycle
-         if (any(self%may_shed(self%system%contact(i)%contact%node))) cycle
-         call note_add(self%warnings, "the surface " // scene%surface(scene%pair(i)%slave)%name // &
-            " of a contact pair keeps its mass in spite of TYPE=MASSLESS: it is prescribed, " // &
-            "tied, rigid, given mass or forces, or one element thick")
+         sheds(i) = any(self%may_shed(self%system%contact(i)%contact%node))
+      end do
+      do i = 1, self%system%n_pair
+         associate (pair => scene%pair(i))
+            if (pair%initiation == initiation_persistent) cycle
+            if (any(sheds .and. (scene%pair%slave == pair%slave .or. &
+               scene%pair%slave == pair%master .and. scene%pair%master == pair%slave))) cycle
+            call note_add(self%warnings, "the surface " // scene%surface(pair%slave)%name // &
+               " of a contact pair keeps its mass in spite of TYPE=MASSLESS: it is prescribed, " &
+               // "tied, rigid, given mass or forces, or one element thick")
+         end associate
       end do
    end subroutine warn_of_mass
 
