@@ -138,17 +138,18 @@ def graded(fine: float, even: float, end: float) -> list[float]:
     return [*place[:-1], end]
 
 
-def half_cylinder(fine: float) -> tuple[tuple[int, int], Callable[[int, int], Point]]:
+def half_cylinder(fine: float, radius: float = RADIUS, half_width: float = HALF_WIDTH,
+                  ) -> tuple[tuple[int, int], Callable[[int, int], Point]]:
     """Cells and positions of the upper cylinder: lowest point at the origin, i to the right."""
-    arc = graded(fine, 1.5*HALF_WIDTH, RADIUS*HALF_ANGLE)
-    angle = [s/RADIUS for s in arc]
+    arc = graded(fine, 1.5*half_width, radius*HALF_ANGLE)
+    angle = [s/radius for s in arc]
     angle = [-a for a in reversed(angle[1:])] + angle
-    height = [s/RADIUS for s in graded(fine, 0.5*HALF_WIDTH, RADIUS)]
+    height = [s/radius for s in graded(fine, 0.5*half_width, radius)]
 
     def place(i: int, j: int) -> Point:
         a, t = angle[i], height[j]
-        x, y = RADIUS*math.sin(a), 2.0*RADIUS*math.sin(0.5*a)**2
-        return (1.0 - t)*x + t*RADIUS*a/HALF_ANGLE, (1.0 - t)*y + t*RADIUS
+        x, y = radius*math.sin(a), 2.0*radius*math.sin(0.5*a)**2
+        return (1.0 - t)*x + t*radius*a/HALF_ANGLE, (1.0 - t)*y + t*radius
 
     return (len(angle) - 1, len(height) - 1), place
 

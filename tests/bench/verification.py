@@ -1,4 +1,4 @@
-"""Make the tables and figures of docs/verification.md again.
+"""Make the tables and figures of docs/verification.md and docs/impacts.md again.
 
     .venv/bin/python tests/bench/verification.py            # print the tables
     .venv/bin/python tests/bench/verification.py --update   # write them and the figures into docs/
@@ -15,37 +15,38 @@ import pathlib
 import re
 import tempfile
 
-from book import (bar, contact_patch, contact_sides, forces, free_bodies, hertz, ironing, numerics, plain,
-                  press_fit, ring, slave_floor, spin, statics, ties, ties_condition)
+from book import (bar, contact_patch, contact_sides, forces, free_bodies, hertz, impacts, ironing,
+                  numerics, plain, press_fit, ring, slave_floor, spin, statics, ties, ties_condition)
 from book.common import Runs
 
-BOOK = pathlib.Path(__file__).resolve().parents[2] / "docs" / "verification.md"
+DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
 
 #: In the order of the book.
 CHAPTERS = [
     chapter
     for module in (ring, spin, bar, forces, free_bodies, statics, ties, ties_condition, contact_patch,
-                   hertz, press_fit, ironing, plain, contact_sides, slave_floor, numerics)
+                   hertz, press_fit, ironing, plain, contact_sides, slave_floor, numerics, impacts)
     for chapter in module.CHAPTERS
 ]
 
 
-def update(text, name, lines):
-    """`text` of the book with the table between the marks of `name` made anew."""
+def update(page, name, lines):
+    """Make the table between the marks of `name` anew in a page."""
+    text = (DOCS / page).read_text()
     mark = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-    assert mark.search(text), f"docs/verification.md has no table {name}"
-    return mark.sub(lambda match: match[1] + "\n".join(lines) + "\n" + match[2], text)
+    assert mark.search(text), f"docs/{page} has no table {name}"
+    text = mark.sub(lambda match: match[1] + "\n".join(lines) + "\n" + match[2], text)
+    (DOCS / page).write_text(text)
 
 
 def main():
-    parser = argparse.ArgumentParser(description="Tables and figures of docs/verification.md")
+    parser = argparse.ArgumentParser(description="Tables and figures of docs/")
     parser.add_argument("--update", action="store_true", help="write into docs/")
     parser.add_argument("only", nargs="*", help="chapters, as they are named in the output")
     options = parser.parse_args()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     chapters = [c for c in CHAPTERS if not options.only or c.name in options.only]
-    figures = BOOK.parent if options.update else None
-    text = BOOK.read_text() if options.update else ""
+    figures = DOCS if options.update else None
     with tempfile.TemporaryDirectory() as folder:
         runs = Runs(folder)
         try:
@@ -54,11 +55,9 @@ def main():
                 lines = chapter.report(futures, figures)
                 print(f"{chapter.name}\n", *lines, "", sep="\n", flush=True)
                 if options.update:
-                    text = update(text, chapter.name, lines)
+                    update(chapter.page, chapter.name, lines)
         finally:
             runs.pool.shutdown(cancel_futures=True)
-    if options.update:
-        BOOK.write_text(text)
 
 
 if __name__ == "__main__":

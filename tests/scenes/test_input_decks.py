@@ -3,9 +3,14 @@
 The ring has test_ring.py, the spinning ring also test_flight.py, tied bodies have test_ties.py.
 """
 
+import sys
+
 import numpy as np
 import pytest
-from scene_tools import DECKS, emcon, figures, run_deck
+from scene_tools import DECKS, ROOT, emcon, figures, run_deck
+
+sys.path.append(str(ROOT / "tests" / "bench"))
+from book import impacts  # noqa: E402
 
 SHORT = {
     "ring": {"h": 0.05, "t_end": 0.5},
@@ -204,3 +209,52 @@ def test_bar_keeps_its_energy(bar):
 @pytest.mark.parametrize("name", ["ring", "hertz", "ironing"])
 def test_slaves_are_the_right_ones(name):
     assert "should be the slave" not in emcon("check", DECKS / f"{name}.inp").stderr
+
+
+@pytest.mark.parametrize("initiation", ["MASSLESS", "PERSISTENT", "VELOCITY UPDATE"])
+def test_bar_on_wall(initiation, tmp_path):
+    """Until the wave is there the free end knows nothing of the wall, but for what an implicit
+    step lets run ahead: at half of the way by less than a millionth."""
+    deck = DECKS / "bar_on_wall.inp"
+    (energy,) = figures(deck, r"Total energy (\S+) J")
+    start, end = figures(deck, r"at the wall from (\S+) s to (\S+) s")
+    run = run_deck(deck, tmp_path, initiation=initiation)
+    history = run.history
+    assert np.abs(history["total"]/energy - 1).max() < 1e-12
+    time, u = run.series("ENDS", "U")
+    at = np.argmin(np.abs(time - 4e-5))
+    assert u[at, 1, 1] == pytest.approx(-4e-3, rel=1e-6)
+    force = np.abs(history["pair1_force_y"])
+    # An increment, and the wave front, about two elements wide.
+    slack = 2.5e-7 + 2*0.005/5000
+    assert history["time"][np.flatnonzero(force)[0]] == pytest.approx(start, abs=slack)
+    assert history["time"][np.flatnonzero(force)[-1]] == pytest.approx(end, abs=slack)
+    impulse = np.sum(force[1:]*np.diff(history["time"]))
+    rebound = impulse/0.16 - 100
+    assert rebound == pytest.approx(history["py"][-1]/0.16, rel=1e-10)
+    assert 97 < rebound < 100
+    if initiation == "MASSLESS":
+        assert np.abs(np.diff((force > 0).astype(int))).sum() == 2
+        assert rebound > 99
+
+
+@pytest.mark.parametrize("restitution", [1, 0.5, 0])
+def test_rigid_bar(restitution, tmp_path):
+    deck = DECKS / "rigid_bar.inp"
+    speed, energy = figures(deck, r"comes back with (\S+) m/s .*, total energy (\S+) J")
+    history = run_deck(deck, tmp_path, restitution=restitution).history
+    kinetic = energy*restitution**2
+    assert history["kinetic"][-1] == pytest.approx(kinetic, rel=1e-12, abs=1e-12*energy)
+    assert history["py"][-1] == pytest.approx(restitution*2*energy/speed, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize(("formulation", "peak_slack", "width_slack"),
+                         [("MORTAR", 1e-3, 0.015), ("NODE TO SURFACE", 0.03, 0.03)])
+def test_roller(formulation, peak_slack, width_slack, tmp_path):
+    """As the heading says: Hertz, for bodies large against the contact."""
+    deck = DECKS / "roller.inp"
+    width, peak, total = figures(deck, r"half-width (\S+) mm, peak pressure (\S+) N.*"
+                                       r"contact forces (\d+)\.")
+    found = impacts.roller_contact(run_deck(deck, tmp_path, formulation=formulation))
+    assert found == (pytest.approx(peak, rel=peak_slack), pytest.approx(width, rel=width_slack))
+    assert total == 35000

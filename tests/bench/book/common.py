@@ -70,7 +70,7 @@ class Runs:
 
 @dataclasses.dataclass(frozen=True)
 class Chapter:
-    """A table of the book: `start` begins its runs, `report` waits and gives its lines.
+    """A table of a page of docs/: `start` begins its runs, `report` waits and gives its lines.
 
     `report(started, figures)` draws into the folder `figures`, unless that is None.
     """
@@ -78,6 +78,7 @@ class Chapter:
     name: str
     start: object
     report: object
+    page: str = "verification.md"
 
 
 def with_print(deck, cards):
