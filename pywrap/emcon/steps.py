@@ -140,9 +140,16 @@ class Step(Cards):
         return self._card("NEWTON", {"TYPE": type, "TOLERANCE": tolerance, "MAXIMUM": maximum,
                                      "POLISH": ends})
 
-    def time_integration(self, scheme: str) -> Step:
-        """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), or a name by which a program gives one."""
-        return self._card("TIME INTEGRATION", {"SCHEME": scheme})
+    def time_integration(self, scheme: str, *, alpha: Number | None = None,
+                         spectral_radius: Number | None = None) -> Step:
+        """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), another scheme, or one that a program gives.
+
+        scheme            MIDPOINT, TRAPEZOIDAL, GENERALIZED ALPHA, BDF2
+        alpha             of GENERALIZED ALPHA, -1/3 to 0 (default -0.05)
+        spectral_radius   of GENERALIZED ALPHA, instead: at the highest frequencies, 0 to 1
+        """
+        return self._card("TIME INTEGRATION", {"SCHEME": scheme, "ALPHA": alpha,
+                                               "SPECTRAL RADIUS": spectral_radius})
 
     # --- output ----------------------------------------------------------------------------
 

@@ -144,23 +144,29 @@ contains
    end subroutine has_looked
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
-   !> that end, and work over the whole step, wherever in it a scheme evaluates forces.
+   !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push
+   !> along gradients at the end, where a scheme says so.
    pure subroutine linearise(self, wanted, motion, target, item)
       class(contact_t), intent(inout) :: self
       integer, intent(in) :: wanted(:)                !! (n) numbers of constraints, ascending
       type(motion_t), intent(in) :: motion            !! placed
       real(wp), intent(in) :: target(:)               !! (n) mean gaps to hold [L]
       type(condition_t), intent(inout) :: item(:)     !! (n)
+      real(wp), dimension(size(item)) :: gap0, dgap
       integer :: k
 
-      if (pose_is_equilibrium(motion%pose)) then
-         call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
-         do k = 1, size(item)
-            if (.not. item(k)%leaves_second) item(k)%h = motion%weight*item(k)%h
-         end do
-      else
-         call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, item)
-      end if
+      if (.not. pose_is_equilibrium(motion%pose)) call self%evaluate(wanted, motion%x, motion%u0, &
+         motion%du, target, item)
+      if (.not. (pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end)) return
+      gap0 = item%gap0
+      dgap = item%dgap
+      call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
+      do k = 1, size(item)
+         if (.not. item(k)%leaves_second) item(k)%h = motion%weight*item(k)%h
+      end do
+      if (pose_is_equilibrium(motion%pose)) return
+      item%gap0 = gap0
+      item%dgap = dgap
    end subroutine linearise
 
    !> Make room for `n` nodes and count them.

@@ -38,6 +38,13 @@ contains
             scene%rigid(k)%origin, "rigid body " // scene%rigid(k)%name // " has a MASSLESS " // &
             "section: it has nothing but its inertia")
       end do
+      do k = 1, size(scene%step)
+         associate (scheme => scene%step(k)%scheme)
+            if (scheme%masses_resist .and. .not. scheme%takes_massless) call add_error(reader%log, &
+               scene%step(k)%choice%origin, "SCHEME=" // trim(scheme%word) // " does not go " // &
+               "with MASSLESS sections; use SCHEME=ENERGY MOMENTUM")
+         end associate
+      end do
       call mark_bare(scene, is_massless, is_bare)
       call mark_contact(scene, meets)
       if (.not. any(meets .and. is_bare)) return

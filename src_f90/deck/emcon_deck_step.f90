@@ -15,6 +15,7 @@ module emcon_deck_step
    use emcon_deck_options, only : choose_option
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
    use emcon_deck_rigid, only : read_turns
+   use emcon_deck_scheme, only : check_schemes, read_scheme
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
@@ -23,7 +24,7 @@ module emcon_deck_step
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
-   use emcon_scheme_registry, only : scheme_given_row, scheme_row
+   use emcon_scheme_registry, only : scheme_row
    use emcon_solver_registry, only : is_foreign_solver, solver_given, solver_names, solvers
    use emcon_steps, only : step_t
    use emcon_text, only : to_text
@@ -72,6 +73,7 @@ contains
       end do
       call pairs_ask(reader, scene%pair, scene%step)
       call check_massless(reader, scene%step)
+      call check_schemes(reader, scene%pair, scene%step)
       call check_restitution(reader, scene%pair, scene%step)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
@@ -318,26 +320,6 @@ contains
          call refuse_option(reader, card, "POLISH", "YES, NO", "")
       end select
    end subroutine read_newton
-
-   !> *TIME INTEGRATION: the scheme of dynamic steps from this one on, or the name of one that a
-   !> program gives.
-   subroutine read_scheme(reader, card, step)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(step_t), intent(inout) :: step
-      character(len=:), allocatable :: known
-
-      select case (option_name(card, "SCHEME"))
-      case ("MIDPOINT", "TRAPEZOIDAL", "GENERALIZEDALPHA", "CENTRALDIFFERENCE")
-         call option_words("scheme", known)
-         call refuse_option(reader, card, "SCHEME", known, "not in this version")
-      case default
-         step%choice%origin = card%origin
-         step%choice%name = option_name(card, "SCHEME")
-         step%choice%row = scheme_row("DYNAMIC", step%choice%name)
-         if (step%choice%row%code == 0) step%choice%row = scheme_given_row
-      end select
-   end subroutine read_scheme
 
    subroutine read_restart(reader, card, step)
       type(reader_t), intent(inout) :: reader

@@ -14,6 +14,7 @@ module emcon_march_begin
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_grid, only : march_count_grid, march_grid_time
+   use emcon_march_past, only : march_past_forget
    use emcon_march_types, only : march_t
    use emcon_mass_return, only : mass_match
    use emcon_mechanism_text, only : free_motion_text
@@ -58,6 +59,7 @@ contains
       self%state%n_easy = 0
       self%state%n_before = self%state%increment
       self%state%start_time = self%state%time
+      call march_past_forget(self%state)
       if (.not. scene%step(i_step)%scheme%masses_resist) self%state%v = 0.0_wp
       call system_begin_step(self%system, scene, i_step, error)
       if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &

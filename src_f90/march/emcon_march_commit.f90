@@ -7,6 +7,7 @@ module emcon_march_commit
    use emcon_keeping, only : keeping_commit
    use emcon_kinds, only : wp
    use emcon_march_guess, only : follow_links
+   use emcon_march_past, only : march_past_keep
    use emcon_march_types, only : increment_t, march_t
    use emcon_numbering, only : gather_dependent
    use emcon_pair_record, only : pair_record_measure
@@ -36,26 +37,17 @@ contains
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
       logical :: is_due
-      integer :: i, a
 
       if (.not. increment%done > 0.0_wp) call pair_sums_begin(self%state%sums%sum)
       associate (state => self%state, system => self%system, set => self%active%set)
          system%response%residual = system%response%residual - self%newton%contact
          call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
-         do i = 1, size(state%v, 2)
-            do a = 1, size(state%v, 1)
-               if (system%space%numbering%unknown(a, i) > 0) then
-                  self%v1(a, i) = pose_velocity(self%motion%pose, state%v(a, i), &
-                     self%motion%du(a, i))
-                  system%response%residual(a, i) = 0.0_wp
-               end if
-            end do
-         end do
-         call follow_links(system, self%v1)
-         state%reaction = system%response%residual
+         call find_velocities(self)
+         state%reaction = system%response%residual/(1.0_wp + self%motion%pose%start_weight)
          if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
          call book_work(self)
+         call march_past_keep(self, h)
          call restitute(self, scene, h, increment%notes, error)
          if (allocated(error)) return
          state%u = state%u + self%ending%du
@@ -64,7 +56,8 @@ contains
          state%v = self%v1
          state%contact = self%newton%contact
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
-            merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist))
+            merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
+            .not. self%motion%pose%pushes_at_end))
          call pair_sums_add(state%sums, system, set, self%motion, h, self%scheme%row%masses_resist)
          state%internal = self%ending%force
          state%energy = self%ending%energy
@@ -88,6 +81,24 @@ contains
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
+
+   !> The velocities at the end, and no reaction where they are unknown.
+   subroutine find_velocities(self)
+      type(march_t), intent(inout) :: self
+      integer :: i, a
+
+      associate (motion => self%motion, system => self%system)
+         do i = 1, size(self%v1, 2)
+            do a = 1, size(self%v1, 1)
+               if (.not. system%space%numbering%unknown(a, i) > 0) cycle
+               self%v1(a, i) = pose_velocity(motion%pose, self%state%v(a, i), motion%du(a, i))
+               if (allocated(motion%v_past)) self%v1(a, i) = self%v1(a, i) + motion%v_past(a, i)
+               system%response%residual(a, i) = 0.0_wp
+            end do
+         end do
+         call follow_links(system, self%v1)
+      end associate
+   end subroutine find_velocities
 
    !> The velocities that impacts and what has no mass call for.
    subroutine restitute(self, scene, h, notes, error)
@@ -225,7 +236,8 @@ contains
    end subroutine tell_stabilized
 
    !> Add the works of the step. With inertia the sums are exact for discrete gradients (see
-   !> docs/theory.md, eq. (23)); in statics forces are taken as linear over the step.
+   !> docs/theory.md, eq. (23)); in statics, and loads where contact pushes at the end, forces are
+   !> taken as linear over the step.
    subroutine book_work(self)
       type(march_t), intent(inout) :: self
       real(wp) :: contact_work
@@ -234,7 +246,14 @@ contains
       associate (state => self%state, part => self%system%response%part, &
             set => self%active%set, motion => self%motion)
          contact_work = 0.0_wp
-         if (self%scheme%row%masses_resist) then
+         if (motion%pose%pushes_at_end) then
+            contact_work = sum((motion%pose%start_weight*state%contact + self%newton%contact) &
+               *motion%du)/(1.0_wp + motion%pose%start_weight)
+            self%ledger%external_work = self%ledger%external_work &
+               + 0.5_wp*sum((state%load + part(role_external)%force)*motion%du) &
+               + sum(state%reaction*motion%du) + sum(part(role_inertia)%force*motion%offset) &
+               /(1.0_wp + motion%pose%start_weight)
+         else if (self%scheme%row%masses_resist) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
             end do

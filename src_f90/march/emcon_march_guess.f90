@@ -1,6 +1,7 @@
 !> The first guess of a step: prescribed motion, and what the velocities lead to.
 module emcon_march_guess
    use emcon_kinds, only : wp
+   use emcon_march_past, only : march_past_take
    use emcon_march_types, only : march_t
    use emcon_numbering, only : spread_dependent
    use emcon_pose, only : instant_later, instant_t, pose_way
@@ -21,12 +22,15 @@ contains
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: is_at_rest          !! free nodes do not move in the guess
-      type(instant_t) :: finish
+      type(instant_t) :: begin, finish
       real(wp) :: u, v
       integer :: k
 
       finish = instant_later(start, h)
-      self%motion%pose = self%scheme%pose(start, h)
+      begin = start
+      begin%h_before = self%state%h_before
+      self%motion%pose = self%scheme%pose(begin, h)
+      call march_past_take(self)
       self%motion%u0 = self%state%u
       self%motion%v0 = self%state%v
       self%motion%offset = 0.0_wp
@@ -42,6 +46,7 @@ contains
                self%motion%du(a, i) = u - state%u(a, i)
                self%v1(a, i) = v
                if (self%scheme%row%masses_resist) then
+                  if (allocated(self%motion%v_past)) v = v - self%motion%v_past(a, i)
                   self%motion%offset(a, i) = pose_way(self%motion%pose, state%v(a, i), v) &
                      - self%motion%du(a, i)
                else

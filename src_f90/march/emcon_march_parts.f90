@@ -46,6 +46,7 @@ contains
          part%h = scale(increment%h, -level)
          part%start%step_time = t0 + scale(real(place, wp), -self%n_level)*increment%h
          part%start%total_time = self%state%start_time + part%start%step_time
+         part%start%h_before = self%state%h_before
          part%may_cut = level < self%n_level
          call march_step(self, scene, part, increment, status, error)
          if (allocated(error)) return

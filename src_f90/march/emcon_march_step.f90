@@ -14,6 +14,7 @@ module emcon_march_step
    use emcon_look_plane, only : overlap_names
    use emcon_march_commit, only : march_commit
    use emcon_march_guess, only : march_guess
+   use emcon_march_past, only : march_past_begin
    use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
@@ -56,7 +57,8 @@ contains
       if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
       self%active%left = [overclosure_left(scene, self%state, part%start%step_time), &
          overclosure_left(scene, self%state, part%start%step_time + part%h)]
-      call keep_factor(self, part, error)
+      call march_past_begin(self, scene, part%start, error)
+      if (.not. allocated(error)) call keep_factor(self, part, error)
       if (allocated(error)) return
       do attempt = 1, 2
          call march_guess(self, scene, part%start, part%h, is_at_rest=attempt == 2)

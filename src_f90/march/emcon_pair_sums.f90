@@ -84,7 +84,7 @@ contains
 
       if (size(self%sum) == 0) return
       if (.not. masses_resist) call pair_sums_begin(self%sum)
-      part = merge(0.5_wp, 1.0_wp, masses_resist)
+      part = merge(0.5_wp, 1.0_wp, masses_resist .and. .not. motion%pose%pushes_at_end)
       self%sum%span = self%sum%span + h
       self%sum%is_pressed = .false.
       contact = 1

@@ -32,6 +32,11 @@ module emcon_state
       real(wp), allocatable :: internal(:, :)    !! (n_dim, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy
       real(wp) :: potential = 0.0_wp             !! energy of the given forces
+      ! for schemes that look back:
+      logical :: has_past = .false.              !! the rest is known
+      real(wp) :: h_before = 0.0_wp              !! size of the last step; 0: there is none [T]
+      real(wp), allocatable :: load(:, :)        !! (n_dim, n_node) external forces
+      real(wp), allocatable :: past(:, :, :)     !! (n_dim, n_node, n_past) as the scheme has it
       type(factor_base_t) :: base                !! of the factor that is kept over steps
    end type state_t
 

@@ -5,6 +5,7 @@
 !> bodies apart and keeps the momenta. Source: Laursen & Love (2002); docs/theory.md,
 !> eqs. (21) and (22).
 module emcon_velocity_update
+   use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : error_t
@@ -20,7 +21,8 @@ module emcon_velocity_update
    implicit none
    private
    public :: push_t, velocity_update_t, velocity_update_reset, velocity_update_apply, &
-      velocity_update_push, velocity_update_free, push_weights, rate_jump_t, velocity_update_change
+      velocity_update_push, velocity_update_free, push_weights, rate_jump_t, &
+      velocity_update_change, velocity_update_accelerate
 
    !> Contacts that stay closed keep gaps of this size relative to an edge: round-off, no loss.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -165,6 +167,39 @@ contains
       call add_jump(self, system, 1.0_wp, v)
    end subroutine velocity_update_change
 
+   !> The acceleration M^-1 `force` of what moves with `v`, such that conditions that always hold go
+   !> on to hold.
+   subroutine velocity_update_accelerate(self, system, held, force, v, acceleration, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: held         !! at the place of the velocities
+      real(wp), intent(in), contiguous :: force(:, :)    !! (n_dim, n_node) [M L/T^2]
+      real(wp), intent(in), contiguous :: v(:, :)        !! (n_dim, n_node) [L/T]
+      real(wp), intent(out), contiguous :: acceleration(:, :)   !! (n_dim, n_node) [L/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      acceleration = 0.0_wp
+      if (.not. self%is_ready) call factorise_mass(self, system, error)
+      if (allocated(error)) return
+      if (self%mass%is_singular) return
+      call pick(system, force, self%push)
+      call self%mass%solve(self%push, self%jump, error)
+      if (.not. allocated(error)) call keep_held(self, system, held, error, &
+         [(-bend(held%item(k), v), k = held%n_linear + 1, held%n_held)])
+      if (.not. allocated(error)) call add_jump(self, system, 1.0_wp, acceleration)
+   end subroutine velocity_update_accelerate
+
+   !> The second derivative of a condition along `v`.
+   pure real(wp) function bend(item, v)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: v(:, :)                    !! (n_dim, n_node) [L/T]
+      real(wp) :: own(size(v, 1)*item%n_node)
+
+      own = reshape(v(:, item%node(:item%n_node)), shape(own))
+      bend = dot_product(own, matmul(item%h(:size(own), :size(own)), own))
+   end function bend
+
    !> Find the jump M^-1 `force` that the shapes of rigid bodies leave; along it the kinetic energy
    !> changes by s b + s^2 a/2; a = 0: there is none.
    subroutine push_along(self, system, set, force, v, gain, error)
@@ -204,12 +239,14 @@ contains
    end subroutine pick
 
    !> Take out of the jump what conditions that always hold, and are not linear, forbid: add
-   !> M^-1 C^T mu such that C times the jump is 0, with their gradients C at the end of the step.
-   subroutine keep_held(self, system, set, error)
+   !> M^-1 C^T mu such that C times the jump is 0, or `wanted`, with their gradients C at the end of
+   !> the step.
+   subroutine keep_held(self, system, set, error, wanted)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: wanted(:)    !! (conditions that are not linear)
       real(wp), allocatable :: row(:, :), way(:, :)
       real(dp), dimension(set%n_held - set%n_linear, 1) :: rate, mu
       real(dp) :: product(size(rate), size(rate))
@@ -221,6 +258,7 @@ contains
       if (allocated(error)) return
       do k = 1, size(rate)
          rate(k, 1) = -real(dot_product(row(:, k), self%jump), dp)
+         if (present(wanted)) rate(k, 1) = rate(k, 1) + real(wanted(k), dp)
          do l = 1, k
             product(l, k) = real(dot_product(row(:, l), way(:, k)), dp)
             product(k, l) = product(l, k)

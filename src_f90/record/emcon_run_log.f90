@@ -103,6 +103,10 @@ contains
          if (step%solver == solver_given) solver = step%solver_name
          scheme = trim(step%scheme%text)
          if (step%scheme%code == scheme_given) scheme = "scheme " // step%choice%name
+         associate (setting => step%scheme%setting)
+            if (setting%word /= "") scheme = scheme // " (" // trim(setting%word) // "=" // &
+               to_text(setting%value) // ")"
+         end associate
          call note_add(notes, "step " // to_text(k) // ": duration " // to_text(step%duration) // &
             ", h = " // to_text(step%h) // trim(merge(", NLGEOM", "        ", step%nlgeom)) // &
             ", " // scheme // ", solver " // solver)

@@ -71,7 +71,7 @@ contains
    pure subroutine format_text(text)
       character(len=:), allocatable, intent(out) :: text
 
-      text = "emcon restart 4, reals of " // to_text(storage_size(1.0_wp)) // " bits"
+      text = "emcon restart 5, reals of " // to_text(storage_size(1.0_wp)) // " bits"
    end subroutine format_text
 
    subroutine write_entry(entry, file, path, error)

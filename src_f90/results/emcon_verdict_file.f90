@@ -107,6 +107,8 @@ contains
       call restart_exchange(restart, "verdict", self%largest_drift)
       call restart_exchange(restart, "verdict", self%reference)
       call restart_exchange(restart, "verdict", self%dynamic_drift)
+      call restart_exchange(restart, "verdict", self%shown_reference)
+      call restart_exchange(restart, "verdict", self%shown_drift)
       call restart_exchange(restart, "verdict", self%deepest)
       call restart_exchange(restart, "verdict", self%deepest_time)
       call restart_exchange(restart, "verdict", self%unconverged)

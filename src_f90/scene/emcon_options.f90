@@ -25,7 +25,7 @@ module emcon_options
    type :: option_row_t
       character(len=14) :: kind                  !! the option
       integer :: code
-      character(len=16) :: word                  !! in decks
+      character(len=20) :: word                  !! in decks
       character(len=24) :: c_name                !! in the headers; empty: it is not there
       character(len=44) :: text                  !! in the log; empty: nothing is said
       character(len=40) :: also                  !! other words of decks, ",A,B,", without blanks

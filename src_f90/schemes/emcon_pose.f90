@@ -5,18 +5,24 @@ module emcon_pose
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: instant_t, pose_t, pose_at_end
+   public :: instant_t, pose_t, pose_at_end, most_past
    public :: pose_moving, pose_velocity, pose_way, pose_is_equilibrium, instant_later
+
+   !> Fields that a scheme keeps of the steps before, at most.
+   integer, parameter :: most_past = 2
 
    !> A moment of a step, as amplitudes see it.
    type :: instant_t
       real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
       real(wp) :: total_time = 0.0_wp            !! since the start of the analysis [T]
+      real(wp) :: h_before = 0.0_wp              !! of the step that ends here; 0: none [T]
    end type instant_t
 
    !> Inertia is s M (b du - w v0): b du - w v0 is the change of velocity, computed with the same b
    !> as the velocity itself. Two factors for du and v0 would round apart, a bias in each step.
-   !> Forces are discrete gradients from the start of the step to a place in it, or gradients there.
+   !> Fields of the steps before add to both.
+   !> Forces are discrete gradients from the start of the step to a place in it, or gradients there,
+   !> to which those at the start may be added.
    type :: pose_t
       real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: masses do not resist
       real(wp) :: rate = 0.0_wp                  !! b [1/T]
@@ -26,6 +32,11 @@ module emcon_pose
       logical :: is_gradient = .false.           !! at `place`, else discrete from the start to it
       real(wp) :: load_place = 0.5_wp            !! part of the way at which loads act: 0..1
       type(instant_t) :: load_instant            !! when loads are taken
+      !> Contact pushes along gradients at the end, else along discrete ones over all of the step.
+      logical :: pushes_at_end = .false.
+      real(wp) :: start_weight = 0.0_wp          !! of all forces at the start; those at `place`: 1
+      real(wp) :: past_velocity(most_past) = 0.0_wp  !! weights of the past in the velocity
+      real(wp) :: past_change(most_past) = 0.0_wp    !! and in b du - w v0
    end type pose_t
 
    !> Gradients at the end of the step, where masses do not resist.
@@ -45,7 +56,8 @@ contains
       pose%v_weight = v_weight
    end function pose_moving
 
-   !> Velocity at the end of a step from `v0` that moved by `du`: v1 = b du + (1 - w) v0.
+   !> Velocity at the end of a step from `v0` that moved by `du`: v1 = b du + (1 - w) v0, and what
+   !> the past adds.
    elemental real(wp) function pose_velocity(pose, v0, du) result(v1)
       type(pose_t), intent(in) :: pose
       real(wp), intent(in) :: v0                 !! at the start [L/T]

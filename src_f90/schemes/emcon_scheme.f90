@@ -6,16 +6,27 @@ module emcon_scheme
    use emcon_pose, only : instant_t, pose_t
    implicit none
    private
-   public :: scheme_t, scheme_row_t
+   public :: scheme_t, scheme_row_t, setting_t
+
+   !> The number of a scheme that decks may give.
+   type :: setting_t
+      character(len=16) :: word = ""             !! of decks; "": there is none
+      real(wp) :: value = 0.0_wp
+   end type setting_t
 
    !> What is known of a scheme before there is one: decks are read by it.
    type :: scheme_row_t
       integer :: code = 0                        !! one of `scheme_`; 0: none
       character(len=8) :: card = ""              !! that asks for it
-      character(len=16) :: word = ""             !! SCHEME= in decks; "": the only one of its card
+      character(len=20) :: word = ""             !! SCHEME= in decks; "": the only one of its card
       character(len=24) :: text = ""             !! in the log; "": the name by which it is given
       logical :: masses_resist = .false.         !! there are velocities, and pushing makes energy
       logical :: loads_ramp = .false.            !! without amplitude they run over the step
+      logical :: takes_jumps = .true.            !! velocities may jump where a step ends
+      logical :: takes_massless = .true.         !! nodes may be without mass
+      logical :: is_accelerated = .false.        !! the past is the acceleration
+      integer :: n_past = 0                      !! fields that are kept of the steps before
+      type(setting_t) :: setting
    end type scheme_row_t
 
    type, abstract :: scheme_t
@@ -23,6 +34,7 @@ module emcon_scheme
    contains
       procedure(pose_interface), deferred :: pose
       procedure :: keeps_energy
+      procedure :: carry
    end type scheme_t
 
    abstract interface
@@ -39,6 +51,19 @@ module emcon_scheme
    end interface
 
 contains
+
+   !> What is kept of a step of size `h` by `du`, in which velocities went from `v0` to `v1`; `past`
+   !> is that of the steps before. Nothing unless overridden.
+   pure subroutine carry(self, h, du, v0, v1, past)
+      class(scheme_t), intent(in) :: self
+      real(wp), intent(in) :: h                              !! > 0 [T]
+      real(wp), intent(in), contiguous :: du(:, :)           !! (n_dim, n_node) [L]
+      real(wp), intent(in), contiguous :: v0(:, :), v1(:, :) !! (n_dim, n_node) [L/T]
+      real(wp), intent(inout), contiguous :: past(:, :, :)   !! (n_dim, n_node, n_past)
+
+      associate (unused => self, no => h + du(1, 1) + v0(1, 1) + v1(1, 1) + past(1, 1, 1))
+      end associate
+   end subroutine carry
 
    !> Is the energy balance of a step exact? If not, what it is off by is shown, not judged.
    pure logical function keeps_energy(self)

@@ -19,6 +19,10 @@ module emcon_motion
       real(wp), allocatable :: v0(:, :)          !! velocity at the start [L/T]
       real(wp), allocatable :: du(:, :)          !! displacement over the step [L]
       real(wp), allocatable :: offset(:, :)      !! to `du`, for inertia [L]
+      ! where the scheme keeps something of the steps before:
+      real(wp), allocatable :: v_past(:, :)      !! what that adds to the velocity at the end [L/T]
+      real(wp), allocatable :: dv_past(:, :)     !! and to the change that inertia sees [L/T]
+      real(wp), allocatable :: carried(:, :)     !! forces from the start, weighted [M L/T^2]
       ! of `motion_place`:
       real(wp), allocatable :: from(:, :)        !! displacement where the span starts [L]
       real(wp), allocatable :: by(:, :)          !! displacement over the span [L]

@@ -13,7 +13,7 @@ module emcon_stepper_file
    use emcon_pair_record, only : pair_record_t
    use emcon_pair_sums, only : pair_sums_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_list, restart_offers, &
-      restart_rewind, restart_t
+      restart_rewind, restart_size, restart_t
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_build, stepper_read_source, stepper_t
    use emcon_text, only : to_text
@@ -93,6 +93,7 @@ contains
          call restart_exchange(restart, "internal", state%internal)
          call restart_exchange(restart, "lam", state%lam)
          call restart_exchange(restart, "is_active", state%is_active)
+         call exchange_past(state, restart)
          if (restart_offers(restart, "has_mass", any(state%has_mass))) call restart_exchange( &
             restart, "has_mass", state%has_mass)
       end associate
@@ -101,6 +102,33 @@ contains
       call exchange_sums(self%march%state%sums, restart)
       call verdict_exchange(self%verdict, restart)
    end subroutine exchange_state
+
+   !> What the scheme looks back on.
+   subroutine exchange_past(state, restart)
+      type(state_t), intent(inout) :: state
+      type(restart_t), intent(inout) :: restart
+
+      if (restart_offers(restart, "load", state%has_past)) then
+         if (.not. allocated(state%load)) allocate(state%load, mold=state%u)
+         call restart_exchange(restart, "load", state%load)
+         call restart_exchange(restart, "h_before", state%h_before)
+         if (.not. allocated(state%past)) allocate(state%past(size(state%u, 1), size(state%u, 2), &
+            restart_size(restart, "past")/size(state%u)))
+         call exchange_fields()
+         state%has_past = .true.
+      end if
+
+   contains
+
+      subroutine exchange_fields()
+         real(wp) :: flat(size(state%past))
+
+         flat = reshape(state%past, shape(flat))
+         call restart_exchange(restart, "past", flat)
+         state%past = reshape(flat, shape(state%past))
+      end subroutine exchange_fields
+
+   end subroutine exchange_past
 
    subroutine exchange_progress(state, restart)
       type(state_t), intent(inout) :: state
@@ -133,6 +161,7 @@ contains
       call restart_exchange(restart, "factor_excess", base%n_excess)
       call restart_exchange(restart, "factor_time", base%start%step_time)
       call restart_exchange(restart, "factor_time", base%start%total_time)
+      call restart_exchange(restart, "factor_time", base%start%h_before)
       call restart_exchange(restart, "factor_time", base%h)
       call restart_exchange(restart, "factor_u0", base%u0)
       call restart_exchange(restart, "factor_du", base%du)

@@ -11,6 +11,7 @@ module emcon_stepper_free
       march_resume, &
       march_set_time
    use emcon_march_guess, only : follow_links
+   use emcon_march_past, only : march_past_forget
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_pair_record, only : pair_record_init
    use emcon_pair_sums, only : pair_sums_begin
@@ -201,6 +202,7 @@ contains
          next%energy = system%response%energy
          next%potential = system%response%potential
          next%contact = 0.0_wp
+         call march_past_forget(next)
          next%reaction = 0.0_wp
          call pair_record_init(next%pairs, system)
          call pair_sums_begin(next%sums%sum)

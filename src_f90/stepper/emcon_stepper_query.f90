@@ -16,6 +16,7 @@ module emcon_stepper_query
    use emcon_motion, only : at_rest, motion_place
    use emcon_march, only : march_free, march_init, march_resume, march_t
    use emcon_march_guess, only : follow_links, march_guess
+   use emcon_march_past, only : march_past_begin
    use emcon_null_space, only : null_space_free, null_space_t
    use emcon_numbering, only : pick_unknowns
    use emcon_pose, only : instant_t
@@ -157,6 +158,7 @@ contains
       call check_field("u1", u1, stepper%scene, error)
       call check_duration(h, error)
       call take_contact(self, error, lam, is_active)
+      if (.not. allocated(error)) call march_past_begin(self%march, stepper%scene, now(self), error)
       if (allocated(error)) return
       call take_motion(self, stepper, h, u1)
       associate (march => self%march, system => self%march%system)

@@ -281,9 +281,13 @@ contains
          n = size(response%residual)
          call vector_sum(n, internal%force, -1.0_wp, external%force, response%residual)
          call vector_add(n, 1.0_wp, inertia%force, response%residual)
+         if (allocated(motion%carried)) call vector_add(n, 1.0_wp, motion%carried, &
+            response%residual)
          if (response%with_sizes) then
             call vector_sum(n, internal%magnitude, 1.0_wp, external%magnitude, response%magnitude)
             call vector_add(n, 1.0_wp, inertia%magnitude, response%magnitude)
+            if (allocated(motion%carried)) response%magnitude = response%magnitude &
+               + abs(motion%carried)
          end if
       end associate
       call phase_leave(self%phases, left)

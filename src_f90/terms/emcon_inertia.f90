@@ -1,5 +1,5 @@
-!> Inertia s M (b du - w v0): the mass between nodes, the same in all directions, that of the
-!> elements and what is given.
+!> Inertia s M (b du - w v0), and what the past adds: the mass between nodes, the same in all
+!> directions, that of the elements and what is given.
 !>
 !> Source: docs/theory.md, eqs. (2) and (4).
 module emcon_inertia
@@ -188,10 +188,12 @@ contains
          call vector_sum(n, motion%du, 1.0_wp, motion%offset, self%rate)
          call vector_scale(n, pose%rate, self%rate)
          call vector_add(n, -pose%v_weight, motion%v0, self%rate)
+         if (allocated(motion%dv_past)) call vector_add(n, 1.0_wp, motion%dv_past, self%rate)
          call inertia_times(self, self%rate, self%product)
          call vector_add(n, pose%mass_scale, self%product, total%force)
          if (.not. response%with_sizes) return
          self%rate = abs(pose%rate*(motion%du + motion%offset)) + abs(pose%v_weight*motion%v0)
+         if (allocated(motion%dv_past)) self%rate = self%rate + abs(motion%dv_past)
          call inertia_times(self, self%rate, self%product)
          total%magnitude = total%magnitude + pose%mass_scale*self%product
       end associate

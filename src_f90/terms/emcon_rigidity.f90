@@ -90,14 +90,14 @@ contains
       end do
    end subroutine linearise
 
-   !> The distance between two nodes. |d|^2 - l^2 is computed from displacements: w.(2 D + w) for
-   !> d = D + w.
+   !> The distance between two nodes; its force acts where the mean of all forces does.
+   !> |d|^2 - l^2 is computed from displacements: w.(2 D + w) for d = D + w.
    pure subroutine hold(node, motion, item)
       integer, intent(in) :: node(:)                  !! (n_end)
       type(motion_t), intent(in) :: motion            !! placed
       type(condition_t), intent(inout) :: item
       real(wp), dimension(size(motion%x, 1)) :: rest, w0, dw, way
-      real(wp) :: length
+      real(wp) :: length, mean
       integer :: a, n_dim
 
       n_dim = size(motion%x, 1)
@@ -114,7 +114,10 @@ contains
       item%gap0 = dot_product(w0, rest + 0.5_wp*w0)/length
       item%dgap = dot_product(rest + w0 + 0.5_wp*dw, dw)/length
       item%gap1 = dot_product(w0 + dw, rest + 0.5_wp*(w0 + dw))/length
-      way = (rest + between(motion%from) + 0.5_wp*between(motion%by))/length
+      mean = 1.0_wp/(1.0_wp + motion%pose%start_weight)
+      way = rest + between(motion%from) + 0.5_wp*between(motion%by)
+      if (mean < 1.0_wp) way = rest + w0 + mean*dw
+      way = way/length
       item%g(:, 1) = -way
       item%g(:, n_end) = way
       way = (rest + w0 + dw)/length
@@ -122,7 +125,7 @@ contains
       item%c(:, n_end) = way
       item%h = 0.0_wp
       do a = 1, n_dim
-         item%h(a, a) = 0.5_wp*motion%weight/length
+         item%h(a, a) = 0.5_wp*mean*motion%weight/length
          item%h(a, n_dim + a) = -item%h(a, a)
          item%h(n_dim + a, a) = -item%h(a, a)
          item%h(n_dim + a, n_dim + a) = item%h(a, a)

@@ -263,7 +263,9 @@ def everything() -> Model:
     step.mortar(integration="SEGMENTS", points=3, multiplier="DUAL", normal="EDGE",
                 feature_angle=40.0)
     step.smoothing("HERMITE", feature_angle=30.0)
-    step.newton(tolerance=1e-9, maximum=30, polish=True).time_integration("ENERGY MOMENTUM")
+    step.newton(tolerance=1e-9, maximum=30, polish=True)
+    step.time_integration("GENERALIZED ALPHA", alpha=-0.1)
+    step.time_integration("GENERALIZED ALPHA", spectral_radius=0.5)
     for request in ("NODE FILE", "EL FILE", "CONTACT FILE", "NODE PRINT", "EL PRINT",
                     "CONTACT PRINT", "ENERGY PRINT"):
         group = {"N": "N", "E": "E"}.get(request[0]) if "ENERGY" not in request else None
