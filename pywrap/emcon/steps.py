@@ -144,7 +144,8 @@ class Step(Cards):
                          spectral_radius: Number | None = None) -> Step:
         """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), another scheme, or one that a program gives.
 
-        scheme            MIDPOINT, TRAPEZOIDAL, GENERALIZED ALPHA, BDF2
+        scheme            MIDPOINT, TRAPEZOIDAL, GENERALIZED ALPHA, BDF2; CENTRAL DIFFERENCE, in
+                          explicit steps
         alpha             of GENERALIZED ALPHA, -1/3 to 0 (default -0.05)
         spectral_radius   of GENERALIZED ALPHA, instead: at the highest frequencies, 0 to 1
         """

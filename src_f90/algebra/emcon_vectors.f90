@@ -6,7 +6,8 @@ module emcon_vectors
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: vector_zero, vector_scale, vector_add, vector_sum, vector_product, vector_sizes
+   public :: vector_zero, vector_scale, vector_add, vector_sum, vector_product, vector_sizes, &
+      vector_copy
 
 contains
 
@@ -62,5 +63,14 @@ contains
 
       z = abs(x)
    end subroutine vector_sizes
+
+   !> z = x
+   pure subroutine vector_copy(n, x, z)
+      integer, intent(in) :: n                   !! numbers in each field
+      real(wp), intent(in) :: x(n)
+      real(wp), intent(out) :: z(n)
+
+      z = x
+   end subroutine vector_copy
 
 end module emcon_vectors

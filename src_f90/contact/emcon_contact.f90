@@ -145,7 +145,7 @@ contains
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push
-   !> along gradients at the end, where a scheme says so.
+   !> along gradients at the start or the end, where a scheme says so.
    pure subroutine linearise(self, wanted, motion, target, item)
       class(contact_t), intent(inout) :: self
       integer, intent(in) :: wanted(:)                !! (n) numbers of constraints, ascending
@@ -155,6 +155,10 @@ contains
       real(wp), dimension(size(item)) :: gap0, dgap
       integer :: k
 
+      if (motion%pose%is_gradient .and. .not. motion%pose%place > 0.0_wp) then
+         call from_start(self, wanted, motion, target, item)
+         return
+      end if
       if (.not. pose_is_equilibrium(motion%pose)) call self%evaluate(wanted, motion%x, motion%u0, &
          motion%du, target, item)
       if (.not. (pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end)) return
@@ -168,6 +172,29 @@ contains
       item%gap0 = gap0
       item%dgap = dgap
    end subroutine linearise
+
+   !> The gradients at the start in place of discrete ones: forces along them have no moment there,
+   !> docs/theory.md, section 14. Stencils that are others there keep the discrete ones.
+   pure subroutine from_start(self, wanted, motion, target, item)
+      class(contact_t), intent(inout) :: self
+      integer, intent(in) :: wanted(:)                !! (n)
+      type(motion_t), intent(in) :: motion            !! placed
+      real(wp), intent(in) :: target(:)               !! (n)
+      type(condition_t), intent(inout) :: item(:)     !! (n)
+      type(condition_t) :: start(size(item))
+      integer :: k, n
+
+      start%leaves_second = .true.
+      call self%evaluate(wanted, motion%x, motion%from, motion%by, target, start)
+      call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, item)
+      do k = 1, size(item)
+         n = item(k)%n_node
+         if (start(k)%n_node /= n) cycle
+         if (any(start(k)%node(:n) /= item(k)%node(:n))) cycle
+         item(k)%g(:, :n) = start(k)%g(:, :n)
+         item(k)%h = 0.0_wp
+      end do
+   end subroutine from_start
 
    !> Make room for `n` nodes and count them.
    pure subroutine condition_resize(self, n)

@@ -89,7 +89,7 @@ module emcon_deck_keywords
       keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,~UNSYMM:NO," &
          // "~EXTRAPOLATION,~CONVERTSDI,!PERTURBATION"), &
       keyword_t("STATIC", in_step, "DIRECT,SOLVER=,!STABILIZE:0,!RIKS,!EXPLICIT"), &
-      keyword_t("DYNAMIC", in_step, "DIRECT,SOLVER=,!ALPHA:0,!EXPLICIT:0,!APPLICATION,!INITIAL," &
+      keyword_t("DYNAMIC", in_step, "DIRECT,EXPLICIT,SOLVER=,!ALPHA:0,!APPLICATION,!INITIAL," &
          // "~NOHAF,~HAFTOL,~HALFINCSCALEFACTOR"), &
       keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER,!FOLLOWER," &
          // "!SECTOR"), &
@@ -271,8 +271,6 @@ contains
       select case (name)
       case ("ALPHA")
          reason = " (the energy-momentum scheme has no numerical damping)"
-      case ("EXPLICIT")
-         reason = " (time integration is implicit)"
       case ("SMALLSLIDING")
          reason = " (contact follows the deformed surfaces)"
       case ("TIED")

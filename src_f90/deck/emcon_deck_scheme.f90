@@ -1,11 +1,9 @@
 !> *TIME INTEGRATION: the scheme of dynamic steps, its number, and what it does not go with.
 module emcon_deck_scheme
-   use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
-      refuse_option
+   use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_options, only : option_words
    use emcon_scheme, only : scheme_row_t, setting_t
    use emcon_scheme_registry, only : scheme_given_row, scheme_row, setting_ranges
    use emcon_steps, only : initiation_massless, initiation_velocity_update, step_t
@@ -22,19 +20,12 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
-      character(len=:), allocatable :: known
 
-      select case (option_name(card, "SCHEME"))
-      case ("CENTRALDIFFERENCE")
-         call option_words("scheme", known)
-         call refuse_option(reader, card, "SCHEME", known, "not in this version")
-      case default
-         step%choice%origin = card%origin
-         step%choice%name = option_name(card, "SCHEME")
-         step%choice%row = scheme_row("DYNAMIC", step%choice%name)
-         if (step%choice%row%code == 0) step%choice%row = scheme_given_row
-         call read_setting(reader, card, step%choice%row)
-      end select
+      step%choice%origin = card%origin
+      step%choice%name = option_name(card, "SCHEME")
+      step%choice%row = scheme_row("DYNAMIC", step%choice%name)
+      if (step%choice%row%code == 0) step%choice%row = scheme_given_row
+      call read_setting(reader, card, step%choice%row)
    end subroutine read_scheme
 
    !> The number of a scheme.

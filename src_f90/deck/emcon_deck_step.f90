@@ -8,6 +8,7 @@ module emcon_deck_step
       conditions_t
    use emcon_deck_contact_settings, only : check_massless, check_restitution, check_statics, &
       pairs_ask, read_controls, read_initiation, read_interference
+   use emcon_deck_explicit, only : check_explicit_cards, suit_explicit
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
    use emcon_deck_loads, only : read_boundary, read_cload, read_dload
@@ -72,6 +73,7 @@ contains
          last = scene%step(k)
       end do
       call pairs_ask(reader, scene%pair, scene%step)
+      call suit_explicit(reader, scene%pair, scene%step)
       call check_massless(reader, scene%step)
       call check_schemes(reader, scene%pair, scene%step)
       call check_restitution(reader, scene%pair, scene%step)
@@ -138,9 +140,12 @@ contains
             end select
          end associate
       end do
-      if (step%scheme%card == step%choice%row%card) step%scheme = step%choice%row
+      if (step%scheme%card == step%choice%row%card .and. .not. step%scheme%is_explicit) then
+         step%scheme = step%choice%row
+      end if
       call read_step_card(reader, reader%card(i_first), step)
       call check_statics(reader, i_first, amplitude, step)
+      if (step%scheme%is_explicit) call check_explicit_cards(reader, i_first, step)
       if (step%scheme%code /= 0 .or. reader%doubt_names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
          "the step has no procedure: *STATIC or *DYNAMIC")
@@ -206,6 +211,7 @@ contains
          return
       end if
       step%scheme = scheme_row(card%name, "")
+      if (has_option(card, "EXPLICIT")) step%scheme = scheme_row(card%name, "CENTRALDIFFERENCE")
       step%is_direct = has_option(card, "DIRECT")
       call read_solver(reader, card, step)
       value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]

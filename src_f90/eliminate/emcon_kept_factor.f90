@@ -22,7 +22,7 @@ module emcon_kept_factor
    private
    public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
       kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
-      kept_factor_free, kept_factor_is_possible
+      kept_factor_free, kept_factor_is_possible, kept_factor_multipliers
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -30,12 +30,12 @@ module emcon_kept_factor
    !> Multipliers of a first guess may be several times too large.
    real(dp), parameter :: most_curved_far = 4.0_dp*most_curved
 
-   !> W^T W may have so many times the entries of the matrix.
-   integer, parameter :: most_products = 4
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
       type(diagonal_blocks_t) :: blocks          !! one for each part that hangs together
+      !> W^T W may have so many times the entries of the matrix.
+      integer :: most_products = 4
       integer :: n_renewal = 0                   !! factors made so far
       integer :: n_forward = 0                   !! columns of W made so far
       integer, private :: n_slot = 0                 !! of the matrix
@@ -130,7 +130,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: k, n
 
-      is_fit = self%is_made .and. set%n**2 <= most_products*self%n_slot
+      is_fit = self%is_made .and. set%n**2 <= self%most_products*self%n_slot
       if (.not. is_fit) return
       if (allocated(self%l)) then
          if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start, self%bend)
@@ -275,5 +275,13 @@ contains
       if (allocated(error)) return
       dq = real(self%blocks%scale*self%x, wp)
    end subroutine kept_factor_correct
+
+   !> The multipliers of the last correction: matrix times `dq` is -residual + G^T mu.
+   pure subroutine kept_factor_multipliers(self, mu)
+      type(kept_factor_t), intent(in) :: self
+      real(wp), intent(out) :: mu(:)             !! (n)
+
+      mu = real(self%mu, wp)
+   end subroutine kept_factor_multipliers
 
 end module emcon_kept_factor

@@ -4,6 +4,7 @@ module emcon_march_begin
    use emcon_active_set, only : active_set_overclosure, active_set_t
    use emcon_correction, only : correction_reset
    use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_explicit, only : explicit_prepare
    use emcon_factor_base, only : factor_base_t
    use emcon_holding, only : holding_begin, holding_t
    use emcon_host, only : host_find_solver
@@ -194,7 +195,10 @@ contains
          call march_count_grid(self, step)
          if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
       end associate
+      self%system%frozen%is_on = .false.
       call measure_start(self, scene%x, error)
+      if (.not. allocated(error) .and. self%scheme%row%is_explicit) call explicit_prepare(self, &
+         scene, error)
       if (allocated(error)) return
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
       self%revision = self%revision + 1

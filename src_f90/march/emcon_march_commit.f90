@@ -3,6 +3,7 @@ module emcon_march_commit
    use emcon_constraints, only : constraints_force
    use emcon_correction, only : correction_reason
    use emcon_errors, only : error_t
+   use emcon_explicit, only : explicit_commit
    use emcon_holding, only : holding_t
    use emcon_keeping, only : keeping_commit
    use emcon_kinds, only : wp
@@ -46,7 +47,12 @@ contains
          call find_velocities(self)
          state%reaction = system%response%residual/(1.0_wp + self%motion%pose%start_weight)
          if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
-         call book_work(self)
+         if (self%scheme%row%is_explicit) then
+            call explicit_commit(self, h, error)
+            if (allocated(error)) return
+         else
+            call book_work(self)
+         end if
          call march_past_keep(self, h)
          call restitute(self, scene, h, increment%notes, error)
          if (allocated(error)) return
@@ -77,6 +83,7 @@ contains
          end associate
       end associate
       call keep_constraints(self)
+      if (self%scheme%row%is_explicit .and. self%explicit%is_free) return
       call keeping_commit(self%newton%keeping, self%newton%correction, self%motion, &
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
@@ -97,6 +104,7 @@ contains
             end do
          end do
          call follow_links(system, self%v1)
+         if (self%scheme%row%is_explicit) self%v1 = self%explicit%v1
       end associate
    end subroutine find_velocities
 

@@ -45,6 +45,7 @@ contains
                   state%u_start, u, v)
                self%motion%du(a, i) = u - state%u(a, i)
                self%v1(a, i) = v
+               if (self%scheme%row%is_explicit) cycle
                if (self%scheme%row%masses_resist) then
                   if (allocated(self%motion%v_past)) v = v - self%motion%v_past(a, i)
                   self%motion%offset(a, i) = pose_way(self%motion%pose, state%v(a, i), v) &

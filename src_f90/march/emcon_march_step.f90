@@ -6,6 +6,7 @@ module emcon_march_step
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_constraints, only : constraint_place
    use emcon_errors, only : error_t
+   use emcon_explicit, only : explicit_begin, explicit_end, explicit_fly
    use emcon_guards, only : guard_slack
    use emcon_judge, only : judge_step, overlap_t
    use emcon_keeping, only : keeping_forget, keeping_step
@@ -49,7 +50,7 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
-      integer :: attempt, left
+      integer :: left
 
       self%layer%is_troubled = .false.
       self%active%may_cut = part%may_cut
@@ -57,19 +58,8 @@ contains
       if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
       self%active%left = [overclosure_left(scene, self%state, part%start%step_time), &
          overclosure_left(scene, self%state, part%start%step_time + part%h)]
-      call march_past_begin(self, scene, part%start, error)
-      if (.not. allocated(error)) call keep_factor(self, part, error)
-      if (allocated(error)) return
-      do attempt = 1, 2
-         call march_guess(self, scene, part%start, part%h, is_at_rest=attempt == 2)
-         call active_set_begin(self%active, self%system, self%motion, self%state)
-         call active_set_solve(self%active, self%system, scene, self%newton, &
-            self%motion, status, error)
-         if (allocated(error)) return
-         increment%n_newton = increment%n_newton + self%active%n_newton
-         if (status /= step_refused .or. self%active%n_newton > 0) exit
-      end do
-      if (status /= step_done) return
+      call solve(self, scene, part, increment, status, error)
+      if (status /= step_done .or. allocated(error)) return
       self%layer%is_settled = .false.
       if (self%layer%is_on .and. self%scheme%row%masses_resist) then
          call phase_enter(self%system%phases, phase_restitution, left)
@@ -80,7 +70,7 @@ contains
       self%ending%du = self%motion%du
       if (self%layer%is_settled) self%ending%du = self%ending%du + self%layer%du
       call judge(self, scene, part, increment, status)
-      if (status == step_done) call find_ending(self, status, error)
+      if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
       if (any(self%active%is_dropped)) then
@@ -90,6 +80,38 @@ contains
       end if
       call march_commit(self, scene, part%h, increment, error)
    end subroutine march_step
+
+   !> The way over the step and the constraints that act in it, from the first guess on; from rest
+   !> if there are no forces there.
+   subroutine solve(self, scene, part, increment, status, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(part_t), intent(in) :: part
+      type(increment_t), intent(inout) :: increment
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_done
+      integer :: attempt
+
+      status = step_refused
+      if (self%scheme%row%is_explicit) call explicit_begin(self, scene, part, error)
+      if (.not. allocated(error)) call march_past_begin(self, scene, part%start, error)
+      if (.not. allocated(error)) call keep_factor(self, part, error)
+      if (allocated(error)) return
+      do attempt = 1, 2
+         call march_guess(self, scene, part%start, part%h, is_at_rest=attempt == 2)
+         call active_set_begin(self%active, self%system, self%motion, self%state)
+         if (self%scheme%row%is_explicit) then
+            call explicit_fly(self, part%h, is_done, status)
+            if (is_done) return
+         end if
+         call active_set_solve(self%active, self%system, scene, self%newton, &
+            self%motion, status, error)
+         if (allocated(error)) return
+         increment%n_newton = increment%n_newton + self%active%n_newton
+         if (status /= step_refused .or. self%active%n_newton > 0) exit
+      end do
+   end subroutine solve
 
    !> Find out whether a factor may be kept in the step, and make the one that is kept again where
    !> it was lost, as in a run that was resumed.
@@ -138,13 +160,20 @@ contains
    end subroutine settle
 
    !> Look at the end of the solved step, where the scheme evaluates forces before it.
-   subroutine find_ending(self, status, error)
+   subroutine find_ending(self, scene, part, status, error)
       type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(part_t), intent(in) :: part
       integer, intent(inout) :: status           !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(motion_t) :: place
       logical :: is_elsewhere
 
+      if (self%scheme%row%is_explicit) then
+         call explicit_end(self, scene, part, is_elsewhere, error)
+         if (is_elsewhere) status = step_refused
+         return
+      end if
       is_elsewhere = self%motion%pose%place < 1.0_wp .or. self%layer%is_settled
       associate (system => self%system, motion => self%motion, ending => self%ending)
          if (is_elsewhere) then

@@ -1,6 +1,7 @@
 !> What a march through time holds, what one increment took, and what a step is.
 module emcon_march_types
    use emcon_active_set, only : active_set_t
+   use emcon_explicit_type, only : explicit_t
    use emcon_host_scheme, only : host_scheme_t
    use emcon_judge, only : judge_t, overlap_t
    use emcon_kinds, only : wp
@@ -73,6 +74,7 @@ module emcon_march_types
       logical, allocatable :: is_bare(:)         !! (n_node) of sections without inertia
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
+      type(explicit_t) :: explicit               !! of explicit steps
       type(judge_t) :: judge
       real(wp) :: clear_until = 0.0_wp           !! nothing for it to see, by `active%travel` [L]
       !> Overlap per edge with which a step began that resolves it

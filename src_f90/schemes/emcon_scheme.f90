@@ -27,6 +27,7 @@ module emcon_scheme
       logical :: is_accelerated = .false.        !! the past is the acceleration
       integer :: n_past = 0                      !! fields that are kept of the steps before
       type(setting_t) :: setting
+      logical :: is_explicit = .false.           !! forces are those at the start, mass is diagonal
    end type scheme_row_t
 
    type, abstract :: scheme_t

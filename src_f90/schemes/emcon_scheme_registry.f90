@@ -4,6 +4,7 @@ module emcon_scheme_registry
    use emcon_kinds, only : wp
    use emcon_scheme, only : scheme_row_t, scheme_t, setting_t
    use emcon_scheme_bdf2, only : scheme_bdf2_t
+   use emcon_scheme_central_difference, only : scheme_central_difference_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_generalized_alpha, only : scheme_generalized_alpha_t
    use emcon_scheme_midpoint, only : scheme_midpoint_t
@@ -13,11 +14,13 @@ module emcon_scheme_registry
    implicit none
    private
    public :: scheme_rows, scheme_given_row, scheme_static, scheme_energy_momentum, scheme_given
-   public :: scheme_midpoint, scheme_trapezoidal, scheme_generalized_alpha, scheme_bdf2
+   public :: scheme_midpoint, scheme_trapezoidal, scheme_generalized_alpha, scheme_bdf2, &
+      scheme_central_difference
    public :: scheme_row, scheme_create, setting_range_t, setting_ranges
 
    integer, parameter :: scheme_static = 1, scheme_energy_momentum = 2, scheme_given = 3, &
-      scheme_midpoint = 4, scheme_trapezoidal = 5, scheme_generalized_alpha = 6, scheme_bdf2 = 7
+      scheme_midpoint = 4, scheme_trapezoidal = 5, scheme_generalized_alpha = 6, scheme_bdf2 = 7, &
+      scheme_central_difference = 8
 
    !> The first row of a card is its default.
    type(scheme_row_t), parameter :: scheme_rows(*) = [ &
@@ -33,7 +36,9 @@ module emcon_scheme_registry
          takes_massless=.false., is_accelerated=.true., n_past=1, &
          setting=setting_t("ALPHA", -0.05_wp)), &
       scheme_row_t(scheme_bdf2, "DYNAMIC", "BDF2", "backward differences", &
-         masses_resist=.true., takes_jumps=.false., takes_massless=.false., n_past=2)]
+         masses_resist=.true., takes_jumps=.false., takes_massless=.false., n_past=2), &
+      scheme_row_t(scheme_central_difference, "DYNAMIC", "CENTRAL DIFFERENCE", &
+         "central differences", masses_resist=.true., is_explicit=.true.)]
 
    !> What the numbers of schemes may be.
    type :: setting_range_t
@@ -87,6 +92,8 @@ contains
          allocate(scheme_generalized_alpha_t :: scheme)
       case (scheme_bdf2)
          allocate(scheme_bdf2_t :: scheme)
+      case (scheme_central_difference)
+         allocate(scheme_central_difference_t :: scheme)
       case default
          allocate(scheme, source=given)
       end select

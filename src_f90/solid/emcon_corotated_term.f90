@@ -13,8 +13,9 @@ module emcon_corotated_term
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
-   use emcon_stiff_elements, only : stiff_elements_init, stiff_elements_t
-   use emcon_term, only : response_t, role_internal, term_t
+   use emcon_stiff_elements, only : stiff_elements_fastest, stiff_elements_init, &
+      stiff_elements_t
+   use emcon_term, only : fastest_t, response_t, role_internal, term_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -22,6 +23,7 @@ module emcon_corotated_term
 
    type, extends(term_t) :: corotated_term_t
       type(stiff_elements_t), private :: own
+      type(fastest_t), private :: fastest                    !! of them
       type(corotated_t), allocatable, private :: frame(:)    !! (n)
       type(corotated_pack_t), allocatable, private :: pack(:)
       integer, allocatable, private :: label(:)              !! (n) of the elements
@@ -32,6 +34,7 @@ module emcon_corotated_term
       procedure :: respond
       procedure :: find_energy
       procedure :: tangent_times
+      procedure :: find_fastest
       procedure :: is_symmetric
    end type corotated_term_t
 
@@ -46,6 +49,7 @@ contains
 
       self%role = role_internal
       call stiff_elements_init(self%own, solid, n_dim, solid%is_corotated)
+      call stiff_elements_fastest(self%own, solid, self%fastest)
       self%label = solid%label(self%own%element)
       allocate(self%frame(size(self%own%element)))
       do k = 1, size(self%frame)
@@ -271,5 +275,15 @@ contains
 
       is_symmetric = motion%pose%is_gradient .or. size(self%frame) == 0
    end function is_symmetric
+
+   !> The fastest of the elements. A frame that turns keeps the frequencies.
+   subroutine find_fastest(self, motion, fastest, is_bounded)
+      class(corotated_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! placed at its end
+      type(fastest_t), intent(inout) :: fastest
+      logical, intent(inout) :: is_bounded       !! by elements
+
+      if (self%fastest%square > fastest%square) fastest = self%fastest
+   end subroutine find_fastest
 
 end module emcon_corotated_term

@@ -3,6 +3,7 @@
 !> Source: docs/theory.md, section 3.
 module emcon_solid_term
    use emcon_csr, only : csr_t
+   use emcon_element_frequency, only : element_frequency
    use emcon_element_lists, only : element_lists
    use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_point_t, &
       pack_response_t, pack_scatter
@@ -11,13 +12,14 @@ module emcon_solid_term
    use emcon_kinds, only : dp, wp
    use emcon_law, only : n_lane
    use emcon_law_registry, only : law_linear
+   use emcon_lumped_mass, only : lumped_mass
    use emcon_motion, only : motion_t
    use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
    use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_evaluate_given, solid_init, solid_pack_respond, solid_t
    use emcon_space, only : lists_append, lists_t, space_t
-   use emcon_term, only : response_t, role_internal, term_t
+   use emcon_term, only : fastest_t, response_t, role_internal, term_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -39,6 +41,7 @@ module emcon_solid_term
       procedure :: tangent_times
       procedure :: add_stiffness
       procedure :: is_symmetric
+      procedure :: find_fastest
    end type solid_term_t
 
 contains
@@ -380,5 +383,51 @@ contains
       is_symmetric = motion%pose%is_gradient .or. self%is_empty &
          .or. (self%has_linear_laws .and. .not. self%nlgeom)
    end function is_symmetric
+
+   !> The fastest of the elements.
+   subroutine find_fastest(self, motion, fastest, is_bounded)
+      class(solid_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! placed at its end
+      type(fastest_t), intent(inout) :: fastest
+      logical, intent(inout) :: is_bounded       !! by elements
+      type(pack_point_t) :: point
+      type(pack_response_t) :: part
+      type(pack_motion_t) :: local
+      integer :: k, l
+
+      if (self%solid%has_given) then
+         call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
+            self%given)
+         if (self%given%inverted_element > 0) return
+      end if
+      local%nlgeom = self%nlgeom
+      do k = 1, size(self%solid%pack)
+         associate (pack => self%solid%pack(k))
+            call pack_gather(pack, motion%from, motion%by, local)
+            call solid_pack_respond(self%solid, pack, local, self%given, .true., point, part)
+            if (any(part%is_inverted)) return
+            do l = 1, pack%n
+               call compare(self%solid, pack%element(l), motion%weight, &
+                  part%tangent(l, :, :pack%n_node, :, :pack%n_node), fastest)
+            end do
+         end associate
+      end do
+   end subroutine find_fastest
+
+   !> Is element `e` faster than the fastest so far?
+   pure subroutine compare(solid, e, factor, tangent, fastest)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+      real(wp), intent(in) :: factor             !! of the tangent
+      real(wp), intent(in) :: tangent(:, :, :, :)   !! (n_dim, n, n_dim, n)
+      type(fastest_t), intent(inout) :: fastest
+      real(wp) :: mass(size(tangent, 2)), square
+      integer :: m
+
+      m = size(tangent, 1)*size(tangent, 2)
+      call lumped_mass(solid%mass(:size(mass), :size(mass), e), mass)
+      square = element_frequency(factor*reshape(tangent, [m, m]), mass)
+      if (square > fastest%square) fastest = fastest_t(e, square)
+   end subroutine compare
 
 end module emcon_solid_term

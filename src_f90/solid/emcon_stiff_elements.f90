@@ -1,13 +1,16 @@
 !> Elements whose stiffness stays: which they are, and the stiffness of their laws at rest.
 module emcon_stiff_elements
    use emcon_element, only : element_motion_t, element_response_t
+   use emcon_element_frequency, only : element_frequency
    use emcon_element_lists, only : element_lists
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
+   use emcon_lumped_mass, only : lumped_mass
    use emcon_solid, only : solid_element_respond, solid_t
+   use emcon_term, only : fastest_t
    implicit none
    private
-   public :: stiff_elements_t, stiff_elements_init, stiff_elements_gather
+   public :: stiff_elements_t, stiff_elements_init, stiff_elements_gather, stiff_elements_fastest
 
    type :: stiff_elements_t
       integer, allocatable :: element(:)         !! (n) their numbers
@@ -45,6 +48,24 @@ contains
          self%stiffness(:m, :m, k) = 2.0_wp*part%tangent(:m, :m)   ! by the end of no way: half
       end do
    end subroutine stiff_elements_init
+
+   !> Take over the fastest of them.
+   pure subroutine stiff_elements_fastest(self, solid, fastest)
+      type(stiff_elements_t), intent(in) :: self
+      type(solid_t), intent(in) :: solid         !! that they were taken from
+      type(fastest_t), intent(inout) :: fastest
+      real(wp) :: mass(size(self%node, 1)), square
+      integer :: k, m
+
+      do k = 1, size(self%element)
+         associate (n => self%n_node(k), e => self%element(k))
+            m = self%start(k + 1) - self%start(k)
+            call lumped_mass(solid%mass(:n, :n, e), mass(:n))
+            square = element_frequency(self%stiffness(:m, :m, k), mass(:n))
+            if (square > fastest%square) fastest = fastest_t(e, square)
+         end associate
+      end do
+   end subroutine stiff_elements_fastest
 
    !> A field on the nodes of element `k` of the list, from that of its first node.
    pure subroutine stiff_elements_gather(self, k, field, local)

@@ -12,7 +12,7 @@ module emcon_space
    implicit none
    private
    public :: space_t, space_init, space_begin_step
-   public :: lists_t, lists_append, lists_begin
+   public :: lists_t, lists_append, lists_alone, lists_begin
 
    !> Freedoms that meet, list by list; freedom a of node i is n_dim*(i - 1) + a.
    type :: lists_t
@@ -62,6 +62,18 @@ contains
       call move_alloc(start, self%start)
       self%freedom = [self%freedom, freedom]
    end subroutine lists_append
+
+   !> Each freedom of the lists in a list of its own: they do not meet.
+   pure subroutine lists_alone(self)
+      type(lists_t), intent(inout) :: self
+      logical :: is_in(maxval([0, self%freedom]))
+      integer :: i
+
+      is_in = .false.
+      is_in(self%freedom) = .true.
+      self%freedom = pack([(i, i = 1, size(is_in))], is_in)
+      self%start = [(i, i = 1, size(self%freedom) + 1)]
+   end subroutine lists_alone
 
    !> Bodies, linear rows, and which freedoms are part of the model: those of `lists`, of equations
    !> and of rigid bodies.

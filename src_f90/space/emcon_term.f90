@@ -13,7 +13,7 @@ module emcon_term
    implicit none
    private
    public :: term_t, term_box_t, forces_t, response_t, response_init, response_begin
-   public :: role_inertia, role_internal, role_external
+   public :: role_inertia, role_internal, role_external, fastest_t
 
    !> Which of the three sums a term adds to.
    integer, parameter :: role_inertia = 1, role_internal = 2, role_external = 3
@@ -55,7 +55,14 @@ module emcon_term
       procedure :: tangent_times
       procedure :: add_stiffness
       procedure :: is_symmetric
+      procedure :: find_fastest
    end type term_t
+
+   !> The element of the highest frequency.
+   type :: fastest_t
+      integer :: element = 0                     !! 0: none has one
+      real(wp) :: square = 0.0_wp                !! of the frequency, an upper bound [1/T^2]
+   end type fastest_t
 
    type :: term_box_t
       class(term_t), allocatable :: term
@@ -135,6 +142,16 @@ contains
 
       is_symmetric = .true.
    end function is_symmetric
+
+   !> Take over the element with the highest frequency at the end of a motion, its mass at its
+   !> nodes. `is_bounded` becomes false if the term has a tangent and knows no elements. Nothing
+   !> unless overridden.
+   subroutine find_fastest(self, motion, fastest, is_bounded)
+      class(term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! placed at its end
+      type(fastest_t), intent(inout) :: fastest
+      logical, intent(inout) :: is_bounded       !! by elements
+   end subroutine find_fastest
 
    !> Room for the forces of all terms.
    pure subroutine response_init(self, n_dim, n_node, n_element)

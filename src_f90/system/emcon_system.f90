@@ -10,6 +10,7 @@ module emcon_system
    use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_frozen, only : frozen_give, frozen_t
    use emcon_host, only : host_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
@@ -17,7 +18,7 @@ module emcon_system
    use emcon_phases, only : phase_assemble, phase_enter, phase_leave, phase_residual, phases_t
    use emcon_reduction, only : reduction_add
    use emcon_scene, only : scene_t
-   use emcon_space, only : lists_begin, lists_t, space_begin_step, space_init, space_t
+   use emcon_space, only : lists_alone, lists_begin, lists_t, space_begin_step, space_init, space_t
    use emcon_steps, only : method_null_space
    use emcon_stiffening, only : stiffening_add, stiffening_set, stiffening_t
    use emcon_term, only : response_begin, response_init, response_t, role_external, &
@@ -47,6 +48,7 @@ module emcon_system
       logical :: is_symmetric = .false.          !! `matrix` is, up to round-off
       type(stiffening_t) :: stiffening           !! of bodies that nothing holds, in `matrix`
       type(response_t) :: response               !! of the terms to the last motion
+      type(frozen_t) :: frozen                   !! forces that stand for those of the terms
       type(notes_t) :: notes                     !! on the linear constraints of the step
       type(phases_t) :: phases                   !! where the time goes
    end type system_t
@@ -143,8 +145,14 @@ contains
       self%notes = notes_t()
       self%stiffening = stiffening_t()
       call lay_out(self, scene, lists, first)
+      self%frozen%is_known = .false.
+      if (scene%step(i_step)%scheme%is_explicit) call lists_alone(lists)
       call space_begin_step(self%space, scene, i_step, lists, self%matrix, slot, error)
       if (allocated(error)) return
+      if (scene%step(i_step)%scheme%is_explicit) then
+         deallocate(slot)
+         allocate(slot(first(size(first))), source=0)
+      end if
       if (scene%step(i_step)%constraint_method == method_null_space &
          .and. .not. self%space%is_reduced) call note_add(self%notes, &
          "ties or equations with long rows: solved with their multipliers, as a saddle point; " &
@@ -236,6 +244,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer :: k
 
+      self%frozen%is_known = .false.
       do k = 1, size(self%term)
          call self%term(k)%term%renew(scene, self%i_step)
       end do
@@ -256,11 +265,13 @@ contains
          self%phases%n_tangent = self%phases%n_tangent + 1
          self%is_symmetric = .true.
          self%matrix%value = 0.0_dp
-      else
+      else if (.not. self%frozen%is_on) then
          self%phases%n_residual = self%phases%n_residual + 1
       end if
+      if (self%frozen%is_on) call frozen_give(self%frozen, self%response)
       do k = 1, size(self%term)
          associate (term => self%term(k)%term)
+            if (self%frozen%is_on .and. term%role == role_internal) cycle
             if (with_tangent) then
                call term%respond(motion, self%response, self%matrix%value, &
                   self%space%reduction%side%value)

@@ -14,7 +14,7 @@ module emcon_host_term
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_append, lists_t, space_t
-   use emcon_term, only : response_t, role_internal, term_t
+   use emcon_term, only : fastest_t, response_t, role_internal, term_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -31,6 +31,7 @@ module emcon_host_term
       procedure :: begin_step
       procedure :: respond
       procedure :: tangent_times
+      procedure :: find_fastest
       procedure :: is_symmetric
    end type host_term_t
 
@@ -288,5 +289,15 @@ contains
          is_symmetric = self%force%is_symmetric_in_steps
       end if
    end function is_symmetric
+
+   !> What is given has a stiffness that no element bounds.
+   subroutine find_fastest(self, motion, fastest, is_bounded)
+      class(host_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! placed at its end
+      type(fastest_t), intent(inout) :: fastest
+      logical, intent(inout) :: is_bounded       !! by elements
+
+      is_bounded = .false.
+   end subroutine find_fastest
 
 end module emcon_host_term

@@ -1,13 +1,14 @@
 !> Inertia s M (b du - w v0), and what the past adds: the mass between nodes, the same in all
 !> directions, that of the elements and what is given.
 !>
-!> Source: docs/theory.md, eqs. (2) and (4).
+!> In explicit steps it stands at the nodes. Source: docs/theory.md, eqs. (2), (4) and section 14.
 module emcon_inertia
    use emcon_csr, only : csr_find, csr_from_elements, csr_t
    use emcon_element_lists, only : element_lists
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
+   use emcon_lumped_mass, only : lumped_mass
    use emcon_reduction, only : freedom_numbers, reduction_fold, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -24,6 +25,7 @@ module emcon_inertia
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
       logical, allocatable :: is_bare(:)         !! (n_node) it has none of its own
       type(csr_t), private :: given, added       !! (n_node x n_node) beside it [M]
+      type(csr_t), private :: consistent, lumped     !! (n_node x n_node) one of them is `mass` [M]
       integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of these
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains
@@ -95,7 +97,49 @@ contains
       end do
       call add_beside(self%mass, self%given)
       call add_beside(self%mass, self%added)
+      self%consistent = self%mass
+      call lump(self, solid)
    end subroutine add_up
+
+   !> The same mass at the nodes: that of the elements shared out, of the rest the sums of rows.
+   pure subroutine lump(self, solid)
+      type(inertia_t), intent(inout) :: self
+      type(solid_t), intent(in) :: solid
+      real(wp) :: share(size(solid%node, 1))
+      integer :: e, i
+
+      associate (lumped => self%lumped)
+         lumped%n_row = solid%n_node
+         lumped%n_col = solid%n_node
+         lumped%row_start = [(i, i = 0, solid%n_node)]
+         lumped%column = [(i - 1, i = 1, solid%n_node)]
+         if (allocated(lumped%value)) deallocate(lumped%value)
+         allocate(lumped%value(solid%n_node), source=0.0_dp)
+         do e = 1, solid%n_element
+            associate (n => solid%geometry(e)%n_node)
+               call lumped_mass(solid%mass(:n, :n, e), share(:n))
+               do i = 1, n
+                  associate (to => lumped%value(solid%node(i, e)))
+                     to = to + real(share(i), dp)
+                  end associate
+               end do
+            end associate
+         end do
+         call add_rows(lumped%value, self%given)
+         call add_rows(lumped%value, self%added)
+      end associate
+   end subroutine lump
+
+   !> Add the sums of the rows of `part`.
+   pure subroutine add_rows(total, part)
+      real(dp), intent(inout) :: total(:)        !! (n_node)
+      type(csr_t), intent(in) :: part
+      integer :: i
+
+      do i = 1, part%n_row
+         total(i) = total(i) + sum(part%value(part%row_start(i) + 1:part%row_start(i + 1)))
+      end do
+   end subroutine add_rows
 
    !> Add a matrix whose pairs are in the pattern.
    pure subroutine add_beside(mass, part)
@@ -155,6 +199,11 @@ contains
       integer, allocatable :: number(:)
       integer :: i, k, a, place, n_dim
 
+      if (scene%step(i_step)%scheme%is_explicit) then
+         self%mass = self%lumped
+      else
+         self%mass = self%consistent
+      end if
       allocate(number, source=freedom_numbers(space%numbering))
       n_dim = size(space%is_alive, 1)
       side = 0.0_dp

@@ -20,6 +20,7 @@ program main
    use test_constraints, only : collect_constraints
    use test_correction, only : collect_correction
    use test_corotated, only : collect_corotated
+   use test_critical_step, only : collect_critical_step
    use test_csr, only : collect_csr
    use test_dgrad, only : collect_dgrad
    use test_dgrad_near, only : collect_dgrad_near
@@ -105,6 +106,7 @@ program main
 
    call run("check", collect_check)
    call run("blas", collect_blas)
+   call run("critical_step", collect_critical_step)
    call run("csr", collect_csr)
    call run("triple_product", collect_triple_product)
    call run("row_elimination", collect_row_elimination)

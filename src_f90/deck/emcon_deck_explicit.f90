@@ -1,0 +1,75 @@
+!> Explicit steps: which cards they have no use for, and what they set by themselves.
+module emcon_deck_explicit
+   use emcon_deck_reader, only : card_error, has_option, option_name, reader_t
+   use emcon_diagnostics, only : add_error
+   use emcon_interactions, only : contact_pair_t
+   use emcon_kinds, only : wp
+   use emcon_solver_registry, only : solver_default
+   use emcon_steps, only : initiation_admissible, initiation_massless, method_null_space, &
+      newton_kept, step_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: check_explicit_cards, suit_explicit
+
+contains
+
+   !> Refuse cards of the explicit step that begins with card `i_first` that would change nothing.
+   subroutine check_explicit_cards(reader, i_first, step)
+      type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: i_first             !! *STEP
+      type(step_t), intent(in) :: step
+      integer :: i
+
+      do i = i_first + 1, size(reader%card)
+         associate (card => reader%card(i))
+            if (card%name == "STEP") exit
+            select case (card%name)
+            case ("NEWTON", "CONSTRAINTMETHOD")
+               call card_error(reader, card, "an explicit step has no system to solve: leave " // &
+                  "the card to other steps")
+            case ("CONTACTINITIATION")
+               if (step%initiation /= initiation_admissible .or. has_option(card, &
+                  "GAPTOLERANCE")) call card_error(reader, card, "in an explicit step gaps " // &
+                  "close to zero, never before: leave the card to other steps")
+            case ("TIMEINTEGRATION")
+               if (option_name(card, "SCHEME") /= "CENTRALDIFFERENCE") call card_error(reader, &
+                  card, "*DYNAMIC, EXPLICIT is SCHEME=CENTRAL DIFFERENCE")
+            case ("DYNAMIC")
+               if (has_option(card, "SOLVER")) call card_error(reader, card, "SOLVER=" // &
+                  option_name(card, "SOLVER") // ": an explicit step has no system to solve")
+            end select
+         end associate
+      end do
+   end subroutine check_explicit_cards
+
+   !> Let explicit steps have the settings that serve them, whatever other steps have, and refuse
+   !> surfaces without mass and rebounds.
+   subroutine suit_explicit(reader, pair, step)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(step_t), intent(inout) :: step(:)
+      integer :: i, k
+
+      do k = 1, size(step)
+         if (.not. step(k)%scheme%is_explicit) cycle
+         if (step(k)%initiation == initiation_massless) then
+            call add_error(reader%log, step(k)%origin, "step " // to_text(k) // " is explicit, " &
+               // "but slave nodes are to be MASSLESS: what has no mass has no acceleration")
+            cycle
+         end if
+         i = findloc(pair%restitution < 1.0_wp, .true., 1)
+         if (i > 0) then
+            call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
+               // "has RESTITUTION=" // to_text(pair(i)%restitution) // ", but step " // &
+               to_text(k) // " is explicit: what rebounds there is the bodies alone")
+            cycle
+         end if
+         step(k)%initiation = initiation_admissible
+         step(k)%constraint_method = method_null_space
+         step(k)%newton = newton_kept
+         step(k)%solver = solver_default
+      end do
+   end subroutine suit_explicit
+
+end module emcon_deck_explicit

@@ -1,0 +1,29 @@
+!> What explicit steps hold from one to the next; nothing of it is needed to go on.
+module emcon_explicit_type
+   use emcon_constraints, only : constraint_set_t
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   implicit none
+   private
+   public :: explicit_t
+
+   type :: explicit_t
+      real(wp) :: limit = huge(1.0_wp)           !! of the step, at the start of the deck's step [T]
+      integer :: element = 0                     !! the fastest one
+      !> (n_unknown) what unknowns weigh, where the mass between them is a diagonal [M]
+      real(wp), allocatable :: mass(:)
+      logical :: is_free = .false.               !! nothing was held in the step
+      type(motion_t) :: place                    !! and the place, that rests
+      real(wp), allocatable :: start(:, :)       !! (n_dim, n_node) residual at the step's start
+      real(wp), allocatable :: load0(:, :)       !! (n_dim, n_node) external forces there
+      real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity there [L/T]
+      real(wp), allocatable :: load(:, :)        !! (n_dim, n_node) external forces there
+      real(wp), allocatable :: residual(:, :)    !! (n_dim, n_node) reactions there
+      real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) contact forces there
+      type(constraint_set_t) :: set              !! that holds velocities there
+      integer, allocatable :: row(:)             !! (set%n) and their places in the set of the step
+      real(wp), allocatable :: mu(:)             !! (constraints of the step) multipliers there
+      real(wp) :: budget = 0.0_wp                !! energy that there may be [M L^2/T^2]
+   end type explicit_t
+
+end module emcon_explicit_type
