@@ -29,7 +29,7 @@ Expected: the lower end meets the floor at t = 1 with velocity -10, rests there 
           Total energy (kinetic + strain - work of gravity) is 0 at the start.
 
 Made by make_bouncing_bar.py. Change a parameter for one run: --set h=0.0025
-with mortar contact: --set formulation=MORTAR
+with mortar contact: --set formulation=MORTAR; with another scheme: --set scheme=MIDPOINT
 """
 
 PARAMETERS = f"""
@@ -39,6 +39,7 @@ t_end = 5.5
 frame = 0.05
 method = NULL SPACE
 initiation = PERSISTENT
+scheme = ENERGY MOMENTUM
 {contact_parameters("NODE TO SURFACE", points=3).strip()}
 """
 
@@ -66,6 +67,7 @@ STEP = f"""
 *STEP, INC=1000000
 *DYNAMIC, DIRECT
 <h>, <t_end>
+*TIME INTEGRATION, SCHEME=<scheme>
 *CONSTRAINT METHOD, TYPE=<method>
 *CONTACT INITIATION, TYPE=<initiation>
 {CONTACT_CARDS.strip()}

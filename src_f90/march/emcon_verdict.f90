@@ -39,6 +39,8 @@ module emcon_verdict
       real(wp) :: dynamic_drift = 0.0_wp         !! from `reference`, in steps that keep energy
       real(wp) :: shown_reference = 0.0_wp       !! the same before steps that do not
       real(wp) :: shown_drift = 0.0_wp           !! from there, in these
+      real(wp) :: contact_reference = 0.0_wp     !! work of contact before such steps
+      real(wp) :: contact_made = 0.0_wp          !! from there, where it is most
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
       real(wp) :: deepest_time = 0.0_wp          !! [T]
       character(len=:), allocatable :: place     !! of the deepest one: bodies and nodes
@@ -169,12 +171,16 @@ contains
          self%has_dynamics = .true.
          self%dynamic_drift = max(self%dynamic_drift, abs(kept - self%reference))
          self%shown_reference = kept
+         self%contact_reference = march%ledger%contact_work
       else
          self%reference = kept
          if (march%scheme%row%masses_resist) then
             self%shown_drift = max(self%shown_drift, abs(kept - self%shown_reference))
+            self%contact_made = max(self%contact_made, &
+               march%ledger%contact_work - self%contact_reference)
          else
             self%shown_reference = kept
+            self%contact_reference = march%ledger%contact_work
          end if
       end if
    end subroutine follow_energy
@@ -208,6 +214,10 @@ contains
       if (self%dynamic_drift > ten_digits*self%largest_energy) call note_add(self%reasons, &
          "the energy balance does NOT close to ten digits (" // &
          to_text(self%dynamic_drift/self%largest_energy, 3) // " of the largest energy)")
+      if (self%contact_made > half_digits*self%largest_energy) call note_add(self%reasons, &
+         "contact has made an energy of " // to_text(self%contact_made, 3) // ", " // &
+         to_text(self%contact_made/self%largest_energy, 3) // " of the largest, which bodies " // &
+         "that touch cannot do; SCHEME=ENERGY MOMENTUM makes none")
       if (self%deepest > touching) call note_add(self%reasons, "bodies overlap by " // &
          to_text(self%deepest, 3) // " of an edge at time " // to_text(self%deepest_time, 9) // &
          ", " // self%place)
