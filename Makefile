@@ -33,7 +33,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench trade soak sanitize docs install status clean \
+.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize docs install status clean \
 	help kernel_objects FORCE
 
 # ---- set-up -------------------------------------------------------------------------------------
@@ -304,6 +304,10 @@ bench:  ## print the timed scenes of tests/bench; fail where the program does mo
 trade: .venv/test.stamp  ## write the table and the figure of docs/trade.md anew
 	$(BUILDING) app
 	$(PY) tests/bench/trade.py --update
+
+extremes: .venv/test.stamp  ## drive everything to its extremes; write the table of docs/stability.md anew
+	$(BUILDING) app
+	$(PY) tests/bench/extremes.py --update
 
 SECONDS ?= 600
 soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, calls, kills; threads

@@ -22,7 +22,7 @@ module emcon_scene_report
    !> A body so many times stiffer than the softest one hardly deforms.
    real(wp), parameter :: much_stiffer = 100.0_wp
    !> Elements of linear shape lock above this ratio of Poisson.
-   real(wp), parameter :: nearly_incompressible = 0.49_wp
+   real(wp), parameter :: nearly_incompressible = 0.45_wp
    !> Waves are not resolved by increments of so many transits.
    real(wp), parameter :: many_transits = 10.0_wp
 

@@ -1,0 +1,89 @@
+"""Drive everything to its extremes; write the table of docs/stability.md.
+
+    .venv/bin/python tests/bench/extremes.py [ROW ...]      # print it
+    .venv/bin/python tests/bench/extremes.py --update       # write it into docs/stability.md
+
+Outcomes are kept in build/extremes by deck and program: what was interrupted goes on. Fails if a run
+is silent: wrong, and nothing says so.
+"""
+
+import argparse
+import concurrent.futures
+import os
+import pathlib
+import re
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "scenes"), str(ROOT / "tests" / "bench")]
+
+from book.common import table  # noqa: E402
+from limits import bodies, impacts, long  # noqa: E402
+from limits.common import HOLDS, SILENT, run_case  # noqa: E402
+from scene_tools import PROGRAM  # noqa: E402
+
+ROWS = [*bodies.ROWS, *impacts.ROWS, *long.ROWS]
+PAGE = ROOT / "docs" / "stability.md"
+
+
+def text_of(value):
+    if isinstance(value, tuple):
+        return " ".join(text_of(part) for part in value if part not in (0.0, 1.0)) or "1"
+    return f"{value:g}" if not isinstance(value, str) else value
+
+
+def folder_of_program():
+    """A folder for the outcomes of this program."""
+    stamp = int(pathlib.Path(PROGRAM).stat().st_mtime)
+    folder = ROOT / "build" / "extremes" / str(stamp)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def line_of(row, outcomes):
+    held = [value for value, outcome in zip(row.values, outcomes, strict=True)
+            if outcome.kind == HOLDS]
+    others = [(value, outcome) for value, outcome in zip(row.values, outcomes, strict=True)
+              if outcome.kind != HOLDS]
+    worst = max((o.figure for o in outcomes if o.kind == HOLDS), default=float("nan"))
+    residual = max((o.residual for o in outcomes if o.kind == HOLDS), default=float("nan"))
+    said = "; ".join(f"{text_of(value)}: {'**silent** ' + format(o.figure, '.1e') if o.kind == SILENT else o.text}"
+                     for value, o in others)
+    return (row.what, ", ".join(map(text_of, row.values)), ", ".join(map(text_of, held)),
+            f"{row.figure}: {worst:.1e} (bar {row.bar:g})", f"{residual:.0e}",
+            said.replace("|", "\\|") or "", row.why)
+
+
+HEAD = ("what", "tried", "holds", "largest figure", "residual", "else the program says", "limit")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--update", action="store_true", help="write docs/stability.md")
+    parser.add_argument("rows", nargs="*", help="names of rows; all")
+    options = parser.parse_args()
+    rows = [row for row in ROWS if not options.rows or row.name in options.rows]
+    folder = folder_of_program()
+    lines, n_silent = [], 0
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        futures = [[pool.submit(run_case, row, value, folder) for value in row.values] for row in rows]
+        for row, future in zip(rows, futures, strict=True):
+            start = time.monotonic()
+            outcomes = [f.result() for f in future]
+            n_silent += sum(o.kind == SILENT for o in outcomes)
+            lines.append(line_of(row, outcomes))
+            print(f"{row.name} ({time.monotonic() - start:.0f} s)", flush=True)
+            for value, o in zip(row.values, outcomes, strict=True):
+                print(f"   {text_of(value):>12}  {o.kind:6}  {o.figure:.1e}  {o.residual:.0e}  {o.text}",
+                      flush=True)
+    if options.update:
+        text = PAGE.read_text()
+        mark = re.compile(r"(<!-- extremes -->\n).*?(<!-- end -->)", re.DOTALL)
+        made = "\n".join(table(HEAD, lines))
+        PAGE.write_text(mark.sub(lambda match: match[1] + made + "\n" + match[2], text))
+    return n_silent
+
+
+if __name__ == "__main__":
+    sys.exit(min(main(), 1))

@@ -1,0 +1,163 @@
+"""Rows of one body: strains, ratios of Poisson, aspects, offsets, rotations, units."""
+
+import functools
+import tempfile
+
+import numpy as np
+from plain_scenes import AUTO, Scene, below
+from scene_tools import number, run_deck
+
+from .common import Row, energy_error, momentum_error, one_element
+
+# ---- strain -------------------------------------------------------------------------------------
+
+LAME, SHEAR = 100*0.3/(1.3*0.4), 100/2.6
+
+
+def stretched(excess):
+    """One element pulled along x to 1 + excess, all nodes driven, in four increments."""
+    return one_element(nlgeom=True, cards="", step=(
+        f"*STATIC\n0.25, 1.\n*BOUNDARY\n1, 1, 2\n4, 1, 2\n2, 1, 1, {number(excess)}\n2, 2\n"
+        f"3, 1, 1, {number(excess)}\n3, 2\n*EL FILE\nS, ENER\n*NODE FILE\nU\n"))
+
+
+def strain_error(run, excess):
+    """Energy against 1/2 (lambda + 2 mu) E^2, E = e + e^2/2, and the Cauchy stress (1 + e) S."""
+    strain = excess + excess*excess/2
+    energy = 0.5*(LAME + 2*SHEAR)*strain**2
+    stress = (1 + excess)*(LAME + 2*SHEAR)*strain
+    history, fields = run.history, run.fields()
+    found = fields["cauchy_stress"][-1].reshape(-1)[0]
+    return max(abs(history["strain"][-1]/energy - 1), abs(found/stress - 1))
+
+
+# ---- ratio of Poisson ---------------------------------------------------------------------------
+
+
+def bent(ratio):
+    """A cantilever, 60 by 6 elements, under a small load at its end."""
+    scene = Scene(1, 1)
+    scene.block("BEAM", (0, 0), (10, 1), (60, 6)).hold("BEAM", lambda x, y: x < 1e-9)
+    deck = scene.deck(AUTO)
+    deck.replace("100.0, 0.3", f"100.0, {ratio!r}")
+    deck.replace("*HYPERELASTIC, COUPLED NEO HOOKE", "*ELASTIC")
+    deck.replace("*DYNAMIC, DIRECT\n<h>, <t_end>", "*STATIC\n1., 1.")
+    tip = [label for label, p in scene.part["BEAM"].node.items() if p[0] > 10 - 1e-9]
+    deck.replace("*NODE FILE", "*CLOAD\n" + "\n".join(f"{n}, 2, -1e-7" for n in tip) + "\n*NODE FILE")
+    return deck
+
+
+def deflection_error(run, ratio):
+    """Beam theory with shear, in plane strain; the clamp takes a percent."""
+    modulus, force = 100/(1 - ratio**2), 7e-7
+    exact = force*(10**3/(3*modulus/12) + 10/(5/6*100/(2*(1 + ratio))))
+    fields = run.fields()
+    tip = fields["displacement"][-1][fields.x[:, 0] > 10 - 1e-9, 1].mean()
+    return abs(tip/-exact - 1)
+
+
+# ---- aspect -------------------------------------------------------------------------------------
+
+
+def flat_elements(ratio):
+    """A disc falls on a layer of elements so many times as long as high."""
+    scene = Scene(0.01, 0.3)
+    scene.disc("DISC", (0.1, 0.51), 0.5, (4, 2), velocity=(0.1, -1))
+    scene.block("LAYER", (-1, -0.5/ratio), (2, 0.5/ratio), (4, 1)).hold("LAYER", below(-0.5/ratio))
+    return scene.deck(AUTO)
+
+
+# ---- separation of scales -----------------------------------------------------------------------
+
+
+def falling(value):
+    """One element in free fall: rho L^2/(E h^2), and offset by size."""
+    scale, offset = value
+    h = (1/(100*scale))**0.5
+    gravity = 0.1/h**2
+    return one_element(at=(offset, -offset), step=(
+        f"*DYNAMIC, DIRECT\n{h!r}, {10*h!r}\n*DLOAD\nONE, GRAV, {gravity!r}, 0., -1.\n"
+        "*NODE FILE\nU, V\n"))
+
+
+def fall_error(run, _):
+    """g t^2/2 of ten increments of 0.1/h^2, 5, which mid-point inertia gives exactly."""
+    u = run.fields()["displacement"][-1]
+    return max(np.abs(u[:, 1]/-5.0 - 1).max(), np.abs(u[:, 0]/5).max())
+
+
+# ---- rotation -----------------------------------------------------------------------------------
+
+
+def spinning(angle):
+    """A block that turns by so many radians in each increment."""
+    scene = Scene(0.1, 10)
+    scene.block("BLOCK", (0, 0), (2, 1), (4, 2), spin=angle/0.1, stiffness=1e4*angle**2)
+    return scene.deck(AUTO)
+
+
+def spin_error(run, _):
+    history = run.history
+    return max(energy_error(run), np.abs(history["lz"]/history["lz"][0] - 1).max())
+
+
+# ---- units --------------------------------------------------------------------------------------
+
+
+def impact(length=1.0, mass=1.0, time=1.0):
+    """A disc on a block, in units so many times as small."""
+    scene = Scene(0.01*time, 0.6*time)
+    speed, density = length/time, mass/length**2
+    stiffness = mass/time**2
+    scene.disc("DISC", (0.1*length, 0.51*length), 0.5*length, (4, 2), velocity=(0.1*speed, -speed),
+               stiffness=100*stiffness, density=density)
+    scene.block("BLOCK", (-length, -0.5*length), (2*length, 0.5*length), (6, 2),
+                stiffness=1000*stiffness, density=density)
+    scene.hold("BLOCK", lambda _, y: y < -0.5*length*(1 - 1e-9))
+    return scene.deck(AUTO)
+
+
+def in_units(value):
+    kind, factor = value
+    return impact(**{kind: factor})
+
+
+def unit_error(run, value):
+    """The rebound is that of units 1, to what rounding grows to on a motion through contact."""
+    return max(energy_error(run), abs(rebound_of(run)/rebound() - 1))
+
+
+def rebound_of(run):
+    history = run.history
+    return history["py"][-1]/history["py"][0]
+
+
+@functools.cache
+def rebound():
+    with tempfile.TemporaryDirectory() as folder:
+        return rebound_of(run_deck(impact(), folder))
+
+ROWS = [
+    Row("strain", "strain of an element, driven: 1e-12 to 9", (
+        1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 4.0, 9.0), stretched, strain_error,
+        "energy and stress, relative", bar=1e-8, reach=8),
+    Row("poisson", "ratio of Poisson of a cantilever, 60 by 6 `CPE4`",
+        (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.4999999), bent, deflection_error,
+        "deflection by beam theory", bar=0.1, warns="body .* locks.*", reach=2,
+        why="plain four-node elements lock: volume is held at four points of each"),
+    Row("aspect", "length by height of elements that a disc falls on",
+        (1, 1e2, 1e3, 1e4, 1e5), flat_elements, energy_error, "energy", reach=5),
+    Row("scale", "rho L^2/(E h^2) of an element in free fall",
+        tuple((10.0**k, 0.0) for k in (0, 4, 8, 12, 16, 20, -4, -8, -12, -16, -20)), falling,
+        fall_error, "place after ten increments", bar=1e-8, reach=8, short=(0, 5, 7, -1),
+        why="forces of round-off strains, eps E L, against inertia, rho L^3/h^2"),
+    Row("offset", "offset by size of an element in free fall",
+        tuple((1.0, 10.0**k) for k in (0, 3, 6, 9, 12)), falling, fall_error,
+        "place after ten increments", bar=1e-8, reach=5,
+        why="the places of the nodes themselves are rounded to eps times the offset"),
+    Row("rotation", "radians that a block turns by in an increment",
+        (0.1, 0.5, 1.0, 2.0, 3.0, 6.0), spinning, spin_error, "energy, angular momentum", reach=6),
+    Row("units", "units of length, mass and time", tuple(
+        (kind, 10.0**k) for kind in ("length", "mass", "time") for k in (-30, -15, 15, 30)),
+        in_units, unit_error, "energy; rebound", bar=1e-6, reach=12, short=(0, 4, -1)),
+]

@@ -1,0 +1,156 @@
+"""What a row of the table of extremes is, and what one of its runs comes to.
+
+A run *holds* where it ends well and a figure that is computed outside of the program is within its
+bar; it is *told* where the program refuses, stops or calls its own result bad, or warns of what is
+wrong. What is neither is silent: a result that is wrong, and nothing says so.
+"""
+
+import dataclasses
+import hashlib
+import json
+import re
+import shutil
+
+import numpy as np
+from scene_tools import Deck, Run, emcon, overrides
+
+HOLDS, TOLD, SILENT = "holds", "told", "silent"
+#: Of the largest energy or momentum: what the scheme promises.
+EXACT = 1e-10
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """A row of the table.
+
+    values          what is tried, from the mildest on
+    deck(value)     the `Deck`; `parameters` are those of its runs
+    judge(run, value)   the figure
+    warns           a pattern of what the log says where the figure is above the bar
+    reach           the run holds for the values up to this many: tested
+    short           places of the values that the tests try
+    """
+
+    name: str
+    what: str
+    values: tuple
+    deck: object
+    judge: object
+    figure: str
+    bar: float = EXACT
+    parameters: dict = dataclasses.field(default_factory=dict)
+    warns: str = ""
+    reach: int = 0
+    short: tuple = (0, -1)
+    timeout: float = 1800.0
+    why: str = ""
+
+    def tested(self):
+        return sorted({k % len(self.values) for k in self.short})
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """Of one run: how it ended, its figure (nan: there is none) and what the program said."""
+
+    kind: str
+    figure: float
+    text: str
+    residual: float = float("nan")
+
+
+def shorter(text):
+    """The first message, without the name of the program and of the file."""
+    for line in text.splitlines():
+        found = re.search(r"(?:error|BAD|warning): (.*)", line)
+        if found:
+            return found[1][:160]
+    return text.strip().splitlines()[0][:160] if text.strip() else ""
+
+
+def residual_of(run):
+    """The largest residual that a solved increment was left with, by the size of its forces."""
+    log = run.file(".log")
+    if not log.exists():
+        return float("nan")
+    with open(log) as lines:
+        last = (float(line.split()[-1]) for line in lines
+                if re.fullmatch(r" *\d+( +[-+.\dE]+){8,}\s*", line))
+        return max(last, default=float("nan"))
+
+
+def run_case(row, value, folder):
+    """Run a value of a row; an earlier outcome of the same deck and program is taken as it is."""
+    deck = row.deck(value)
+    key = hashlib.sha256(json.dumps([deck.text(), str(row.parameters)]).encode()).hexdigest()[:16]
+    kept = folder / f"{key}.json"
+    if kept.exists():
+        return Outcome(**json.loads(kept.read_text()))
+    place = folder / key
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir()
+    done = emcon(deck.write(place / "deck.inp"), "--quiet", "--output", place,
+                 *overrides(row.parameters), timeout=row.timeout)
+    run = Run(place / "deck", done.stderr)
+    figure, text = float("nan"), done.stderr
+    if done.returncode == 0:
+        figure = float(row.judge(run, value))
+    verdict = json.loads(run.file(".json").read_text()) if run.file(".json").exists() else {}
+    if done.returncode == 0 and figure <= row.bar:
+        kind, text = HOLDS, ""
+    elif done.returncode != 0 or verdict.get("verdict") == "bad":
+        kind, text = TOLD, shorter(text) or "; ".join(verdict.get("reasons", []))
+    elif row.warns and re.search(row.warns, run.log):
+        kind, text = TOLD, re.search(row.warns, run.log)[0]
+    else:
+        kind, text = SILENT, ""
+    outcome = Outcome(kind, figure, text, residual_of(run))
+    shutil.rmtree(place)
+    kept.write_text(json.dumps(dataclasses.asdict(outcome)))
+    return outcome
+
+
+# ---- figures ------------------------------------------------------------------------------------
+
+
+def thinned(run, rows=10000):
+    """The history, of a long run about so many rows."""
+    with open(run.file(".csv")) as file:
+        n = sum(1 for _ in file)
+    every = max(1, n//rows)
+    with open(run.file(".csv")) as file:
+        lines = [line for k, line in enumerate(file) if k == 0 or (k - 1) % every == 0 or k == n - 1]
+    return np.genfromtxt(lines, delimiter=",", names=True)
+
+
+def energy_error(run, _=None):
+    """Change of the total, less the work of contact, by the largest energy that was there."""
+    history = thinned(run)
+    kept = history["total"] - history["contact_work"]
+    largest = (np.abs(history["kinetic"]) + np.abs(history["strain"])).max()
+    return np.abs(kept - kept[0]).max()/largest
+
+
+def with_penetration(run, _=None):
+    """The same, or the deepest overlap by the edge that the judge saw, where that is more."""
+    return max(energy_error(run), run.verdict["penetration"])
+
+
+def momentum_error(run, _=None):
+    """Energy, and the momenta of free bodies by the largest momentum."""
+    history = run.history
+    size = np.hypot(history["px"], history["py"]).max()
+    drift = max(np.abs(history[name] - history[name][0]).max() for name in ("px", "py"))
+    return max(energy_error(run), drift/size if size else 0.0)
+
+
+def one_element(size=1.0, at=(0.0, 0.0), material="*ELASTIC\n100., 0.3\n*DENSITY\n1.", cards="",
+                step="", nlgeom=True):
+    """The deck of one square element; `step` is what stands between *STEP and *END STEP."""
+    x, y = at
+    places = [(x, y), (x + size, y), (x + size, y + size), (x, y + size)]
+    nodes = "\n".join(f"{k}, {px!r}, {py!r}" for k, (px, py) in enumerate(places, 1))
+    return Deck(f"*HEADING\none element\n*NODE, NSET=ALL\n{nodes}\n"
+                "*ELEMENT, TYPE=CPE4, ELSET=ONE\n1, 1, 2, 3, 4\n"
+                f"*MATERIAL, NAME=M\n{material}\n*SOLID SECTION, ELSET=ONE, MATERIAL=M\n1.\n{cards}"
+                f"*STEP{', NLGEOM' if nlgeom else ''}, INC=100000000\n{step}*END STEP\n")

@@ -1,0 +1,184 @@
+"""Rows of contact: ratios of stiffness, mass and size, increments, speeds, gaps, piles."""
+
+import dataclasses
+
+import numpy as np
+from plain_scenes import AUTO, Scene, below
+from scene_tools import number
+
+from .common import EXACT, Row, momentum_error, with_penetration
+
+# ---- a disc on a block --------------------------------------------------------------------------
+
+#: Wave speed of the disc, sqrt((lambda + 2 mu)/rho) of E = 100, nu = 0.3, rho = 1, and the time that
+#: it takes through the shortest element, about.
+WAVE = (100*0.7/(1.3*0.4))**0.5
+TRANSIT = 0.1/WAVE
+
+
+def dropped(h=0.01, t_end=0.5, velocity=(0.1, -1.0), gap=0.01, stiffness=1000.0, gravity=0.0):
+    scene = Scene(h, t_end, gravity)
+    scene.disc("DISC", (0.1, 0.5 + gap), 0.5, (4, 2), velocity=velocity)
+    scene.block("BLOCK", (-1, -0.5), (2, 0.5), (6, 2), stiffness=stiffness)
+    return scene.hold("BLOCK", below(-0.5)).deck(AUTO)
+
+
+def stiffer(ratio):
+    return dropped(stiffness=100.0*ratio)
+
+
+def against_heavier(ratio):
+    """A light disc hits a free one that is so many times as dense, and as stiff."""
+    scene = Scene(0.01, 0.6)
+    scene.disc("LIGHT", (0.1, 1.01), 0.5, (4, 2), velocity=(0, -1))
+    scene.disc("HEAVY", (0, 0), 0.5, (4, 2), stiffness=100.0*ratio, density=ratio)
+    return scene.deck(AUTO)
+
+
+def in_increments(transits):
+    """Ten increments; the disc reaches the block in the fifth."""
+    h = transits*TRANSIT
+    return dropped(h=h, t_end=10*h, velocity=(0, -1), gap=4.5*h)
+
+
+def at_speed(share):
+    speed = share*WAVE
+    return dropped(h=0.02/speed, t_end=1.2/speed, velocity=(0, -speed), gap=0.05)
+
+
+def grazing(angle):
+    """A disc flies along a floor that it meets at so many radians."""
+    scene = Scene(0.02, 2.0)
+    scene.disc("DISC", (-1, 0.5 + angle), 0.5, (6, 2), velocity=(1, -angle))
+    scene.block("FLOOR", (-2, -0.5), (4, 0.5), (8, 1)).hold("FLOOR", below(-0.5))
+    return scene.deck(AUTO)
+
+
+def from_gap(gap):
+    """A block falls flat on a floor under gravity."""
+    scene = Scene(0.005, 0.3, gravity=10.0)
+    scene.block("BLOCK", (0, gap), (1, 1), (3, 3))
+    scene.block("FLOOR", (-1, -0.5), (3, 0.5), (5, 1)).hold("FLOOR", below(-0.5))
+    return scene.deck(AUTO)
+
+
+# ---- meshes -------------------------------------------------------------------------------------
+
+
+def sizes(ratio):
+    """Edges of a block that falls, by those of the floor."""
+    slaves, masters = (1, round(ratio)) if ratio >= 1 else (round(1/ratio), 1)
+    scene = Scene(0.01, 0.2)
+    scene.block("BLOCK", (0, 0.05), (1, 1), (slaves, 1), velocity=(0.1, -1))
+    scene.block("FLOOR", (0, -1), (1, 1), (masters, 1)).hold("FLOOR", below(-1))
+    return scene.deck(AUTO)
+
+
+def thin_column(share):
+    """The floor under a disc has a column of elements that is so much thinner than the others."""
+    scene = Scene(0.01, 0.3)
+    scene.disc("DISC", (0.5 + 0.3*share, 0.51), 0.5, (4, 2), velocity=(0, -1))
+    x = [-1, 0, 0.5, 0.5 + share, 1.0 + share, 2]
+    scene.block("FLOOR", (0, -0.5), (5, 0.5), (5, 1), shape=lambda s, y: (
+        x[round(s)], y)).hold("FLOOR", below(-0.5))
+    return scene.deck(AUTO)
+
+
+def at_once(n):
+    """So many nodes meet a floor in the same increment."""
+    scene = Scene(0.01, 0.1)
+    scene.block("SLAB", (0, 0.025), (0.1*(n - 1), 0.2), (n - 1, 2), velocity=(0, -1))
+    scene.block("FLOOR", (-1, -1), (0.1*(n - 1) + 2, 1), (max(4, n//3), 1))
+    return scene.hold("FLOOR", below(-1)).deck(AUTO)
+
+
+def stack(n):
+    """Blocks on each other, a small gap between them, fall on a floor."""
+    scene = Scene(0.005, 0.3, gravity=10.0)
+    for k in range(n):
+        scene.block(f"B{k}", (0.05*(-1)**k, 0.01 + 0.51*k), (1, 0.5), (3 + k % 2, 2), stiffness=1e4)
+    scene.block("FLOOR", (-1, -0.5), (3, 0.5), (5, 1), stiffness=1e4).hold("FLOOR", below(-0.5))
+    scene.pairs = [("B0", "FLOOR"), *((f"B{k + 1}", f"B{k}") for k in range(n - 1))]
+    return scene.deck(AUTO)
+
+
+# ---- rest and restitution -----------------------------------------------------------------------
+
+
+def bouncing(restitution):
+    """A rigid disc on a rigid floor: it comes to rest at t (1 + e)/(1 - e), t the first fall."""
+    scene = Scene(0.01, 2.0, gravity=10.0)
+    scene.disc("DISC", (0, 0.7), 0.5, (4, 2))
+    scene.block("FLOOR", (-1, -1), (2, 1), (4, 1))
+    deck = scene.deck(AUTO)
+    deck.replace("*SURFACE INTERACTION, NAME=SMOOTH",
+                 "*NODE\n9001, 0., 0.7\n9002, 0., -1.\n"
+                 "*RIGID BODY, ELSET=DISC, REF NODE=9001\n*RIGID BODY, ELSET=FLOOR, REF NODE=9002\n"
+                 "*BOUNDARY\n9002, 1, 2\n9002, 6\n"
+                 f"*SURFACE INTERACTION, NAME=SMOOTH, RESTITUTION={restitution}")
+    return deck
+
+
+def rest_error(run, restitution):
+    """The kinetic energy that is left half a unit of time after it should rest, by that of the
+    first impact, beyond what an increment of falling makes; and any overlap."""
+    history = run.history
+    fall = (2*0.2/10)**0.5
+    end = fall*(1 + restitution)/(1 - restitution)
+    late = history["kinetic"][history["time"] > end + 0.5]
+    first = history["kinetic"][history["time"] < fall + 0.01].max()
+    floor = (10*0.01)**2/(10*fall)**2
+    return max(late.max()/first/floor if len(late) else np.inf, run.verdict["penetration"])
+
+
+def settled(n):
+    """A block on a floor, first in equilibrium, then for `n` increments of dynamics."""
+    scene = Scene(0.01, 0.01*n, gravity=10.0)
+    scene.block("BLOCK", (0, 0), (1, 1), (2, 2))
+    scene.block("FLOOR", (-1, -0.5), (3, 0.5), (4, 1)).hold("FLOOR", below(-0.5))
+    scene.hold("BLOCK", lambda x, y: abs(x - 0.5) < 1e-9, axes="1")
+    deck = scene.deck(AUTO)
+    k = deck.find("*STEP")
+    statics = [(head.replace("*DYNAMIC, DIRECT", "*STATIC"), list(lines))
+               for head, lines in deck.card[k:]]
+    statics[1] = ("*STATIC", ["0.5, 1."])
+    deck.card[k:k] = statics
+    deck.replace("*NODE FILE\nU\n", "*NODE FILE, FREQUENCY=1000\nU\n")
+    return deck
+
+
+def stir(run, _):
+    """Largest kinetic energy of the dynamics, by the strain energy."""
+    history = run.history
+    return history["kinetic"].max()/history["strain"].max()
+
+
+NODES = {"formulation": "NODE TO SURFACE"}
+ROWS = [dataclasses.replace(row, parameters=NODES) for row in (
+    Row("stiffness", "stiffness of a block by that of the disc that falls on it",
+        (1, 1e3, 1e6, 1e9, 1e12), stiffer, with_penetration, "energy, overlap", reach=5),
+    Row("mass", "mass and stiffness of a disc by those of the one that hits it",
+        (1, 1e3, 1e6, 1e9, 1e12), against_heavier, momentum_error, "energy, momenta", reach=5),
+    Row("increment", "h by the time of a wave through an element, an impact in the fifth of ten",
+        (1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e1, 1e2, 1e3), in_increments, with_penetration,
+        "energy, overlap", reach=8, short=(0, 4, -1)),
+    Row("speed", "speed of an impact by that of waves", (1e-2, 1e-4, 1e-6, 0.1, 0.3, 1.0, 2.0),
+        at_speed, with_penetration, "energy, overlap", reach=7),
+    Row("grazing", "angle at which a disc meets a floor [rad]",
+        (1e-2, 1e-4, 1e-6, 1e-8), grazing, with_penetration, "energy, overlap", reach=4),
+    Row("gap", "gap from which a block falls flat on a floor", (1e-2, 1e-6, 1e-12, 0.0), from_gap,
+        with_penetration, "energy, overlap", reach=4),
+    Row("sizes", "edges of the falling block by those of the floor",
+        (1, 1e-1, 1e-2, 1e-3, 1e1, 1e2, 1e3), sizes, with_penetration, "energy, overlap", reach=7),
+    Row("thin", "width of an element under a disc by that of its neighbours",
+        (1e-1, 1e-3, 1e-6, 1e-9, 1e-12), thin_column, with_penetration, "energy, overlap", reach=4),
+    Row("at_once", "nodes that meet a floor in one increment", (10, 100, 1000, 10000), at_once,
+        with_penetration, "energy, overlap", reach=4, short=(0, 1)),
+    Row("stack", "blocks of a stack that falls", (2, 5, 10, 20), stack, with_penetration,
+        "energy, overlap", reach=4, short=(0, 2)),
+    Row("restitution", "`RESTITUTION` of a rigid disc that bounces to rest",
+        (0.0, 0.2, 0.5, 0.7), bouncing, rest_error,
+        "kinetic energy at rest, by that of one increment's fall", bar=1.0, reach=4),
+    Row("rest", "increments of a block that rests", (100, 1000, 100000), settled, stir,
+        "kinetic by strain energy", bar=EXACT, reach=3, short=(0,)),
+)]
