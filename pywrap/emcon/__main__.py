@@ -1,7 +1,8 @@
-"""`python -m emcon`: a picture, an animation or a short table of a run; two runs compared.
+"""`python -m emcon`: a picture, an animation or a short table of a run; two runs compared; studies.
 
 Exit codes as in docs/deck.md: 0 done, 2 wrong or missing input, 4 cannot write; `compare` with a
-tolerance: 1 if a difference is above it.
+tolerance: 1 if a difference is above it; `study`: 1 if a goal is not met, 3 if no member is done,
+130 if interrupted.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ def _tolerance(text: str) -> float:
     return 0.0 if text.strip() == "0" else _positive(text)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m emcon", description="Look at EMCON results.")
+def _parser(arguments: list[str]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m emcon", description="Look at EMCON results; run studies.")
     parser.add_argument("--version", action="version", version=f"emcon {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     plot = commands.add_parser("plot", help="write a picture of a run")
@@ -70,7 +71,26 @@ def _parser() -> argparse.ArgumentParser:
                      help="compare these fields, columns and series only")
     table = commands.add_parser("summary", help="print a short table of a run")
     table.add_argument("result", metavar="RESULT", help=_RESULT)
+    many = commands.add_parser("study", help="run a deck with many settings, weigh errors and cost")
+    if "study" in arguments[:1]:
+        # h5py and matplotlib take long to load; other commands do not need all of it
+        from .study import add_arguments
+
+        add_arguments(many)
     return parser
+
+
+def _study(options: argparse.Namespace) -> int:
+    from .study import StudyError, run_study
+
+    try:
+        return run_study(options)
+    except StudyError as problem:
+        print(f"error: {problem}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted; the same command goes on with what is left", file=sys.stderr)
+        return 130
 
 
 def _plot(options: argparse.Namespace) -> None:
@@ -102,7 +122,8 @@ def _compare(options: argparse.Namespace) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options = _parser(arguments).parse_args(arguments)
     try:
         if options.command == "plot":
             _plot(options)
@@ -110,6 +131,8 @@ def main(arguments: list[str] | None = None) -> int:
             _animate(options)
         elif options.command == "compare":
             return _compare(options)
+        elif options.command == "study":
+            return _study(options)
         else:
             print(summary(locate(options.result)))
     except ResultError as problem:

@@ -12,7 +12,8 @@
 
 The sides of what the builders make have names: BLOCK_TOP, RING_OUTER, ... Each is a surface and
 the set of its nodes; the body itself is a set of nodes and of elements. `read` takes meshes from
-files of Gmsh and Abaqus; `boundary_edges` finds the edges of bodies in cells of any code.
+files of Gmsh and Abaqus; `refine` cuts each element in four; `boundary_edges` finds the edges of
+bodies in cells of any code.
 
 Lengths are in the deck's unit [L], angles in radians, counter-clockwise. Nodes and elements are
 named by their labels, whole numbers from 1 on, as in a deck.
@@ -22,7 +23,8 @@ from .checks import MeshError, MeshWarning
 from .edges import boundary_edges
 from .mesh import Mesh
 from .reading import read
+from .refinement import refine
 from .shapes import block, disc, grid, ring, strip
 
 __all__ = ["Mesh", "MeshError", "MeshWarning", "block", "boundary_edges", "disc", "grid", "read",
-           "ring", "strip"]
+           "refine", "ring", "strip"]

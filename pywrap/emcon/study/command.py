@@ -1,0 +1,207 @@
+"""`python -m emcon study`: many runs of a deck, and what their settings buy."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..results import ResultPaths
+from .accuracy import Run
+from .choice import parse_goals
+from .deck import DeckFile, read_deck
+from .errors import StudyError
+from .execution import (Progress, Task, executor_of, find_program, record_of, run_all, run_member,
+                        sweep, version_of)
+from .figures import write_figures
+from .measures import from_json
+from .plan import (QUAD, Member, Plan, make_plan, parse_set, parse_vary, unique, write_manifest)
+from .reference import check_references, references_of
+from .report import Study, goals_met, in_words, rows_of, write_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options of the command."""
+    parser.add_argument("deck", metavar="DECK", type=Path, help="the deck to vary")
+    parser.add_argument("--vary", metavar="NAME=V,V,...", action="append", default=[],
+                        help="values of a parameter of the deck, of mesh (edges cut into 1, 2, 4) "
+                        "or threads; may be repeated: all combinations are run")
+    parser.add_argument("--set", metavar="NAME=V", action="append", default=[], dest="fixed",
+                        help="the same value in all members")
+    parser.add_argument("--reference", metavar="KIND", action="append", default=[],
+                        help="finest (default), refined-mesh, quad, closed-form:FILE.json, "
+                        "file:RESULT; may be repeated, goals look at the first")
+    parser.add_argument("--goal", metavar="MEASURE:TOL", action="append", default=[],
+                        help="find the cheapest setting within TOL; exit with 1 if there is none")
+    parser.add_argument("--step", metavar="NAME", default="h",
+                        help="the knob that goes to 0 (default h)")
+    parser.add_argument("--output", metavar="DIR", type=Path,
+                        help="folder of the study (default NAME_study)")
+    parser.add_argument("--repeat", metavar="N", type=_count, default=1,
+                        help="run each member N times, the smallest CPU time counts")
+    parser.add_argument("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1,
+                        help="runs at a time (default: the processors)")
+    parser.add_argument("--executor", metavar="MODULE:CALLABLE",
+                        help="function that makes the concurrent.futures executor to run by")
+    parser.add_argument("--run-member", metavar="K", type=int,
+                        help="run the member in row K of the manifest, nothing else")
+    parser.add_argument("--manifest", action="store_true", help="write the manifest, run nothing")
+    parser.add_argument("--time-limit", metavar="S", type=_seconds,
+                        help="end a run after S seconds on the clock")
+    parser.add_argument("--fresh", action="store_true", help="remove what an earlier study left")
+    parser.add_argument("--program", metavar="FILE", help="the program (default: emcon)")
+    parser.add_argument("--quad-program", metavar="FILE",
+                        help="the program of quadruple precision")
+
+
+def _count(text: str) -> int:
+    if not (text.isdigit() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
+
+
+@dataclass(frozen=True)
+class _Setup:
+    """What the command line asks for."""
+
+    deck: DeckFile
+    plan: Plan
+    members: list[Member]
+    tasks: list[Task]
+    folder: Path
+    version: str
+    program: str
+
+
+def run_study(options: argparse.Namespace) -> int:
+    """Exit code: 0 done, 1 a goal is not met, 3 no member is done. Raises `StudyError`."""
+    setup = _set_up(options)
+    if options.manifest:
+        print(f"{setup.folder/'manifest.csv'}: {len(setup.members)} rows, 0 to "
+              f"{len(setup.members) - 1}")
+        return 0
+    if options.run_member is not None:
+        return _one(setup, options.run_member)
+    sweep(setup.folder)
+    waiting = [task for task in setup.tasks if record_of(task) is None]
+    if waiting:
+        with executor_of(options.executor, options.jobs) as executor:
+            fresh = run_all(waiting, executor, Progress(len(waiting), sys.stderr))
+    else:
+        fresh = {}
+    records = {task.member.index: fresh.get(task.member.index) or record_of(task) or {}
+               for task in setup.tasks}
+    return _conclude(setup, options, records, len(waiting))
+
+
+def _set_up(options: argparse.Namespace) -> _Setup:
+    deck = read_deck(options.deck)
+    goals = parse_goals(options.goal)
+    plan = make_plan(parse_vary(options.vary), parse_set(options.fixed), deck.parameters(),
+                     options.step)
+    references = options.reference or ["finest"]
+    check_references(references, plan)
+    program = find_program(options.program)
+    of_quad = (find_program(options.quad_program, "release-real128")
+               if "quad" in references else program)
+    members = plan.members(references, bool(goals))
+    folder = options.output or Path(f"{deck.name}_study")
+    version = version_of(program)
+    _claim(folder, deck, version, options.fresh)
+    write_manifest(folder/"manifest.csv", members, plan.knobs)
+    tasks = [Task(member, str(folder.resolve()), DeckFile(deck.path.resolve(), deck.text),
+                  of_quad if member.role == QUAD else program, options.repeat,
+                  options.time_limit) for member in members]
+    return _Setup(deck, plan, members, tasks, folder, version, program)
+
+
+def _claim(folder: Path, deck: DeckFile, version: str, fresh: bool) -> None:
+    """Make the folder of the study, or see that what is there is of this deck and program."""
+    if fresh:
+        shutil.rmtree(folder/"members", ignore_errors=True)
+        (folder/"study.json").unlink(missing_ok=True)
+    wanted = {"deck": deck.path.name, "checksum": deck.checksum, "version": version}
+    mark = folder/"study.json"
+    try:
+        found = json.loads(mark.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        found = None
+    except (OSError, ValueError) as problem:
+        raise StudyError(f"cannot read {mark}: {problem}; --fresh begins anew") from None
+    if found is None:
+        (folder/"members").mkdir(parents=True, exist_ok=True)
+        part = folder/f"study.json.{unique()}"
+        part.write_text(json.dumps(wanted) + "\n", encoding="utf-8")
+        part.replace(mark)
+        return
+    changed = [what for name, what in (("checksum", f"the deck {deck.path}, or what it includes,"),
+                                       ("version", "the program"))
+               if found.get(name) != wanted[name]]
+    if changed:
+        told = (f" ({found.get('version')} then, {version} now)"
+                if found.get("version") != version else "")
+        raise StudyError(f"{folder} holds a study begun before {' and '.join(changed)} changed"
+                         f"{told}: its members cannot be compared with new ones. Give another "
+                         "--output, --fresh to run all members anew, or bring back what changed")
+
+
+def _one(setup: _Setup, index: int) -> int:
+    if not 0 <= index < len(setup.tasks):
+        raise StudyError(f"--run-member {index}: the manifest has the rows 0 to "
+                         f"{len(setup.tasks) - 1}")
+    record = run_member(setup.tasks[index])
+    text = setup.members[index].text(setup.plan.knobs)
+    print(f"{index}: {text}: {record['status']}"
+          + (f": {record['message']}" if record["status"] != "done" else ""))
+    return 0
+
+
+def _runs(setup: _Setup, records: Mapping[int, dict[str, Any]]) -> list[Run]:
+    return [Run(task.member, records[task.member.index],
+                from_json(records[task.member.index]["measures"]),
+                ResultPaths(task.home/setup.deck.name))
+            for task in setup.tasks if records[task.member.index].get("status") == "done"]
+
+
+def _conclude(setup: _Setup, options: argparse.Namespace,
+              records: Mapping[int, dict[str, Any]], n_run: int) -> int:
+    runs = _runs(setup, records)
+    n = len(setup.members)
+    head = (f"study of {setup.deck.path.name}: {n} members, {len(runs)} done"
+            + (f", {n - len(runs)} failed" if len(runs) < n else "")
+            + (f"; {n - n_run} of them were there" if n_run < n else ""))
+    study = Study(setup.plan, setup.members, records, runs,
+                  references_of(_kinds(options), setup.plan, runs), parse_goals(options.goal), head)
+    write_table(setup.folder, rows_of(study), head)
+    text = in_words(study)
+    (setup.folder/"report.txt").write_text(text, encoding="utf-8")
+    figures = write_figures(study, setup.folder)
+    print(text)
+    print("written:", *(str(setup.folder/name) for name in ("table.csv", "table.h5",
+                                                            "report.txt")),
+          *map(str, figures))
+    if not runs:
+        return 3
+    return 0 if goals_met(study) else 1
+
+
+def _kinds(options: argparse.Namespace) -> Sequence[str]:
+    kinds: Sequence[str] = options.reference or ["finest"]
+    return kinds

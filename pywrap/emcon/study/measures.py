@@ -1,0 +1,250 @@
+"""What is measured of one run: rows of numbers, of a body or of a pair of surfaces each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..comparison import common_times
+from ..fields import FieldFile
+from ..results import (Array, Bodies, ResultPaths, read_bodies, read_history, read_pairs)
+
+#: What is measured, and its unit.
+NAMES = {
+    "displacement": "displacements of the nodes, over all frames [L]",
+    "position": "how far the centre of a body has gone at the last frame [L]",
+    "rebound": "velocity of the centre of a body at the end [L/T]",
+    "impulse": "impulse of a pair on its slave surface, over the run [M L/T]",
+    "duration": "how long a pair was in contact [T]",
+    "force": "force of a pair over time, means of windows of the run [M L/T^2]",
+    "peak_force": "largest force of a pair in an increment [M L/T^2]",
+    "peak_pressure": "largest contact pressure at a node, of the frames [M/(L T^2)]",
+    "mean_pressure": "force over length in contact, mean over the contact [M/(L T^2)]",
+    "scatter": "force of an increment beside the mean of its neighbours, rms over rms of the force",
+    "switches": "how often a pair came into contact or lost it",
+    "penetration": "deepest overlap of bodies, looked for both ways, per edge",
+    "stand_off": "largest air across which contact forces acted, per edge",
+    "energy": "largest change of the total energy, over the largest energy",
+    "rigid_energy": "kinetic energy of a body's translation and rotation at the last frame",
+    "vibration": "kinetic energy beside that, and strain energy, of all bodies at the last frame",
+    "momentum": "px, py at the end [M L/T]",
+    "angular_momentum": "about the origin, at the end [M L^2/T]",
+}
+#: Those that should be 0: they are their own error.
+OWN = ("scatter", "penetration", "stand_off", "energy")
+#: Of which every row is a body, or a pair: `rebound_2` is that of body 2.
+ROWS = ("position", "rebound", "impulse", "duration", "force", "peak_force", "mean_pressure",
+        "switches", "rigid_energy")
+#: Windows of the run over which forces are averaged.
+WINDOWS = 50
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Values, (n_row, n_comp), and the largest size of the quantity over the run."""
+
+    rows: Array
+    size: float
+
+
+def measure(paths: ResultPaths, windows: int = WINDOWS) -> dict[str, Measured]:
+    """What the files of a run tell; measures that they do not tell are left out."""
+    history = read_history(paths)
+    bodies = read_bodies(paths)
+    found = {**_of_history(history), **_of_pairs(history, windows), **_of_verdict(paths)}
+    if bodies is not None:
+        v = np.stack([bodies.px, bodies.py], axis=2)/bodies.mass[:, None]
+        found["rebound"] = _of_rows(v[-1], v)
+    pairs = read_pairs(paths)
+    if pairs is not None:
+        n = _n_pair(history)
+        spans = np.diff(pairs.time)[:, None]
+        force = (np.linalg.norm(pairs.force[1:, :n], axis=2)*spans).sum(axis=0)
+        length = (pairs.length[1:, :n]*spans).sum(axis=0)
+        mean = np.divide(force, length, out=np.zeros_like(force), where=length > 0.0)
+        found["mean_pressure"] = _of_rows(mean[:, None])
+    if paths.field.is_file():
+        with FieldFile(paths.field) as fields:
+            found |= _of_fields(fields, history, bodies)
+    return {name: found[name] for name in NAMES if name in found
+            and np.isfinite(found[name].rows).all()}
+
+
+def _of_rows(rows: Array, over_time: Array | None = None) -> Measured:
+    rows = np.asarray(rows, dtype=np.float64)
+    sizes = np.linalg.norm(rows if over_time is None else over_time, axis=-1)
+    return Measured(rows, float(np.max(sizes, initial=0.0)))
+
+
+def _of_history(history: NDArray[np.void]) -> dict[str, Measured]:
+    total = history["total"]
+    largest = max(float(np.abs(history[name]).max())
+                  for name in ("kinetic", "strain", "external_work"))
+    change = float(np.abs(total - total[0]).max())
+    found = {"energy": _of_rows(np.array([[change/largest if largest > 0.0 else change]]))}
+    p = np.column_stack([history["px"], history["py"]])
+    found["momentum"] = _of_rows(p[-1:], p)
+    found["angular_momentum"] = _of_rows(history["lz"][-1:, None], history["lz"][:, None])
+    return found
+
+
+def _n_pair(history: NDArray[np.void]) -> int:
+    names = history.dtype.names or ()
+    return sum(name.startswith("pair") and name.endswith("_impulse_x") for name in names)
+
+
+def _of_pairs(history: NDArray[np.void], windows: int) -> dict[str, Measured]:
+    """From the columns of the pairs; nothing without a pair."""
+    n = _n_pair(history)
+    if not n:
+        return {}
+    force = pair_columns(history, "force")[1:]
+    impulse = pair_columns(history, "impulse")
+    duration = np.array([history[f"pair{k + 1}_duration"] for k in range(n)]).T
+    active = np.array([history[f"pair{k + 1}_active"] for k in range(n)]) > 0
+    means = windowed(history["time"], impulse, windows)
+    rough = np.linalg.norm(force[1:-1] - 0.5*(force[:-2] + force[2:]), axis=2)
+    size = np.linalg.norm(force, axis=2)
+    found = {
+        "impulse": _of_rows(impulse[-1], impulse),
+        "duration": _of_rows(duration[-1][:, None]),
+        "force": _of_rows(means.transpose(1, 0, 2).reshape(n, -1)),
+        "peak_force": _of_rows(size.max(axis=0, initial=0.0)[:, None]),
+        "switches": _of_rows((np.diff(active, axis=1) != 0).sum(axis=1)[:, None]),
+    }
+    if (size > 0.0).any():
+        found["scatter"] = _of_rows(np.sqrt(np.sum(rough**2, keepdims=True)/np.sum(size**2)))
+    return found
+
+
+def pair_columns(history: NDArray[np.void], name: str) -> Array:
+    """Columns `pairN_NAME_x` and `_y` of all pairs, (n_row, n_pair, 2)."""
+    return np.array([[history[f"pair{k + 1}_{name}_{axis}"] for axis in "xy"]
+                     for k in range(_n_pair(history))]).transpose(2, 0, 1)
+
+
+def windowed(times: Array, integral: Array, windows: int) -> Array:
+    """Means over equal windows of what has the `integral` (n_time, ...): (windows, ...).
+
+    Means do not depend on the increments, but for those that a window's end cuts.
+    """
+    ends = np.linspace(times[0], times[-1], windows + 1)
+    flat = integral.reshape(len(times), -1)
+    at_ends = np.column_stack([np.interp(ends, times, column) for column in flat.T])
+    means: Array = np.diff(at_ends, axis=0)/np.diff(ends)[:, None]
+    return means.reshape(windows, *integral.shape[1:])
+
+
+def _of_verdict(paths: ResultPaths) -> dict[str, Measured]:
+    verdict = read_verdict(paths)
+    return {name: _of_rows(np.array([[float(verdict[name])]]))
+            for name in ("penetration", "stand_off") if name in verdict}
+
+
+def read_verdict(paths: ResultPaths) -> dict[str, Any]:
+    """NAME.json; empty where it is not there or broken."""
+    try:
+        found = json.loads(paths.base.with_name(paths.base.name + ".json").read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+# --- fields ------------------------------------------------------------------------------------
+
+def _of_fields(fields: FieldFile, history: NDArray[np.void],
+               bodies: Bodies | None) -> dict[str, Measured]:
+    found: dict[str, Measured] = {}
+    if "contact_pressure" in fields.point_fields:
+        pressure = fields["contact_pressure"]
+        peak = max(float(np.nanmax(np.abs(frame), initial=0.0)) for frame in pressure)
+        found["peak_pressure"] = _of_rows(np.array([[peak]]))
+    if bodies is None or "displacement" not in fields.point_fields:
+        return found
+    body = fields.bodies()
+    if body.max() + 1 != len(bodies.mass):
+        return found
+    start = body_geometry(fields, body, None, bodies.mass)
+    end = body_geometry(fields, body, fields["displacement"][-1][:, :2], bodies.mass)
+    found["position"] = _of_rows(end.centre - start.centre)
+    row = common_times(fields.times[-1:], history["time"])[1]
+    if len(row):
+        rigid = rigid_energy(bodies, int(row[0]), end)
+        stored = float(history["kinetic"][row[0]] + history["strain"][row[0]])
+        top = float((history["kinetic"] + history["strain"]).max())
+        found["rigid_energy"] = Measured(rigid[:, None], top)
+        found["vibration"] = Measured(np.array([[stored - rigid.sum()]]), top)
+    return found
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Centre of mass (n_body, 2) [L] and moment of inertia about it (n_body) [M L^2]."""
+
+    centre: Array
+    inertia: Array
+
+
+def body_geometry(fields: FieldFile, body: NDArray[np.int64], u: Array | None,
+                  mass: Array) -> Geometry:
+    """Of each body in the positions of `u` (n_node, 2); its density is taken as uniform."""
+    place = fields.points[:, :2]
+    moved = place if u is None else place + u
+    area, first = np.zeros(len(mass)), np.zeros((len(mass), 2))
+    second = np.zeros(len(mass))
+    reference = np.array([place[body == k].mean(axis=0) for k in range(len(mass))])
+    for count in {len(cell) for cell in fields.cells}:
+        cells = np.array([cell for cell in fields.cells if len(cell) == count])
+        owner = body[cells[:, 0]]
+        for weight, values, slopes in _points(count):
+            jacobian = np.einsum("kd,ekc->edc", slopes, place[cells])
+            share = weight*np.abs(np.linalg.det(jacobian))
+            # from a point of the body: far from the origin digits would be lost
+            arm = np.einsum("k,ekc->ec", values, moved[cells]) - reference[owner]
+            np.add.at(area, owner, share)
+            np.add.at(first, owner, share[:, None]*arm)
+            np.add.at(second, owner, share*(arm**2).sum(axis=1))
+    arm = first/area[:, None]
+    inertia = mass*(second/area - (arm**2).sum(axis=1))
+    return Geometry(reference + arm, inertia)
+
+
+def _points(count: int) -> list[tuple[float, Array, Array]]:
+    """Weights, shape functions and slopes (n, 2) at points that integrate squares exactly."""
+    if count == 3:
+        slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+        return [(1/6, 0.5*(1.0 - np.eye(3)[k]), slopes) for k in range(3)]
+    corner = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    found = []
+    for r, s in corner*np.sqrt(0.6):
+        for a, b, weight in ((r, s, 25/81), (r, 0.0, 20/81), (0.0, s, 20/81), (0.0, 0.0, 16/81)):
+            values = 0.25*(1 + corner[:, 0]*a)*(1 + corner[:, 1]*b)
+            slopes = 0.25*np.column_stack([corner[:, 0]*(1 + corner[:, 1]*b),
+                                           corner[:, 1]*(1 + corner[:, 0]*a)])
+            found.append((weight, values, slopes))
+    return found
+
+
+def rigid_energy(bodies: Bodies, row: int, at: Geometry) -> Array:
+    """Kinetic energy of translation and rotation of each body, (n_body)."""
+    p = np.column_stack([bodies.px[row], bodies.py[row]])
+    spin = bodies.lz[row] - (at.centre[:, 0]*p[:, 1] - at.centre[:, 1]*p[:, 0])
+    moved: Array = 0.5*(p**2).sum(axis=1)/bodies.mass
+    turned = np.divide(0.5*spin**2, at.inertia, out=np.zeros_like(spin), where=at.inertia > 0.0)
+    return moved + turned
+
+
+# --- storing -----------------------------------------------------------------------------------
+
+def to_json(found: Mapping[str, Measured]) -> dict[str, Any]:
+    return {name: {"rows": m.rows.tolist(), "size": m.size} for name, m in found.items()}
+
+
+def from_json(found: Mapping[str, Any]) -> dict[str, Measured]:
+    return {name: Measured(np.array(m["rows"], dtype=np.float64), float(m["size"]))
+            for name, m in found.items()}

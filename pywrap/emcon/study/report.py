@@ -1,0 +1,287 @@
+"""A study as a table and in words."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from .accuracy import Run, base, fitted_order
+from .choice import Goal, cheapest
+from .measures import NAMES, OWN
+from .plan import MEMBER, Member, Plan, same_settings
+from .reference import Reference, knob_size, limits_of, sequence
+
+#: Measures that tables in words begin with.
+SHOWN = ("displacement", "position", "rebound", "impulse", "force", "energy")
+_MOST_COLUMNS = 6
+_MOST_COMPONENTS = 2
+
+
+@dataclass(frozen=True)
+class Study:
+    """All that is known when its members have been run."""
+
+    plan: Plan
+    members: Sequence[Member]
+    records: Mapping[int, dict[str, Any]]
+    runs: Sequence[Run]                     #: those that are done
+    references: Sequence[Reference]
+    goals: Sequence[Goal]
+    head: str
+
+    @cached_property
+    def treatments(self) -> list[Treatment]:
+        """Members that differ in the step alone, each against the finest of them."""
+        found: dict[tuple[str, ...], Treatment] = {}
+        for run in self.runs:
+            key = self.plan.treatment(run.member.settings)
+            if run.member.role != MEMBER or key in found:
+                continue
+            runs = [r for r in sequence(self.plan, self.runs, run.member.settings, self.plan.step)
+                    if r.member.role == MEMBER]
+            others = [name for name in self.plan.knobs if name != self.plan.step]
+            own = Reference("own", runs[0].member.text(others), runs[0],
+                            limits_of(runs, self.plan.step))
+            found[key] = Treatment(runs, own)
+        return list(found.values())
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """Runs of one treatment, the finest first, and the finest as their limit."""
+
+    runs: Sequence[Run]
+    limit: Reference
+
+
+def rows_of(study: Study) -> list[dict[str, object]]:
+    """A row of the table for each member."""
+    by_index = {run.member.index: run for run in study.runs}
+    own = _own_errors(study)
+    rows = []
+    for member in study.members:
+        record, run = study.records.get(member.index, {}), by_index.get(member.index)
+        row: dict[str, object] = {"index": member.index, "role": member.role, **member.settings}
+        row |= {name: record.get(name, "") for name in
+                ("status", "message", "verdict", "cpu", "increments", "newton", "cuts")}
+        if run is not None:
+            row |= _values(run)
+            for reference in study.references:
+                row |= {f"error_{reference.kind}_{name}": error
+                        for name, error in reference.errors(run).items()}
+            row |= {f"own_{name}": error for name, error in own.get(member.index, {}).items()}
+        rows.append(row)
+    return rows
+
+
+def _own_errors(study: Study) -> dict[int, dict[str, float]]:
+    """Errors of each member against the finest one of its treatment."""
+    return {run.member.index: treatment.limit.errors(run)
+            for treatment in study.treatments if len(treatment.runs) > 1
+            for run in treatment.runs}
+
+
+def _values(run: Run) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for name, measured in run.measures.items():
+        n, components = measured.rows.shape
+        if components > _MOST_COMPONENTS:
+            continue
+        for k in range(n):
+            for c in range(components):
+                label = name + (f"_{k + 1}" if n > 1 else "") + ("_xy"[c + 1] if components > 1
+                                                                else "")
+                found[label] = float(measured.rows[k, c])
+    return found
+
+
+def write_table(folder: Path, rows: Sequence[Mapping[str, object]], head: str) -> None:
+    """table.csv and table.h5, a data set for each column; cells that are missing empty or NaN."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    with (folder/"table.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([_cell(row.get(name, "")) for name in names] for row in rows)
+    with h5py.File(folder/"table.h5", "w") as file:
+        file.attrs["study"] = head
+        for name in names:
+            values = [row.get(name, "") for row in rows]
+            if all(isinstance(v, (int, float)) or v == "" for v in values):
+                file[name] = np.array([math.nan if v == "" else v for v in values], dtype=float)
+            else:
+                file.create_dataset(name, data=[str(v) for v in values],
+                                    dtype=h5py.string_dtype())
+
+
+def _cell(value: object) -> str:
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+# --- words -------------------------------------------------------------------------------------
+
+def in_words(study: Study) -> str:
+    """The study as text: failures, references, errors, orders, what the goals ask for."""
+    parts = [study.head, _failures(study)]
+    for reference in study.references:
+        parts += [_of_reference(study, reference)]
+    parts += [_orders(study), *_goals(study)]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _failures(study: Study) -> str:
+    lines = []
+    for member in study.members:
+        record = study.records.get(member.index, {})
+        knobs = member.text([*study.plan.knobs, *(n for n in ("mesh",)
+                                                  if n not in study.plan.knobs)])
+        if record.get("status") != "done":
+            text = " ".join(str(record.get("message", "")).split())
+            lines.append(f"  {knobs}: failed: {text}")
+        elif record.get("verdict") == "bad":
+            lines.append(f"  {knobs}: bad: {'; '.join(record.get('reasons', []))}")
+    return "\n".join(lines)
+
+
+def shown_measures(study: Study, reference: Reference) -> list[str]:
+    """Measures of goals first, then those that tell most."""
+    known = {name for run in study.runs for name in reference.errors(run)}
+    wanted = dict.fromkeys([*(goal.name for goal in study.goals), *SHOWN, *NAMES])
+    return [name for name in wanted if name in known][:_MOST_COLUMNS]
+
+
+def _of_reference(study: Study, reference: Reference) -> str:
+    names = shown_measures(study, reference)
+    knobs = max([len(run.member.text(study.plan.knobs)) for run in study.runs], default=0)
+    width = [max(len(name), 9) + 2 for name in names]
+    lines = [f"reference {reference.kind}: {reference.title}",
+             f"  {'':<{knobs}}{'CPU s':>9}" + "".join(f"{n:>{w}}" for n, w in zip(names, width))]
+    for run in study.runs:
+        errors = reference.errors(run)
+        lines.append(f"  {run.member.text(study.plan.knobs):<{knobs}}{run.record['cpu']:>9.3g}"
+                     + "".join(f"{_size(errors.get(n)):>{w}}" for n, w in zip(names, width))
+                     + ("   the reference" if run is reference.run else ""))
+    if reference.limits:
+        lines.append(f"  {'it may be wrong by':<{knobs + 9}}"
+                     + "".join(f"{_size(reference.uncertainty(n)) if base(n) not in OWN else '':>{w}}"
+                               for n, w in zip(names, width)))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _size(error: float | None) -> str:
+    return "-" if error is None or math.isnan(error) else f"{error:.1e}"
+
+
+def _orders(study: Study) -> str:
+    """Orders in the step size of each treatment towards its own limit."""
+    step = study.plan.step
+    lines = []
+    for treatment in study.treatments:
+        coarse = treatment.runs[1:]
+        if len(coarse) < 2:
+            continue
+        words = []
+        for name in SHOWN:
+            limit = treatment.limit.limits.get(name)
+            if limit is None or name in OWN:
+                continue
+            errors = [treatment.limit.errors(run).get(name, math.nan) for run in coarse]
+            slope = fitted_order([knob_size(run, step) for run in coarse], errors,
+                                 limit.uncertainty)
+            words.append(f"{name} {'none' if math.isnan(limit.order) else f'{limit.order:.1f}'}"
+                         + (f" (slope {slope:.1f})" if not math.isnan(slope) else ""))
+        lines.append(f"  {treatment.limit.title}: {', '.join(words)}")
+    if not lines:
+        return ""
+    return "\n".join([f"orders in {step}, of the three finest runs (and the slope of the errors "
+                      "against the finest)", *lines])
+
+
+def _goals(study: Study) -> list[str]:
+    if not study.goals or not study.references:
+        return [f"goal {goal.name}:{goal.tolerance:g}: there is no reference to hold it against"
+                for goal in study.goals]
+    reference = study.references[0]
+    found = [goal_words(study, reference, [goal]) for goal in study.goals]
+    if len(study.goals) > 1:
+        found.append(goal_words(study, reference, study.goals))
+    return found
+
+
+def safe_error(reference: Reference, run: Run, name: str) -> float:
+    """The error with what the reference may be wrong by; infinite where it is not known."""
+    error = reference.errors(run).get(name, math.inf)
+    return error if run is reference.run else error + reference.uncertainty(name)
+
+
+def candidates(study: Study) -> list[Run]:
+    """Runs that may be chosen: neither references alone nor bad ones."""
+    return [run for run in study.runs if run.member.role in (MEMBER, "default")
+            and run.record.get("verdict") != "bad"]
+
+
+def goal_words(study: Study, reference: Reference, goals: Sequence[Goal]) -> str:
+    """The cheapest setting that meets all `goals`, or how near the best one came."""
+    runs = candidates(study)
+    text = " and ".join(f"{goal.name}:{goal.tolerance:g}" for goal in goals)
+    over = [max((safe_error(reference, run, g.name)/g.tolerance for g in goals), default=math.inf)
+            for run in runs]
+    k = cheapest([run.record["cpu"] for run in runs], over, 1.0)
+    if k is None:
+        return _not_met(study, reference, goals, runs, over, text)
+    run = runs[k]
+    errors = ", ".join(f"{g.name} to {safe_error(reference, run, g.name):.1e}" for g in goals)
+    return (f"goal {text}: the cheapest setting is {run.member.text(study.plan.knobs)}: "
+            f"{run.record['cpu']:.3g} s, {errors}" + _against_default(study, run))
+
+
+def _not_met(study: Study, reference: Reference, goals: Sequence[Goal], runs: Sequence[Run],
+             over: Sequence[float], text: str) -> str:
+    reached = [k for k in range(len(runs)) if over[k] < math.inf]
+    if not reached:
+        return f"goal {text}: not measured in any member that is done"
+    k = min(reached, key=lambda k: over[k])
+    words = [f"goal {text}: not met. The best, {runs[k].member.text(study.plan.knobs)}, comes to "
+             + ", ".join(f"{g.name} {safe_error(reference, runs[k], g.name):.1e}" for g in goals)
+             + f", {over[k]:.2g} times the goal"]
+    vague = [g.name for g in goals if reference.uncertainty(g.name) > g.tolerance]
+    if vague:
+        words.append(f"The reference itself may be wrong by more than that in {', '.join(vague)}: "
+                     f"a finer {study.plan.step} is due")
+    return ". ".join(words)
+
+
+def _against_default(study: Study, chosen: Run) -> str:
+    """How many times cheaper than the deck's own setting, and by which knobs."""
+    own = study.plan.default_settings()
+    default = next((run for run in study.runs if same_settings(run.member.settings, own)
+                    and run.member.role in (MEMBER, "default")), None)
+    if default is None or default is chosen:
+        return "; it is the deck's own" if default is chosen else ""
+    cpu = default.record["cpu"]
+    words = []
+    for knob in study.plan.knobs:
+        value = chosen.member.settings[knob]
+        if same_settings({knob: value}, {knob: own[knob]}):
+            continue
+        alone = next((run for run in study.runs
+                      if same_settings(run.member.settings, {**own, knob: value})), None)
+        gain = f"{cpu/alone.record['cpu']:.2g} times" if alone else "not run by itself"
+        words.append(f"{knob}={value} alone: {gain}")
+    return (f"; {cpu/chosen.record['cpu']:.2g} times cheaper than the deck's own "
+            f"({default.member.text(study.plan.knobs)}, {cpu:.3g} s)"
+            + (f"; {'; '.join(words)}" if words else ""))
+
+
+def goals_met(study: Study) -> bool:
+    """Whether some member meets each goal."""
+    return all(any(safe_error(study.references[0], run, goal.name) <= goal.tolerance
+                   for run in candidates(study)) for goal in study.goals
+               ) if study.references else not study.goals
