@@ -1,7 +1,6 @@
 """Studies: a deck run with many settings, what each buys in accuracy and costs in time.
 
-    python -m emcon study ring.inp --vary h=0.1,0.05,0.025 --vary initiation=PERSISTENT,ADMISSIBLE \\
-        --goal rebound:1e-2
+    python -m emcon study ring.inp --vary h=0.1,0.05,0.025 --goal rebound:1e-2
 
 `plan` says what is run, `execution` runs it, `measures` tells what a run gave, `accuracy` how far
 two runs are apart, `reference` against which one, `choice` which setting pays, `report` and

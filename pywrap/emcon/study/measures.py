@@ -197,7 +197,7 @@ def body_geometry(fields: FieldFile, body: NDArray[np.int64], u: Array | None,
     moved = place if u is None else place + u
     area, first = np.zeros(len(mass)), np.zeros((len(mass), 2))
     second = np.zeros(len(mass))
-    reference = np.array([place[body == k].mean(axis=0) for k in range(len(mass))])
+    near = np.array([moved[body == k].mean(axis=0) for k in range(len(mass))])
     for count in {len(cell) for cell in fields.cells}:
         cells = np.array([cell for cell in fields.cells if len(cell) == count])
         owner = body[cells[:, 0]]
@@ -205,13 +205,13 @@ def body_geometry(fields: FieldFile, body: NDArray[np.int64], u: Array | None,
             jacobian = np.einsum("kd,ekc->edc", slopes, place[cells])
             share = weight*np.abs(np.linalg.det(jacobian))
             # from a point of the body: far from the origin digits would be lost
-            arm = np.einsum("k,ekc->ec", values, moved[cells]) - reference[owner]
+            arm = np.einsum("k,ekc->ec", values, moved[cells]) - near[owner]
             np.add.at(area, owner, share)
             np.add.at(first, owner, share[:, None]*arm)
             np.add.at(second, owner, share*(arm**2).sum(axis=1))
     arm = first/area[:, None]
     inertia = mass*(second/area - (arm**2).sum(axis=1))
-    return Geometry(reference + arm, inertia)
+    return Geometry(near + arm, inertia)
 
 
 def _points(count: int) -> list[tuple[float, Array, Array]]:

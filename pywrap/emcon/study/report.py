@@ -13,10 +13,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .accuracy import Run, base, fitted_order
+from .accuracy import Run, fitted_order
 from .choice import Goal, cheapest
 from .measures import NAMES, OWN
-from .plan import MEMBER, Member, Plan, same_settings
+from .plan import DEFAULT, MEMBER, MESH, QUAD, Member, Plan, same_settings
 from .reference import Reference, knob_size, limits_of, sequence
 
 #: Measures that tables in words begin with.
@@ -36,6 +36,14 @@ class Study:
     references: Sequence[Reference]
     goals: Sequence[Goal]
     head: str
+
+    def label(self, member: Member) -> str:
+        """`h=0.1, initiation=ADMISSIBLE`, with the mesh where there are several."""
+        with_mesh = [MESH] if any(MESH in m.settings for m in self.members) else []
+        shown = Member(member.index, member.role, {MESH: "1", **member.settings})
+        return (shown if with_mesh else member).text(
+            dict.fromkeys([*self.plan.knobs, *with_mesh])) + (", quad" if member.role == QUAD
+                                                              else "")
 
     @cached_property
     def treatments(self) -> list[Treatment]:
@@ -97,8 +105,8 @@ def _values(run: Run) -> dict[str, object]:
             continue
         for k in range(n):
             for c in range(components):
-                label = name + (f"_{k + 1}" if n > 1 else "") + ("_xy"[c + 1] if components > 1
-                                                                else "")
+                label = name + (f"_{k + 1}" if n > 1 else "")
+                label += f"_{'xy'[c]}" if components > 1 else ""
                 found[label] = float(measured.rows[k, c])
     return found
 
@@ -140,8 +148,7 @@ def _failures(study: Study) -> str:
     lines = []
     for member in study.members:
         record = study.records.get(member.index, {})
-        knobs = member.text([*study.plan.knobs, *(n for n in ("mesh",)
-                                                  if n not in study.plan.knobs)])
+        knobs = study.label(member)
         if record.get("status") != "done":
             text = " ".join(str(record.get("message", "")).split())
             lines.append(f"  {knobs}: failed: {text}")
@@ -159,18 +166,18 @@ def shown_measures(study: Study, reference: Reference) -> list[str]:
 
 def _of_reference(study: Study, reference: Reference) -> str:
     names = shown_measures(study, reference)
-    knobs = max([len(run.member.text(study.plan.knobs)) for run in study.runs], default=0)
+    knobs = max([len(study.label(run.member)) for run in study.runs], default=0)
     width = [max(len(name), 9) + 2 for name in names]
     lines = [f"reference {reference.kind}: {reference.title}",
              f"  {'':<{knobs}}{'CPU s':>9}" + "".join(f"{n:>{w}}" for n, w in zip(names, width))]
     for run in study.runs:
         errors = reference.errors(run)
-        lines.append(f"  {run.member.text(study.plan.knobs):<{knobs}}{run.record['cpu']:>9.3g}"
+        lines.append(f"  {study.label(run.member):<{knobs}}{run.record['cpu']:>9.3g}"
                      + "".join(f"{_size(errors.get(n)):>{w}}" for n, w in zip(names, width))
                      + ("   the reference" if run is reference.run else ""))
     if reference.limits:
         lines.append(f"  {'it may be wrong by':<{knobs + 9}}"
-                     + "".join(f"{_size(reference.uncertainty(n)) if base(n) not in OWN else '':>{w}}"
+                     + "".join(f"{'' if n in OWN else _size(reference.uncertainty(n)):>{w}}"
                                for n, w in zip(names, width)))
     return "\n".join(line.rstrip() for line in lines)
 
@@ -223,7 +230,7 @@ def safe_error(reference: Reference, run: Run, name: str) -> float:
 
 def candidates(study: Study) -> list[Run]:
     """Runs that may be chosen: neither references alone nor bad ones."""
-    return [run for run in study.runs if run.member.role in (MEMBER, "default")
+    return [run for run in study.runs if run.member.role in (MEMBER, DEFAULT)
             and run.record.get("verdict") != "bad"]
 
 
@@ -231,15 +238,14 @@ def goal_words(study: Study, reference: Reference, goals: Sequence[Goal]) -> str
     """The cheapest setting that meets all `goals`, or how near the best one came."""
     runs = candidates(study)
     text = " and ".join(f"{goal.name}:{goal.tolerance:g}" for goal in goals)
-    over = [max((safe_error(reference, run, g.name)/g.tolerance for g in goals), default=math.inf)
-            for run in runs]
+    over = [excess(reference, run, goals) for run in runs]
     k = cheapest([run.record["cpu"] for run in runs], over, 1.0)
     if k is None:
         return _not_met(study, reference, goals, runs, over, text)
     run = runs[k]
     errors = ", ".join(f"{g.name} to {safe_error(reference, run, g.name):.1e}" for g in goals)
-    return (f"goal {text}: the cheapest setting is {run.member.text(study.plan.knobs)}: "
-            f"{run.record['cpu']:.3g} s, {errors}" + _against_default(study, run))
+    return (f"goal {text}: the cheapest setting is {study.label(run.member)}: "
+            f"{run.record['cpu']:.3g} s, {errors}" + _against_default(study, reference, goals, run))
 
 
 def _not_met(study: Study, reference: Reference, goals: Sequence[Goal], runs: Sequence[Run],
@@ -248,7 +254,7 @@ def _not_met(study: Study, reference: Reference, goals: Sequence[Goal], runs: Se
     if not reached:
         return f"goal {text}: not measured in any member that is done"
     k = min(reached, key=lambda k: over[k])
-    words = [f"goal {text}: not met. The best, {runs[k].member.text(study.plan.knobs)}, comes to "
+    words = [f"goal {text}: not met. The best, {study.label(runs[k].member)}, comes to "
              + ", ".join(f"{g.name} {safe_error(reference, runs[k], g.name):.1e}" for g in goals)
              + f", {over[k]:.2g} times the goal"]
     vague = [g.name for g in goals if reference.uncertainty(g.name) > g.tolerance]
@@ -258,26 +264,34 @@ def _not_met(study: Study, reference: Reference, goals: Sequence[Goal], runs: Se
     return ". ".join(words)
 
 
-def _against_default(study: Study, chosen: Run) -> str:
+def _against_default(study: Study, reference: Reference, goals: Sequence[Goal], chosen: Run) -> str:
     """How many times cheaper than the deck's own setting, and by which knobs."""
     own = study.plan.default_settings()
     default = next((run for run in study.runs if same_settings(run.member.settings, own)
-                    and run.member.role in (MEMBER, "default")), None)
+                    and run.member.role in (MEMBER, DEFAULT)), None)
     if default is None or default is chosen:
         return "; it is the deck's own" if default is chosen else ""
     cpu = default.record["cpu"]
-    words = []
+    words = [f"; {cpu/chosen.record['cpu']:.2g} times cheaper than the deck's own "
+             f"({study.label(default.member)}, {cpu:.3g} s)"]
     for knob in study.plan.knobs:
         value = chosen.member.settings[knob]
         if same_settings({knob: value}, {knob: own[knob]}):
             continue
         alone = next((run for run in study.runs
                       if same_settings(run.member.settings, {**own, knob: value})), None)
-        gain = f"{cpu/alone.record['cpu']:.2g} times" if alone else "not run by itself"
-        words.append(f"{knob}={value} alone: {gain}")
-    return (f"; {cpu/chosen.record['cpu']:.2g} times cheaper than the deck's own "
-            f"({default.member.text(study.plan.knobs)}, {cpu:.3g} s)"
-            + (f"; {'; '.join(words)}" if words else ""))
+        if alone is None:
+            words.append(f"{knob}={value} alone: not run")
+        elif alone is not chosen:
+            met = excess(reference, alone, goals) <= 1.0
+            words.append(f"{knob}={value} alone: {cpu/alone.record['cpu']:.2g} times"
+                         + ("" if met else ", and the goal is not met"))
+    return "; ".join(words)
+
+
+def excess(reference: Reference, run: Run, goals: Sequence[Goal]) -> float:
+    """The largest error of a run over what the goals allow."""
+    return max(safe_error(reference, run, goal.name)/goal.tolerance for goal in goals)
 
 
 def goals_met(study: Study) -> bool:

@@ -1,0 +1,386 @@
+"""What studies compute of runs, against closed forms in numpy."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from emcon.mesh import block, disc, refine
+from emcon.results import Bodies
+from emcon.study import StudyError
+from emcon.study.accuracy import (Limit, Run, common_nodes, difference, fitted_order, limit_of,
+                                  observed_order)
+from emcon.study.choice import cheapest, pareto_front, parse_goals
+from emcon.study.deck import DeckFile, read_deck, refined_deck
+from emcon.study.execution import Progress, bar_text
+from emcon.study.measures import (Measured, _of_history, _of_pairs, body_geometry, rigid_energy,
+                                  windowed)
+from emcon.study.plan import Member, make_plan, parse_vary, read_manifest, write_manifest
+from emcon.study.reference import Reference
+from emcon.study.report import Study, goal_words, goals_met
+
+EPSILON = np.finfo(float).eps
+SIZES = [(1.0, 2.0, 4.0), (0.1, 0.15, 0.4), (0.01, 0.02, 0.03)]
+
+
+# --- convergence -------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("p", [0.6, 1.0, 1.7, 2.0, 4.0])
+@pytest.mark.parametrize("sizes", SIZES)
+def test_order_and_limit_of_a_power(p: float, sizes: tuple[float, ...]) -> None:
+    """Of values that err by 3 h**p the order is p, and what the finest errs by is 3 h1**p."""
+    values = [1.0 + 3.0*h**p for h in sizes]
+    fine, coarse = values[1] - values[0], values[2] - values[1]
+    # differences lose digits: epsilon of the values, over the differences, over the logarithm
+    digits = 16*EPSILON*max(values)/min(fine, coarse)/math.log(sizes[2]/sizes[1])
+    assert observed_order(sizes, fine, coarse) == pytest.approx(p, abs=digits*max(1.0, p))
+    found = limit_of(sizes, fine, coarse)
+    if p <= 2.0:
+        slope = 8.0*p/min(1.0, (sizes[1]/sizes[0])**p - 1.0)
+        assert found.uncertainty == pytest.approx(3.0*sizes[0]**p, rel=slope*digits + 1e-13)
+    else:
+        # no more than second order is believed: a bound, not an estimate
+        assert found.uncertainty > 3.0*sizes[0]**p
+
+
+def test_limits_where_no_order_is_seen() -> None:
+    assert limit_of((1.0, 2.0), 0.3, None).uncertainty == pytest.approx(0.3, rel=4*EPSILON)
+    assert limit_of((1.0, 4.0), 0.3, None).uncertainty == pytest.approx(0.1, rel=4*EPSILON)
+    # growing or equal differences: no convergence, the larger counts
+    for fine, coarse in ((0.3, 0.1), (0.3, 0.3)):
+        found = limit_of((1.0, 2.0, 4.0), fine, coarse)
+        assert found.uncertainty == 0.3 and not found.order >= 0.5
+    assert limit_of((1.0, 2.0, 4.0), 0.0, 0.1) == pytest.approx(Limit(0.0, math.nan), nan_ok=True)
+
+
+def test_fitted_order_looks_above_the_floor() -> None:
+    h = np.array([0.1, 0.2, 0.4, 0.8])
+    assert fitted_order(h, 5.0*h**1.5, 0.0) == pytest.approx(1.5, rel=1e-14)
+    noisy = np.maximum(5.0*h**1.5, 1.0)
+    assert fitted_order(h, noisy, 1.0) == pytest.approx(1.5, rel=1e-14)
+    assert math.isnan(fitted_order(h, noisy, 100.0))
+
+
+def test_difference_by_scale() -> None:
+    rows = Measured(np.array([[3.0, 4.0], [0.0, 0.0]]), 10.0)
+    other = Measured(np.array([[3.0, 4.5], [0.1, 0.0]]), 10.0)
+    assert difference(other, rows) == pytest.approx(0.1, rel=1e-14)      # over the largest row
+    assert difference(other, rows, 1) == pytest.approx(0.01, rel=1e-14)  # 0: over the size
+    assert difference(rows, rows) == 0.0
+    assert math.isnan(difference(rows, Measured(np.zeros((3, 2)), 1.0)))
+    assert difference(other, Measured(np.zeros((2, 2)), 0.0)) == math.inf
+    given = Measured(np.array([[3.0, 4.0], [np.nan, np.nan]]), 10.0)
+    assert difference(other, given) == pytest.approx(0.1, rel=1e-14)
+
+
+def test_common_nodes_of_bodies_that_touch() -> None:
+    coarse = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    fine = np.array([[0.5, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [0.0, 0, 0], [1.0, 0, 0]])
+    a, b = common_nodes(coarse, fine)
+    assert a.tolist() == [0, 1, 2, 3] and b.tolist() == [3, 1, 4, 2]
+    b, a = common_nodes(fine, coarse)
+    assert a.tolist() == [0, 1, 2, 3] and b.tolist() == [3, 1, 4, 2]
+    assert common_nodes(coarse, fine + 0.1) is None
+
+
+# --- choice ------------------------------------------------------------------------------------
+
+def test_pareto_front_by_definition() -> None:
+    draw = np.random.default_rng(5)
+    for n in (1, 2, 7, 40):
+        cost, error = draw.integers(1, 9, n).astype(float), draw.integers(1, 9, n).astype(float)
+        better = [any((cost[j] <= cost[k] and error[j] <= error[k]
+                       and (cost[j], error[j]) != (cost[k], error[k])) for j in range(n))
+                  for k in range(n)]
+        front = pareto_front(cost, error)
+        assert {(cost[k], error[k]) for k in front} == {
+            (cost[k], error[k]) for k in range(n) if not better[k]}
+        assert all(cost[a] < cost[b] for a, b in itertools.pairwise(front))
+
+
+def test_cheapest_within_the_goal() -> None:
+    assert cheapest([3.0, 1.0, 2.0], [0.01, 1.0, 0.1], 0.1) == 2
+    assert cheapest([3.0, 1.0], [0.5, math.nan], 0.1) is None
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("rebond:1e-3", "no measure 'rebond'.*did you mean rebound"),
+    ("energy_2:1", "no measure 'energy_2'"),
+    ("rebound", "MEASURE:TOLERANCE"),
+    ("rebound:-1", "above 0"),
+    ("rebound:nan", "above 0"),
+])
+def test_wrong_goals(text: str, words: str) -> None:
+    with pytest.raises(StudyError, match=words):
+        parse_goals([text])
+
+
+def study_of(errors: dict[str, tuple[float, float]], limit: float, goal: str) -> Study:
+    """Members `h, initiation` with CPU times and errors of the impulse, around a reference of 1."""
+    plan = plan_of("h=0.1,0.01", "initiation=ADMISSIBLE,PERSISTENT")
+    members = plan.members([], True)
+    runs = []
+    for member in members:
+        cpu, error = errors[f"{member.settings['h']} {member.settings['initiation'][0]}"]
+        runs.append(Run(member, {"cpu": cpu, "verdict": "good"},
+                        {"impulse": Measured(np.array([[1.0 + error, 0.0]]), 1.0)}, None))
+    right = Run(Member(-1, "file", {}), {}, {"impulse": Measured(np.array([[1.0, 0.0]]), 1.0)},
+                None)
+    reference = Reference("file", "exact", right, {"impulse": Limit(limit, 1.0)})
+    return Study(plan, members, {}, runs, [reference], parse_goals([goal]), "")
+
+
+ERRORS = {"0.1 A": (1.0, 0.04), "0.1 P": (2.0, 0.2), "0.01 A": (10.0, 0.01), "0.01 P": (12.0, 0.02)}
+
+
+def test_the_knobs_that_pay_are_named() -> None:
+    study = study_of(ERRORS, 0.005, "impulse:0.05")
+    words = goal_words(study, study.references[0], study.goals)
+    assert "the cheapest setting is h=0.1, initiation=ADMISSIBLE: 1 s, impulse to 4.5e-02" in words
+    assert "12 times cheaper than the deck's own (h=0.01, initiation=PERSISTENT, 12 s)" in words
+    assert "h=0.1 alone: 6 times, and the goal is not met" in words
+    assert words.endswith("initiation=ADMISSIBLE alone: 1.2 times")
+    assert goals_met(study)
+
+
+def test_what_the_reference_is_not_certain_of_counts() -> None:
+    """An error of 0.04 is not known to be below 0.05 by a reference that may err by 0.02."""
+    study = study_of(ERRORS, 0.02, "impulse:0.05")
+    words = goal_words(study, study.references[0], study.goals)
+    assert "the cheapest setting is h=0.01, initiation=ADMISSIBLE" in words
+    study = study_of(ERRORS, 0.1, "impulse:0.05")
+    words = goal_words(study, study.references[0], study.goals)
+    assert "not met. The best, h=0.01, initiation=ADMISSIBLE, comes to impulse 1.1e-01" in words
+    assert "2.2 times the goal" in words and "may be wrong by more than that in impulse" in words
+    assert not goals_met(study)
+
+
+# --- measures ----------------------------------------------------------------------------------
+
+def history(times: np.ndarray, **columns: np.ndarray) -> np.ndarray:
+    names = ["time", "kinetic", "strain", "external_work", "total", "px", "py", "lz",
+             *(f"pair1_{what}" for what in ("force_x", "force_y", "impulse_x", "impulse_y",
+                                            "duration", "active")), *columns]
+    table = np.zeros(len(times), dtype=[(name, float) for name in dict.fromkeys(names)])
+    table["time"] = times
+    for name, values in columns.items():
+        table[name] = values
+    return table
+
+
+def test_windows_do_not_see_the_increments() -> None:
+    """Means of cos(t) over windows are differences of sin, on any grid that has their ends."""
+    ends = np.linspace(0.0, 3.0, 11)
+    coarse = ends
+    fine = np.union1d(np.linspace(0.0, 3.0, 371), ends)
+    expected = np.diff(np.sin(ends))/np.diff(ends)
+    for times in (coarse, fine):
+        found = windowed(times, np.sin(times)[:, None, None], 10)[:, 0, 0]
+        assert np.abs(found - expected).max() < 64*EPSILON
+
+
+def test_pairs_of_a_comb() -> None:
+    """A force of 0, 2, 0, 2 beside means of neighbours: 2 everywhere, over the rms of force."""
+    n = 101
+    times = np.linspace(0.0, 1.0, n)
+    force = np.where(np.arange(n) % 2 == 0, 2.0, 0.0)
+    force[0] = 0.0
+    table = history(times, pair1_force_y=force, pair1_active=(force > 0).astype(float),
+                    pair1_impulse_y=np.cumsum(force)*0.01, pair1_duration=np.full(n, 0.5))
+    found = _of_pairs(table, 10)
+    inner = n - 3                                        # increments with two neighbours
+    assert found["scatter"].rows[0, 0] == pytest.approx(
+        math.sqrt(inner*4.0/(force**2).sum()), rel=1e-14)
+    assert found["switches"].rows[0, 0] == n - 2
+    assert found["impulse"].rows[0].tolist() == [0.0, pytest.approx(1.0, rel=1e-13)]
+    assert found["peak_force"].rows[0, 0] == 2.0 and found["duration"].rows[0, 0] == 0.5
+    assert np.allclose(found["force"].rows[0][1::2], 1.0, rtol=0.0, atol=1e-13)
+    straight = history(times, pair1_force_y=1.0 + times)
+    assert _of_pairs(straight, 10)["scatter"].rows[0, 0] < 16*EPSILON
+
+
+def test_energy_and_momenta() -> None:
+    times = np.linspace(0.0, 1.0, 5)
+    found = _of_history(history(times, kinetic=np.array([4.0, 3, 2, 1, 2]),
+                                total=np.array([4.0, 4.0, 3.5, 4.0, 4.0]),
+                                px=np.array([0.0, 3, 0, 0, 0]), py=np.array([0.0, 4, 0, 0, 1])))
+    assert found["energy"].rows[0, 0] == 0.5/4.0
+    assert found["momentum"].rows.tolist() == [[0.0, 1.0]] and found["momentum"].size == 5.0
+
+
+def fields_of(mesh: object) -> SimpleNamespace:
+    cells = [row for kind in mesh.elements for row in mesh.connectivity(kind)]
+    return SimpleNamespace(points=np.column_stack([mesh.nodes, np.zeros(len(mesh.nodes))]),
+                           cells=cells)
+
+
+def test_centre_and_inertia_of_a_rectangle() -> None:
+    """m (a^2 + b^2)/12 of a rectangle, moved and turned; of any mesh of it, far from 0."""
+    mesh = refine(block((1e3, 2e3), (3.0, 1.0), (2, 2))) + block((0.0, 0.0), (1.0, 1.0), (1, 1),
+                                                                 "SECOND")
+    body = np.array([0]*25 + [1]*4)
+    found = body_geometry(fields_of(mesh), body, None, np.array([6.0, 2.0]))
+    assert found.centre[0] == pytest.approx([1001.5, 2000.5], rel=4*EPSILON)
+    # products of lengths, of positions that are rounded by epsilon of a thousand
+    assert found.inertia == pytest.approx([6.0*10.0/12.0, 2.0*2.0/12.0], rel=1e3*64*EPSILON)
+    c, s = math.cos(0.7), math.sin(0.7)
+    x = mesh.nodes
+    u = (x - x[0]) @ np.array([[c, s], [-s, c]]) - (x - x[0])
+    turned = body_geometry(fields_of(mesh), body, u, np.array([6.0, 2.0]))
+    assert turned.inertia == pytest.approx(found.inertia, rel=1e4*64*EPSILON)
+
+
+def test_triangles_and_quadrilaterals_have_one_inertia() -> None:
+    quads = block((0.0, 0.0), (3.0, 2.0), (1, 1))
+    corner = quads.connectivity("CPE4")[0]
+    split = SimpleNamespace(points=fields_of(quads).points,
+                            cells=[corner[[0, 1, 2]], corner[[0, 2, 3]]])
+    body = np.zeros(4, dtype=int)
+    one, other = (body_geometry(f, body, None, np.ones(1)) for f in (fields_of(quads), split))
+    assert one.inertia == pytest.approx(13.0/12.0, rel=16*EPSILON)
+    assert other.inertia == pytest.approx(13.0/12.0, rel=16*EPSILON)
+
+
+def test_inertia_of_a_disc_of_chords() -> None:
+    """The polygon of n corners on a circle: m r^2/6 (2 + cos(2 pi/n)); a disc in the limit."""
+    mesh = disc((0.0, 0.0), 2.0, (6, 3))
+    n = len(mesh.surfaces["DISC_RIM"])
+    found = body_geometry(fields_of(mesh), np.zeros(len(mesh.nodes), dtype=int), None,
+                          np.ones(1))
+    assert found.inertia[0] == pytest.approx(4.0/6.0*(2.0 + math.cos(2.0*math.pi/n)), rel=1e-13)
+
+
+def test_energy_of_a_rigid_motion() -> None:
+    """v = (2, -1), spin 3 about the centre at (5, 7): 1/2 m v^2 + 1/2 I w^2."""
+    mass, inertia = 4.0, 0.5
+    p = mass*np.array([2.0, -1.0])
+    spin = inertia*3.0 + 5.0*p[1] - 7.0*p[0]
+    bodies = Bodies(np.array([mass]), p[None, :1], p[None, 1:], np.array([[spin]]))
+    at = SimpleNamespace(centre=np.array([[5.0, 7.0]]), inertia=np.array([inertia]))
+    assert rigid_energy(bodies, 0, at)[0] == pytest.approx(0.5*4*5 + 0.5*0.5*9, rel=64*EPSILON)
+
+
+# --- plans -------------------------------------------------------------------------------------
+
+PARAMETERS = {"h": "0.01", "t_end": "8", "initiation": "PERSISTENT"}
+
+
+def plan_of(*vary: str, **fixed: str) -> object:
+    return make_plan(parse_vary(vary), fixed, PARAMETERS, "h")
+
+
+def test_members_are_the_grid_with_the_default() -> None:
+    plan = plan_of("h=0.2,0.1", "initiation=ADMISSIBLE,PERSISTENT", t_end="1")
+    members = plan.members(["finest"], True)
+    assert [m.role for m in members] == ["member"]*4 + ["default"]
+    assert members[-1].settings == {"h": "0.01", "initiation": "PERSISTENT", "t_end": "1"}
+    assert len({m.key for m in members}) == 5
+    assert plan_of("h=0.02,1e-2").members(["finest"], True)[-1].role == "member"
+
+
+def test_refined_mesh_asks_for_one_more() -> None:
+    members = plan_of("h=0.2,0.1").members(["refined-mesh"], False)
+    assert [(m.role, m.settings.get("mesh")) for m in members] == [
+        ("member", None), ("member", None), ("reference", "2")]
+    assert members[-1].settings["h"] == "0.1"
+    two = plan_of("h=0.2,0.1", "mesh=1,2").members(["refined-mesh"], False)
+    assert [m.settings["mesh"] for m in two if m.role == "reference"] == ["4"]
+
+
+def test_a_member_keeps_its_folder_when_a_study_grows() -> None:
+    few, many = plan_of("h=0.2,0.1"), plan_of("h=0.4,0.2,0.1")
+    keys = [{m.settings["h"]: m.key for m in plan.members([], False)} for plan in (few, many)]
+    assert keys[0].items() <= keys[1].items()
+
+
+@pytest.mark.parametrize(("vary", "fixed", "words"), [
+    (["hh=1,2"], {}, "no knob 'hh'.*h, t_end, initiation, and mesh, threads; did you mean h"),
+    (["h=0.1,x"], {}, "numbers above 0"),
+    (["h=0.1,0"], {}, "numbers above 0"),
+    (["h=0.1,,2"], {}, "a value is empty"),
+    (["h"], {}, "give --vary NAME=VALUE"),
+    (["h=1", "h=2"], {}, "there twice"),
+    (["h=1"], {"h": "2"}, "varied and set"),
+    (["mesh=1,3"], {}, "cutting edges in half"),
+    (["threads=0"], {}, "whole numbers above 0"),
+])
+def test_wrong_plans(vary: list[str], fixed: dict[str, str], words: str) -> None:
+    with pytest.raises(StudyError, match=words):
+        plan_of(*vary, **fixed)
+
+
+def test_the_manifest_is_read_as_it_was_written(tmp_path: Path) -> None:
+    plan = plan_of("h=0.2,0.1", "initiation=VELOCITY UPDATE,PERSISTENT", t_end="1")
+    members = plan.members(["refined-mesh"], True)
+    write_manifest(tmp_path/"manifest.csv", members, plan.knobs)
+    assert read_manifest(tmp_path/"manifest.csv") == members
+
+
+# --- decks -------------------------------------------------------------------------------------
+
+def test_parameters_and_checksum_know_included_files(tmp_path: Path) -> None:
+    (tmp_path/"inner.inp").write_text("*PARAMETER\nH = 0.1 # size\nword = 'A B'\n")
+    (tmp_path/"deck.inp").write_text("*PARAMETER\nt_end=1\n*Include, input=inner.inp\n")
+    deck = read_deck(tmp_path/"deck.inp")
+    assert deck.parameters() == {"t_end": "1", "h": "0.1", "word": "A B"}
+    (tmp_path/"inner.inp").write_text("*PARAMETER\nH = 0.2\n")
+    assert read_deck(tmp_path/"deck.inp").checksum != deck.checksum
+    (tmp_path/"inner.inp").unlink()
+    with pytest.raises(StudyError, match=r"cannot read .*inner.inp"):
+        read_deck(tmp_path/"deck.inp")
+
+
+MESH = """*NODE, NSET=ALL
+1, 0, 0
+2, 1, 0
+3, 1, 1
+4, 0, 1
+*NODE
+99, 5, 5
+*ELEMENT, TYPE=CPE4, ELSET=BODY
+1, 1, 2, 3, 4
+*NSET, NSET=FOOT
+1, 2
+"""
+
+
+@pytest.mark.parametrize(("card", "words"), [
+    ("*CLOAD\nFOOT, 2, 1.\n", "CLOAD: the values on the set FOOT"),
+    ("*EQUATION\n2\nFOOT, 1, 1., 3, 1, -1.\n", "EQUATION"),
+    ("*DLOAD\n1, GRAV, 1., 0., -1., 0.\n", "element 1 is cut in parts"),
+    ("*INITIAL CONDITIONS, TYPE=VELOCITY\n3, 1, 1.\n", "node 3 is named by its label"),
+])
+def test_what_a_finer_mesh_would_change_is_refused(card: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match=words):
+        refined_deck(DeckFile(Path("deck.inp"), MESH + card), 1, tmp_path/"scratch.inp")
+
+
+def test_pressure_stays_on_its_face(tmp_path: Path) -> None:
+    text = refined_deck(DeckFile(Path("deck.inp"), MESH + "*DLOAD\nBODY, P3, 2.\n"), 1,
+                        tmp_path/"scratch.inp")
+    assert "BODY_P3_PARTS, P3, 2." in text and "99, 5.0, 5.0" in text
+    assert not (tmp_path/"scratch.inp").exists()
+    (tmp_path/"fine.inp").write_text(text)
+    from emcon.mesh import MeshWarning, read
+    with pytest.warns(MeshWarning):
+        fine = read(tmp_path/"fine.inp")
+    wanted = set(fine.element_sets["BODY_P3_PARTS"].tolist())
+    assert wanted == {int(e) for e, f in fine.boundary(lambda x, y: y == 1.0)}
+
+
+# --- the bar -----------------------------------------------------------------------------------
+
+def test_the_bar_is_for_terminals() -> None:
+    assert bar_text(4, 1, 10, 12.3, 10) == "[####......] 4 of 10, 1 failed, 12 s"
+    for is_terminal in (False, True):
+        out = io.StringIO()
+        out.isatty = lambda known=is_terminal: known
+        bar = Progress(2, out)
+        bar.show(1, 0)
+        bar.end()
+        assert bool(out.getvalue()) == is_terminal

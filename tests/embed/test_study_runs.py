@@ -1,0 +1,371 @@
+"""Whole studies: of a bar that falls, freely in closed form or onto a floor."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import csv
+import json
+import os
+import re
+import signal
+import stat
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from emcon.study.deck import DeckFile, read_deck
+from emcon.study.execution import RECORD, Task, call, record_of, run_member
+from emcon.study.plan import Member
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = ROOT/"build"/"release"/"emcon"
+BAR = ROOT/"input_decks"/"bouncing_bar.inp"
+RING = ROOT/"input_decks"/"ring.inp"
+EPSILON = np.finfo(float).eps
+#: Of one study [s].
+LONGEST = 300
+
+
+def study(folder: Path, *options: object, deck: Path = BAR,
+          code: int = 0) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(command(deck, *options), cwd=folder, env=ENVIRONMENT, text=True,
+                          capture_output=True, timeout=LONGEST)
+    assert done.returncode == code, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+def command(deck: Path, *options: object) -> list[str]:
+    return [sys.executable, "-m", "emcon", "study", str(deck), "--output", "study",
+            "--program", str(PROGRAM), *map(str, options)]
+
+
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT/"pywrap"), "MPLBACKEND": "agg"}
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder/"study"/"table.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def stamps(folder: Path) -> dict[str, int]:
+    """When each whole member was written."""
+    return {p.parent.name: p.stat().st_mtime_ns
+            for p in (folder/"study"/"members").glob(f"*/{RECORD}")}
+
+
+FREE = ("--vary", "h=0.1,0.05", "--set", "t_end=0.5", "--set", "frame=0.5")
+
+
+@pytest.fixture(scope="module")
+def free(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A fall of half a time unit, g = 10, held against closed forms, and on two meshes."""
+    folder = tmp_path_factory.mktemp("free")
+    values = {"rebound_1": [0.0, -5.0], "position_1": [0.0, -1.25], "momentum": [0.0, -50.0],
+              "rigid_energy_1": 125.0, "vibration": 0.0, "impulse": [0.0, 0.0]}
+    (folder/"closed.json").write_text(json.dumps(values))
+    done = study(folder, *FREE, "--vary", "mesh=1,2", "--reference", "closed-form:closed.json",
+                 "--reference", "finest", "--goal", "rebound:1e-9")
+    return folder, done.stdout
+
+
+def test_a_free_fall_has_no_error(free: tuple[Path, str]) -> None:
+    """The scheme is exact for it: errors are rounding, of sums over fifty elements."""
+    folder, text = free
+    rows = table(folder)
+    assert [row["status"] for row in rows] == ["done"]*len(rows)
+    for row in rows:
+        for name in ("rebound", "position", "momentum", "rigid_energy", "vibration", "impulse"):
+            assert float(row[f"error_closed-form_{name}"]) < 1e5*EPSILON, name
+    assert "the cheapest setting is" in text and "rebound to" in text
+
+
+def test_members_on_two_meshes_share_nodes(free: tuple[Path, str]) -> None:
+    rows = table(free[0])
+    assert {row["mesh"] for row in rows} >= {"1", "2"}
+    errors = [float(row["error_finest_displacement"]) for row in rows]
+    assert max(errors) < 1e5*EPSILON                     # and so it was found on each mesh
+
+
+def test_the_two_tables_agree(free: tuple[Path, str]) -> None:
+    rows = table(free[0])
+    with h5py.File(free[0]/"study"/"table.h5") as file:
+        assert set(file) == set(rows[0])
+        for name in file:
+            column = file[name][()]
+            if column.dtype.kind == "f":
+                expected = np.array([float(row[name] or "nan") for row in rows])
+                assert np.array_equal(column, expected, equal_nan=True), name
+            else:
+                assert [v.decode() for v in column] == [row[name] for row in rows], name
+
+
+def test_pictures_and_words_are_there(free: tuple[Path, str]) -> None:
+    folder, text = free
+    for name in ("work_closed-form", "work_finest", "steps_finest"):
+        assert (folder/"study"/f"{name}.png").read_bytes()[:4] == b"\x89PNG", name
+    assert (folder/"study"/"report.txt").read_text() in text
+
+
+def test_whole_members_are_not_run_again(free: tuple[Path, str]) -> None:
+    folder, _ = free
+    before = stamps(folder)
+    done = study(folder, *FREE, "--vary", "mesh=1,2")
+    assert "4 members, 4 done; 4 of them were there" in done.stdout
+    assert stamps(folder) == before
+
+
+# --- goals and references ----------------------------------------------------------------------
+
+def test_errors_of_the_impact_and_a_goal_too_far(tmp_path: Path) -> None:
+    """A goal below what the reference is certain of is not met, and the text says so."""
+    done = study(tmp_path, "--vary", "h=0.02,0.01,0.005", "--set", "t_end=1.5",
+                 "--goal", "rebound:1e-13", "--goal", "displacement:1", code=1)
+    text = " ".join(done.stdout.split())
+    assert "goal rebound:1e-13: not met. The best" in text and "times the goal" in text
+    assert "The reference itself may be wrong by more than that in rebound" in text
+    assert "goal displacement:1: the cheapest setting is h=" in text
+    assert "goal rebound:1e-13 and displacement:1: not met" in text
+    rows = table(tmp_path)
+    finest = min(rows, key=lambda row: float(row["h"]))
+    assert float(finest["impulse_y"]) > 0.0
+    assert all(float(row["energy"]) < 1e-12 for row in rows)
+
+
+def test_a_refined_mesh_of_the_ring(tmp_path: Path) -> None:
+    study(tmp_path, "--vary", "h=0.1", "--set", "t_end=0.2", "--set", "frame=0.1",
+          "--reference", "refined-mesh", deck=RING)
+    rows = table(tmp_path)
+    assert [row["mesh"] for row in rows] == ["", "2"]
+    assert all(row["status"] == "done" and row["verdict"] == "good" for row in rows)
+    # both are of one ring: its displacements differ by a bit of the discretisation
+    assert 0.0 < float(rows[0]["error_refined-mesh_displacement"]) < 0.1
+
+
+def test_another_run_as_reference(tmp_path: Path) -> None:
+    subprocess.run([PROGRAM, BAR, "--quiet", "--output", tmp_path, "--set=h=0.01",
+                    "--set=t_end=0.5"], check=True)
+    study(tmp_path, "--vary", "h=0.01", "--set", "t_end=0.5", "--reference", "file:bouncing_bar")
+    (row,) = table(tmp_path)
+    errors = {name: float(value) for name, value in row.items()
+              if name.startswith("error_file_") and value}
+    assert len(errors) > 8 and "error_file_displacement" in errors
+    own = {"error_file_energy", "error_file_penetration", "error_file_stand_off"}
+    assert all(error == 0.0 for name, error in errors.items() if name not in own)
+
+
+def test_no_quadruple_precision(tmp_path: Path) -> None:
+    done = study(tmp_path, *FREE, "--reference", "quad", "--quad-program", "nowhere", code=2)
+    assert "there is no program of quadruple precision" in done.stderr
+    assert "--quad-program" in done.stderr
+
+
+# --- failures ----------------------------------------------------------------------------------
+
+def test_a_member_that_fails_is_a_result(tmp_path: Path) -> None:
+    done = study(tmp_path, *FREE, "--vary", "method=NULL SPACE,NONSENSE")
+    rows = table(tmp_path)
+    assert [row["status"] for row in rows] == ["done", "failed", "done", "failed"]
+    assert all("NONSENSE" in row["message"] for row in rows if row["status"] == "failed")
+    assert "4 members, 2 done, 2 failed" in done.stdout and "NONSENSE" in done.stdout
+    before = stamps(tmp_path)
+    study(tmp_path, *FREE, "--vary", "method=NULL SPACE,NONSENSE")
+    assert stamps(tmp_path) == before and len(before) == 4
+
+
+def test_all_fail(tmp_path: Path) -> None:
+    done = study(tmp_path, *FREE, "--set", "method=NONSENSE", code=3)
+    assert "2 members, 0 done, 2 failed" in done.stdout
+
+
+def program(folder: Path, text: str) -> Path:
+    """A program in front of the real one."""
+    path = folder/"program"
+    path.write_text("#!/bin/sh\n" + textwrap.dedent(text))
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path
+
+
+def task_of(folder: Path, runs: Path = PROGRAM, limit: float | None = None,
+            **settings: str) -> Task:
+    deck = read_deck(BAR)
+    return Task(Member(0, "member", {"t_end": "0.1", "frame": "0.1", **settings}), str(folder),
+                DeckFile(BAR, deck.text), str(runs), 1, limit)
+
+
+def test_a_run_ended_by_a_signal_is_repeated(tmp_path: Path) -> None:
+    task = task_of(tmp_path, program(tmp_path, "kill -9 $$\n"))
+    record = run_member(task)
+    assert record["status"] == "failed" and record["message"] == (
+        "the program was ended by signal 9")
+    assert record_of(task) is None and not list((tmp_path/"members").iterdir())
+    assert run_member(task_of(tmp_path))["status"] == "done" and record_of(task) is not None
+
+
+def test_a_run_that_takes_too_long(tmp_path: Path) -> None:
+    record = run_member(task_of(tmp_path, program(tmp_path, "exec sleep 60\n"), limit=0.2))
+    assert record["message"] == "not done after 0.2 s (--time-limit)"
+
+
+def test_the_time_is_that_of_the_processor(tmp_path: Path) -> None:
+    burn = "import time\nwhile time.process_time() < 0.3: pass"
+    code, cpu, _ = call([sys.executable, "-c", burn], tmp_path/"log", None)
+    assert code == 0 and cpu >= 0.3
+    start = time.monotonic()
+    code, cpu, _ = call(["/bin/sleep", "0.3"], tmp_path/"log", None)
+    assert code == 0 and cpu < 0.3 <= time.monotonic() - start
+
+
+def test_the_smallest_time_of_several(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    times = iter((3.0, 1.0, 2.0))
+
+    def timed(*arguments: object) -> tuple[int, float, str]:
+        code, _, text = call(*arguments)
+        return code, next(times), text
+
+    monkeypatch.setattr("emcon.study.execution.call", timed)
+    task = task_of(tmp_path)
+    record = run_member(Task(task.member, task.folder, task.deck, task.program, 3, None))
+    assert (record["cpu"], record["runs"], record["status"]) == (1.0, 3, "done")
+    assert record_of(task) is not None                   # three runs are more than one
+
+
+def test_a_study_that_is_killed_goes_on(tmp_path: Path) -> None:
+    """kill -9 in the middle: whole members stay, the half one is repeated, the end is the same."""
+    options = ("--vary", "h=0.02,0.01,0.0001", "--set", "t_end=1.5", "--jobs", 1)
+    running = subprocess.Popen(command(BAR, *options), cwd=tmp_path, env=ENVIRONMENT,
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    members = tmp_path/"study"/"members"
+    deadline = time.monotonic() + LONGEST
+    while len(stamps(tmp_path)) < 2 or not list(members.glob("*.part-*/bouncing_bar.*")):
+        assert running.poll() is None and time.monotonic() < deadline
+        time.sleep(0.005)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    before = stamps(tmp_path)
+    assert len(before) == 2 and list(members.glob("*.part-*"))
+    done = study(tmp_path, *options)
+    assert "3 members, 3 done; 2 of them were there" in done.stdout
+    after = stamps(tmp_path)
+    assert before.items() <= after.items() and len(after) == 3
+    assert not list(members.glob("*.part-*"))
+    other = tmp_path/"other"
+    other.mkdir()
+    study(other, *options)
+    for one, two in zip(table(tmp_path), table(other), strict=True):
+        one.pop("cpu"), two.pop("cpu")
+        assert one == two
+
+
+# --- many machines -----------------------------------------------------------------------------
+
+def test_rows_of_the_manifest_one_by_one(tmp_path: Path) -> None:
+    """What an array job does: each index in a process of its own, at the same time."""
+    done = study(tmp_path, *FREE, "--manifest")
+    assert done.stdout == "study/manifest.csv: 2 rows, 0 to 1\n"
+    with (tmp_path/"study"/"manifest.csv").open() as file:
+        assert [row["h"] for row in csv.DictReader(file)] == ["0.1", "0.05"]
+    assert not stamps(tmp_path)
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        jobs = [pool.submit(study, tmp_path, *FREE, "--run-member", k) for k in (0, 1, 0, 1)]
+        texts = [job.result().stdout for job in jobs]
+    assert texts == ["0: h=0.1: done\n", "1: h=0.05: done\n"]*2
+    before = stamps(tmp_path)
+    done = study(tmp_path, *FREE)
+    assert "2 of them were there" in done.stdout and stamps(tmp_path) == before
+    study(tmp_path, *FREE, "--run-member", 2, code=2)
+
+
+def test_any_executor(tmp_path: Path) -> None:
+    (tmp_path/"mine.py").write_text(textwrap.dedent("""\
+        import concurrent.futures
+
+        class Lossy(concurrent.futures.ThreadPoolExecutor):
+            count = 0
+
+            def submit(self, work, task):
+                self.count += 1
+                if self.count == 1:
+                    return super().submit(divmod, 1, 0)      # a worker that is lost
+                return super().submit(work, task)
+
+        def lossy():
+            return Lossy(2)
+
+        def processes():
+            return concurrent.futures.ProcessPoolExecutor(2)
+
+        def nothing():
+            return 7
+        """))
+    done = study(tmp_path, *FREE, "--executor", "mine:lossy")
+    assert "1 failed" in done.stdout and "ZeroDivisionError" in done.stdout
+    done = study(tmp_path, *FREE, "--executor", "mine:processes")
+    assert "2 members, 2 done; 1 of them were there" in done.stdout
+    other = ("--vary", "h=0.25", *FREE[2:], "--reference", "file:study/none")
+    assert "no result" in study(tmp_path, *other, code=2).stderr
+    for name, words in (("mine", "MODULE:CALLABLE"), ("mine:absent", "absent"),
+                        ("none_such:x", "none_such"), ("mine:nothing", "no submit")):
+        fresh = study(tmp_path, *FREE, "--fresh", "--executor", name, code=2)
+        assert words in fresh.stderr
+
+
+def test_a_local_dask_cluster(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    (tmp_path/"cluster.py").write_text(textwrap.dedent("""\
+        from distributed import Client
+
+        def dask():
+            client = Client(n_workers=2, threads_per_worker=1, dashboard_address=None)
+            return client.get_executor()
+        """))
+    done = study(tmp_path, *FREE, "--executor", "cluster:dask")
+    assert "2 members, 2 done" in done.stdout
+    assert [row["status"] for row in table(tmp_path)] == ["done", "done"]
+
+
+# --- refusals ----------------------------------------------------------------------------------
+
+def test_a_deck_that_changed_is_refused(tmp_path: Path) -> None:
+    deck = tmp_path/"bar.inp"
+    deck.write_text(BAR.read_text())
+    study(tmp_path, *FREE, deck=deck)
+    before = stamps(tmp_path)
+    deck.write_text(BAR.read_text().replace("10., 0., -1., 0.", "11., 0., -1., 0."))
+    error = study(tmp_path, *FREE, deck=deck, code=2).stderr
+    assert "bar.inp, or what it includes, changed" in error
+    assert "--output" in error and "--fresh" in error
+    assert stamps(tmp_path) == before
+    study(tmp_path, *FREE, "--fresh", deck=deck)
+    (row, _) = table(tmp_path)
+    assert float(row["rebound_1_y"]) == pytest.approx(-5.5, rel=1e-9)
+
+
+def test_another_version_is_refused(tmp_path: Path) -> None:
+    study(tmp_path, *FREE)
+    other = program(tmp_path, "echo emcon 99.0\n")
+    error = study(tmp_path, *FREE, "--program", other, code=2).stderr
+    assert re.search(r"before the program changed \(emcon [\d.]+ then, emcon 99.0 now\)", error)
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    (["--vary", "hh=1"], "there is no knob 'hh'"),
+    (["--vary", "method=NULL SPACE,SADDLE POINT"], "h is not varied"),
+    (["--vary", "h=1,2", "--goal", "nothing:1"], "there is no measure 'nothing'"),
+    (["--vary", "h=1,2", "--reference", "truth"], "known are finest, quad, refined-mesh"),
+    (["--vary", "h=1,2", "--reference", "closed-form:none.json"], "none.json"),
+    (["--vary", "h=1,2", "--jobs", "0"], "whole number above 0"),
+    (["--vary", "h=1,2", "--program", "/nowhere/emcon"], "no program /nowhere/emcon"),
+])
+def test_refusals(options: list[str], words: str, tmp_path: Path) -> None:
+    assert words in study(tmp_path, *options, code=2).stderr
+    assert not (tmp_path/"study").exists()
+
+
+def test_a_deck_that_is_not_there(tmp_path: Path) -> None:
+    assert "cannot read" in study(tmp_path, deck=tmp_path/"none.inp", code=2).stderr
