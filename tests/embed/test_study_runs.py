@@ -21,6 +21,7 @@ import pytest
 from emcon.study.deck import DeckFile, read_deck
 from emcon.study.execution import RECORD, Task, call, record_of, run_member
 from emcon.study.plan import Member
+from python_doc import PAGE, examples
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT/"build"/"release"/"emcon"
@@ -157,6 +158,16 @@ def test_another_run_as_reference(tmp_path: Path) -> None:
     assert len(errors) > 8 and "error_file_displacement" in errors
     own = {"error_file_energy", "error_file_penetration", "error_file_stand_off"}
     assert all(error == 0.0 for name, error in errors.items() if name not in own)
+
+
+def test_a_program_of_another_precision(tmp_path: Path) -> None:
+    """It runs the finest setting once more; here the program is the same: nothing differs."""
+    done = study(tmp_path, *FREE, "--reference", "quad", "--quad-program", PROGRAM)
+    rows = table(tmp_path)
+    assert [(row["role"], row["h"]) for row in rows] == [
+        ("member", "0.1"), ("member", "0.05"), ("quad", "0.05")]
+    assert float(rows[1]["error_quad_displacement"]) == 0.0
+    assert "reference quad: quadruple precision at h=0.05" in done.stdout
 
 
 def test_no_quadruple_precision(tmp_path: Path) -> None:
@@ -317,13 +328,9 @@ def test_any_executor(tmp_path: Path) -> None:
 
 def test_a_local_dask_cluster(tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    (tmp_path/"cluster.py").write_text(textwrap.dedent("""\
-        from distributed import Client
-
-        def dask():
-            client = Client(n_workers=2, threads_per_worker=1, dashboard_address=None)
-            return client.get_executor()
-        """))
+    (example,) = [found for chapter in examples(PAGE.read_text(encoding="utf-8")).values()
+                  for found in chapter if found.file == "cluster.py"]
+    (tmp_path/"cluster.py").write_text(example.code.text)
     done = study(tmp_path, *FREE, "--executor", "cluster:dask")
     assert "2 members, 2 done" in done.stdout
     assert [row["status"] for row in table(tmp_path)] == ["done", "done"]

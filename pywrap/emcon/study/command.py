@@ -119,7 +119,7 @@ def _set_up(options: argparse.Namespace) -> _Setup:
     references = options.reference or ["finest"]
     check_references(references, plan)
     program = find_program(options.program)
-    of_quad = (find_program(options.quad_program, "release-real128")
+    of_quad = (find_program(options.quad_program, "release-quad")
                if "quad" in references else program)
     members = plan.members(references, bool(goals))
     folder = options.output or Path(f"{deck.name}_study")

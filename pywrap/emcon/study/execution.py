@@ -72,12 +72,21 @@ def run_member(task: Task) -> dict[str, Any]:
         record = _run(task, part)
         if record.pop("is_whole"):
             (part/RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-            if task.home.exists():
-                shutil.rmtree(task.home, ignore_errors=True)
-            part.rename(task.home)
+            _put(part, task)
         return record
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def _put(part: Path, task: Task) -> None:
+    """Give a whole member its folder, unless another process was faster."""
+    if record_of(task) is None:
+        shutil.rmtree(task.home, ignore_errors=True)
+    try:
+        part.rename(task.home)
+    except OSError:
+        if record_of(task) is None:
+            raise
 
 
 def _run(task: Task, part: Path) -> dict[str, Any]:
@@ -267,7 +276,7 @@ def find_program(named: str | None, folder: str = "release") -> str:
             return str(Path(found).resolve())
     if folder != "release":
         raise StudyError(f"--reference quad: there is no program of quadruple precision, {built}; "
-                         "make PRECISION=quad app builds it, --quad-program names another")
+                         "make app PRECISION=quad builds it, --quad-program names another")
     raise StudyError(f"no program {named or 'emcon'}: it is not on the path; make app builds it, "
                      "--program names it")
 
