@@ -34,7 +34,10 @@ LONGEST = 300
 
 def study(folder: Path, *options: object, deck: Path = BAR,
           code: int = 0) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(command(deck, *options), cwd=folder, env=ENVIRONMENT, text=True,
+    if "--figures" not in options:
+        options = (*options, "--no-figures")
+    arguments = [option for option in options if option != "--figures"]
+    done = subprocess.run(command(deck, *arguments), cwd=folder, env=ENVIRONMENT, text=True,
                           capture_output=True, timeout=LONGEST)
     assert done.returncode == code, done.stdout + done.stderr
     assert "Traceback" not in done.stderr, done.stderr
@@ -71,7 +74,7 @@ def free(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
               "rigid_energy_1": 125.0, "vibration": 0.0, "impulse": [0.0, 0.0]}
     (folder/"closed.json").write_text(json.dumps(values))
     done = study(folder, *FREE, "--vary", "mesh=1,2", "--reference", "closed-form:closed.json",
-                 "--reference", "finest", "--goal", "rebound:1e-9")
+                 "--reference", "finest", "--goal", "rebound:1e-9", "--figures")
     return folder, done.stdout
 
 
@@ -136,6 +139,24 @@ def test_errors_of_the_impact_and_a_goal_too_far(tmp_path: Path) -> None:
     finest = min(rows, key=lambda row: float(row["h"]))
     assert float(finest["impulse_y"]) > 0.0
     assert all(float(row["energy"]) < 1e-12 for row in rows)
+
+
+def test_each_knob_is_tried_alone(tmp_path: Path) -> None:
+    """Of a free fall all settings are right: the cheapest is chosen, its knobs are run alone."""
+    options = ("--vary", "h=0.1,0.05", "--vary", "method=SADDLE POINT,DIAGONAL", "--set",
+               "t_end=0.5", "--set", "frame=0.5", "--goal", "rebound:1e-6")
+    done = study(tmp_path, *options, "--vary", "threads=1")
+    rows = table(tmp_path)
+    assert [row["role"] for row in rows] == ["member"]*4 + ["default", "alone", "alone"]
+    default = rows[4]
+    assert (default["h"], default["method"]) == ("0.005", "NULL SPACE")
+    for row in rows[5:]:
+        assert sum(row[knob] != default[knob] for knob in ("h", "method")) == 1
+    text = " ".join(done.stdout.split())
+    assert "method=SADDLE POINT alone: " in text and re.search(r"h=0.\d+ alone: ", text)
+    assert "failed" in text                              # the method that there is not
+    again = study(tmp_path, *options, "--vary", "threads=1")
+    assert "7 of them were there" in again.stdout
 
 
 def test_a_refined_mesh_of_the_ring(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import os
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,11 @@ from .deck import DeckFile, read_deck
 from .errors import StudyError
 from .execution import (Progress, Task, executor_of, find_program, record_of, run_all, run_member,
                         sweep, version_of)
-from .figures import write_figures
 from .measures import from_json
-from .plan import (QUAD, Member, Plan, make_plan, parse_set, parse_vary, unique, write_manifest)
+from .plan import (ALONE, QUAD, Member, Plan, make_plan, parse_set, parse_vary, unique,
+                   write_manifest)
 from .reference import check_references, references_of
-from .report import Study, goals_met, in_words, rows_of, write_table
+from .report import Study, goals_met, in_words, missing_knobs, rows_of, write_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--manifest", action="store_true", help="write the manifest, run nothing")
     parser.add_argument("--time-limit", metavar="S", type=_seconds,
                         help="end a run after S seconds on the clock")
+    parser.add_argument("--no-figures", action="store_true", help="tables and words alone")
     parser.add_argument("--fresh", action="store_true", help="remove what an earlier study left")
     parser.add_argument("--program", metavar="FILE", help="the program (default: emcon)")
     parser.add_argument("--quad-program", metavar="FILE",
@@ -100,15 +101,34 @@ def run_study(options: argparse.Namespace) -> int:
     if options.run_member is not None:
         return _one(setup, options.run_member)
     sweep(setup.folder)
-    waiting = [task for task in setup.tasks if record_of(task) is None]
+    records, n_run = _run(setup.tasks, options)
+    study = _study(setup, options, records, n_run)
+    alone = missing_knobs(study)
+    if alone:
+        setup = _with_members(setup, alone)
+        more, n_more = _run(setup.tasks[-len(alone):], options)
+        study = _study(setup, options, records | more, n_run + n_more)
+    return _conclude(setup, study, not options.no_figures)
+
+
+def _run(tasks: Sequence[Task], options: argparse.Namespace) -> tuple[dict[int, Any], int]:
+    """Records of all members by index, and how many had to be run."""
+    waiting = [task for task in tasks if record_of(task) is None]
+    fresh: dict[int, Any] = {}
     if waiting:
         with executor_of(options.executor, options.jobs) as executor:
             fresh = run_all(waiting, executor, Progress(len(waiting), sys.stderr))
-    else:
-        fresh = {}
-    records = {task.member.index: fresh.get(task.member.index) or record_of(task) or {}
-               for task in setup.tasks}
-    return _conclude(setup, options, records, len(waiting))
+    return {task.member.index: fresh.get(task.member.index) or record_of(task) or {}
+            for task in tasks}, len(waiting)
+
+
+def _with_members(setup: _Setup, settings: Sequence[dict[str, str]]) -> _Setup:
+    """With rows at the end of the manifest."""
+    new = [Member(len(setup.members) + k, ALONE, values) for k, values in enumerate(settings)]
+    members = [*setup.members, *new]
+    write_manifest(setup.folder/"manifest.csv", members, setup.plan.knobs)
+    tasks = [replace(setup.tasks[0], member=member) for member in new]
+    return replace(setup, members=members, tasks=[*setup.tasks, *tasks])
 
 
 def _set_up(options: argparse.Namespace) -> _Setup:
@@ -180,24 +200,32 @@ def _runs(setup: _Setup, records: Mapping[int, dict[str, Any]]) -> list[Run]:
             for task in setup.tasks if records[task.member.index].get("status") == "done"]
 
 
-def _conclude(setup: _Setup, options: argparse.Namespace,
-              records: Mapping[int, dict[str, Any]], n_run: int) -> int:
+def _study(setup: _Setup, options: argparse.Namespace, records: Mapping[int, dict[str, Any]],
+           n_run: int) -> Study:
     runs = _runs(setup, records)
     n = len(setup.members)
     head = (f"study of {setup.deck.path.name}: {n} members, {len(runs)} done"
             + (f", {n - len(runs)} failed" if len(runs) < n else "")
             + (f"; {n - n_run} of them were there" if n_run < n else ""))
-    study = Study(setup.plan, setup.members, records, runs,
-                  references_of(_kinds(options), setup.plan, runs), parse_goals(options.goal), head)
-    write_table(setup.folder, rows_of(study), head)
+    return Study(setup.plan, setup.members, records, runs,
+                 references_of(_kinds(options), setup.plan, runs), parse_goals(options.goal), head)
+
+
+def _conclude(setup: _Setup, study: Study, draws: bool) -> int:
+    figures: list[Path] = []
+    write_table(setup.folder, rows_of(study), study.head)
     text = in_words(study)
     (setup.folder/"report.txt").write_text(text, encoding="utf-8")
-    figures = write_figures(study, setup.folder)
+    if draws:
+        # matplotlib takes long to load
+        from .figures import write_figures
+
+        figures = write_figures(study, setup.folder)
     print(text)
     print("written:", *(str(setup.folder/name) for name in ("table.csv", "table.h5",
                                                             "report.txt")),
           *map(str, figures))
-    if not runs:
+    if not study.runs:
         return 3
     return 0 if goals_met(study) else 1
 

@@ -19,6 +19,8 @@ MESH, THREADS = "mesh", "threads"
 PROGRAM_KNOBS = (MESH, THREADS)
 #: Why a member is run.
 MEMBER, DEFAULT, REFERENCE, QUAD = "member", "default", "reference", "quad"
+#: The deck's own setting but for one knob, to tell what that does by itself.
+ALONE = "alone"
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ..results import ResultError, locate
 from .accuracy import Limit, Run, base, differences, limits
 from .errors import StudyError
 from .measures import NAMES, OWN, ROWS, Measured, measure
-from .plan import MESH, QUAD, Member, Plan, as_number, same_settings
+from .plan import ALONE, MESH, QUAD, Member, Plan, as_number, same_settings
 
 #: Kinds of references; the last two with a file behind a colon.
 KINDS = ("finest", "quad", "refined-mesh", "closed-form", "file")
@@ -84,7 +84,7 @@ def references_of(texts: Sequence[str], plan: Plan, runs: Sequence[Run]) -> list
 
 def sequence(plan: Plan, runs: Sequence[Run], settings: dict[str, str], knob: str) -> list[Run]:
     """Runs that differ from `settings` in `knob` alone, the finest first."""
-    chosen = [run for run in runs if run.member.role != QUAD
+    chosen = [run for run in runs if run.member.role not in (ALONE, QUAD)
               and same_settings({**run.member.settings, knob: "1"}, {**settings, knob: "1"})]
     return sorted(chosen, key=lambda run: knob_size(run, knob))
 

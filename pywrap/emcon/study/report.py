@@ -216,10 +216,7 @@ def _goals(study: Study) -> list[str]:
         return [f"goal {goal.name}:{goal.tolerance:g}: there is no reference to hold it against"
                 for goal in study.goals]
     reference = study.references[0]
-    found = [goal_words(study, reference, [goal]) for goal in study.goals]
-    if len(study.goals) > 1:
-        found.append(goal_words(study, reference, study.goals))
-    return found
+    return [goal_words(study, reference, goals) for goals in goal_groups(study.goals)]
 
 
 def safe_error(reference: Reference, run: Run, name: str) -> float:
@@ -234,22 +231,48 @@ def candidates(study: Study) -> list[Run]:
             and run.record.get("verdict") != "bad"]
 
 
+def choice(study: Study, reference: Reference, goals: Sequence[Goal]) -> Run | None:
+    """The cheapest run that meets all `goals`."""
+    runs = candidates(study)
+    k = cheapest([run.record["cpu"] for run in runs],
+                 [excess(reference, run, goals) for run in runs], 1.0)
+    return None if k is None else runs[k]
+
+
 def goal_words(study: Study, reference: Reference, goals: Sequence[Goal]) -> str:
     """The cheapest setting that meets all `goals`, or how near the best one came."""
-    runs = candidates(study)
     text = " and ".join(f"{goal.name}:{goal.tolerance:g}" for goal in goals)
-    over = [excess(reference, run, goals) for run in runs]
-    k = cheapest([run.record["cpu"] for run in runs], over, 1.0)
-    if k is None:
-        return _not_met(study, reference, goals, runs, over, text)
-    run = runs[k]
+    run = choice(study, reference, goals)
+    if run is None:
+        return _not_met(study, reference, goals, text)
     errors = ", ".join(f"{g.name} to {safe_error(reference, run, g.name):.1e}" for g in goals)
     return (f"goal {text}: the cheapest setting is {study.label(run.member)}: "
             f"{run.record['cpu']:.3g} s, {errors}" + _against_default(study, reference, goals, run))
 
 
-def _not_met(study: Study, reference: Reference, goals: Sequence[Goal], runs: Sequence[Run],
-             over: Sequence[float], text: str) -> str:
+def missing_knobs(study: Study) -> list[dict[str, str]]:
+    """Settings that would tell what each knob of the chosen ones does by itself."""
+    own = study.plan.default_settings()
+    found: list[dict[str, str]] = []
+    for goals in goal_groups(study.goals) if study.references else []:
+        run = choice(study, study.references[0], goals)
+        for knob in study.plan.knobs if run else ():
+            assert run is not None
+            alone = {**own, knob: run.member.settings[knob]}
+            known = [*found, *(member.settings for member in study.members)]
+            if not any(same_settings(alone, settings) for settings in known):
+                found.append(alone)
+    return found
+
+
+def goal_groups(goals: Sequence[Goal]) -> list[Sequence[Goal]]:
+    """Each goal, and all of them."""
+    return [*([goal] for goal in goals), *([goals] if len(goals) > 1 else [])]
+
+
+def _not_met(study: Study, reference: Reference, goals: Sequence[Goal], text: str) -> str:
+    runs = candidates(study)
+    over = [excess(reference, run, goals) for run in runs]
     reached = [k for k in range(len(runs)) if over[k] < math.inf]
     if not reached:
         return f"goal {text}: not measured in any member that is done"
@@ -281,7 +304,7 @@ def _against_default(study: Study, reference: Reference, goals: Sequence[Goal], 
         alone = next((run for run in study.runs
                       if same_settings(run.member.settings, {**own, knob: value})), None)
         if alone is None:
-            words.append(f"{knob}={value} alone: not run")
+            words.append(f"{knob}={value} alone: failed")
         elif alone is not chosen:
             met = excess(reference, alone, goals) <= 1.0
             words.append(f"{knob}={value} alone: {cpu/alone.record['cpu']:.2g} times"
