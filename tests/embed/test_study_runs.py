@@ -24,7 +24,7 @@ from emcon.study.plan import Member
 from python_doc import PAGE, examples
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = ROOT/"build"/"release"/"emcon"
+PROGRAM = Path(os.environ.get("EMCON", ROOT/"build"/"release"/"emcon"))
 BAR = ROOT/"input_decks"/"bouncing_bar.inp"
 RING = ROOT/"input_decks"/"ring.inp"
 EPSILON = np.finfo(float).eps
