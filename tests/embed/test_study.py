@@ -148,6 +148,16 @@ def test_the_knobs_that_pay_are_named() -> None:
     assert goals_met(study)
 
 
+def test_a_dearer_setting_is_called_so() -> None:
+    """The deck's own is cheaper, but does not meet the goal."""
+    errors = {**ERRORS, "0.01 P": (5.0, 0.2), "0.1 A": (1.0, 0.2)}
+    study = study_of(errors, 0.005, "impulse:0.05")
+    words = goal_words(study, study.references[0], study.goals)
+    assert "h=0.01, initiation=ADMISSIBLE: 10 s" in words
+    assert ("2 times dearer than the deck's own (h=0.01, initiation=PERSISTENT, 5 s, and the goal "
+            "is not met)") in words
+
+
 def test_what_the_reference_is_not_certain_of_counts() -> None:
     """An error of 0.04 is not known to be below 0.05 by a reference that may err by 0.02."""
     study = study_of(ERRORS, 0.02, "impulse:0.05")

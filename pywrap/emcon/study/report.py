@@ -295,8 +295,11 @@ def _against_default(study: Study, reference: Reference, goals: Sequence[Goal], 
     if default is None or default is chosen:
         return "; it is the deck's own" if default is chosen else ""
     cpu = default.record["cpu"]
-    words = [f"; {cpu/chosen.record['cpu']:.2g} times cheaper than the deck's own "
-             f"({study.label(default.member)}, {cpu:.3g} s)"]
+    gain = cpu/chosen.record["cpu"]
+    words = [f"; {max(gain, 1.0/gain):.2g} times {'cheaper' if gain >= 1.0 else 'dearer'} than the "
+             f"deck's own ({study.label(default.member)}, {cpu:.3g} s"
+             + ("" if excess(reference, default, goals) <= 1.0 else ", and the goal is not met")
+             + ")"]
     for knob in study.plan.knobs:
         value = chosen.member.settings[knob]
         if same_settings({knob: value}, {knob: own[knob]}):
