@@ -487,13 +487,15 @@ class Model(Cards):
 
     def step(self, procedure: Literal["STATIC", "DYNAMIC"], h: Number = 1.0,
              duration: Number = 1.0, h_min: Number | None = None, h_max: Number | None = None, *,
-             direct: bool = False, nlgeom: bool | None = None, increments: int | str | None = None,
+             direct: bool = False, explicit: bool = False, nlgeom: bool | None = None,
+             increments: int | str | None = None,
              amplitude: Literal["RAMP", "STEP"] | None = None, solver: str | None = None) -> Step:
         """`*STEP`: a further step, to which conditions, settings and output are added.
 
         h, duration    increment and length of the step [T]
         h_min, h_max   bounds of the increment [T] where it is cut or grown
         direct         keep to h
+        explicit       of dynamic steps: central differences, h below the critical step
         nlgeom         large displacements; stays on for later steps
         increments     most increments of the step; default no limit
         amplitude      RAMP in static steps, STEP in dynamic ones: what holds anyway
@@ -502,7 +504,8 @@ class Model(Cards):
         options: dict[str, object] = {
             "NLGEOM": "NO" if nlgeom is False else nlgeom, "INC": increments,
             "AMPLITUDE": amplitude}
-        step = Step(self, options, procedure, {"DIRECT": direct, "SOLVER": solver},
+        step = Step(self, options, procedure,
+                    {"DIRECT": direct, "EXPLICIT": explicit, "SOLVER": solver},
                     (h, duration, h_min, h_max))
         self._steps.append(step)
         return step

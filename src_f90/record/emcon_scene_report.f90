@@ -41,7 +41,7 @@ contains
       call add_ties(stepper%scene, rows)
       call add_choices(stepper, rows)
       call add_sizes(stepper, rows)
-      call add_increment(stepper%scene, body, rows)
+      call add_increment(stepper, body, rows)
       call advise_rigid(body, rows)
       call advise_locking(body, rows)
       call advise_massless(stepper%scene, body, rows)
@@ -195,26 +195,29 @@ contains
    end subroutine add_sizes
 
    !> The increment that follows waves through the shortest element, against that of the deck.
-   subroutine add_increment(scene, body, rows)
-      type(scene_t), intent(in) :: scene
+   subroutine add_increment(stepper, body, rows)
+      type(stepper_t), intent(in) :: stepper
       type(body_t), intent(in) :: body(:)
       type(report_row_t), allocatable, intent(inout) :: rows(:)
       type(report_row_t) :: row
       real(wp) :: transit
       integer :: k
 
-      k = findloc(scene%step%scheme%masses_resist, .true., 1)
+      k = findloc(stepper%scene%step%scheme%masses_resist, .true., 1)
       if (k == 0) return
       transit = shortest_transit(body)
       if (.not. transit < huge(transit)) return
       call row_begin(row, "increments", "step")
       call row_put(row, "step", k, " #")
-      call row_put(row, "h", scene%step(k)%h, ": h = #")
-      call row_put(row, "courant_number", scene%step(k)%h/transit, &
-         ", # times the shortest transit")
-      call row_put(row, "recommended_h", transit, "; recommended where waves matter: h = #")
-      if (scene%step(k)%h > many_transits*transit) call row_put(row, "remark", &
-         "waves are not resolved, rigid motion and bending are", "; #")
+      associate (step => stepper%scene%step(k), march => stepper%march)
+         call row_put(row, "h", step%h, ": h = #")
+         if (step%scheme%is_explicit .and. march%state%i_step == k) call row_put(row, &
+            "critical_h", march%explicit%limit, ", critical h = #")
+         call row_put(row, "courant_number", step%h/transit, ", # times the shortest transit")
+         call row_put(row, "recommended_h", transit, "; recommended where waves matter: h = #")
+         if (step%h > many_transits*transit) call row_put(row, "remark", &
+            "waves are not resolved, rigid motion and bending are", "; #")
+      end associate
       call rows_add(rows, row)
    end subroutine add_increment
 

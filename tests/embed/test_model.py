@@ -273,6 +273,7 @@ def everything() -> Model:
                     totals="YES" if "PRINT" in request and "ENERGY" not in request else None)
     step.restart(5)
     model.step("STATIC", nlgeom=False, direct=True, solver="UMFPACK")
+    model.step("DYNAMIC", 0.001, 1.0, explicit=True)
     return model
 
 

@@ -1,6 +1,7 @@
 """Explicit steps: central differences with the mass at the nodes, contact that closes exactly."""
 
 import dataclasses
+import json
 import re
 import shutil
 
@@ -134,6 +135,10 @@ def test_critical_step_is_sharp(tmp_path):
                  step=LAST, **LINEAR)
     run = run_deck(deck, tmp_path/"below", h=0.999*limit, t_end=2000*0.999*limit)
     assert critical_step(run) == pytest.approx(limit, rel=1e-5)       # six digits in the log
+    deck.set_parameter("h", number(0.999*limit))
+    done = emcon("check", deck.write(tmp_path/"block.inp"), "--json")
+    (row,) = json.loads(done.stdout)["increments"]
+    assert row["critical_h"] == pytest.approx(limit, rel=1e-8)
     # At h w = 1.998 the highest vibration holds up to 1/(1 - 0.999^2) = 500 times its energy.
     assert run.history["total"].max() <= 500*run.history["total"][0]
     done, _ = attempt(deck, tmp_path/"above", (), {"h": 1.001*limit, "t_end": 1})
