@@ -301,9 +301,10 @@ bench:  ## print the timed scenes of tests/bench; fail where the program does mo
 	@set -e; for program in $(filter %/bench_%,$(BENCHES)); do $$program; done
 	@set -e; for script in tests/bench/bench_*.py; do $(PY) $$script; done
 
-trade: .venv/test.stamp  ## write the table and the figure of docs/trade.md anew
+trade: .venv/test.stamp  ## write the tables and the figure of docs/trade.md anew
 	$(BUILDING) app
 	$(PY) tests/bench/trade.py --update
+	$(PY) tests/bench/trade_knobs.py --update
 
 extremes: .venv/test.stamp  ## drive everything to its extremes; write the table of docs/stability.md anew
 	$(BUILDING) app

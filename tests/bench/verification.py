@@ -31,13 +31,11 @@ CHAPTERS = [
 ]
 
 
-def update(page, name, lines):
-    """Make the table between the marks of `name` anew in a page."""
-    text = (DOCS / page).read_text()
+def update(text, name, lines):
+    """`text` of a page with the table between the marks of `name` made anew."""
     mark = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-    assert mark.search(text), f"docs/{page} has no table {name}"
-    text = mark.sub(lambda match: match[1] + "\n".join(lines) + "\n" + match[2], text)
-    (DOCS / page).write_text(text)
+    assert mark.search(text), f"the page has no table {name}"
+    return mark.sub(lambda match: match[1] + "\n".join(lines) + "\n" + match[2], text)
 
 
 def main():
@@ -56,7 +54,8 @@ def main():
                 lines = chapter.report(futures, figures)
                 print(f"{chapter.name}\n", *lines, "", sep="\n", flush=True)
                 if options.update:
-                    update(chapter.page, chapter.name, lines)
+                    page = DOCS / chapter.page
+                    page.write_text(update(page.read_text(), chapter.name, lines))
         finally:
             runs.pool.shutdown(cancel_futures=True)
 

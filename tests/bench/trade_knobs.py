@@ -1,0 +1,157 @@
+"""Every knob of a run turned by itself, on five scenes: what it costs and what it changes.
+
+    .venv/bin/python tests/bench/trade_knobs.py [--update] [words of the names of scenes]
+
+Writes a table between the marks `knobs` of docs/trade.md. Errors are those against the same mesh with
+increments sixteen times as small and massless surfaces.
+"""
+
+import argparse
+import pathlib
+import tempfile
+
+import numpy as np
+from trade import NTS, PAGE, PROGRAM, ball, bowl, drift, drawn, force_of, impulse_of, percent
+
+from book.common import size, table  # isort: skip, `trade` says where
+from book.forces import switches
+from scene_tools import DECKS, Deck, Run
+from timing import usage
+from verification import update
+
+SINGLE = PROGRAM.parent.parent / "release-single" / "emcon"
+
+
+def knobbed(deck):
+    """`deck` with `scheme` and `newton` among its parameters."""
+    text = deck.text()
+    if "TYPE=<newton>" not in text:
+        for head in ("*NEWTON, TOLERANCE=<tolerance>\n", "*NEWTON\n"):
+            text = text.replace(head, "")
+        text = text.replace("*CONTACT INITIATION, TYPE=<initiation>\n",
+                            "*CONTACT INITIATION, TYPE=<initiation>\n*NEWTON, TYPE=<newton>, "
+                            "TOLERANCE=<tolerance>, POLISH=<polish>\n")
+        text = text.replace("*PARAMETER\n", "*PARAMETER\nnewton = KEPT\npolish = YES\n", 1)
+        if "\ntolerance = " not in text:
+            text = text.replace("*PARAMETER\n", "*PARAMETER\ntolerance = 1e-10\n", 1)
+    if "SCHEME=<scheme>" not in text:
+        text = text.replace("*CONTACT INITIATION, TYPE=<initiation>\n", "*TIME INTEGRATION, "
+                            "SCHEME=<scheme>\n*CONTACT INITIATION, TYPE=<initiation>\n")
+        text = text.replace("*PARAMETER\n", "*PARAMETER\nscheme = ENERGY MOMENTUM\n", 1)
+    return Deck(text)
+
+
+def from_file(name):
+    return lambda: knobbed(Deck.read(DECKS / f"{name}.inp"))
+
+
+def plain(scene, body):
+    return lambda: knobbed(drawn(scene, body, None)("elastic"))
+
+
+#: Name, deck, parameters of the default run.
+SCENES = (
+    ("ring on a foundation", from_file("ring"), {**NTS, "h": 0.02, "t_end": 4.0, "frame": 4.0}),
+    ("bouncing bar", from_file("bouncing_bar"),
+     {**NTS, "h": 0.005, "t_end": 5.3, "frame": 5.3}),
+    ("tied ring", from_file("tied_ring"), {**NTS, "h": 0.02, "t_end": 4.0, "frame": 4.0}),
+    ("ball on a block", plain(ball, "BLOCK"), {**NTS, "h": 0.01}),
+    ("disc in a bowl", plain(bowl, "BOWL"), {**NTS, "h": 0.01}),
+)
+MORTAR = {"formulation": "MORTAR"}
+#: Text, what changes: parameters (h as a factor), or the program.
+KNOBS = (
+    ("default", {}),
+    ("h, twice", {"h": 2.0}), ("h, half", {"h": 0.5}), ("h, a quarter", {"h": 0.25}),
+    ("`SCHEME=MIDPOINT`", {"scheme": "MIDPOINT"}),
+    ("`SCHEME=TRAPEZOIDAL`", {"scheme": "TRAPEZOIDAL"}),
+    ("`SCHEME=GENERALIZED ALPHA`", {"scheme": "GENERALIZED ALPHA"}),
+    ("`SCHEME=BDF2`", {"scheme": "BDF2"}),
+    ("`SCHEME=ENERGY DECAYING`", {"scheme": "ENERGY DECAYING"}),
+    ("`ADMISSIBLE`", {"initiation": "ADMISSIBLE"}),
+    ("`VELOCITY UPDATE`", {"initiation": "VELOCITY UPDATE"}),
+    ("`MASSLESS`", {"initiation": "MASSLESS"}),
+    ("`MASSLESS`, h, half", {"initiation": "MASSLESS", "h": 0.5}),
+    ("`SEGMENT`", {"formulation": "SEGMENT"}), ("`MORTAR`", MORTAR),
+    ("`MORTAR`, `STANDARD`", {**MORTAR, "multiplier": "STANDARD"}),
+    ("`HERMITE`", {"smoothing": "HERMITE"}),
+    ("`*NEWTON, TYPE=FULL`", {"newton": "FULL"}),
+    ("`POLISH=NO`, 1e-8", {"polish": "NO", "tolerance": "1e-8"}),
+    ("`SADDLE POINT`", {"method": "SADDLE POINT"}),
+    ("`PRECISION=single`", {"program": SINGLE}),
+)
+
+
+def run_of(deck, folder, parameters, change):
+    """The run, its processor time [s]; None: the program stopped, with its message."""
+    change = dict(change)
+    program = change.pop("program", PROGRAM)
+    merged = {**parameters, **change}
+    if "h" in change:
+        merged["h"] = parameters["h"]*change["h"]
+    folder.mkdir()
+    path = deck.write(folder / "deck.inp")
+    options = [f"--set={name}={value}" for name, value in merged.items()]
+    done = usage([program, path, "--quiet", "--output", folder, *options])
+    run = Run(folder / "deck", done.errors)
+    return (run if run.file(".vtkhdf").exists() and done.code in (0, 3) else None), done
+
+
+def figures_of(run, reference):
+    """Displacements, impulse and forces (means over a fiftieth of the run) against the reference."""
+    u, exact = (r.fields()["displacement"][-1] for r in (run, reference))
+    place = np.linalg.norm(u - exact)/np.linalg.norm(exact)
+    impulse, full = impulse_of(run.history), impulse_of(reference.history)
+    means = []
+    for r in (run, reference):
+        history = r.history
+        time = history["time"]
+        total = np.cumsum(np.linalg.norm(force_of(history, 1)[1], axis=0)*np.diff(time))
+        means.append(np.diff(np.interp(np.linspace(0, time[-1], 51), time[1:], total)))
+    force = np.linalg.norm(means[0] - means[1])/np.linalg.norm(means[1])
+    along = np.linalg.norm(force_of(run.history, 1)[1], axis=0)
+    return (percent(place), percent(np.linalg.norm(impulse - full)/np.linalg.norm(full)),
+            percent(force), switches(along), size(drift(run.history)))
+
+
+def lines_of(name, make, parameters, rounds):
+    """Rows of a scene; the processor time is the least of the rounds, over that of the default."""
+    deck, cost, kept = make(), {}, {}
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        reference, done = run_of(deck, folder / "reference", parameters,
+                                 {"h": 1/16, "initiation": "MASSLESS"})
+        assert reference, done.errors
+        for k in range(rounds):
+            for knob, change in KNOBS:
+                if not pathlib.Path(change.get("program", PROGRAM)).exists():
+                    continue
+                place = folder / f"{len(list(folder.iterdir()))}"
+                run, done = run_of(deck, place, parameters, change)
+                cost.setdefault(knob, []).append(done.cpu)
+                if k == 0:
+                    kept[knob] = figures_of(run, reference) if run else (
+                        "stops: " + done.errors.strip().splitlines()[-1][:80], "", "", "", "")
+    first = min(cost["default"])
+    return [(name, knob, f"{min(cost[knob])/first:.2f}", *found) for knob, found in kept.items()]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--update", action="store_true", help="write into docs/trade.md")
+    parser.add_argument("--rounds", type=int, default=3, help="runs of each (3)")
+    parser.add_argument("only", nargs="*", help="words of the names of scenes")
+    options = parser.parse_args()
+    lines = []
+    for name, make, parameters in SCENES:
+        if not options.only or any(word in name for word in options.only):
+            lines += lines_of(name, make, parameters, options.rounds)
+    lines = table(["scene", "knob", "CPU", "displacements", "impulse", "forces", "switches",
+                   "energy"], lines)
+    print(*lines, sep="\n")
+    if options.update:
+        PAGE.write_text(update(PAGE.read_text(), "knobs", lines))
+
+
+if __name__ == "__main__":
+    main()
