@@ -14,7 +14,7 @@ module emcon_element_pack_plane
    private
    public :: element_pack_t, pack_motion_t, pack_point_t, pack_response_t
    public :: pack_fill, pack_gather, pack_scatter, pack_clear, pack_point, pack_point_check
-   public :: pack_add_point
+   public :: pack_add_point, pack_add_rounding
 
    !> Elements of one kind and one law. Lanes that are left over repeat the first one.
    type :: element_pack_t
@@ -119,6 +119,25 @@ contains
          end do
       end do
    end subroutine pack_scatter
+
+   !> Add to the nodes whose turn it is what the displacements of their elements are rounded by.
+   pure subroutine pack_add_rounding(self, turn_of, turn, largest, stiffness, total)
+      type(element_pack_t), intent(in) :: self
+      integer, intent(in), contiguous :: turn_of(:)          !! (n_node)
+      integer, intent(in) :: turn                            !! as `turn_of` has them
+      real(wp), intent(in) :: largest(n_lane)                !! displacement [L]
+      real(wp), intent(in) :: stiffness(:, :)                !! (>= n_node, n_element) [M/T^2]
+      real(wp), intent(inout), contiguous :: total(:, :)     !! (2, n_node)
+      integer :: i, l, node
+
+      do l = 1, self%n
+         do i = 1, self%n_node
+            node = self%node(l, i)
+            if (turn_of(node) /= turn) cycle
+            total(:, node) = total(:, node) + largest(l)*stiffness(i, self%element(l))
+         end do
+      end do
+   end subroutine pack_add_rounding
 
    !> Nothing, before points are added.
    pure subroutine pack_clear(n, response, with_tangent)

@@ -6,7 +6,7 @@ module emcon_solid_term
    use emcon_element_frequency, only : element_frequency
    use emcon_element_lists, only : element_lists
    use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_point_t, &
-      pack_response_t, pack_scatter
+      pack_add_rounding, pack_response_t, pack_scatter
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
@@ -221,19 +221,13 @@ contains
       real(wp), intent(in), contiguous :: magnitude(:, :, :)   !! (n_lane, n_dim, >= n_node)
       real(wp), intent(in) :: largest(n_lane)    !! displacement [L]
       type(response_t), intent(inout) :: response
-      real(wp) :: rounding(n_lane, size(force, 2), pack%n_node)
-      integer :: i, l
 
       associate (total => response%part(self%role), turn_of => self%shares%turn)
          call pack_scatter(pack, turn_of, turn, force, total%force)
          if (.not. response%with_sizes) return
          call pack_scatter(pack, turn_of, turn, magnitude, total%magnitude)
-         do i = 1, pack%n_node
-            do l = 1, n_lane
-               rounding(l, :, i) = largest(l)*self%solid%stiffness(i, pack%element(l))
-            end do
-         end do
-         call pack_scatter(pack, turn_of, turn, rounding, response%rounding)
+         call pack_add_rounding(pack, turn_of, turn, largest, self%solid%stiffness, &
+            response%rounding)
       end associate
    end subroutine add_forces
 
