@@ -22,7 +22,7 @@ from emcon.study.measures import (Measured, _of_history, _of_pairs, body_geometr
                                   windowed)
 from emcon.study.plan import Member, make_plan, parse_vary, read_manifest, write_manifest
 from emcon.study.reference import Reference
-from emcon.study.report import Study, goal_words, goals_met
+from emcon.study.report import Study, goal_words, goals_met, missing_knobs
 
 EPSILON = np.finfo(float).eps
 SIZES = [(1.0, 2.0, 4.0), (0.1, 0.15, 0.4), (0.01, 0.02, 0.03)]
@@ -146,6 +146,17 @@ def test_the_knobs_that_pay_are_named() -> None:
     assert "h=0.1 alone: 6 times, and the goal is not met" in words
     assert words.endswith("initiation=ADMISSIBLE alone: 1.2 times")
     assert goals_met(study)
+
+
+def test_each_knob_of_the_choice_is_asked_for_alone() -> None:
+    study = study_of(ERRORS, 0.005, "impulse:0.05")
+    assert missing_knobs(study) == []                    # the grid has them
+    few = [m for m in study.members if m.settings["h"] == "0.1"
+           and m.settings["initiation"] == "ADMISSIBLE"]
+    runs = [run for run in study.runs if run.member in few]
+    lone = Study(study.plan, few, {}, runs, study.references, study.goals, "")
+    assert missing_knobs(lone) == [{"h": "0.1", "initiation": "PERSISTENT"},
+                                   {"h": "0.01", "initiation": "ADMISSIBLE"}]
 
 
 def test_a_dearer_setting_is_called_so() -> None:

@@ -141,24 +141,6 @@ def test_errors_of_the_impact_and_a_goal_too_far(tmp_path: Path) -> None:
     assert all(float(row["energy"]) < 1e-12 for row in rows)
 
 
-def test_each_knob_is_tried_alone(tmp_path: Path) -> None:
-    """Of a free fall all settings are right: the cheapest is chosen, its knobs are run alone."""
-    options = ("--vary", "h=0.1,0.05", "--vary", "method=SADDLE POINT,DIAGONAL", "--set",
-               "t_end=0.5", "--set", "frame=0.5", "--goal", "rebound:1e-6")
-    done = study(tmp_path, *options, "--vary", "threads=1")
-    rows = table(tmp_path)
-    assert [row["role"] for row in rows] == ["member"]*4 + ["default", "alone", "alone"]
-    default = rows[4]
-    assert (default["h"], default["method"]) == ("0.005", "NULL SPACE")
-    for row in rows[5:]:
-        assert sum(row[knob] != default[knob] for knob in ("h", "method")) == 1
-    text = " ".join(done.stdout.split())
-    assert "method=SADDLE POINT alone: " in text and re.search(r"h=0.\d+ alone: ", text)
-    assert "failed" in text                              # the method that there is not
-    again = study(tmp_path, *options, "--vary", "threads=1")
-    assert "7 of them were there" in again.stdout
-
-
 def test_a_refined_mesh_of_the_ring(tmp_path: Path) -> None:
     study(tmp_path, "--vary", "h=0.1", "--set", "t_end=0.2", "--set", "frame=0.1",
           "--reference", "refined-mesh", deck=RING)
