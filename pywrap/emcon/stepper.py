@@ -381,21 +381,21 @@ class Stepper(Queries, Conditions):
     def ledger(self) -> dict[str, float]:
         """`energies` and `momenta` together."""
         names = ("kinetic", "strain", "potential", "external_work", "contact_work",
-                 "stabilization", "restitution_loss", "total", "px", "py", "lz")
+                 "stabilization", "restitution_loss", "scheme_loss", "total", "px", "py", "lz")
         found = structure("emcon_ledger", self._handle.call(_core.emcon_get_ledger))
         return {name: found[name] for name in names}
 
     def energies(self) -> dict[str, float]:
         """Energies and works [M L^2/T^2]: kinetic, strain, potential, external_work, contact_work,
-        stabilization, restitution_loss, total.
+        stabilization, restitution_loss, scheme_loss, total.
 
         `potential` is that of given forces; total = kinetic + strain + potential - external_work.
         """
-        return dict(list(self.ledger.items())[:8])
+        return dict(list(self.ledger.items())[:9])
 
     def momenta(self) -> dict[str, float]:
         """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`."""
-        return dict(list(self.ledger.items())[8:])
+        return dict(list(self.ledger.items())[9:])
 
 
 def _text(address: int, function: Callable[..., Any]) -> tuple[int, str]:

@@ -141,16 +141,19 @@ class Step(Cards):
                                      "POLISH": ends})
 
     def time_integration(self, scheme: str, *, alpha: Number | None = None,
-                         spectral_radius: Number | None = None) -> Step:
+                         spectral_radius: Number | None = None,
+                         dissipation: Number | None = None) -> Step:
         """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), another scheme, or one that a program gives.
 
-        scheme            MIDPOINT, TRAPEZOIDAL, GENERALIZED ALPHA, BDF2; CENTRAL DIFFERENCE, in
-                          explicit steps
+        scheme            MIDPOINT, TRAPEZOIDAL, GENERALIZED ALPHA, BDF2, ENERGY DECAYING; CENTRAL
+                          DIFFERENCE, in explicit steps
         alpha             of GENERALIZED ALPHA, -1/3 to 0 (default -0.05)
         spectral_radius   of GENERALIZED ALPHA, instead: at the highest frequencies, 0 to 1
+        dissipation       of ENERGY DECAYING, 0 to 1 (0.125)
         """
         return self._card("TIME INTEGRATION", {"SCHEME": scheme, "ALPHA": alpha,
-                                               "SPECTRAL RADIUS": spectral_radius})
+                                               "SPECTRAL RADIUS": spectral_radius,
+                                               "DISSIPATION": dissipation})
 
     # --- output ----------------------------------------------------------------------------
 

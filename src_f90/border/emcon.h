@@ -85,6 +85,7 @@ typedef struct emcon_ledger {
    double lz;        /* angular momentum about the origin */
    double stabilization;   /* work of what *CONTACT CONTROLS, STABILIZE bears: round-off */
    double restitution_loss;   /* of contact work: what impacts took by RESTITUTION, >= 0 */
+   double scheme_loss;        /* what the damping of the scheme took, >= 0 */
 } emcon_ledger;
 
 /* A sparse matrix by rows: row i has the entries row_start[i] to row_start[i + 1] - 1 of `column`

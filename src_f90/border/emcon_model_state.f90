@@ -41,6 +41,7 @@ contains
          ledger%lz = real(from%angular, c_double)
          ledger%stabilization = real(from%stabilization, c_double)
          ledger%restitution_loss = real(from%restitution, c_double)
+         ledger%scheme_loss = real(from%decay, c_double)
       end associate
    end subroutine model_ledger
 

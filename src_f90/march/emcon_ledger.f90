@@ -25,6 +25,7 @@ module emcon_ledger
       real(wp) :: stabilization = 0.0_wp
       !> Of contact work: what impacts with a restitution below 1 took, since the start, >= 0
       real(wp) :: restitution = 0.0_wp
+      real(wp) :: decay = 0.0_wp                 !! taken by the scheme, since the start
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]
       real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]

@@ -21,6 +21,7 @@ module emcon_march_commit
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update
    use emcon_term, only : role_external, role_inertia, role_internal
+   use emcon_term_registry, only : terms_decay
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_velocity_update, only : push_t, push_weights, velocity_update_apply, &
       velocity_update_push
@@ -274,6 +275,8 @@ contains
                + 0.5_wp*sum((state%internal + part(role_internal)%force)*motion%du)
          end if
          self%ledger%contact_work = self%ledger%contact_work + contact_work
+         if (motion%pose%dissipation > 0.0_wp) self%ledger%decay = self%ledger%decay &
+            + terms_decay(self%system%term)
       end associate
    end subroutine book_work
 

@@ -77,7 +77,9 @@ contains
       associate (motion => self%motion, state => self%state)
          if (allocated(motion%carried)) deallocate(motion%carried)
          if (allocated(motion%v_past)) deallocate(motion%v_past, motion%dv_past)
+         if (allocated(motion%du_before)) deallocate(motion%du_before)
          if (.not. state%has_past) return
+         if (motion%pose%recalled > 0.0_wp) motion%du_before = state%past(:, :, 1)
          if (motion%pose%start_weight > 0.0_wp) motion%carried = motion%pose%start_weight &
             *(state%internal - state%load - state%contact)
          if (size(state%past, 3) == 0) return

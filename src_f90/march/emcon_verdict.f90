@@ -86,7 +86,8 @@ contains
       type(verdict_t), intent(inout) :: self
       type(ledger_t), intent(in) :: before, after
 
-      associate (change => after%total - after%contact_work - before%total + before%contact_work)
+      associate (change => (after%total - after%contact_work + after%decay) &
+            - (before%total - before%contact_work + before%decay))
          self%total0 = self%total0 + change
          self%reference = self%reference + change
          self%shown_reference = self%shown_reference + change
@@ -163,7 +164,7 @@ contains
       real(wp) :: kept
 
       associate (ledger => march%ledger)
-         kept = ledger%total - ledger%contact_work
+         kept = ledger%total - ledger%contact_work + ledger%decay
          self%largest_energy = max(self%largest_energy, ledger%kinetic + ledger%strain)
          self%largest_drift = max(self%largest_drift, abs(kept - self%total0))
       end associate
@@ -292,6 +293,8 @@ contains
                to_text(ledger%contact_work, 9))
             if (ledger%restitution > 0.0_wp) call note_add(lines, "impacts took an energy of " // &
                to_text(ledger%restitution, 9) // " (RESTITUTION), part of contact work")
+            if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "the damping of the scheme " // &
+               "took an energy of " // to_text(ledger%decay, 9))
             call note_add(lines, "total at start " // to_text(self%total0, 12) // ", at end " // &
                to_text(ledger%total, 12))
             call note_add(lines, "largest error of the energy balance " // &

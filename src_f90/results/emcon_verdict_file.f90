@@ -79,6 +79,7 @@ contains
          call json_number(line, "contact_work", ledger%contact_work)
          call json_number(line, "stabilization", ledger%stabilization)
          call json_number(line, "restitution_loss", ledger%restitution)
+         call json_number(line, "scheme_loss", ledger%decay)
          call json_number(line, "total", ledger%total)
       end associate
       call json_number(line, "total_at_start", self%total0)

@@ -35,6 +35,8 @@ module emcon_pose
       !> Contact pushes along gradients at the end, else along discrete ones over all of the step.
       logical :: pushes_at_end = .false.
       real(wp) :: start_weight = 0.0_wp          !! of all forces at the start; those at `place`: 1
+      real(wp) :: dissipation = 0.0_wp           !! chi, of docs/theory.md, eq. (4e); 0: none
+      real(wp) :: recalled = 0.0_wp              !! part of the last strain increments: 0..1
       real(wp) :: past_velocity(most_past) = 0.0_wp  !! weights of the past in the velocity
       real(wp) :: past_change(most_past) = 0.0_wp    !! and in b du - w v0
    end type pose_t

@@ -24,6 +24,7 @@ module emcon_scheme
       logical :: loads_ramp = .false.            !! without amplitude they run over the step
       logical :: takes_jumps = .true.            !! velocities may jump where a step ends
       logical :: takes_massless = .true.         !! nodes may be without mass
+      logical :: dissipates = .false.            !! elements take energy
       logical :: is_accelerated = .false.        !! the past is the acceleration
       integer :: n_past = 0                      !! fields that are kept of the steps before
       type(setting_t) :: setting

@@ -5,6 +5,7 @@ module emcon_scheme_registry
    use emcon_scheme, only : scheme_row_t, scheme_t, setting_t
    use emcon_scheme_bdf2, only : scheme_bdf2_t
    use emcon_scheme_central_difference, only : scheme_central_difference_t
+   use emcon_scheme_energy_decaying, only : scheme_energy_decaying_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_generalized_alpha, only : scheme_generalized_alpha_t
    use emcon_scheme_midpoint, only : scheme_midpoint_t
@@ -15,12 +16,12 @@ module emcon_scheme_registry
    private
    public :: scheme_rows, scheme_given_row, scheme_static, scheme_energy_momentum, scheme_given
    public :: scheme_midpoint, scheme_trapezoidal, scheme_generalized_alpha, scheme_bdf2, &
-      scheme_central_difference
+      scheme_central_difference, scheme_energy_decaying
    public :: scheme_row, scheme_create, setting_range_t, setting_ranges
 
    integer, parameter :: scheme_static = 1, scheme_energy_momentum = 2, scheme_given = 3, &
       scheme_midpoint = 4, scheme_trapezoidal = 5, scheme_generalized_alpha = 6, scheme_bdf2 = 7, &
-      scheme_central_difference = 8
+      scheme_central_difference = 8, scheme_energy_decaying = 9
 
    !> The first row of a card is its default.
    type(scheme_row_t), parameter :: scheme_rows(*) = [ &
@@ -38,7 +39,10 @@ module emcon_scheme_registry
       scheme_row_t(scheme_bdf2, "DYNAMIC", "BDF2", "backward differences", &
          masses_resist=.true., takes_jumps=.false., takes_massless=.false., n_past=2), &
       scheme_row_t(scheme_central_difference, "DYNAMIC", "CENTRAL DIFFERENCE", &
-         "central differences", masses_resist=.true., is_explicit=.true.)]
+         "central differences", masses_resist=.true., is_explicit=.true.), &
+      scheme_row_t(scheme_energy_decaying, "DYNAMIC", "ENERGY DECAYING", &
+         "energy-decaying scheme", masses_resist=.true., takes_massless=.false., &
+         dissipates=.true., n_past=1, setting=setting_t("DISSIPATION", 0.125_wp))]
 
    !> What the numbers of schemes may be.
    type :: setting_range_t
@@ -50,7 +54,8 @@ module emcon_scheme_registry
 
    type(setting_range_t), parameter :: setting_ranges(*) = [ &
       setting_range_t(scheme_generalized_alpha, "ALPHA", -1.0_wp/3.0_wp, 0.0_wp, "-1/3 to 0"), &
-      setting_range_t(scheme_generalized_alpha, "SPECTRAL RADIUS", 0.0_wp, 1.0_wp, "0 to 1")]
+      setting_range_t(scheme_generalized_alpha, "SPECTRAL RADIUS", 0.0_wp, 1.0_wp, "0 to 1"), &
+      setting_range_t(scheme_energy_decaying, "DISSIPATION", 0.0_wp, 1.0_wp, "0 to 1")]
 
    !> Of schemes that a program gives.
    type(scheme_row_t), parameter :: scheme_given_row = &
@@ -94,6 +99,8 @@ contains
          allocate(scheme_bdf2_t :: scheme)
       case (scheme_central_difference)
          allocate(scheme_central_difference_t :: scheme)
+      case (scheme_energy_decaying)
+         allocate(scheme_energy_decaying_t :: scheme)
       case default
          allocate(scheme, source=given)
       end select

@@ -22,6 +22,7 @@ module emcon_motion
       ! where the scheme keeps something of the steps before:
       real(wp), allocatable :: v_past(:, :)      !! what that adds to the velocity at the end [L/T]
       real(wp), allocatable :: dv_past(:, :)     !! and to the change that inertia sees [L/T]
+      real(wp), allocatable :: du_before(:, :)   !! over the step before [L]
       real(wp), allocatable :: carried(:, :)     !! forces from the start, weighted [M L/T^2]
       ! of `motion_place`:
       real(wp), allocatable :: from(:, :)        !! displacement where the span starts [L]

@@ -185,6 +185,11 @@ contains
       else
          ledger%restitution = 0.0_wp
       end if
+      if (restart_offers(restart, "decay", is_written=abs(ledger%decay) > 0.0_wp)) then
+         call restart_exchange(restart, "decay", ledger%decay)
+      else
+         ledger%decay = 0.0_wp
+      end if
    end subroutine exchange_ledger
 
    subroutine exchange_pairs(pairs, restart)

@@ -2,6 +2,7 @@
 module emcon_term_registry
    use emcon_corotated_term, only : corotated_term_init, corotated_term_t
    use emcon_csr, only : csr_t
+   use emcon_decay_plane, only : decay_term_init, decay_term_t
    use emcon_errors, only : error_t
    use emcon_host, only : host_t
    use emcon_host_check, only : host_check_mass
@@ -19,7 +20,7 @@ module emcon_term_registry
    implicit none
    private
    public :: terms_create, terms_solid, terms_mass, terms_mass_times, terms_mass_values, &
-      terms_massless, terms_return_mass
+      terms_massless, terms_return_mass, terms_decay
 
    !> Where the terms that every model has stand; what is given comes after them.
    integer, parameter :: of_inertia = 1, of_solid = 2, of_loads = 3, n_own = 3
@@ -34,6 +35,7 @@ contains
       type(host_t), intent(in), optional :: given
       integer :: n, i, first
       logical :: has_linear, turns               ! there are linear elements, corotated ones
+      logical :: decays                          ! elements take energy in some step
 
       n = 0
       if (present(given)) then
@@ -41,13 +43,15 @@ contains
       end if
       has_linear = any(scene%section(scene%element_section)%kinematics == kinematics_linear)
       turns = any(scene%section(scene%element_section)%kinematics == kinematics_corotated)
-      first = n_own + count([has_linear, turns])
+      decays = any(scene%step%scheme%dissipates)
+      first = n_own + count([has_linear, turns, decays])
       allocate(term(first + n))
       allocate(inertia_t :: term(of_inertia)%term)
       allocate(solid_term_t :: term(of_solid)%term)
       allocate(loads_t :: term(of_loads)%term)
       if (has_linear) allocate(linear_term_t :: term(n_own + 1)%term)
-      if (turns) allocate(corotated_term_t :: term(first)%term)
+      if (turns) allocate(corotated_term_t :: term(n_own + count([has_linear, turns]))%term)
+      if (decays) allocate(decay_term_t :: term(first)%term)
       call create_own(scene, term, error, given)
       do i = 1, n
          if (allocated(error)) return
@@ -103,6 +107,8 @@ contains
             call linear_term_init(part, solid, size(scene%x, 1), error)
          type is (corotated_term_t)
             call corotated_term_init(part, solid, size(scene%x, 1))
+         type is (decay_term_t)
+            call decay_term_init(part, solid)
          end select
       end do
    end subroutine create_own
@@ -200,6 +206,20 @@ contains
          value = part%value
       end select
    end subroutine terms_mass_values
+
+   !> What the damping of the scheme has taken in the last motion [M L^2/T^2].
+   pure real(wp) function terms_decay(term) result(work)
+      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+      integer :: k
+
+      work = 0.0_wp
+      do k = n_own + 1, size(term)
+         select type (part => term(k)%term)
+         type is (decay_term_t)
+            work = part%work
+         end select
+      end do
+   end function terms_decay
 
    !> M field, in all directions.
    pure subroutine terms_mass_times(term, field, product)

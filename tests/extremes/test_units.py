@@ -20,6 +20,7 @@ DIMENSION = {
     "contact_work": (2, 1, -2),
     "stabilization": (2, 1, -2),
     "restitution_loss": (2, 1, -2),
+    "scheme_loss": (2, 1, -2),
     "total": (2, 1, -2),
     "px": (1, 1, -1),
     "py": (1, 1, -1),

@@ -1,0 +1,58 @@
+!> The energy-momentum scheme with a stress against strain increments that change from step to step:
+!> high frequencies die out, energy never rises above that of the start, momenta are exact.
+!>
+!> After an idea of Armero & Romero (2001); docs/theory.md, eqs. (4e) to (4g).
+module emcon_scheme_energy_decaying
+   use emcon_kinds, only : wp
+   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
+   use emcon_scheme, only : scheme_t
+   implicit none
+   private
+   public :: scheme_energy_decaying_t
+
+   type, extends(scheme_t) :: scheme_energy_decaying_t
+   contains
+      procedure :: pose => decaying_pose
+      procedure :: keeps_energy => decaying_keeps_energy
+      procedure :: carry => decaying_carry
+   end type scheme_energy_decaying_t
+
+contains
+
+   !> That of the energy-momentum scheme. A step that is longer than the one before sees an
+   !> increment that is too small, which takes energy all the same.
+   pure function decaying_pose(self, start, h) result(pose)
+      class(scheme_energy_decaying_t), intent(in) :: self
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      type(pose_t) :: pose
+
+      pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+      pose%load_instant = instant_later(start, 0.5_wp*h)
+      pose%dissipation = self%row%setting%value
+      if (start%h_before > 0.0_wp) pose%recalled = min(1.0_wp, h/start%h_before)
+   end function decaying_pose
+
+   !> With what the damping has taken.
+   pure logical function decaying_keeps_energy(self) result(keeps_energy)
+      class(scheme_energy_decaying_t), intent(in) :: self
+
+      associate (unused => self)
+      end associate
+      keeps_energy = .true.
+   end function decaying_keeps_energy
+
+   !> The way.
+   pure subroutine decaying_carry(self, h, du, v0, v1, past)
+      class(scheme_energy_decaying_t), intent(in) :: self
+      real(wp), intent(in) :: h                              !! > 0 [T]
+      real(wp), intent(in), contiguous :: du(:, :)           !! (n_dim, n_node) [L]
+      real(wp), intent(in), contiguous :: v0(:, :), v1(:, :) !! (n_dim, n_node) [L/T]
+      real(wp), intent(inout), contiguous :: past(:, :, :)   !! (n_dim, n_node, 1) [L]
+
+      associate (unused => self, no => h + v0(1, 1) + v1(1, 1))
+      end associate
+      past(:, :, 1) = du
+   end subroutine decaying_carry
+
+end module emcon_scheme_energy_decaying

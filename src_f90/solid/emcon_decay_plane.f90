@@ -1,0 +1,208 @@
+!> Stress of elements against strain increments that change from step to step, where the scheme asks
+!> for it: chi/2 C (dE - dE_before), with the moduli C at rest.
+!>
+!> Source: docs/theory.md, eqs. (4e) to (4g).
+module emcon_decay_plane
+   use emcon_csr, only : csr_t
+   use emcon_element, only : element_motion_t, element_point, point_motion_t
+   use emcon_element_lists, only : element_lists
+   use emcon_kinds, only : dp, wp
+   use emcon_law, only : law_response_plane, law_response_t
+   use emcon_motion, only : motion_t
+   use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
+   use emcon_space, only : lists_append, lists_t, space_t
+   use emcon_term, only : response_t, role_internal, term_t
+   implicit none
+   private
+   public :: decay_term_t, decay_term_init
+
+   !> Components of strain and stress.
+   integer, parameter :: n_strain = 3
+
+   type, extends(term_t) :: decay_term_t
+      type(solid_t), private :: solid
+      logical, allocatable, private :: is_damped(:)      !! (n_element) it has moduli, and deforms
+      real(wp), allocatable, private :: moduli(:, :, :)  !! (3, 3, n_law) at rest [M/(L T^2)]
+      logical, private :: nlgeom = .true.
+      integer, allocatable, private :: slot(:)           !! element matrices by columns
+      real(wp) :: work = 0.0_wp                  !! of the last motion's forces [M L^2/T^2]
+   contains
+      procedure :: lay_out
+      procedure :: begin_step
+      procedure :: respond
+      procedure :: is_symmetric
+   end type decay_term_t
+
+contains
+
+   !> The elements of `solid` that deform by a law of EMCON.
+   subroutine decay_term_init(self, solid)
+      type(decay_term_t), intent(out) :: self
+      type(solid_t), intent(in) :: solid
+      real(wp), parameter :: rest(n_strain) = 0.0_wp
+      type(law_response_t) :: state
+      integer :: k
+
+      self%role = role_internal
+      self%solid = solid
+      allocate(self%moduli(n_strain, n_strain, size(solid%law)), source=0.0_wp)
+      allocate(self%is_damped(solid%n_element), source=.false.)
+      do k = 1, size(solid%law)
+         if (.not. allocated(solid%law(k)%law)) cycle
+         call law_response_plane(solid%law(k)%law, rest, rest, state)
+         ! By the end of a step of no size.
+         self%moduli(:, :, k) = 2.0_wp*state%tangent
+         self%is_damped = self%is_damped .or. (solid%law_of == k .and. .not. solid%is_rigid)
+      end do
+   end subroutine decay_term_init
+
+   !> The freedoms of each element.
+   pure subroutine lay_out(self, lists)
+      class(decay_term_t), intent(in) :: self
+      type(lists_t), intent(inout) :: lists
+      integer, allocatable :: start(:), freedom(:)
+
+      call element_lists(self%solid, lists%n_dim, start, freedom, self%is_damped)
+      call lists_append(lists, start(2:) - start(:size(start) - 1), freedom)
+   end subroutine lay_out
+
+   !> As `term_t` has it.
+   subroutine begin_step(self, scene, i_step, space, matrix, slot)
+      class(decay_term_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step              !! from 1
+      type(space_t), intent(in) :: space
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: slot(:)             !! element matrices by columns
+
+      associate (unused => space, no => matrix)
+      end associate
+      self%nlgeom = scene%step(i_step)%nlgeom
+      self%slot = slot
+   end subroutine begin_step
+
+   !> Forces of a motion; none where the scheme has no dissipation.
+   subroutine respond(self, motion, response, value, side)
+      class(decay_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion                     !! placed
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      integer :: e, first
+
+      self%work = 0.0_wp
+      if (.not. motion%pose%dissipation > 0.0_wp) return
+      first = 0
+      do e = 1, self%solid%n_element
+         if (.not. self%is_damped(e)) cycle
+         call add_element(self, e, first, motion, response, value, side)
+         first = first + (size(motion%du, 1)*self%solid%geometry(e)%n_node)**2
+      end do
+   end subroutine respond
+
+   !> The motions of an element over the step, and over the one before.
+   pure subroutine gather(self, e, motion, now, before)
+      type(decay_term_t), intent(in) :: self
+      integer, intent(in) :: e
+      type(motion_t), intent(in) :: motion
+      type(element_motion_t), intent(out) :: now, before
+      integer :: i
+
+      now%nlgeom = (self%nlgeom .or. self%solid%is_corotated(e)) .and. .not. self%solid%is_linear(e)
+      before%nlgeom = now%nlgeom
+      do i = 1, self%solid%geometry(e)%n_node
+         associate (node => self%solid%node(i, e), u0 => motion%u0)
+            now%from(:, i) = u0(:, node) - u0(:, self%solid%node(1, e))
+            now%by(:, i) = motion%du(:, node) - motion%du(:, self%solid%node(1, e))
+            if (.not. allocated(motion%du_before)) cycle
+            before%by(:, i) = motion%du_before(:, node) &
+               - motion%du_before(:, self%solid%node(1, e))
+            before%from(:, i) = now%from(:, i) - before%by(:, i)
+         end associate
+      end do
+   end subroutine gather
+
+   !> Add the forces of element `e`, and their derivatives to the places from `first` on.
+   subroutine add_element(self, e, first, motion, response, value, side)
+      type(decay_term_t), intent(inout) :: self
+      integer, intent(in) :: e, first
+      type(motion_t), intent(in) :: motion
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
+      type(element_motion_t) :: now, before
+      type(point_motion_t) :: point, last
+      real(wp) :: c(n_strain, n_strain), s(n_strain), way(n_strain), f(size(motion%du, 1))
+      integer :: g, i
+
+      call gather(self, e, motion, now, before)
+      associate (geometry => self%solid%geometry(e), total => response%part(self%role))
+         do g = 1, geometry%n_gp
+            call element_point(geometry, g, now, point)
+            call element_point(geometry, g, before, last)
+            c = 0.5_wp*motion%pose%dissipation*geometry%weight(g) &
+               *self%moduli(:, :, self%solid%law_of(e))
+            way = point%dstrain - motion%pose%recalled*last%dstrain
+            s = matmul(c, way)
+            self%work = self%work + dot_product(s, point%dstrain)
+            do i = 1, geometry%n_node
+               f = matmul(point%f_mid, traction(s, geometry%gradient(:, i, g)))
+               associate (node => self%solid%node(i, e))
+                  total%force(:, node) = total%force(:, node) + f
+                  if (response%with_sizes) total%magnitude(:, node) = total%magnitude(:, node) &
+                     + abs(f)
+               end associate
+            end do
+            if (present(value)) call add_tangent(self%slot(first + 1:), &
+               geometry%gradient(:, :geometry%n_node, g), c, point, value, side)
+         end do
+      end associate
+   end subroutine add_element
+
+   !> Stress times a gradient.
+   pure function traction(s, gradient) result(t)
+      real(wp), intent(in) :: s(n_strain)        !! S11, S22, S12
+      real(wp), intent(in) :: gradient(:)        !! (n_dim)
+      real(wp) :: t(size(gradient))
+
+      t = [s(1)*gradient(1) + s(n_strain)*gradient(2), s(n_strain)*gradient(1) + s(2)*gradient(2)]
+   end function traction
+
+   !> Add the derivatives of the forces of a point by the end of the step, but for that of the place
+   !> where the stress acts: a factor can then be made again without the step before.
+   subroutine add_tangent(slot, gradient, c, point, value, side)
+      integer, intent(in) :: slot(:)             !! of the element, by columns
+      real(wp), intent(in) :: gradient(:, :)     !! (n_dim, n_node)
+      real(wp), intent(in) :: c(n_strain, n_strain)          !! with the weight of the point
+      type(point_motion_t), intent(in) :: point
+      real(dp), intent(inout), contiguous :: value(:), side(:)
+      real(wp) :: k(size(gradient, 1)), change(n_strain)
+      integer :: i, j, a, b, n
+
+      n = 0
+      do j = 1, size(gradient, 2)
+         do b = 1, size(gradient, 1)
+            associate (g => gradient(:, j), f => point%f_end)
+               change = matmul(c, [f(b, 1)*g(1), f(b, 2)*g(2), f(b, 1)*g(2) + f(b, 2)*g(1)])
+            end associate
+            do i = 1, size(gradient, 2)
+               k = matmul(point%f_mid, traction(change, gradient(:, i)))
+               do a = 1, size(k)
+                  n = n + 1
+                  if (slot(n) > 0) value(slot(n)) = value(slot(n)) + real(k(a), dp)
+                  if (slot(n) < 0) side(-slot(n)) = side(-slot(n)) + real(k(a), dp)
+               end do
+            end do
+         end do
+      end do
+   end subroutine add_tangent
+
+   !> The strain increment has its derivative by the end, its forces act at the middle.
+   pure logical function is_symmetric(self, motion)
+      class(decay_term_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+
+      is_symmetric = .not. (motion%pose%dissipation > 0.0_wp .and. (self%nlgeom .or. &
+         any(self%solid%is_corotated)))
+   end function is_symmetric
+
+end module emcon_decay_plane
