@@ -120,7 +120,7 @@ contains
       integer, intent(inout) :: n
       type(pair_stencil_t) :: stencil
       type(frame_t) :: frame(0:1)
-      real(wp) :: local(2, n_place), dlocal(2, n_place)
+      real(wp) :: local(2, n_place), dlocal(2, n_place), corner(2, 4), motion(2, 4)
       integer :: k, m
       logical :: is_wide
 
@@ -128,25 +128,43 @@ contains
          is_wide = options%integration == integration_elements
          if (list%start(e + 1) > list%start(e)) call stencil_slave(stencil, self%slave, e, &
             options%normal == normal_nodal, self%slave_corner)
+         call place_edge(self%slave%edge(:, e), self%slave%edge(1, e), corner(:, :2), motion(:, :2))
          do k = list%start(e), list%start(e + 1) - 1
             m = list%edge(k)
             if (self%is_self) then
                if (self%slave%place(m) < self%slave%place(e) &
                   .or. chain_distance(self%slave, e, m) < 2) cycle
             end if
+            call place_edge(self%master%edge(:, m), self%slave%edge(1, e), corner(:, 3:), &
+               motion(:, 3:))
+            if (.not. pair_comes_near(self%slave%length(e), corner, motion)) cycle
             call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
                is_wide, self%master_corner)
             if (is_wide) stencil%rounding = self%rounding*chain_shorter(self%master, m)
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)
-            if (.not. pair_comes_near(self%slave%length(e), local, local + dlocal)) cycle
             if (.not. pair_is_meant(stencil, frame, self%deepest_start)) cycle
             if (is_wide .and. .not. stencil%is_smooth) call pair_cut_corners(stencil, frame(0))
             call pair_append(self%pair, n, stencil)
          end do
       end associate
       call pairs_drop_far(self%pair, self%master, self%start(e), n, x, u0)
+
+   contains
+
+      !> Nodes of an edge at the start, relative to the node `origin`, and their motion.
+      pure subroutine place_edge(node, origin, at, way)
+         integer, intent(in) :: node(2), origin
+         real(wp), intent(out) :: at(2, 2), way(2, 2)   !! [L]
+         integer :: i
+
+         do i = 1, 2
+            at(:, i) = (x(:, node(i)) - x(:, origin)) + (u0(:, node(i)) - u0(:, origin))
+            way(:, i) = du(:, node(i))
+         end do
+      end subroutine place_edge
+
    end subroutine choose_pairs
 
    pure subroutine mortar_measure_edges(self, x, u0, du)

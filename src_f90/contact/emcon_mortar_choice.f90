@@ -5,7 +5,7 @@ module emcon_mortar_choice
    use emcon_chain, only : chain_is_joint, chain_t
    use emcon_kinds, only : dp, wp
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, n_place, &
-      pair_stencil_t, place_first, place_last, place_master
+      pair_stencil_t, place_master
    use emcon_mortar_stencil, only : frame_faces, stencil_gather
    use emcon_sort, only : sort_order
    implicit none
@@ -25,21 +25,24 @@ module emcon_mortar_choice
 
 contains
 
-   !> Do the boxes of both edges come within `depth` of each other on the way from `x0` to `x1`,
-   !> along both axes at once? What the list of candidates holds beyond that depends on its age.
-   pure logical function pair_comes_near(depth, x0, x1)
-      real(wp), intent(in) :: depth, x0(:, :), x1(:, :)  !! (2, n_place)
+   !> Do the boxes of both edges come within `depth` of each other on the way from `x0` to
+   !> x0 + `dx`, along both axes at once? What the list of candidates holds beyond that depends on
+   !> its age.
+   pure logical function pair_comes_near(depth, x0, dx)
+      real(wp), intent(in) :: depth                      !! [L]
+      real(wp), intent(in) :: x0(2, 4), dx(2, 4)         !! both nodes of the slave edge, then of the
+                                                         !! master edge [L]
       real(wp) :: d(4, 0:1), first, last
       integer :: i
 
       d(:, 0) = box_distances(x0) - depth
-      d(:, 1) = box_distances(x1) - depth
+      d(:, 1) = box_distances(x0 + dx) - depth
       first = 0.0_wp
       last = 1.0_wp
       pair_comes_near = .false.
       do i = 1, 4
-         if (maxval(d(i, :)) <= 0.0_wp) cycle
-         if (minval(d(i, :)) > 0.0_wp) return
+         if (max(d(i, 0), d(i, 1)) <= 0.0_wp) cycle
+         if (min(d(i, 0), d(i, 1)) > 0.0_wp) return
          associate (zero => d(i, 0)/(d(i, 0) - d(i, 1)))
             if (d(i, 0) > 0.0_wp) then
                first = max(first, zero)
@@ -53,13 +56,11 @@ contains
 
    !> By how much the box of the master edge lies above and below that of the slave edge, by axis.
    pure function box_distances(x) result(d)
-      real(wp), intent(in) :: x(:, :)            !! (2, n_place)
+      real(wp), intent(in) :: x(2, 4)            !! as in `pair_comes_near`
       real(wp) :: d(4)
 
-      associate (slave => x(:, [place_first, place_last]), master => x(:, place_master(:2)))
-         d(:2) = minval(master, 2) - maxval(slave, 2)
-         d(3:) = minval(slave, 2) - maxval(master, 2)
-      end associate
+      d(:2) = min(x(:, 3), x(:, 4)) - max(x(:, 1), x(:, 2))
+      d(3:) = min(x(:, 1), x(:, 2)) - max(x(:, 3), x(:, 4))
    end function box_distances
 
    !> Do the edges face each other and overlap, or nearly so, the master not behind the slave?

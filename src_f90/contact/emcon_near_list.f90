@@ -54,9 +54,18 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(inout) :: reach           !! [L]
       real(wp) :: step_motion, way
+      integer :: i
 
-      step_motion = largest(du(:, self%node))
-      way = largest(u0(:, self%node) - self%u)
+      step_motion = 0.0_wp
+      way = 0.0_wp
+      do i = 1, size(self%node)
+         associate (v => du(:, self%node(i)), w => u0(:, self%node(i)) - self%u(:, i))
+            step_motion = max(step_motion, v(1)**2 + v(2)**2)
+            way = max(way, w(1)**2 + w(2)**2)
+         end associate
+      end do
+      step_motion = sqrt(step_motion)
+      way = sqrt(way)
       if (.not. 2.0_wp*(way + step_motion) + self%depth < reach) then
          call search(self, x, u0, step_motion, reach)
          way = 0.0_wp
@@ -93,25 +102,20 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       integer, intent(in) :: item(:, :)
       real(wp), allocatable, intent(out) :: box(:, :, :)
-      integer :: i
+      real(wp) :: at(2)
+      integer :: i, k
 
       allocate(box(2, size(item, 2), 2))
       do i = 1, size(item, 2)
-         box(:, i, 1) = minval(x(:, item(:, i)) + u(:, item(:, i)), 2)
-         box(:, i, 2) = maxval(x(:, item(:, i)) + u(:, item(:, i)), 2)
+         at = x(:, item(1, i)) + u(:, item(1, i))
+         box(:, i, 1) = at
+         box(:, i, 2) = at
+         do k = 2, size(item, 1)
+            at = x(:, item(k, i)) + u(:, item(k, i))
+            box(:, i, 1) = min(box(:, i, 1), at)
+            box(:, i, 2) = max(box(:, i, 2), at)
+         end do
       end do
    end subroutine boxes
-
-   !> Largest of the lengths of the columns of `v`.
-   pure real(wp) function largest(v)
-      real(wp), intent(in) :: v(:, :)
-      integer :: i
-
-      largest = 0.0_wp
-      do i = 1, size(v, 2)
-         largest = max(largest, v(1, i)**2 + v(2, i)**2)
-      end do
-      largest = sqrt(largest)
-   end function largest
 
 end module emcon_near_list

@@ -8,7 +8,8 @@ module emcon_convergence
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: convergence_t, convergence_init, convergence_begin, convergence_judge
+   public :: convergence_t, convergence_init, convergence_begin, convergence_judge, &
+      convergence_nears_end
    public :: next_done, next_tangent, next_old_tangent, next_give_up, round_off, most_rounding
 
    !> What follows an evaluation.
@@ -94,6 +95,18 @@ contains
       self%n_renewal = 0
       self%knows_sizes = .false.
    end subroutine convergence_begin
+
+   !> Is the next residual, if it follows the last two as the square of what went before, within
+   !> the tolerance, so that no tangent will be asked for there?
+   pure logical function convergence_nears_end(self) result(nears_end)
+      type(convergence_t), intent(in) :: self
+
+      nears_end = self%is_polish
+      associate (n => self%n_history)
+         if (n < 2 .or. nears_end) return
+         nears_end = self%last*(self%last/self%history(n - 1))**2 <= self%tolerance
+      end associate
+   end function convergence_nears_end
 
    !> What to do next, now that the largest relative residual is `size`.
    pure subroutine convergence_judge(self, size, is_rounding, next)

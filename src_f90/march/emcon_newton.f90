@@ -7,7 +7,7 @@ module emcon_newton
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
       constraints_rows
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
-      convergence_t, most_rounding, next_done, next_give_up, next_tangent, round_off
+      convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t, correction_ticks
    use emcon_errors, only : err_interrupt, error_t, raise
@@ -203,7 +203,7 @@ contains
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: norm, defect
-      logical :: is_rounding, is_driven, goes_on
+      logical :: is_rounding, is_driven, goes_on, has_tangent
       integer :: next
 
       call begin(self, set%n)
@@ -212,8 +212,8 @@ contains
       do
          call check_interrupt(self, status, error)
          if (allocated(error)) return
-         call evaluate_damped(self, system, set, motion, .not. self%convergence%is_polish, status, &
-            error)
+         has_tangent = is_driven .or. .not. convergence_nears_end(self%convergence)
+         call evaluate_damped(self, system, set, motion, has_tangent, status, error)
          if (.not. allocated(error) .and. status == newton_converged) call measure(self, system, &
             set, norm, defect, is_rounding)
          if (self%correction%n_redundant > 0 .and. status == newton_converged) then
@@ -237,6 +237,9 @@ contains
             status = newton_diverged
             return
          case (next_tangent)
+            if (.not. has_tangent) call evaluate_damped(self, system, set, motion, .true., status, &
+               error)
+            if (allocated(error)) return
             call factorise(self, system, set, status, error)
             if (allocated(error) .or. status /= newton_converged) return
          end select
