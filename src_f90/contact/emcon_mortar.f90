@@ -128,15 +128,15 @@ contains
          is_wide = options%integration == integration_elements
          if (list%start(e + 1) > list%start(e)) call stencil_slave(stencil, self%slave, e, &
             options%normal == normal_nodal, self%slave_corner)
-         call place_edge(self%slave%edge(:, e), self%slave%edge(1, e), corner(:, :2), motion(:, :2))
+         call place_edge(self%slave%edge(:, e), self%slave%edge(1, e), 0, corner, motion)
          do k = list%start(e), list%start(e + 1) - 1
             m = list%edge(k)
             if (self%is_self) then
                if (self%slave%place(m) < self%slave%place(e) &
                   .or. chain_distance(self%slave, e, m) < 2) cycle
             end if
-            call place_edge(self%master%edge(:, m), self%slave%edge(1, e), corner(:, 3:), &
-               motion(:, 3:))
+            call place_edge(self%master%edge(:, m), self%slave%edge(1, e), &
+               size(self%slave%edge, 1), corner, motion)
             if (.not. pair_comes_near(self%slave%length(e), corner, motion)) cycle
             call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
                is_wide, self%master_corner)
@@ -153,15 +153,19 @@ contains
 
    contains
 
-      !> Nodes of an edge at the start, relative to the node `origin`, and their motion.
-      pure subroutine place_edge(node, origin, at, way)
-         integer, intent(in) :: node(2), origin
-         real(wp), intent(out) :: at(2, 2), way(2, 2)   !! [L]
+      !> The nodes of an edge, behind `n_before` others: where they start, relative to the node
+      !> `origin`, and how they move.
+      pure subroutine place_edge(node, origin, n_before, at, way)
+         integer, intent(in) :: node(:)          !! of the edge
+         integer, intent(in) :: origin, n_before
+         real(wp), intent(inout) :: at(:, :), way(:, :)   !! (n_dim, >= n_before + nodes) [L]
          integer :: i
 
-         do i = 1, 2
-            at(:, i) = (x(:, node(i)) - x(:, origin)) + (u0(:, node(i)) - u0(:, origin))
-            way(:, i) = du(:, node(i))
+         do i = 1, size(node)
+            associate (j => n_before + i, a => node(i))
+               at(:, j) = (x(:, a) - x(:, origin)) + (u0(:, a) - u0(:, origin))
+               way(:, j) = du(:, a)
+            end associate
          end do
       end subroutine place_edge
 

@@ -30,8 +30,7 @@ contains
    !> its age.
    pure logical function pair_comes_near(depth, x0, dx)
       real(wp), intent(in) :: depth                      !! [L]
-      real(wp), intent(in) :: x0(2, 4), dx(2, 4)         !! both nodes of the slave edge, then of the
-                                                         !! master edge [L]
+      real(wp), intent(in) :: x0(:, :), dx(:, :)         !! (2, 4) slave edge, master edge [L]
       real(wp) :: d(4, 0:1), first, last
       integer :: i
 
@@ -56,7 +55,7 @@ contains
 
    !> By how much the box of the master edge lies above and below that of the slave edge, by axis.
    pure function box_distances(x) result(d)
-      real(wp), intent(in) :: x(2, 4)            !! as in `pair_comes_near`
+      real(wp), intent(in) :: x(:, :)            !! (2, 4) as in `pair_comes_near` [L]
       real(wp) :: d(4)
 
       d(:2) = min(x(:, 3), x(:, 4)) - max(x(:, 1), x(:, 2))

@@ -57,6 +57,7 @@ module emcon_active_set
       integer :: n_stale = 0                     !! so often in this step
       logical :: only_adds = .false.             !! nothing is let go any more in this step
       logical :: one_by_one = .false.            !! one contact a time is taken in or let go
+      integer :: n_early = 0                     !! sets left before they were solved, in this step
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
@@ -152,6 +153,7 @@ contains
       self%n_newton = 0
       self%n_tried = 0
       self%n_stale = 0
+      self%n_early = 0
       self%only_adds = .false.
       self%one_by_one = .false.
       self%comes_and_goes = .false.

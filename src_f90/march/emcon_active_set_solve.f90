@@ -11,14 +11,14 @@
 module emcon_active_set_solve
    use emcon_active_set, only : active_set_drop, active_set_let_go, active_set_put_off, &
       active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_not_held
-   use emcon_active_set_update, only : active_set_advance
+   use emcon_active_set_update, only : active_set_advance, active_set_leave, most_early
    use emcon_errors, only : error_t
    use emcon_gaps, only : pair_search
    use emcon_holding, only : holding_complete, holding_find_free
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
-   use emcon_newton, only : newton_converged, newton_diverged, newton_redundant, newton_solve, &
-      newton_t
+   use emcon_newton, only : newton_converged, newton_diverged, newton_early, newton_redundant, &
+      newton_solve, newton_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
    use emcon_system, only : system_t
@@ -50,6 +50,8 @@ contains
          status = step_not_held
          if (allocated(self%holding%text)) return
          self%before = motion%du
+         newton%looks_early = self%masses_resist .and. .not. self%only_adds &
+            .and. self%n_early < most_early
          call newton_solve(newton, system, self%set, motion, status, error)
          if (allocated(error)) return
          do k = 1, self%set%n
@@ -71,6 +73,10 @@ contains
             cycle
          end if
          newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
+         if (status == newton_early) then
+            call active_set_leave(self, system, motion)
+            cycle
+         end if
          if (status /= newton_converged .or. size(system%contact) == 0) return
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_advance(self, system, motion, is_done, status)

@@ -9,13 +9,15 @@ module emcon_active_set_update
    use emcon_system, only : system_t
    implicit none
    private
-   public :: active_set_advance
+   public :: active_set_advance, active_set_leave
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
    real(wp), parameter :: force_noise = 1.0e3_wp*epsilon(1.0_wp)
    !> A step is solved again so often at most because stencils were chosen for another motion.
    integer, parameter :: most_stale = 3
+   !> Sets left before they were solved in one step at most.
+   integer, parameter, public :: most_early = 10
 
    !> The one change of a set.
    type :: choice_t
@@ -50,6 +52,25 @@ contains
       if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)
       is_done = status /= step_done
    end subroutine active_set_advance
+
+   !> The next set, where the present one was seen to change before the step was solved with it. It
+   !> was not tried to the end, so that no cycle is told from it; where what follows is no set to
+   !> go on with, the present one stays, and is solved to the end.
+   subroutine active_set_leave(self, system, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      logical :: before(size(self%is_active)), has_changed
+      integer :: status
+
+      before = self%is_active
+      call update(self, system, motion, has_changed, status)
+      self%n_tried = self%n_tried - 1
+      self%n_early = self%n_early + 1
+      if (status == step_done .and. has_changed) return
+      self%is_active = before
+      self%n_early = most_early
+   end subroutine active_set_leave
 
    !> The next set, from the gaps and multipliers of the converged one. Of the conditions gap >= 0,
    !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does

@@ -20,7 +20,8 @@ module emcon_keeping
    implicit none
    private
    public :: keeping_t, keeping_step, keeping_begin, keeping_make, keeping_renew, &
-      keeping_correct, keeping_give_up, keeping_commit, keeping_forget, keeping_looks
+      keeping_correct, keeping_break_off, keeping_give_up, keeping_commit, keeping_forget, &
+      keeping_looks
 
    !> A factor serves so many increments at most, and until its solves have taken so many
    !> corrections more than short ones: about as many as a new one costs.
@@ -183,6 +184,13 @@ contains
       call mixing_move(self%mixing, self%proposed, dq)
       self%n_correction = self%n_correction + 1
    end subroutine keeping_correct
+
+   !> A solve ends before its end: it tells nothing of what the factor costs.
+   pure subroutine keeping_break_off(self)
+      type(keeping_t), intent(inout) :: self
+
+      self%n_correction = 0
+   end subroutine keeping_break_off
 
    !> The factor does not lead to an end: no more of it in this step, and back to the first guess.
    !> One that is not fit for the step's constraints may be for those of the next.

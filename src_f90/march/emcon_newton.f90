@@ -7,12 +7,14 @@ module emcon_newton
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
       constraints_rows
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
-      convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, round_off
+      convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
+      round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t, correction_ticks
+   use emcon_early_look, only : early_enough, early_look
    use emcon_errors, only : err_interrupt, error_t, raise
-   use emcon_keeping, only : keeping_begin, keeping_correct, keeping_give_up, keeping_looks, &
-      keeping_make, keeping_renew, keeping_t
+   use emcon_keeping, only : keeping_begin, keeping_break_off, keeping_correct, keeping_give_up, &
+      keeping_looks, keeping_make, keeping_renew, keeping_t
    use emcon_kept_factor, only : kept_factor_serves
    use emcon_kinds, only : int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
@@ -28,13 +30,16 @@ module emcon_newton
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
-   public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant
+   public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant, &
+      newton_early
 
    !> How a solve ended. Refused: there are no forces at the displacements, see `refusal` of
    !> the response;
    !> redundant: some constraints depend on others, see `correction%redundant`.
    integer, parameter :: newton_converged = 0, newton_refused = 1, newton_diverged = 2, &
       newton_singular = 3, newton_redundant = 4
+   !> Not at the end yet, and seen to need another set of constraints.
+   integer, parameter :: newton_early = -1
 
    !> A correction larger than so many diagonals of the scene comes from a pivot of round-off: in
    !> statics, where nothing else moves a body as far.
@@ -67,6 +72,7 @@ module emcon_newton
       real(wp) :: work = 0.0_wp                  !! of the correction at its start; 0: no search
       type(line_search_t) :: line
       type(keeping_t) :: keeping                 !! of a factor over steps
+      logical :: looks_early = .false.           !! in the next solve: may it end as `newton_early`?
       logical :: is_idle = .false.               !! no load: all forces are round-off
    end type newton_t
 
@@ -145,6 +151,11 @@ contains
          call convergence_judge(self%convergence, max(norm, defect), is_rounding, next)
          if (next == next_done) return
          if (next == next_give_up) exit
+         call look(self, system, set, motion, max(norm, defect), status)
+         if (status == newton_early) then
+            call keeping_break_off(self%keeping)
+            return
+         end if
          if (next == next_tangent) then
             call keeping_renew(self%keeping, self%correction)
             cycle
@@ -230,6 +241,9 @@ contains
          call search(self, system, set, motion, goes_on)
          if (goes_on) cycle
          call convergence_judge(self%convergence, max(norm, defect), is_rounding, next)
+         if (next /= next_done .and. next /= next_give_up) call look(self, system, set, motion, &
+            max(norm, defect), status)
+         if (status == newton_early) return
          select case (next)
          case (next_done)
             return
@@ -251,6 +265,22 @@ contains
          end if
       end do
    end subroutine solve_by_tangents
+
+   !> Once in a solve, where a few digits are right: does the step ask for another set?
+   subroutine look(self, system, set, motion, size, status)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: size               !! relative residual
+      integer, intent(inout) :: status           !! `newton_early` if so
+      logical :: changes
+
+      if (.not. self%looks_early .or. size > early_enough) return
+      self%looks_early = .false.
+      call early_look(system, set, motion, changes)
+      if (changes) status = newton_early
+   end subroutine look
 
    !> In statics, go back on the last correction if contact forces turned on the way.
    subroutine search(self, system, set, motion, goes_on)

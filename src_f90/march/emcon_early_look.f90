@@ -1,0 +1,59 @@
+!> Is a set of active constraints seen to be another one before its step is solved to the end?
+!>
+!> Once forces are met to a few digits, what pulls hard or has gone in deep tells that the set will
+!> change: what is left of the way with this one leads nowhere. Only that it changes is told here;
+!> which set follows is judged by the rules of emcon_active_set_update, and a set that stands has
+!> always been solved to the end. Source: docs/theory.md, section 6.
+module emcon_early_look
+   use emcon_constraints, only : constraint_set_t
+   use emcon_gaps, only : pair_measure
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: early_look, early_enough
+
+   !> Relative residual from which on a look is worth while.
+   real(wp), parameter :: early_enough = 1.0e-4_wp
+   !> A constraint pulls clearly by more than this part of the largest multiplier, and a gap is
+   !> clearly closed by more than this part of an edge: far more than the residual leaves open.
+   real(wp), parameter :: clearly = 1.0e-2_wp
+
+contains
+
+   !> Does the motion, which solves the step to a few digits, ask for another set?
+   subroutine early_look(system, set, motion, changes)
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: changes            !! clearly so
+      logical :: is_active(system%n_constraint)
+      integer :: pair, i, id
+
+      associate (lam => set%lam(set%n_held + 1:set%n))
+         changes = .false.
+         if (size(lam) > 0) changes = minval(lam) < -clearly*maxval(abs(lam))
+      end associate
+      if (changes) return
+      is_active = .false.
+      is_active(set%id(:set%n)) = .true.
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact, &
+               first => system%first_constraint(pair))
+            if (contact%clearance > 0.0_wp) cycle
+            call pair_measure(system, pair, motion%x, motion%u0, motion%du)
+            do i = 1, contact%n_constraint
+               id = first + i
+               if (is_active(id)) cycle
+               associate (gap => contact%state(i))
+                  if (.not. (gap%is_near .and. gap%is_over) .or. gap%is_arriving) cycle
+                  changes = changes .or. (gap%gap1 < min(gap%gap0, gap%closed) - clearly*gap%size)
+               end associate
+            end do
+         end associate
+         if (changes) return
+      end do
+   end subroutine early_look
+
+end module emcon_early_look
