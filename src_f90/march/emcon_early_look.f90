@@ -28,16 +28,13 @@ contains
       type(constraint_set_t), intent(in) :: set
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: changes            !! clearly so
-      logical :: is_active(system%n_constraint)
-      integer :: pair, i, id
+      integer :: pair, i, id, k
 
-      associate (lam => set%lam(set%n_held + 1:set%n))
-         changes = .false.
-         if (size(lam) > 0) changes = minval(lam) < -clearly*maxval(abs(lam))
-      end associate
+      changes = .false.
+      if (set%n > set%n_held) changes = minval(set%lam(set%n_held + 1:set%n)) &
+         < -clearly*maxval(abs(set%lam(set%n_held + 1:set%n)))
       if (changes) return
-      is_active = .false.
-      is_active(set%id(:set%n)) = .true.
+      k = set%n_held                             ! active ones so far; they ascend
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair))
@@ -45,7 +42,13 @@ contains
             call pair_measure(system, pair, motion%x, motion%u0, motion%du)
             do i = 1, contact%n_constraint
                id = first + i
-               if (is_active(id)) cycle
+               do while (k < set%n)
+                  if (set%id(k + 1) >= id) exit
+                  k = k + 1
+               end do
+               if (k < set%n) then
+                  if (set%id(k + 1) == id) cycle
+               end if
                associate (gap => contact%state(i))
                   if (.not. (gap%is_near .and. gap%is_over) .or. gap%is_arriving) cycle
                   changes = changes .or. (gap%gap1 < min(gap%gap0, gap%closed) - clearly*gap%size)

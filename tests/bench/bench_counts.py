@@ -19,6 +19,7 @@ import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
+import crowds  # noqa: E402
 from scene_tools import DECKS, ROOT, run_deck  # noqa: E402
 from verification import update  # noqa: E402
 
@@ -36,6 +37,10 @@ SCENES = {
     "self_contact": {},
     "press_fit": {},
     "hertz": {},
+    "pile": {"t_end": 0.3},
+    "strips": {"t_end": 6e-4},
+    "strips, MORTAR": {"t_end": 6e-4, "formulation": "MORTAR"},
+    "fold": {"t_end": 1, "formulation": "NODE TO SURFACE"},
 }
 #: Of the verdict, beside `counts`.
 OWN = ("increments", "newton", "cuts")
@@ -46,11 +51,13 @@ INCREMENTS = 50
 
 
 def count(name, folder):
-    """Counts of a scene, and the seconds it took."""
-    deck = DECKS/f"{name.split(',')[0]}.inp"
+    """Counts of a scene, and the seconds it took: all, and those of search and gaps."""
+    base = name.split(",")[0]
+    deck = crowds.SCENES[base]() if base in crowds.SCENES else DECKS/f"{base}.inp"
     verdict = run_deck(deck, folder, **SCENES[name]).verdict
     counts = {key: verdict[key] for key in OWN} | verdict["counts"]
-    return counts, sum(verdict["seconds"].values())
+    seconds = verdict["seconds"]
+    return counts, sum(seconds.values()), seconds["search"] + seconds["gaps"]
 
 
 def rises(stored, found):
@@ -74,9 +81,10 @@ def compare(scenes, writes):
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in scenes:
-            found[name], seconds = count(name, folder)
+            found[name], seconds, near = count(name, folder)
             told = ", ".join(f"{n} {key}" for key, n in found[name].items())
-            print(f"{name}: {told}; {seconds:.2f} s", flush=True)
+            print(f"{name}: {told}; {seconds:.2f} s, search and gaps {100*near/seconds:.0f} %",
+                  flush=True)
     stored = json.loads(STORE.read_text()) if STORE.exists() else {}
     above, below = rises(stored, found)
     for text in below:
