@@ -140,9 +140,10 @@ class Step(Cards):
         return self._card("NEWTON", {"TYPE": type, "TOLERANCE": tolerance, "MAXIMUM": maximum,
                                      "POLISH": ends})
 
-    def time_integration(self, scheme: str, *, alpha: Number | None = None,
+    def time_integration(self, scheme: str | None = None, *, alpha: Number | None = None,
                          spectral_radius: Number | None = None,
-                         dissipation: Number | None = None) -> Step:
+                         dissipation: Number | None = None,
+                         tolerance: Number | None = None) -> Step:
         """`*TIME INTEGRATION`: ENERGY MOMENTUM (default), another scheme, or one that a program gives.
 
         scheme            MIDPOINT, TRAPEZOIDAL, GENERALIZED ALPHA, BDF2, ENERGY DECAYING; CENTRAL
@@ -150,10 +151,23 @@ class Step(Cards):
         alpha             of GENERALIZED ALPHA, -1/3 to 0 (default -0.05)
         spectral_radius   of GENERALIZED ALPHA, instead: at the highest frequencies, 0 to 1
         dissipation       of ENERGY DECAYING, 0 to 1 (0.125)
+        tolerance         increments follow the error of the motion: relative, by the way that it
+                          goes (1e-2 rough, 1e-4 fine); not in steps that are `direct`
         """
         return self._card("TIME INTEGRATION", {"SCHEME": scheme, "ALPHA": alpha,
                                                "SPECTRAL RADIUS": spectral_radius,
-                                               "DISSIPATION": dissipation})
+                                               "DISSIPATION": dissipation,
+                                               "TOLERANCE": tolerance})
+
+    def events(self, type: str | None = None, *, fraction: Number | None = None,
+               off: bool = False) -> Step:
+        """`*EVENTS`: contact begins and ends within short increments, which the log tells.
+
+        type            PAIR (default): a pair meets or parts; NODE: each slave node
+        fraction        of the increment of the step, 1e-6 to 1 (default 1e-3)
+        off             events of earlier steps are no longer looked for
+        """
+        return self._card("EVENTS", {"TYPE": type, "FRACTION": fraction, "OFF": off or None})
 
     # --- output ----------------------------------------------------------------------------
 

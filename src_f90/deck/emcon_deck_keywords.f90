@@ -101,7 +101,8 @@ module emcon_deck_keywords
       keyword_t("SURFACE SMOOTHING", in_step, "TYPE=,FEATUREANGLE=", has_data=.false.), &
       keyword_t("NEWTON", in_step, "TYPE=,TOLERANCE=,MAXIMUM=,POLISH=", has_data=.false.), &
       keyword_t("TIME INTEGRATION", in_step, "SCHEME=,ALPHA=,SPECTRALRADIUS=," &
-         // "DISSIPATION=,!TOLERANCE", has_data=.false.), &
+         // "DISSIPATION=,TOLERANCE=", has_data=.false.), &
+      keyword_t("EVENTS", in_step, "TYPE=,FRACTION=,OFF", has_data=.false.), &
       keyword_t("NODE FILE", in_step, "NSET=," // filed), &
       keyword_t("EL FILE", in_step, "ELSET=," // filed), &
       keyword_t("CONTACT FILE", in_step, filed), &

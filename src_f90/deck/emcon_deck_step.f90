@@ -11,6 +11,7 @@ module emcon_deck_step
    use emcon_deck_explicit, only : check_explicit_cards, suit_explicit
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
+   use emcon_deck_increments, only : check_increments, read_events, read_tolerance
    use emcon_deck_loads, only : read_boundary, read_cload, read_dload
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_options, only : choose_option
@@ -99,6 +100,10 @@ contains
       step%polishes = last%polishes
       step%restart_frequency = last%restart_frequency
       step%choice = last%choice
+      step%tolerance = last%tolerance
+      step%tolerance_origin = last%tolerance_origin
+      step%event_fraction = last%event_fraction
+      step%events = last%events
    end subroutine inherit
 
    !> Procedure and settings of the step whose first card is `i_first`.
@@ -135,6 +140,9 @@ contains
                call read_newton(reader, card, step)
             case ("TIMEINTEGRATION")
                call read_scheme(reader, card, step)
+               call read_tolerance(reader, card, step)
+            case ("EVENTS")
+               call read_events(reader, card, step)
             case ("RESTART")
                call read_restart(reader, card, step)
             end select
@@ -146,6 +154,7 @@ contains
       call read_step_card(reader, reader%card(i_first), step)
       call check_statics(reader, i_first, amplitude, step)
       if (step%scheme%is_explicit) call check_explicit_cards(reader, i_first, step)
+      call check_increments(reader, i_first, step)
       if (step%scheme%code /= 0 .or. reader%doubt_names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
          "the step has no procedure: *STATIC or *DYNAMIC")

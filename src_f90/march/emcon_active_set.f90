@@ -16,12 +16,14 @@ module emcon_active_set
       active_set_restart, active_set_select, active_set_look, active_set_pass
    public :: active_set_let_go, active_set_put_off, active_set_drop, touch_tol, most_sets
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
-      step_stands_off, step_not_held, step_overlaps, step_unbalanced
+      step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
+      step_passes_event
 
    !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
    integer, parameter :: step_done = 0, step_refused = 1, step_diverged = 2, step_singular = 3, &
       step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8, &
-      step_overlaps = 9, step_unbalanced = 10
+      step_overlaps = 9, step_unbalanced = 10, step_rough = 11, step_strikes = 12, &
+      step_passes_event = 13
 
    !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))

@@ -13,6 +13,7 @@ module emcon_march
    use emcon_layer, only : layer_free, layer_init
    use emcon_ledger, only : ledger_init, ledger_measure, ledger_t
    use emcon_march_begin, only : march_begin_step, march_renumber, march_resume
+   use emcon_march_control, only : march_controlled
    use emcon_march_grid, only : easy_increments, grid_whole, march_grid_time, march_is_done, &
       march_set_time
    use emcon_march_parts, only : march_in_parts
@@ -25,6 +26,7 @@ module emcon_march
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_given
    use emcon_state, only : state_t
+   use emcon_step_control, only : control_forget
    use emcon_system, only : system_init
    use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
@@ -133,24 +135,20 @@ contains
             return
          end if
          stride = min(state%grid_stride, self%n_grid - state%n_grid)
-         call cross_grid(self, scene, state%n_grid + stride, increment, error)
+         if (self%is_controlled) then
+            call march_controlled(self, scene, increment, error)
+         else
+            call cross_grid(self, scene, state%n_grid + stride, increment, error)
+         end if
          if (allocated(error)) then
-            call keeping_forget(self%newton%keeping, self%newton%correction)
-            if (error%code == err_interrupt) then
-               if (allocated(self%before)) then
-                  state = self%before%state
-                  self%ledger = self%before%ledger
-               end if
-               return
-            end if
-            if (increment%done > 0.0_wp) call march_set_time(self, scene, state%step_time &
-               + increment%done)
-            call ledger_measure(self%ledger, self%system, scene%x, self%state)
+            call end_failed(self, scene, increment, error)
             return
          end if
-         state%n_grid = state%n_grid + stride
+         if (.not. self%is_controlled) then
+            state%n_grid = state%n_grid + stride
+            state%step_time = march_grid_time(self, step, state%n_grid)
+         end if
          state%increment = state%increment + 1
-         state%step_time = march_grid_time(self, step, state%n_grid)
          state%time = state%start_time + state%step_time
          increment%n_active = count(state%is_active(self%system%first_constraint(1) + 1:))
          if (increment%n_cut > 0) then
@@ -166,6 +164,26 @@ contains
       end associate
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine march_increment
+
+   !> An increment has failed, or was interrupted.
+   subroutine end_failed(self, scene, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(increment_t), intent(in) :: increment
+      type(error_t), intent(in) :: error
+
+      call keeping_forget(self%newton%keeping, self%newton%correction)
+      if (error%code == err_interrupt) then
+         if (allocated(self%before)) then
+            self%state = self%before%state
+            self%ledger = self%before%ledger
+         end if
+         return
+      end if
+      if (increment%done > 0.0_wp) call march_set_time(self, scene, self%state%step_time &
+         + increment%done)
+      call ledger_measure(self%ledger, self%system, scene%x, self%state)
+   end subroutine end_failed
 
    !> Let `n` threads work on the model: the bits are the same for any number.
    pure subroutine march_set_threads(self, n)
@@ -221,6 +239,8 @@ contains
       before = self%state
       ledger_before = self%ledger
       increment%h = h
+      self%judges_size = .false.
+      call control_forget(self%state%control)
       call march_in_parts(self, scene, self%state%step_time, increment, error)
       if (allocated(error)) then
          call march_go_back(self, before, ledger_before)

@@ -3,7 +3,7 @@
 module emcon_march_begin
    use emcon_active_set, only : active_set_overclosure, active_set_t
    use emcon_correction, only : correction_reset
-   use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit, only : explicit_prepare
    use emcon_factor_base, only : factor_base_t
    use emcon_holding, only : holding_begin, holding_t
@@ -14,7 +14,8 @@ module emcon_march_begin
    use emcon_kinds, only : wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
-   use emcon_march_grid, only : march_count_grid, march_grid_time
+   use emcon_march_accuracy, only : accuracy_begin
+   use emcon_march_grid, only : march_count_grid, march_grid_time, march_part_time
    use emcon_march_past, only : march_past_forget
    use emcon_march_types, only : march_t
    use emcon_mass_return, only : mass_match
@@ -25,10 +26,11 @@ module emcon_march_begin
    use emcon_overclosure, only : overclosure_check
    use emcon_pose, only : pose_at_end
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
-   use emcon_scene, only : scene_t
+   use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_create, scheme_given
    use emcon_solver_registry, only : solver_given
    use emcon_state, only : state_t
+   use emcon_step_control, only : control_begin
    use emcon_steps, only : initiation_massless, initiation_persistent, method_saddle_point, &
       newton_kept, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_find_energy, &
@@ -55,6 +57,8 @@ contains
 
       self%state%i_step = i_step
       self%state%n_grid = 0
+      self%state%n_part = 0
+      call control_begin(self%state%control)
       self%state%is_off_grid = .false.
       self%state%grid_stride = 1
       self%state%n_easy = 0
@@ -166,6 +170,8 @@ contains
 
       associate (step => scene%step(self%state%i_step), state => self%state)
          call choose_scheme(self, step)
+         call check_tolerance(self, scene, error)
+         if (allocated(error)) return
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
             scene%x, step%newton_tolerance, step%newton_maximum)
          self%newton%convergence%polishes = step%polishes
@@ -192,8 +198,7 @@ contains
          end if
          call begin_massless(self, scene, step, error)
          if (allocated(error)) return
-         call march_count_grid(self, step)
-         if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
+         call begin_times(self, scene, step)
       end associate
       self%system%frozen%is_on = .false.
       call measure_start(self, scene%x, error)
@@ -215,6 +220,21 @@ contains
       end function options_of
 
    end subroutine prepare
+
+   !> The grid of the step, who controls sizes on it, and the time where it is taken up.
+   subroutine begin_times(self, scene, step)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+
+      call march_count_grid(self, step)
+      if (self%is_controlled .and. step%tolerance > 0.0_wp) call accuracy_begin(self, scene)
+      associate (state => self%state)
+         if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
+         if (state%n_part > 0) state%step_time = march_part_time(self, step, &
+            state%n_grid*self%n_unit + state%n_part)
+      end associate
+   end subroutine begin_times
 
    !> Internal forces and energies at the displacements that the step starts from.
    subroutine measure_start(self, x, error)
@@ -316,6 +336,20 @@ contains
          call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
       end if
    end subroutine choose_solver
+
+   !> Increments can follow the error of a scheme that tells it.
+   subroutine check_tolerance(self, scene, error)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+
+      associate (step => scene%step(self%state%i_step))
+         if (.not. step%scheme%masses_resist .or. .not. step%tolerance > 0.0_wp) return
+         if (self%scheme%error_constant() > 0.0_wp) return
+         call raise(error, err_input, where_text(scene, step%tolerance_origin) // ": error: " // &
+            "TOLERANCE= needs a scheme that tells its error, and this one does not")
+      end associate
+   end subroutine check_tolerance
 
    !> The scheme of a step: of its row, or one that was given.
    subroutine choose_scheme(self, step)

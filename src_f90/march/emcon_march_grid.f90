@@ -1,16 +1,19 @@
 !> The grid of increments of a step: times are counted in integers, and meet its end exactly.
 module emcon_march_grid
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : int64, wp
    use emcon_march_types, only : march_t
    use emcon_scene, only : scene_t
+   use emcon_step_control, only : most_power
    use emcon_steps, only : step_t
    implicit none
    private
    public :: march_count_grid, march_count_increments, march_grid_time, march_is_done, &
-      march_set_time, grid_whole, easy_increments
+      march_set_time, march_part_time, march_size, grid_whole, easy_increments
 
    !> An increment is halved so often at most, unless the deck gives h_min.
    integer, parameter :: default_levels = 12, most_levels = 24
+   !> So often for its error.
+   integer, parameter :: error_levels = 6
    !> Increments without a cut after which an automatic increment is doubled.
    integer, parameter :: easy_increments = 5
    !> Closer than this a step's duration counts as a whole number of increments.
@@ -42,7 +45,35 @@ contains
       if (step%h_min > 0.0_wp) then
          self%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
       end if
+      call count_units(self, step)
    end subroutine march_count_grid
+
+   !> Units of time of a step whose increments follow the error or end at events.
+   pure subroutine count_units(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      integer :: n, power
+
+      self%judges_size = .false.
+      self%is_controlled = step%scheme%masses_resist .and. .not. step%scheme%is_explicit .and. &
+         (step%tolerance > 0.0_wp .or. step%event_fraction > 0.0_wp)
+      if (.not. self%is_controlled) return
+      self%h_deck = step%h
+      n = self%n_level
+      if (step%event_fraction > 0.0_wp) n = max(n, min(most_levels, &
+         1 - exponent(step%event_fraction)))
+      self%n_unit = 2_int64**n
+      self%n_least = 2_int64**(n - self%n_level)
+      self%n_window = 0
+      if (step%event_fraction > 0.0_wp) self%n_window = max(1_int64, &
+         int(step%event_fraction*real(self%n_unit, wp), int64))
+      power = exponent(real(self%most_stride, wp)) - 1
+      if (step%tolerance > 0.0_wp .and. .not. step%h_max > 0.0_wp) power = &
+         exponent(real(self%n_grid, wp)) - 1
+      self%largest_power = min(power, most_power)
+      self%least_power = -self%n_level
+      if (.not. step%h_min > 0.0_wp) self%least_power = -min(self%n_level, error_levels)
+   end subroutine count_units
 
    !> Increments of a step in which none is cut.
    pure integer function march_count_increments(step) result(n)
@@ -78,6 +109,49 @@ contains
       if (n >= self%n_grid) march_grid_time = step%duration
    end function march_grid_time
 
+   !> Time since the start of the step after `n` units.
+   pure real(wp) function march_part_time(self, step, n)
+      type(march_t), intent(in) :: self
+      type(step_t), intent(in) :: step
+      integer(int64), intent(in) :: n            !! >= 0
+      integer :: whole
+      real(wp) :: part
+
+      whole = int(n/self%n_unit)
+      march_part_time = march_grid_time(self, step, whole)
+      if (mod(n, self%n_unit) == 0) return
+      part = real(mod(n, self%n_unit), wp)/real(self%n_unit, wp)
+      march_part_time = march_part_time + part*interval(self, step, whole)
+   end function march_part_time
+
+   !> Size of the interval of the grid after point `n` [T]: the last one may be shorter than h.
+   pure real(wp) function interval(self, step, n)
+      type(march_t), intent(in) :: self
+      type(step_t), intent(in) :: step
+      integer, intent(in) :: n                   !! >= 0
+
+      interval = step%h
+      if (n < self%n_grid - 1 .or. abs(real(self%n_grid, wp)*step%h - step%duration) &
+         <= grid_whole*step%duration) return
+      interval = step%duration - real(n, wp)*step%h
+   end function interval
+
+   !> Size of an increment of `n` units after the first `from` [T]: where it can be without the
+   !> rounding of times.
+   pure real(wp) function march_size(self, step, from, n) result(h)
+      type(march_t), intent(in) :: self
+      type(step_t), intent(in) :: step
+      integer(int64), intent(in) :: from, n      !! >= 0, > 0
+      integer :: first, last
+
+      first = int(from/self%n_unit)
+      last = int((from + n - 1)/self%n_unit)
+      h = real(n, wp)/real(self%n_unit, wp)*interval(self, step, last)
+      if (last == first .or. last < self%n_grid - 1) return
+      if (interval(self, step, last) < step%h) h = march_part_time(self, step, from + n) &
+         - march_part_time(self, step, from)
+   end function march_size
+
    !> Let the state be that of `time` since the start of the step [T]. What differs by no more than
    !> the rounding of sums from a point of the grid is that point.
    subroutine march_set_time(self, scene, time)
@@ -95,6 +169,7 @@ contains
          if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, n)
          if (state%step_time < march_grid_time(self, step, n)) n = n - 1
          state%n_grid = n
+         state%n_part = 0
          state%time = state%start_time + state%step_time
       end associate
 

@@ -1,7 +1,8 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
    use emcon_active_set, only : step_cycling, step_diverged, step_done, step_not_held, &
-      step_overlaps, step_refused, step_singular, step_stands_off, step_too_far, step_unbalanced
+      step_overlaps, step_passes_event, step_refused, step_rough, step_singular, step_stands_off, &
+      step_strikes, step_too_far, step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_march_begin, only : march_renumber
@@ -14,7 +15,7 @@ module emcon_march_parts
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
    implicit none
    private
-   public :: march_in_parts
+   public :: march_in_parts, march_attempt, march_match, march_stop
 
    !> Halvings of an increment after which nodes without mass take it back.
    integer, parameter :: return_level = 3
@@ -36,9 +37,7 @@ contains
       character(len=:), allocatable :: reason
       integer :: level, place, status
 
-      call notes_append(increment%warnings, self%warnings)
-      self%warnings = notes_t()
-      call match(self, scene, error)
+      call march_match(self, scene, increment, error)
       if (allocated(error)) return
       level = 0
       place = 0
@@ -48,7 +47,8 @@ contains
          part%start%total_time = self%state%start_time + part%start%step_time
          part%start%h_before = self%state%h_before
          part%may_cut = level < self%n_level
-         call march_step(self, scene, part, increment, status, error)
+         part%level = level
+         call march_attempt(self, scene, part, increment, status, reason, error)
          if (allocated(error)) return
          if (status == step_done) then
             place = place + 2**(self%n_level - level)
@@ -56,39 +56,72 @@ contains
             if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
             cycle
          end if
-         if (.not. allocated(self%before)) self%before = start_t(self%state, self%ledger)
-         call reason_text(self, scene, status, reason)
-         if (may_return(self, status, level)) then
-            call return_mass(self, scene, status, reason, increment, error)
-            if (allocated(error)) return
-            cycle
-         end if
-         if (.not. is_hopeless(self, status)) then
-            call note_add(increment%notes, "increment cut at time " // &
-               to_text(part%start%total_time, 9) // ", h = " // to_text(part%h) // ": " // &
-               reason)
-            increment%n_cut = increment%n_cut + 1
-            level = level + 1
-            if (level <= self%n_level) cycle
-            reason = "with h = " // to_text(part%h) // ", the smallest allowed, " // reason
-         end if
-         call failure_text(self, scene, reason)
-         call raise(error, err_analysis, "the analysis stops at time " // &
-            to_text(part%start%total_time, 9) // ": " // reason)
+         level = level + 1
+         if (level <= self%n_level) cycle
+         call march_stop(self, scene, part, "with h = " // to_text(part%h) // &
+            ", the smallest allowed, " // reason, error)
          return
       end do
    end subroutine march_in_parts
 
-   !> Let the model have the masses of the state, which may be one of before.
-   subroutine match(self, scene, error)
+   !> One step. Where it fails because nodes without mass find no balance these take their mass back
+   !> after some halvings, and it is tried again.
+   subroutine march_attempt(self, scene, part, increment, status, reason, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
+      type(part_t), intent(in) :: part
+      type(increment_t), intent(inout) :: increment
+      integer, intent(out) :: status                 !! `step_done`, or why a smaller one may do
+      character(len=:), allocatable, intent(out) :: reason   !! of a failure
+      type(error_t), allocatable, intent(out) :: error
+
+      do
+         call march_step(self, scene, part, increment, status, error)
+         if (allocated(error) .or. status == step_done) return
+         if (.not. allocated(self%before)) self%before = start_t(self%state, self%ledger)
+         call reason_text(self, scene, status, reason)
+         if (.not. may_return(self, status, part%level)) exit
+         call return_mass(self, scene, status, reason, increment, error)
+         if (allocated(error)) return
+      end do
+      if (is_hopeless(self, status)) then
+         call march_stop(self, scene, part, reason, error)
+         return
+      end if
+      call note_add(increment%notes, "increment cut at time " // &
+         to_text(part%start%total_time, 9) // ", h = " // to_text(part%h) // ": " // reason)
+      increment%n_cut = increment%n_cut + 1
+   end subroutine march_attempt
+
+   !> The analysis ends as `part` fails.
+   subroutine march_stop(self, scene, part, why, error)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(part_t), intent(in) :: part
+      character(len=*), intent(in) :: why            !! for the message
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: reason
+
+      reason = why
+      call failure_text(self, scene, reason)
+      call raise(error, err_analysis, "the analysis stops at time " // &
+         to_text(part%start%total_time, 9) // ": " // reason)
+   end subroutine march_stop
+
+   !> Begin an increment: tell what there is to tell, and let the model have the masses of the
+   !> state, which may be one of before.
+   subroutine march_match(self, scene, increment, error)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
       logical :: has_changed
 
+      call notes_append(increment%warnings, self%warnings)
+      self%warnings = notes_t()
       call mass_match(self, scene, has_changed, error)
       if (has_changed .and. .not. allocated(error)) call march_renumber(self, scene, error)
-   end subroutine match
+   end subroutine march_match
 
    !> May a step have failed as nodes without mass find no balance? Shorter ones were tried.
    pure logical function may_return(self, status, level)
@@ -170,6 +203,13 @@ contains
          text = "nodes without mass find no balance where contacts open or close"
       case (step_overlaps)
          text = "bodies would overlap where no contact acts"
+      case (step_rough)
+         text = "the error is " // to_text(self%finding%ratio, 3) // " times TOLERANCE"
+      case (step_strikes)
+         text = "contact begins or ends: the error is " // to_text(self%finding%ratio, 3) // &
+            " times TOLERANCE"
+      case (step_passes_event)
+         text = "contact begins or ends in it"
       case default
          text = "reason " // to_text(status)
       end select

@@ -13,10 +13,12 @@ module emcon_march_step
    use emcon_kept_factor, only : kept_factor_renew
    use emcon_kinds, only : wp
    use emcon_look_plane, only : overlap_names
+   use emcon_march_accuracy, only : accuracy_judge
    use emcon_march_commit, only : march_commit
+   use emcon_march_events, only : events_judge, events_look
    use emcon_march_guess, only : march_guess
    use emcon_march_past, only : march_past_begin
-   use emcon_march_types, only : increment_t, march_t, part_t
+   use emcon_march_types, only : finding_t, increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
    use emcon_phases, only : phase_enter, phase_factorise, phase_judge, phase_leave, &
@@ -53,6 +55,7 @@ contains
       integer :: left
 
       self%layer%is_troubled = .false.
+      self%finding = finding_t()
       self%active%may_cut = part%may_cut
       self%active%gap_tolerance = 0.0_wp
       if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
@@ -70,6 +73,7 @@ contains
       self%ending%du = self%motion%du
       if (self%layer%is_settled) self%ending%du = self%ending%du + self%layer%du
       call judge(self, scene, part, increment, status)
+      if (status == step_done .and. self%judges_size) call judge_size(self, scene, part, status)
       if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
@@ -112,6 +116,23 @@ contains
          if (status /= step_refused .or. self%active%n_newton > 0) exit
       end do
    end subroutine solve
+
+   !> Is the step too long for the tolerance, or for an event that lies in it?
+   subroutine judge_size(self, scene, part, status)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(part_t), intent(in) :: part
+      integer, intent(inout) :: status           !! one of the `step_` codes
+      real(wp) :: window
+
+      associate (step => scene%step(self%state%i_step))
+         call events_look(self)
+         window = real(self%n_window, wp)/real(self%n_unit, wp)*step%h
+         if (window > 0.0_wp) call events_judge(self, step, part, window, status)
+         if (step%tolerance > 0.0_wp .and. status == step_done) call accuracy_judge(self, &
+            part, step%tolerance, status)
+      end associate
+   end subroutine judge_size
 
    !> Find out whether a factor may be kept in the step, and make the one that is kept again where
    !> it was lost, as in a run that was resumed.

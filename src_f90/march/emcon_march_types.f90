@@ -4,7 +4,7 @@ module emcon_march_types
    use emcon_explicit_type, only : explicit_t
    use emcon_host_scheme, only : host_scheme_t
    use emcon_judge, only : judge_t, overlap_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : int64, wp
    use emcon_layer, only : layer_t
    use emcon_ledger, only : ledger_t
    use emcon_motion, only : motion_t
@@ -19,7 +19,7 @@ module emcon_march_types
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, part_t, ending_t, start_t
+   public :: march_t, increment_t, part_t, ending_t, start_t, finding_t
 
    !> What one increment took.
    type :: increment_t
@@ -52,7 +52,15 @@ module emcon_march_types
       type(instant_t) :: start
       real(wp) :: h = 0.0_wp                     !! > 0 [T]
       logical :: may_cut = .false.               !! smaller ones are possible
+      integer :: level = 0                       !! so often it was made shorter
    end type part_t
+
+   !> What was found of the step that was solved last.
+   type :: finding_t
+      real(wp) :: ratio = -1.0_wp                !! of its error to the tolerance; < 0: not judged
+      logical :: changes_contact = .false.       !! contacts begin or end in it
+      real(wp) :: event_at = 0.0_wp              !! part of it before the first event
+   end type finding_t
 
    !> What an increment that is interrupted goes back to.
    type :: start_t
@@ -82,6 +90,20 @@ module emcon_march_types
       integer :: n_grid = 0                      !! grid increments in the step
       integer :: most_stride = 1                 !! largest increment, in grid increments
       integer :: n_level = 0                     !! halvings allowed
+      ! Of steps with increments that follow the error or end at events:
+      logical :: is_controlled = .false.
+      logical :: judges_size = .false.           !! in this increment: it is none of a given size
+      real(wp) :: h_deck = 0.0_wp                !! increment of the deck [T]
+      integer(int64) :: n_unit = 1               !! units of time in the increment of the deck,
+      integer(int64) :: n_least = 1              !! in the smallest one,
+      integer(int64) :: n_window = 0             !! and in one in which an event may lie
+      integer :: least_power = 0, largest_power = 0   !! of two, of sizes that the error asks for
+      type(finding_t) :: finding
+      real(wp), allocatable :: mass(:, :)        !! (n_dim, n_node) of each unknown, else 0 [M]
+      !> (n_dim, n_node) mean forces on it over the step: of contact, and all others [M L/T^2]
+      real(wp), allocatable :: push(:, :), force(:, :)
+      !> (n_dim, n_node) change of the mean velocity over the mean of two steps [L/T^2]
+      real(wp), allocatable :: rate(:, :)
       integer :: revision = 0                    !! changes with the numbering of the unknowns
       type(motion_t) :: motion                   !! of the step
       real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity at its end

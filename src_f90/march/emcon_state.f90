@@ -4,6 +4,7 @@ module emcon_state
    use emcon_kinds, only : wp
    use emcon_pair_record, only : pair_record_t
    use emcon_pair_sums, only : pair_sums_t
+   use emcon_step_control, only : step_control_t
    implicit none
    private
    public :: state_t
@@ -11,6 +12,7 @@ module emcon_state
    type :: state_t
       integer :: i_step = 0                      !! step of the deck, from 1
       integer :: n_grid = 0                      !! grid increments of h done in this step
+      integer :: n_part = 0                      !! and units of the next one
       integer :: grid_stride = 1                 !! grid increments per increment, a power of two
       integer :: n_easy = 0                      !! increments in a row without a cut
       integer :: increment = 0                   !! increments done over all steps
@@ -38,6 +40,7 @@ module emcon_state
       real(wp), allocatable :: load(:, :)        !! (n_dim, n_node) external forces
       real(wp), allocatable :: past(:, :, :)     !! (n_dim, n_node, n_past) as the scheme has it
       type(factor_base_t) :: base                !! of the factor that is kept over steps
+      type(step_control_t) :: control            !! of the size of increments
    end type state_t
 
 end module emcon_state

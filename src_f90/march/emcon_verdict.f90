@@ -13,7 +13,8 @@ module emcon_verdict
    use emcon_solid, only : solid_t
    use emcon_stand_off, only : stand_off_mean, stand_off_t
    use emcon_term_registry, only : terms_solid
-   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_step_control, only : control_sizes, n_why, why_text
+   use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none
    private
    public :: verdict_t, verdict_start, verdict_update, verdict_move, verdict_end, &
@@ -318,6 +319,7 @@ contains
                " of an element, mean over the impulse " // &
                to_text(stand_off_mean(self%stand_off), 3))
             call add_small(self%small, scene, lines)
+            call add_sizes(march, lines)
             do k = 1, size(self%largest_force)
                call note_add(lines, "contact " // &
                   scene%surface(scene%pair(k)%slave)%name // " on " // &
@@ -345,6 +347,28 @@ contains
             max(small%rotation(i), small%strain(i)) <= small_limit)))
       end do
    end subroutine add_small
+
+   !> Which sizes increments had that chose them, and what made them smaller.
+   subroutine add_sizes(march, lines)
+      type(march_t), intent(in) :: march
+      type(notes_t), intent(inout) :: lines
+      type(notes_t) :: sizes
+      type(string_t) :: why(n_why)
+      integer :: k
+
+      associate (control => march%state%control)
+         call control_sizes(control, sizes)
+         if (sizes%n == 0) return
+         do k = 1, n_why
+            why(k)%text = trim(why_text(k)) // " " // to_text(control%n_less(k))
+         end do
+         call note_add(lines, "increments of sizes, by the powers of two below them, " // &
+            joined(sizes%item(:sizes%n), ", ", sizes%n))
+         call note_add(lines, "made smaller for: " // joined(why, ", ", n_why) // &
+            "; larger error than TOLERANCE in " // to_text(control%n_over) // &
+            "; events located " // to_text(control%n_event))
+      end associate
+   end subroutine add_sizes
 
    !> What these pairs can do to need no guards.
    pure subroutine guard_advice(pair, advice)

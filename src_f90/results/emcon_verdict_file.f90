@@ -7,6 +7,7 @@ module emcon_verdict_file
    use emcon_march, only : march_t
    use emcon_restart_data, only : restart_exchange, restart_list, restart_offers, restart_t
    use emcon_stand_off, only : stand_off_mean
+   use emcon_step_control, only : control_sizes, n_why, step_control_t, why_text
    use emcon_text, only : notes_t, string_t
    use emcon_verdict, only : verdict_end, verdict_is_good, verdict_t
    implicit none
@@ -95,8 +96,26 @@ contains
          call json_number(line, "linear_rotation", maxval(self%small%rotation))
          call json_number(line, "linear_strain", maxval(self%small%strain))
       end if
+      call add_sizes(march%state%control, line)
       line = line // "}"
    end subroutine compose
+
+   !> Of a run whose increments choose their sizes: how many of which, and why some are smaller.
+   subroutine add_sizes(control, line)
+      type(step_control_t), intent(in) :: control
+      character(len=:), allocatable, intent(inout) :: line
+      type(notes_t) :: sizes
+      integer :: k
+
+      call control_sizes(control, sizes)
+      if (sizes%n == 0) return
+      call json_texts(line, "increment_sizes", sizes)
+      do k = 1, n_why
+         call json_number(line, "smaller_for_" // trim(why_text(k)), real(control%n_less(k), wp))
+      end do
+      call json_number(line, "increments_over_tolerance", real(control%n_over, wp))
+      call json_number(line, "events", real(control%n_event, wp))
+   end subroutine add_sizes
 
    !> Put the running figures into `restart`, or go on with those that it has.
    subroutine verdict_exchange(self, restart)

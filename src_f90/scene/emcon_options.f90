@@ -13,9 +13,9 @@ module emcon_options
       section_t
    use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
    use emcon_solver_registry, only : solvers
-   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
-      initiation_velocity_update, method_null_space, method_saddle_point, newton_full, &
-      newton_kept, step_t
+   use emcon_steps, only : events_nodes, events_pairs, initiation_admissible, &
+      initiation_massless, initiation_persistent, initiation_velocity_update, &
+      method_null_space, method_saddle_point, newton_full, newton_kept, step_t
    implicit none
    private
    public :: option_row_t, n_option_row, option_row, option_code, option_default, option_words, &
@@ -63,6 +63,8 @@ module emcon_options
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
       option_row_t("newton", newton_kept, "KEPT", "", "", ""), &
       option_row_t("newton", newton_full, "FULL", "", "a tangent in each iteration", ""), &
+      option_row_t("events", events_pairs, "PAIR", "", "of pairs", ""), &
+      option_row_t("events", events_nodes, "NODE", "", "of nodes", ""), &
       option_row_t("kinematics", kinematics_nonlinear, "NONLINEAR", "", "", ""), &
       option_row_t("kinematics", kinematics_linear, "LINEAR", "", "small strains", ""), &
       option_row_t("kinematics", kinematics_corotated, "COROTATED", "", &
@@ -138,6 +140,8 @@ contains
          code = contact%smoothing
       case ("initiation")
          code = step%initiation
+      case ("events")
+         code = step%events
       case ("kinematics")
          code = section%kinematics
       case ("method")

@@ -14,6 +14,7 @@ module emcon_steps
       initiation_massless
    public :: method_null_space, method_saddle_point
    public :: newton_kept, newton_full
+   public :: events_pairs, events_nodes
    public :: prescribed_find
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4
@@ -21,6 +22,7 @@ module emcon_steps
       initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2
    integer, parameter :: newton_kept = 1, newton_full = 2
+   integer, parameter :: events_pairs = 1, events_nodes = 2
 
    !> One prescribed degree of freedom: u = `value` times the amplitude.
    !>
@@ -76,6 +78,10 @@ module emcon_steps
       real(wp) :: duration = 1.0_wp                  !! [T]
       real(wp) :: h_min = 0.0_wp                     !! 0: not given
       real(wp) :: h_max = 0.0_wp                     !! 0: not given
+      real(wp) :: tolerance = 0.0_wp                 !! error of an increment, relative; 0: any
+      type(origin_t) :: tolerance_origin
+      real(wp) :: event_fraction = 0.0_wp            !! of h, in which events lie; 0: anywhere
+      integer :: events = events_pairs               !! one of `events_`
       integer :: constraint_method = method_null_space
       integer :: solver = solver_default             !! one of `solver_`
       character(len=:), allocatable :: solver_name   !! of `solver_given`, upper case, no blanks

@@ -37,6 +37,7 @@ module emcon_scheme
       procedure(pose_interface), deferred :: pose
       procedure :: keeps_energy
       procedure :: carry
+      procedure :: error_constant
    end type scheme_t
 
    abstract interface
@@ -75,5 +76,15 @@ contains
       end associate
       keeps_energy = .false.
    end function keeps_energy
+
+   !> C of the error C h^3 u''' that a step leaves in the displacement; 0: it is not known, and
+   !> increments cannot follow it.
+   pure real(wp) function error_constant(self)
+      class(scheme_t), intent(in) :: self
+
+      associate (unused => self)
+      end associate
+      error_constant = 0.0_wp
+   end function error_constant
 
 end module emcon_scheme

@@ -12,6 +12,7 @@ module emcon_scheme_energy_momentum
    contains
       procedure :: pose => energy_momentum_pose
       procedure :: keeps_energy => energy_momentum_keeps_energy
+      procedure :: error_constant => energy_momentum_error_constant
    end type scheme_energy_momentum_t
 
 contains
@@ -32,5 +33,14 @@ contains
 
       keeps_energy = .true.
    end function energy_momentum_keeps_energy
+
+   !> Of u1 = u0 + h (v0 + v1)/2.
+   pure real(wp) function energy_momentum_error_constant(self) result(constant)
+      class(scheme_energy_momentum_t), intent(in) :: self
+
+      associate (unused => self)
+      end associate
+      constant = 1.0_wp/12.0_wp
+   end function energy_momentum_error_constant
 
 end module emcon_scheme_energy_momentum

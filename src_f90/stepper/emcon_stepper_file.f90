@@ -101,6 +101,7 @@ contains
       call exchange_pairs(self%march%state%pairs, restart)
       call exchange_sums(self%march%state%sums, restart)
       call verdict_exchange(self%verdict, restart)
+      call exchange_control(self%march%state, restart)
    end subroutine exchange_state
 
    !> What the scheme looks back on.
@@ -143,6 +144,41 @@ contains
       call restart_exchange(restart, "time", state%start_time)
       call restart_exchange(restart, "time", state%time)
    end subroutine exchange_progress
+
+   !> What the sizes of increments follow; only in files of runs in which they do.
+   subroutine exchange_control(state, restart)
+      type(state_t), intent(inout) :: state
+      type(restart_t), intent(inout) :: restart
+
+      associate (control => state%control)
+         if (.not. restart_offers(restart, "control", any(control%n_size > 0))) return
+         call restart_exchange(restart, "control", state%n_part)
+         call restart_exchange(restart, "control", control%power)
+         call restart_exchange(restart, "control", control%n_same)
+         call restart_exchange(restart, "control", control%n_size)
+         call restart_exchange(restart, "control", control%n_less)
+         call restart_exchange(restart, "control", control%n_event)
+         call restart_exchange(restart, "control", control%n_over)
+         call restart_exchange(restart, "control_size", control%asked)
+         call restart_exchange(restart, "control_size", control%ratio)
+         call restart_exchange(restart, "control_size", control%h_before)
+         call restart_exchange(restart, "control_size", control%largest_kinetic)
+         if (.not. restart_offers(restart, "control_force", allocated(control%force))) return
+         if (.not. allocated(control%force)) then
+            allocate(control%force, mold=state%u)
+            allocate(control%contact, mold=state%u)
+            allocate(control%velocity, mold=state%u)
+         end if
+         call restart_exchange(restart, "control_force", control%force)
+         call restart_exchange(restart, "control_contact", control%contact)
+         call restart_exchange(restart, "control_velocity", control%velocity)
+         call restart_exchange(restart, "control_size", control%span)
+         call restart_exchange(restart, "control", control%n_known)
+         if (.not. restart_offers(restart, "control_change", control%n_known > 1)) return
+         if (.not. allocated(control%rate)) allocate(control%rate, mold=state%u)
+         call restart_exchange(restart, "control_change", control%rate)
+      end associate
+   end subroutine exchange_control
 
    !> Of which motion the kept factor was made; where the file has none it is made anew.
    subroutine exchange_base(base, u, restart)

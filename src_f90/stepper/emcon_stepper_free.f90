@@ -17,6 +17,7 @@ module emcon_stepper_free
    use emcon_pair_sums, only : pair_sums_begin
    use emcon_pose, only : pose_at_end
    use emcon_state, only : state_t
+   use emcon_step_control, only : control_forget
    use emcon_stepper, only : stepper_check_solids, stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_number, check_size, &
       check_that, stepper_check_open
@@ -119,6 +120,7 @@ contains
       if (present(u)) call measure_rest(self, next, error)
       if (allocated(error)) return
       next%base%is_set = .false.
+      call control_forget(next%control)
       call march_go_back(self%march, next, self%march%ledger)
       call gaps_forget(self%march%system)
       if (present(time)) call march_set_time(self%march, self%scene, &

@@ -25,6 +25,7 @@ CARD = {
     "method": "*CONSTRAINT METHOD",
     "newton": "*NEWTON",
     "scheme": "*TIME INTEGRATION",
+    "events": "*EVENTS",
     "solver": "*STATIC",
 }
 

@@ -267,6 +267,7 @@ def everything() -> Model:
     step.time_integration("GENERALIZED ALPHA", alpha=-0.1)
     step.time_integration("GENERALIZED ALPHA", spectral_radius=0.5)
     step.time_integration("ENERGY DECAYING", dissipation=0.5)
+    step.time_integration(tolerance=1e-3).events("NODE", fraction=0.01).events(off=True)
     for request in ("NODE FILE", "EL FILE", "CONTACT FILE", "NODE PRINT", "EL PRINT",
                     "CONTACT PRINT", "ENERGY PRINT"):
         group = {"N": "N", "E": "E"}.get(request[0]) if "ENERGY" not in request else None
