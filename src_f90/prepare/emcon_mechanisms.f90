@@ -164,7 +164,7 @@ contains
       real(wp) :: center(2), extent
       integer :: i
 
-      center = sum(bodies%center(:, member), dim=2)/real(size(member), wp)
+      center = sum(bodies%center(:, member), dim=2)/real(max(1, size(member)), wp)
       extent = 0.0_wp
       do i = 1, size(member)
          extent = max(extent, bodies%size(member(i)) &

@@ -5,6 +5,7 @@ module linear_scenes
    use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : numbering_t
    use emcon_scene, only : scene_t
+   use random_draws, only : draw_random
    implicit none
    private
    public :: add_equation, add_node, put_row, begin_rows, make_random_rows, dense_terms
@@ -118,7 +119,7 @@ contains
       call begin_rows(linear)
       do a = 1, 2
          do k = 1, 4
-            call random_number(w)
+            call draw_random(w)
             w = 0.25_wp + 0.25_wp*w
             call put_row(linear, 2*(own(k) - 1) + a, 2*([own(k), other(:, k)] - 1) + a, &
                [1.0_wp, -w(1), -w(2), w(1) + w(2) - 1.0_wp])

@@ -8,6 +8,7 @@ module random_constraints
    use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_steps, only : prescribed_t
+   use random_draws, only : draw_random
    use small_scenes, only : shake
    implicit none
    private
@@ -47,7 +48,7 @@ contains
       do k = 1, n_constraint
          associate (item => problem%set%item(k))
             call condition_resize(item, 3 + mod(k, 3))
-            call random_number(u)
+            call draw_random(u)
             item%node(:item%n_node) = [k, 11 + int(5.0_wp*u(:item%n_node - 1)) &
                + [(5*(i - 1), i = 1, item%n_node - 1)]]
             call shake(item%g, 1.0_wp)
@@ -105,10 +106,10 @@ contains
    subroutine finish(problem)
       type(problem_t), intent(inout) :: problem
 
-      call random_number(problem%set%lam)
-      call random_number(problem%set%defect)
+      call draw_random(problem%set%lam)
+      call draw_random(problem%set%defect)
       allocate(problem%residual(problem%numbering%n_unknown))
-      call random_number(problem%residual)
+      call draw_random(problem%residual)
       call make_rows(problem)
    end subroutine finish
 
@@ -151,7 +152,7 @@ contains
       integer, allocatable :: slot(:)
       real(wp) :: u(n_each*n)
 
-      call random_number(u)
+      call draw_random(u)
       row = [(i, i = 1, n), (1 + mod(i, n), i = 1, n_each*n)]
       column = [(i, i = 1, n), 1 + int(u*real(n, wp))]
       call csr_from_entries(a, n, n, row, column, slot)

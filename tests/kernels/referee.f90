@@ -4,7 +4,7 @@ module referee
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: qp, function_of_three, increment_of, slopes_of
+   public :: qp, function_of_three, increment_of, slopes_of, increment_doubt, slope_doubt
 
    abstract interface
       !> One of several functions of three variables.
@@ -20,6 +20,13 @@ module referee
    !> the middle has an error of the order of its square, far below `epsilon` of `wp`.
    real(qp), parameter :: small = 1.0e-10_qp
 
+   !> Where `wp` is the referee's own kind its rounding counts. That of an increment: a part of
+   !> `epsilon` of the function itself, to be added to the scale. That of a slope: third derivatives
+   !> up to 600 times `small`^2/6, to be added to a relative tolerance.
+   logical, parameter :: is_own = precision(1.0_wp) == precision(1.0_qp)
+   real(wp), parameter :: increment_doubt = merge(1.0_wp, 0.0_wp, is_own)
+   real(wp), parameter :: slope_doubt = merge(real(100.0_qp*small**2, wp), 0.0_wp, is_own)
+
 contains
 
    !> f(x0 + dx) - f(x0) to the relative accuracy of `wp`, however small `dx` is.
@@ -31,7 +38,7 @@ contains
       real(qp) :: step, way(3), middle(3)
 
       step = real(maxval(abs(dx)), qp)
-      if (step >= small) then
+      if (step >= small .or. is_own) then
          df = real(f(which, real(x0, qp) + real(dx, qp)) - f(which, real(x0, qp)), wp)
       else
          way = real(dx, qp)/step

@@ -9,6 +9,7 @@ module small_scenes
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
    use emcon_steps, only : load_t, prescribed_t, step_t
+   use random_draws, only : draw_random
    implicit none
    private
    public :: block_t, scene_begin, add_block, block_node, add_surface, add_step, prescribe, clamp
@@ -255,7 +256,7 @@ contains
       real(wp), intent(out) :: field(:, :)
       real(wp), intent(in) :: size
 
-      call random_number(field)
+      call draw_random(field)
       field = 2.0_wp*size*(field - 0.5_wp)
    end subroutine shake
 

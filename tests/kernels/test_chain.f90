@@ -10,6 +10,7 @@ module test_chain
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    use small_scenes, only : add_block, add_surface, block_t, bottom, left, make_block, right, &
       scene_begin, top
    implicit none
@@ -430,11 +431,11 @@ contains
       integer :: edge(2, n - 1), case, i, j, pair(2)
 
       do case = 1, 40
-         call random_number(x)
+         call draw_random(x)
          do i = 2, n                             ! steps of a fifth: few crossings to many
             x(:, i) = x(:, i - 1) + 0.2_wp*(x(:, i) - 0.4_wp)
          end do
-         call random_number(key)
+         call draw_random(key)
          edge = edges_along(1, n, .false.)
          edge = edge(:, sort_order(real(key, dp)))
          call make_chain(x, edge, scene, chain, error)

@@ -4,6 +4,7 @@ module test_check
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_errors, only : err_file, err_input, error_t, raise
    use emcon_kinds, only : wp
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_check
@@ -33,7 +34,7 @@ contains
       type(error_t), allocatable :: raised
       real(wp) :: a(2, 3)
 
-      call random_number(a)
+      call draw_random(a)
       call raise(raised, err_file, "cannot open x")
       call check_near(error, 1.0_wp + epsilon(1.0_wp), 1.0_wp, epsilon(1.0_wp), 1.0_wp, "scalar")
       call check_near(error, a, a, 0.0_wp, 1.0_wp, "matrix")

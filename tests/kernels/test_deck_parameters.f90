@@ -7,6 +7,7 @@ module test_deck_parameters
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_text, only : read_integer, read_real, string_t, to_text
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_deck_parameters
@@ -79,7 +80,7 @@ contains
       logical :: ok
 
       do i = 1, 2000
-         call random_number(random)
+         call draw_random(random)
          if (mod(i, 2) == 0) then
             write(word, "(es40.25e2)") (random(1) - 0.5_wp) &
                *10.0_wp**nint(30.0_wp*random(2) - 15.0_wp)

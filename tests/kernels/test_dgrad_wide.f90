@@ -8,6 +8,7 @@ module test_dgrad_wide
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_dgrad_wide
@@ -45,8 +46,8 @@ contains
    subroutine draw(x0, dx)
       real(wp), intent(out) :: x0(:), dx(:)
 
-      call random_number(x0)
-      call random_number(dx)
+      call draw_random(x0)
+      call draw_random(dx)
       x0 = 1.0_wp + x0
       dx = dx - 0.5_wp
    end subroutine draw

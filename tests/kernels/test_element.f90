@@ -11,6 +11,7 @@ module test_element
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_element_respond, solid_init, solid_t
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    use small_scenes, only : block_t, make_block, shake, young
    implicit none
    private
@@ -376,7 +377,7 @@ contains
          if (allocated(error)) return
          u0 = 0.0_wp
          do k = 1, 400
-            call random_number(c)
+            call draw_random(c)
             f = 10.0_wp**mod(k, 9)*reshape([1.0_wp, c, c, c*c], [2, 2])
             f(2, 2) = f(2, 2) + 10.0_wp**(-mod(k, 17))
             du = matmul(f, sample%x) - sample%x

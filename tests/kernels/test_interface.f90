@@ -25,6 +25,7 @@ module test_interface
    use emcon_system, only : system_init, system_t
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
+   use random_draws, only : draw_random
    use small_scenes, only : add_block, add_surface, block_t, bottom, make_two_blocks, shake, top
    use sparse_samples, only : dense_of
    use tie_scenes, only : make_disc
@@ -243,7 +244,7 @@ contains
          allocate(way, mold=du)
          allocate(lam(values%n))
          call shake(way, 1.0_wp)
-         call random_number(lam)
+         call draw_random(lam)
          call query_curvature_times(face%query, face%stepper, lam, way, product, error)
          if (.not. allocated(error)) call query_curvature(face%query, lam, matrix, error)
          if (allocated(error)) return
@@ -290,7 +291,7 @@ contains
          allocate(way, mold=du)
          allocate(lam(values%n))
          call shake(way, 1.0_wp)
-         call random_number(lam)
+         call draw_random(lam)
          call query_curvature_times(face%query, face%stepper, lam, way, product, error)
          if (allocated(error)) return
          call query_contact(face%query, face%stepper, u0, du + width*way, values, error)

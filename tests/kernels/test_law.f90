@@ -7,7 +7,8 @@ module test_law
    use emcon_law_registry, only : find_law_row, law_coupled_neo_hooke, law_create, law_given, &
       law_linear, law_mooney_rivlin, law_neo_hooke, law_ogden, law_rows, law_yeoh, n_constant
    use emcon_text, only : to_text
-   use referee, only : increment_of, qp, slopes_of
+   use random_draws, only : draw_random
+   use referee, only : increment_doubt, increment_of, qp, slope_doubt, slopes_of
    implicit none
    private
    public :: collect_law
@@ -164,7 +165,7 @@ contains
 
       s = real(maxval(abs(strain)), qp)
       way = real(strain, qp)
-      if (s >= t) then
+      if (s >= t .or. increment_doubt > 0.0_wp) then
          w = real(textbook(which, way), wp)
          return
       end if
@@ -184,8 +185,8 @@ contains
       real(wp), intent(out) :: strain(3), dstrain(3)
 
       do
-         call random_number(strain)
-         call random_number(dstrain)
+         call draw_random(strain)
+         call draw_random(dstrain)
          strain = 0.5_wp*s*(strain - 0.5_wp)
          dstrain = ds*(dstrain - 0.5_wp)
          if (has_volume(strain + dstrain)) exit
@@ -215,17 +216,20 @@ contains
             call draw(10.0_wp**(-digits_small), 0.0_wp, strain, zero)
             expected = energy_of(i, strain)
             call law_response_plane(box(i)%law, strain, zero, response)
-            call check_near(error, response%energy, expected, tol, expected, &
+            call check_near(error, response%energy, expected, tol, &
+               expected + increment_doubt, &
                trim(name(i)) // " at 1e-" // to_text(digits_small))
             call law_response_plane(box(i)%law, zero, strain, response)
-            call check_near(error, response%energy, expected, tol, expected, &
+            call check_near(error, response%energy, expected, tol, &
+               expected + increment_doubt, &
                trim(name(i)) // " at the end of a step to 1e-" // to_text(digits_small))
          end do
          do k = 0, 4                             ! stretched up to 140 times and sheared
             strain = [10.0_wp**k, -0.3_wp, 0.4_wp*sqrt(10.0_wp**k)]
             call law_response_plane(box(i)%law, strain, [0.0_wp, 0.0_wp, 0.0_wp], response)
             expected = energy_of(i, strain)
-            call check_near(error, response%energy, expected, tol, expected, &
+            call check_near(error, response%energy, expected, tol, &
+               expected + increment_doubt, &
                trim(name(i)) // " at a strain of 1e" // to_text(k))
          end do
       end do
@@ -247,7 +251,8 @@ contains
             call law_response_plane(box(i)%law, strain, dstrain, response)
             call check_near(error, dot_product(response%stress, dstrain), &
                increment_of(textbook, i, strain, dstrain), tol, &
-               (lam + mu)*sum(abs(dstrain)), trim(name(i)) // " at 2^-" // to_text(k))
+               (lam + mu)*(sum(abs(dstrain)) + increment_doubt), &
+               trim(name(i)) // " at 2^-" // to_text(k))
          end do
       end do
    end subroutine test_identity
@@ -264,8 +269,8 @@ contains
          do k = 1, 50
             call draw(0.8_wp, 0.0_wp, strain, zero)
             call law_response_plane(box(i)%law, strain, zero, response)
-            call check_near(error, response%stress, slopes_of(textbook, i, strain), tol, &
-               lam + mu, trim(name(i)))
+            call check_near(error, response%stress, slopes_of(textbook, i, strain), &
+               tol + slope_doubt, lam + mu, trim(name(i)))
          end do
       end do
    end subroutine test_stress
@@ -338,8 +343,8 @@ contains
          do i = 1, n_law
             call law_response_plane(box(i)%law, strain, zero, response)
             expected = (printed(i, x, 1.0_qp + h) - printed(i, x, 1.0_qp - h))/h
-            call check_near(error, response%stress_33, real(expected, wp), tol, lam + mu, &
-               trim(name(i)))
+            call check_near(error, response%stress_33, real(expected, wp), &
+               tol + slope_doubt, lam + mu, trim(name(i)))
          end do
       end do
    end subroutine test_stress_33
@@ -444,7 +449,8 @@ contains
                call law_response_plane(box(i)%law, strain, dstrain, response)
                call check_near(error, dot_product(response%stress, dstrain), &
                   increment_of(textbook, i, strain, dstrain), tol, &
-                  (lam + mu)*sum(abs(dstrain)), trim(name(i)) // " at 2^-" // to_text(k))
+                  (lam + mu)*(sum(abs(dstrain)) + increment_doubt), &
+               trim(name(i)) // " at 2^-" // to_text(k))
                way = 0.0_wp
                way(1 + mod(k, 3)) = step
                call law_response_plane(box(i)%law, strain, dstrain + way, up)

@@ -4,7 +4,7 @@ module test_newton
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_correction, only : correction_free, correction_reset, correction_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_init, motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_refused, &
       newton_singular, newton_solve, newton_t
@@ -30,6 +30,11 @@ module test_newton
       type(motion_t) :: motion
       integer :: status = 0
    end type trial_t
+
+   !> Residuals below it are round-off, of the state or of the matrix; single precision has but one
+   !> between it and 0.1 for sure.
+   real(wp), parameter :: round_off = 1.0e4_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   integer, parameter :: least_seen = merge(3, 1, round_off < 1.0e-6_wp)
 
 contains
 
@@ -89,7 +94,7 @@ contains
       quadratic_constant = 0.0_wp
       do k = 2, newton%convergence%n_iteration + 1
          associate (r => newton%convergence%history(k - 1:k))
-            if (r(1) > 0.1_wp .or. r(2) < 1.0e4_wp*epsilon(1.0_wp)) cycle
+            if (r(1) > 0.1_wp .or. r(2) < round_off) cycle
             quadratic_constant = max(quadratic_constant, r(2)/r(1)**2)
          end associate
       end do
@@ -104,11 +109,11 @@ contains
 
       constant = quadratic_constant(trial%newton)
       call check_equal(error, trial%status, newton_converged, what // ": status")
-      call check_true(error, constant > 0.0_wp .and. constant < 5.0_wp, &
+      call check_true(error, (constant > 0.0_wp .or. least_seen < 2) .and. constant < 5.0_wp, &
          what // ": r1 < 5 r0^2, found " // to_text(constant))
       associate (r => trial%newton%convergence%history(:trial%newton%convergence%n_iteration + 1))
-         call check_true(error, count(r < 0.1_wp .and. r > 1.0e4_wp*epsilon(1.0_wp)) >= 3, &
-            what // ": three residuals between 0.1 and round-off")
+         call check_true(error, count(r < 0.1_wp .and. r > round_off) >= least_seen, &
+            what // ": residuals between 0.1 and round-off")
       end associate
    end subroutine check_quadratic
 

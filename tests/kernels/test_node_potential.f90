@@ -77,7 +77,7 @@ contains
       integer :: k, n
 
       do k = 1, 3
-         n = 20*2**k
+         n = merge(20, 8, precision(off) >= 15)*2**k
          stepper = stepper_t()
          call open_well(stepper, .false., 1.0_wp, pi/real(n, wp), n, error)
          do while (.not. allocated(error))

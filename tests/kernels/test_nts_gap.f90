@@ -7,6 +7,7 @@ module test_nts_gap
    use emcon_nts_gap, only : nts_gap
    use emcon_nts_gap_value, only : nts_gap_value
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    use referee, only : qp
    use small_scenes, only : shake
    implicit none
@@ -87,7 +88,7 @@ contains
       n_crossed = 0
       do i = 1, 400
          x = flat
-         call random_number(turn)
+         call draw_random(turn)
          turn = 4.2_wp*(turn - 0.5_wp)           ! > 0: convex
          x(:, 5:5) = turned(turn, reshape([-0.9_wp, 0.0_wp], [2, 1]))
          call shake(move, 0.4_wp)
@@ -142,7 +143,7 @@ contains
          call nts_gap_value(x, 4, 5, round, bent, xi)
          call check_near(error, bent, exact, 0.5_wp, 2.0_wp*maxval(round), "gap")
          call check_true(error, bent <= exact + tol, "outside")
-         call random_number(way)
+         call draw_random(way)
          x(:, 1) = x(:, 2) + 0.1_wp*(way - 0.5_wp)
          call nts_gap_value(x, 4, 5, sharp, exact, xi)
          call nts_gap_value(x, 4, 5, round, bent, xi)
@@ -153,7 +154,7 @@ contains
          turn = (x(1, 2) - x(1, 4))*(x(2, 3) - x(2, 2)) - (x(2, 2) - x(2, 4))*(x(1, 3) - x(1, 2))
          if (turn > 0.0_wp) call check_near(error, bent, 0.0_wp, tol, 1.0_wp, "convex corner")
          x = flat
-         call random_number(x(:, 1))
+         call draw_random(x(:, 1))
          call nts_gap_value(x, 4, 5, round, bent, xi)
          call check_near(error, bent, x(2, 1), tol + 1.0e-9_wp*maxval(round), 1.0_wp, &
             "nothing to round on a flat surface")
@@ -188,7 +189,7 @@ contains
       call shake(move, 0.3_wp)
       call shake(dx, 0.35_wp)
       x0 = flat + move
-      call random_number(x0(:, 1))
+      call draw_random(x0(:, 1))
       x0(:, 1) = [-0.5_wp, -0.5_wp] + [2.0_wp, 1.0_wp]*x0(:, 1)
    end subroutine draw
 
@@ -347,13 +348,14 @@ contains
       integer :: i, k, j, n_beyond
 
       step = eps**(1.0_wp/3.0_wp)
+      if (step > 1.0e-3_wp) return               ! in single precision longer than what is rounded
       n_beyond = 0
       do i = 1, 200
          call shake(move, 0.05_wp)
          call shake(dx, 0.15_wp)
          x0 = flat + move
          x0(2, 4:5) = x0(2, 4:5) - [0.9_wp, 0.7_wp]
-         call random_number(x0(:, 1))
+         call draw_random(x0(:, 1))
          x0(:, 1) = [-0.5_wp, 0.4_wp] + [2.0_wp, 0.3_wp]*x0(:, 1)
          a = nts_gap(x0, dx, 4, 5, round, goes_around=.true.)
          call nts_gap_value(x0, 4, 5, round, gap(1), xi, goes_around=.true.)

@@ -9,6 +9,7 @@ module test_numbering
    use emcon_steps, only : step_t
    use linear_scenes, only : begin_rows, dense_terms, make_random_rows, put_row
    use random_constraints, only : make_problem, problem_t
+   use random_draws, only : draw_random
    use small_scenes, only : clamp, prescribe, shake
    implicit none
    private
@@ -109,7 +110,7 @@ contains
                call check_equal(error, numbering%term(from:to), [d], "a term of its own")
             end associate
          end do
-         call random_number(field)
+         call draw_random(field)
          call spread_dependent(numbering, field)
          do k = 1, linear%n
             total = 0.0_wp
@@ -144,7 +145,7 @@ contains
          call check_near(error, x, matmul(transpose(abs(t)), reshape(abs(force), [60])), tol, &
             1.0_wp, "|T|^T |f|")
          call check_true(error, all(x >= abs(vector)*(1.0_wp - tol)), "magnitudes bound")
-         call random_number(x)
+         call draw_random(x)
          call spread_dependent(numbering, motion)
          before = sum(force*motion)
          call gather_dependent(numbering, force)

@@ -8,6 +8,7 @@ module test_point_function
    use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
       point_outside, point_response_t
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_point_function
@@ -154,8 +155,8 @@ contains
       integer, intent(in) :: i
       real(wp), intent(out) :: z0(3), way(3)
 
-      call random_number(z0)
-      call random_number(way)
+      call draw_random(z0)
+      call draw_random(way)
       z0 = 0.5_wp*(z0 - 0.5_wp)
       if (mod(i, 5) == 0) z0 = 0.0_wp
       way = way - 0.5_wp
@@ -370,7 +371,8 @@ contains
       call check_near(error, dot_product(heavy%gradient(:, 1) - plain%gradient(:, 1), dz(:, 1)), &
          0.0_wp, 32.0_wp*eps, 1.0_wp, "another metric, the same difference")
       associate (change => heavy%gradient(:, 1) - plain%gradient(:, 1))
-         call check_true(error, abs(change(2)) > 1.0e3_wp*eps, "the metric has an effect")
+         call check_true(error, abs(change(2)) > min(1.0e3_wp*eps, 1.0e-6_wp), &
+            "the metric has an effect")
          call check_near(error, change(1)*dz(3, 1), change(3)*dz(1, 1), 32.0_wp*eps, 1.0_wp, &
             "along A dz")
       end associate
@@ -435,8 +437,8 @@ contains
       real(wp) :: z0(3, 7), dz(3, 7), expected(3, 7)
       integer :: status, n
 
-      call random_number(z0)
-      call random_number(dz)
+      call draw_random(z0)
+      call draw_random(dz)
       dz = 0.3_wp*dz
       call point_gradient(sample_of(mixed), z0(:, :0), dz(:, :0), .true., response, status)
       call check_equal(error, status, point_ok, "no points")

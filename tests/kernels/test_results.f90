@@ -19,6 +19,7 @@ module test_results
    use emcon_text, only : string_t, to_text
    use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
       vtkhdf_end_frame, vtkhdf_publish, vtkhdf_resume, vtkhdf_t, vtkhdf_write
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_results
@@ -290,7 +291,7 @@ contains
       logical :: flags(2)
 
       call scratch("restart", base)
-      call random_number(u)
+      call draw_random(u)
       u(1, 1) = tiny(1.0_wp)
       u(2, 2) = -huge(1.0_wp)
       numbers = [3, -1, huge(1)]

@@ -9,6 +9,7 @@ module test_rigid_bodies
    use emcon_mechanism_rows, only : mechanism_rows_t
    use emcon_scene, only : scene_t
    use emcon_system, only : system_init, system_t
+   use random_draws, only : draw_random
    use small_scenes, only : add_block, block_t, make_block
    implicit none
    private
@@ -45,6 +46,7 @@ contains
    subroutine test_rank(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n = 5, n_row = 15
+      real(dp), parameter :: rank_tol = 1.0e3_dp*max(epsilon(1.0_dp), real(epsilon(1.0_wp), dp))
       type(scene_t) :: scene
       type(block_t) :: block
       type(system_t) :: system
@@ -59,7 +61,7 @@ contains
       end do
       call system_init(system, scene, error)
       if (allocated(error)) return
-      call random_number(r)
+      call draw_random(r)
       dof = 1 + int(r(:4, :)*real(8*n, wp))
       r = r + 0.5_wp
       do k = 1, n_row
@@ -68,7 +70,7 @@ contains
          call add_row(rows, [dof(:, k), dof(:, m)], [r(5:, k), r(5:, m)])
          call fill_row(a(2*k - 1, :), dof(:, k), r(5:, k))
          call fill_row(a(2*k, :), [dof(:, k), dof(:, m)], [r(5:, k), r(5:, m)])
-         call dense_rank(real(a(:2*k, :), dp), 1.0e3_dp*epsilon(1.0_dp), rank, error)
+         call dense_rank(real(a(:2*k, :), dp), rank_tol, rank, error)
          if (allocated(error)) return
          call check_equal(error, count_motions(rows, system, scene), 3*n - rank, "motions left")
          if (allocated(error)) return

@@ -2,7 +2,7 @@
 module test_rigid_motion
    use check, only : check_equal, check_true, test_case_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
@@ -12,6 +12,9 @@ module test_rigid_motion
    implicit none
    private
    public :: collect_rigid_motion
+
+   !> Length of short ties beside blocks of size 1. Ranks are found in double.
+   real(wp), parameter :: short = sqrt(max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)))
 
 contains
 
@@ -290,7 +293,7 @@ contains
 
       call make_chain(scene, system, 2, block, error)
       if (allocated(error)) return
-      scene%x(2, block_node(block(1), 1, 1)) = sqrt(epsilon(1.0_wp))
+      scene%x(2, block_node(block(1), 1, 1)) = short
       call drop_rows(system%space%linear)
       call tie_node(scene, system%space%linear, block_node(block(2), 0, 0), &
          [block_node(block(1), 1, 0), block_node(block(1), 1, 1)], 0.0_wp)
@@ -314,7 +317,7 @@ contains
       if (allocated(error)) return
       call drop_rows(system%space%linear)
       side = [block_node(block(1), 1, 0), block_node(block(1), 1, 1)]
-      scene%x(2, side) = 0.7_wp + [0.0_wp, sqrt(epsilon(1.0_wp))]
+      scene%x(2, side) = 0.7_wp + [0.0_wp, short]
       call tie_node(scene, system%space%linear, block_node(block(2), 0, 0), side, 0.3_wp)
       call tie_node(scene, system%space%linear, block_node(block(2), 0, 1), side, 0.9_wp)
       do k = 1, 2

@@ -6,6 +6,7 @@ module test_search
    use emcon_kinds, only : wp
    use emcon_search, only : box_distance, candidates_t, search_candidates
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_search
@@ -75,9 +76,9 @@ contains
       real(wp), intent(out) :: low(:, :), high(:, :)
       real(wp) :: u(size(low, 2))
 
-      call random_number(low)
-      call random_number(high)
-      call random_number(u)
+      call draw_random(low)
+      call draw_random(high)
+      call draw_random(u)
       high(1, :) = low(1, :) + 10.0_wp**(-3.0_wp*u)*high(1, :)
       high(2, :) = low(2, :) + 10.0_wp**(-3.0_wp*u)*high(2, :)
    end subroutine random_boxes
@@ -203,9 +204,9 @@ contains
       integer :: i
 
       do i = 1, 60
-         call random_number(point)
-         call random_number(ends)
-         call random_number(u)
+         call draw_random(point)
+         call draw_random(ends)
+         call draw_random(u)
          ends(:, 2, :) = ends(:, 1, :) + 10.0_wp**(-3.0_wp*u(1))*(ends(:, 2, :) - 0.5_wp)
          point(1, :) = 3.0_wp*point(1, :) - 1.0_wp
          call check_list(error, point, ends, 10.0_wp**(-4.0_wp*u(2)), "case " // to_text(i))
@@ -250,8 +251,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: point(2, 40), ends(2, 2, 40)
 
-      call random_number(point)
-      call random_number(ends)
+      call draw_random(point)
+      call draw_random(ends)
       point(1, 21:) = point(1, 21:) + 1.0e6_wp
       ends(1, :, 21:) = ends(1, :, 21:) + 1.0e6_wp
       call check_list(error, point, ends, 0.05_wp, "clusters")
@@ -262,8 +263,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: point(2, 60), ends(2, 2, 61)
 
-      call random_number(point)
-      call random_number(ends)
+      call draw_random(point)
+      call draw_random(ends)
       ends(:, 2, :60) = ends(:, 1, :60) + 0.01_wp*ends(:, 2, :60)
       ends(:, 1, 61) = -5.0_wp
       ends(:, 2, 61) = 5.0_wp
@@ -274,8 +275,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: point(2, 3), ends(2, 2, 3)
 
-      call random_number(point)
-      call random_number(ends)
+      call draw_random(point)
+      call draw_random(ends)
       call check_list(error, point(:, :0), ends, 0.1_wp, "no points")
       call check_list(error, point, ends(:, :, :0), 0.1_wp, "no edges")
    end subroutine test_empty

@@ -8,6 +8,7 @@ module test_shape
    use emcon_shape, only : shape_fault, shape_t, shape_table_t, shape_tabulate
    use emcon_shape_quadrilateral_plane, only : shape_quadrilateral_t
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_shape
@@ -51,7 +52,7 @@ contains
       do k = 1, size(kind)
          call make_room(kind(k), value, slope)
          do i = 1, 20
-            call random_number(point)
+            call draw_random(point)
             call kind(k)%shape%values(point, value, slope)
             call check_near(error, sum(value), 1.0_wp, tol, 1.0_wp, "sum of the values")
             call check_near(error, sum(slope, dim=2), [0.0_wp, 0.0_wp], tol, 1.0_wp, &
@@ -80,7 +81,7 @@ contains
          call make_room(kind(k), value, slope)
          call kind(k)%shape%places(place)
          do i = 1, 20
-            call random_number(point)
+            call draw_random(point)
             call kind(k)%shape%values(point, value, slope)
             call check_near(error, matmul(place, value), point, tol, 1.0_wp, "position")
             call check_near(error, matmul(place, transpose(slope)), identity, tol, 1.0_wp, &
@@ -122,7 +123,7 @@ contains
       do k = 1, size(kind)
          call make_room(kind(k), up, slope)
          call make_room(kind(k), down, other)
-         call random_number(point)
+         call draw_random(point)
          call kind(k)%shape%values(point, up, slope)
          do a = 1, 2
             way = 0.0_wp

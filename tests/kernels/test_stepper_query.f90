@@ -15,6 +15,7 @@ module test_stepper_query
       query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature_times
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    use small_scenes, only : shake, young
    use stepper_scenes, only : check_same_state, drop_h, make_drop, make_tied_drop, open_scene
    implicit none
@@ -250,7 +251,7 @@ contains
       if (.not. allocated(error)) call query_links(stepper, links, error)
       if (allocated(error)) return
       allocate(dq(links%n_col), u1(2, size(stepper%scene%x, 2)))
-      call random_number(dq)
+      call draw_random(dq)
       dq = 2.0_wp*dq - 1.0_wp
       call residual_at(0.0_wp, low)
       call query_tangent(query, .true., matrix, error)

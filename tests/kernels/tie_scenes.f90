@@ -10,6 +10,7 @@ module tie_scenes
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use emcon_tie, only : tie_measure
+   use random_draws, only : draw_random
    use small_scenes, only : scene_begin
    implicit none
    private
@@ -113,7 +114,7 @@ contains
       real(wp) :: place(n + 1), r(n + 1)
 
       place = even(n, first, last)
-      call random_number(r)
+      call draw_random(r)
       place(2:n) = place(2:n) + 0.8_wp*(r(2:n) - 0.5_wp)*(last - first)/real(n, wp)
    end function uneven
 
