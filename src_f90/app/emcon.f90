@@ -6,7 +6,7 @@ program emcon
    use emcon_errors, only : err_input, err_none, error_t
    use emcon_interrupt, only : interrupt_watch, is_interrupted
    use emcon_run, only : run_check, run_deck, run_prepare, run_report_t, run_restart
-   use emcon_version, only : version
+   use emcon_version, only : precision_names, this_precision, version
    implicit none
 
    interface
@@ -49,7 +49,8 @@ contains
          end associate
          return
       case ("version")
-         write(output_unit, "(a)") "emcon " // version
+         write(output_unit, "(a)") "emcon " // version // ", " // &
+            trim(precision_names(this_precision)) // " precision"
          return
       case ("check")
          call run_check(command%path, command%options, report, error)

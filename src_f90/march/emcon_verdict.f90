@@ -15,13 +15,18 @@ module emcon_verdict
    use emcon_term_registry, only : terms_solid
    use emcon_step_control, only : control_sizes, n_why, why_text
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   use emcon_version, only : this_precision
    implicit none
    private
    public :: verdict_t, verdict_start, verdict_update, verdict_move, verdict_end, &
       verdict_is_good, verdict_is_failure, verdict_balance_lines, verdict_line, guard_advice
 
-   !> Error of the energy balance, relative to the largest energy, that is accepted.
-   real(wp), parameter :: ten_digits = 1.0e-10_wp
+   !> Error of the energy balance, relative to the largest energy, that is accepted in single,
+   !> double and quadruple precision: 3, 6 and 9 digits above `epsilon`.
+   real(wp), parameter :: closing(3) = [1.0e-4_wp, 1.0e-10_wp, 1.0e-25_wp]
+   character(len=*), parameter :: closing_digits(3) = [character(len=11) :: "four", "ten", &
+      "twenty-five"]
+   real(wp), parameter :: energy_bar = closing(this_precision)
    !> Largest relative residual that is accepted where rounding ends Newton's method early: half of
    !> the digits are left.
    real(wp), parameter :: half_digits = sqrt(epsilon(1.0_wp))
@@ -213,9 +218,10 @@ contains
       if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
          "loads do work on motions that nothing holds: stabilization bears " // &
          to_text(self%stabilization, 3))
-      if (self%dynamic_drift > ten_digits*self%largest_energy) call note_add(self%reasons, &
-         "the energy balance does NOT close to ten digits (" // &
-         to_text(self%dynamic_drift/self%largest_energy, 3) // " of the largest energy)")
+      if (self%dynamic_drift > energy_bar*self%largest_energy) call note_add(self%reasons, &
+         "the energy balance does NOT close to " // trim(closing_digits(this_precision)) // &
+         " digits (" // to_text(self%dynamic_drift/self%largest_energy, 3) // &
+         " of the largest energy)")
       if (self%contact_made > half_digits*self%largest_energy) call note_add(self%reasons, &
          "contact has made an energy of " // to_text(self%contact_made, 3) // ", " // &
          to_text(self%contact_made/self%largest_energy, 3) // " of the largest, which bodies " // &
@@ -256,8 +262,9 @@ contains
       else
          line = "verdict: good: "
          if (self%has_dynamics) line = line // &
-            "the energy balance closes to ten digits or better, "
-         if (self%shown_drift > ten_digits*self%largest_energy) line = line // "the scheme does " &
+            "the energy balance closes to " // trim(closing_digits(this_precision)) // &
+            " digits or better, "
+         if (self%shown_drift > energy_bar*self%largest_energy) line = line // "the scheme does " &
             // "not keep energy: the balance is off by " // &
             to_text(self%shown_drift/self%largest_energy, 3) // " of the largest energy (shown, " &
             // "not judged), "

@@ -15,7 +15,7 @@ module emcon_run_log
    use emcon_solver_registry, only : solver_given
    use emcon_stepper, only : stepper_t
    use emcon_text, only : note_add, notes_append, notes_t, string_t, to_text
-   use emcon_version, only : version
+   use emcon_version, only : precision_names, this_precision, version
    implicit none
    private
    public :: log_start, log_increment, model_lines
@@ -34,7 +34,8 @@ contains
       type(report_row_t), allocatable :: rows(:)
       integer :: k
 
-      call log_line(log, "EMCON " // version // ", deck " // path)
+      call log_line(log, "EMCON " // version // ", " // trim(precision_names(this_precision)) &
+         // " precision, deck " // path)
       call log_lines(log, "with ", notes_t(size(stepper%override), stepper%override))
       call log_lines(log, "", notes_t(size(diagnostic), diagnostic))
       call log_lines(log, "", model_notes(stepper))

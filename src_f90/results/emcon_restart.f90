@@ -12,12 +12,15 @@ module emcon_restart
       restart_rewind, restart_t
    use emcon_sealed_file, only : seal_check, seal_put
    use emcon_text, only : string_t, to_text
+   use emcon_version, only : precision_names, this_precision
    implicit none
    private
    public :: restart_t, restart_write, restart_read
 
    !> Groups by kind: integers, reals, texts. Their names are listed in `<group>_names`.
    character(len=*), parameter :: group(3) = [character(len=9) :: "/integers", "/reals", "/texts"]
+   !> Version of the layout.
+   character(len=*), parameter :: layout = "emcon restart 5"
 
 contains
 
@@ -67,11 +70,11 @@ contains
       end do
    end subroutine write_entries
 
-   !> Version of the layout, and the kind of the state: neither can be mixed.
+   !> The layout, and the kind of the state: neither can be mixed.
    pure subroutine format_text(text)
       character(len=:), allocatable, intent(out) :: text
 
-      text = "emcon restart 5, reals of " // to_text(storage_size(1.0_wp)) // " bits"
+      text = layout // ", reals of " // to_text(storage_size(1.0_wp)) // " bits"
    end subroutine format_text
 
    subroutine write_entry(entry, file, path, error)
@@ -97,7 +100,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(hdf5_file_t) :: file
       type(string_t), allocatable :: found(:)
-      character(len=:), allocatable :: needed
+      character(len=:), allocatable :: needed, advice
       type(error_t), allocatable :: ignored
 
       call seal_check(path, "", error)
@@ -108,8 +111,13 @@ contains
          if (size(found) /= 1) then
             call raise(error, err_file, path // " is not a restart file")
          else if (found(1)%text /= needed) then
+            advice = ""
+            if (index(found(1)%text, layout) == 1) advice = ". This is " // &
+               trim(precision_names(this_precision)) // " precision: go on with the build that " &
+               // "wrote it, or run the deck again"
             call raise(error, err_file, path // " is a restart file of another build of the " &
-               // "program: it says '" // found(1)%text // "', needed is '" // needed // "'")
+               // "program: it says '" // found(1)%text // "', needed is '" // needed // "'" &
+               // advice)
          end if
       end if
       if (.not. allocated(error)) call read_entries(self, file, error)

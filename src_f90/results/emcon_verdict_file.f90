@@ -10,6 +10,7 @@ module emcon_verdict_file
    use emcon_step_control, only : control_sizes, n_why, step_control_t, why_text
    use emcon_text, only : notes_t, string_t
    use emcon_verdict, only : verdict_end, verdict_is_good, verdict_t
+   use emcon_version, only : precision_names, this_precision
    implicit none
    private
    public :: verdict_so_far, verdict_write, verdict_exchange
@@ -66,6 +67,7 @@ contains
       call json_texts(line, "warnings", self%warnings)
       call json_number(line, "warning_count", real(self%n_warning, wp))
       call json_text(line, "message", self%message)
+      call json_text(line, "precision", trim(precision_names(this_precision)))
       associate (state => march%state, ledger => march%ledger)
          call json_number(line, "increments", real(state%increment, wp))
          call json_number(line, "time", state%time)
