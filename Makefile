@@ -34,7 +34,7 @@ Q := $(if $(V),,@)
 .SUFFIXES:
 .DEFAULT_GOAL := help
 .PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize docs install status clean \
-	help kernel_objects FORCE
+	precisions help kernel_objects FORCE
 
 # ---- set-up -------------------------------------------------------------------------------------
 
@@ -274,6 +274,11 @@ $(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o fortranobject.o) $(BUIL
 
 # The package holds the extension of the mode made last. `install` replaces a file, where `cp`
 # would write into one that a running Python has mapped.
+ifneq ($(PRECISION),double)
+ifneq ($(filter pywrap run,$(MAKECMDGOALS)),)
+$(error Python and C see double: pywrap is for PRECISION=double; app, lib and kernels are for all)
+endif
+endif
 pywrap: $(P)/_core$(EXT_SUFFIX)  ## the Python package, used as .venv/bin/python -m emcon
 	$(Q)find '$(PACKAGE)' -name 'libemcon.so.*' ! -name $(SHARED) -delete
 	$(Q)for f in $< $(BUILD)/$(SHARED); do \
@@ -291,6 +296,13 @@ test:  ## set up, build, run all tests
 	$(BUILDING) MODE=release PRECISION=double .venv/test.stamp app lib pywrap kernels
 	$(BUILDING) MODE=debug PRECISION=double kernels
 	@$(PY) -m pytest -n $(shell nproc) tests
+
+precisions: .venv/test.stamp  ## build single and quad, run the kernel tests and decks of all three
+	$(BUILDING) MODE=release PRECISION=double app kernels
+	$(BUILDING) MODE=release PRECISION=single app kernels
+	$(BUILDING) MODE=release PRECISION=quad app kernels
+	@set -e; for folder in release release-single release-quad; do build/$$folder/kernels; done
+	@$(PY) -m pytest -q tests/extremes/test_precision.py
 
 lint: .venv/lint.stamp  ## check the Fortran sources against the written rules
 	.venv/bin/fortitude check src_f90 tests/kernels tests/bench
@@ -347,4 +359,4 @@ clean:  ## remove build/ and the compiled extension (.venv stays)
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while IFS='	' read -r name text; do \
-		printf '  make %-9s %s\n' "$$name" "$$text"; done
+		printf '  make %-10s %s\n' "$$name" "$$text"; done
