@@ -100,7 +100,7 @@ module emcon_api
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &
       load_pressure
    use emcon_text, only : string_t
-   use emcon_version, only : version
+   use emcon_version, only : precision_names, this_precision, version
    implicit none
    public
 end module emcon_api

@@ -1,5 +1,6 @@
 """README.md and docs/*.md tell the truth: figures, links, folders, make targets, options."""
 
+import functools
 import re
 import shlex
 import subprocess
@@ -35,7 +36,7 @@ def code_spans(text):
 
 def commands(page):
     """Command lines as lists of words, a prompt and a remark left out; options that stand alone are
-    those of the program."""
+    those of the program, or of its studies."""
     text = page.read_text()
     for line in [*code_blocks(text), *code_spans(text)]:
         line = line.removeprefix("$ ").split("  #")[0]
@@ -102,26 +103,30 @@ def program_of(words):
     if re.search(r"(^|/)python3?$", words[0]):
         words = words[1:]
     if words[0] == "-m":
-        return (sys.executable, *words[:2]), words[2:]
+        n = 3 if words[1:3] == ["emcon", "study"] else 2
+        return (sys.executable, *words[:n]), words[n:]
     return (sys.executable, ROOT / words[0]), words[1:]
+
+
+@functools.cache
+def options_of(program):
+    told = subprocess.run([*program, "--help"], capture_output=True, text=True, check=True).stdout
+    return set(re.findall(r"--[a-z][\w-]*", told))
 
 
 @EACH_PAGE
 def test_options(page):
-    helps = {}
     for words in commands(page):
         if words[0] == "make":
             continue
         program, rest = program_of(words)
-        options = re.findall(r"--[a-z][\w-]*", " ".join(rest))
+        options = set(re.findall(r"--[a-z][\w-]*", " ".join(rest)))
         if not options:
             continue
-        if program not in helps:
-            helps[program] = subprocess.run(
-                [*program, "--help"], capture_output=True, text=True, check=True
-            ).stdout
-        known = re.findall(r"--[a-z][\w-]*", helps[program])
-        assert set(options) <= set(known), words
+        known = options_of(program)
+        if words[0] == "emcon" and rest[0].startswith("--"):
+            known = known | options_of((sys.executable, "-m", "emcon", "study"))
+        assert options <= known, words
 
 
 @EACH_PAGE
