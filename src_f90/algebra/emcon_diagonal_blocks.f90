@@ -329,6 +329,13 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: b
 
+      if (self%n_thread == 1) then               ! a team of one asks the system for each barrier
+         do b = 1, self%n_block
+            call solve(self%block(b), is_second, rhs, x)
+         end do
+         call take_error(self, error)
+         return
+      end if
       !$omp parallel do default(none) shared(self, is_second, rhs, x) &
       !$omp num_threads(self%n_thread) schedule(static, 1)
       do b = 1, self%n_block

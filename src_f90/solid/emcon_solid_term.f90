@@ -114,6 +114,23 @@ contains
          if (self%given%inverted_element > 0) return
       end if
       call shares_lay_out(self%shares, self%solid%pack, size(motion%by, 2), response%n_thread)
+      if (self%shares%n == 1) then               ! a team of one asks the system for each barrier
+         call respond_share(self, 1, motion, response, value, side)
+      else
+         call respond_shares(self, motion, response, value, side)
+      end if
+      t = findloc(self%shares%inverted > 0, .true., 1)
+      if (t > 0) call refuse(self, self%shares%inverted(t), response)
+   end subroutine respond
+
+   !> All shares, by threads.
+   subroutine respond_shares(self, motion, response, value, side)
+      type(solid_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! placed
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      integer :: t
+
       !$omp parallel default(none) shared(self, motion, response, value, side) &
       !$omp num_threads(response%n_thread)
       !$omp do schedule(static, 1)
@@ -127,9 +144,7 @@ contains
       end do
       !$omp end do
       !$omp end parallel
-      t = findloc(self%shares%inverted > 0, .true., 1)
-      if (t > 0) call refuse(self, self%shares%inverted(t), response)
-   end subroutine respond
+   end subroutine respond_shares
 
    !> The packs of a share: those nodes of theirs that no other share has.
    subroutine respond_share(self, share, motion, response, value, side)
