@@ -30,7 +30,7 @@ PAGE = ROOT / "docs" / "stability.md"
 def text_of(value):
     if isinstance(value, tuple):
         return " ".join(text_of(part) for part in value if part not in (0.0, 1.0)) or "1"
-    return f"{value:g}" if not isinstance(value, str) else value
+    return f"{value:.8g}" if not isinstance(value, str) else value
 
 
 def folder_of_program():
@@ -47,15 +47,15 @@ def line_of(row, outcomes):
     others = [(value, outcome) for value, outcome in zip(row.values, outcomes, strict=True)
               if outcome.kind != HOLDS]
     worst = max((o.figure for o in outcomes if o.kind == HOLDS), default=float("nan"))
-    residual = max((o.residual for o in outcomes if o.kind == HOLDS), default=float("nan"))
-    said = "; ".join(f"{text_of(value)}: {'**silent** ' + format(o.figure, '.1e') if o.kind == SILENT else o.text}"
-                     for value, o in others)
-    return (row.what, ", ".join(map(text_of, row.values)), ", ".join(map(text_of, held)),
-            f"{row.figure}: {worst:.1e} (bar {row.bar:g})", f"{residual:.0e}",
+    said = "; ".join(f"{text_of(value)}: " + (f"**silent** {outcome.figure:.1e}"
+                                              if outcome.kind == SILENT else outcome.text)
+                     for value, outcome in others)
+    return (row.what, ", ".join(map(text_of, row.values)), "all" if not others else ", ".join(map(text_of, held)),
+            f"{row.figure}: {worst:.1e} (bar {row.bar:g})",
             said.replace("|", "\\|") or "", row.why)
 
 
-HEAD = ("what", "tried", "holds", "largest figure", "residual", "else the program says", "limit")
+HEAD = ("what", "tried", "holds", "largest figure", "else the program says", "limit")
 
 
 def main():
@@ -75,8 +75,7 @@ def main():
             lines.append(line_of(row, outcomes))
             print(f"{row.name} ({time.monotonic() - start:.0f} s)", flush=True)
             for value, o in zip(row.values, outcomes, strict=True):
-                print(f"   {text_of(value):>12}  {o.kind:6}  {o.figure:.1e}  {o.residual:.0e}  {o.text}",
-                      flush=True)
+                print(f"   {text_of(value):>14}  {o.kind:6}  {o.figure:.1e}  {o.text}", flush=True)
     if options.update:
         text = PAGE.read_text()
         mark = re.compile(r"(<!-- extremes -->\n).*?(<!-- end -->)", re.DOTALL)

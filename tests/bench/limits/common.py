@@ -56,7 +56,6 @@ class Outcome:
     kind: str
     figure: float
     text: str
-    residual: float = float("nan")
 
 
 def shorter(text):
@@ -66,17 +65,6 @@ def shorter(text):
         if found:
             return found[1][:160]
     return text.strip().splitlines()[0][:160] if text.strip() else ""
-
-
-def residual_of(run):
-    """The largest residual that a solved increment was left with, by the size of its forces."""
-    log = run.file(".log")
-    if not log.exists():
-        return float("nan")
-    with open(log) as lines:
-        last = (float(line.split()[-1]) for line in lines
-                if re.fullmatch(r" *\d+( +[-+.\dE]+){8,}\s*", line))
-        return max(last, default=float("nan"))
 
 
 def run_case(row, value, folder):
@@ -104,7 +92,7 @@ def run_case(row, value, folder):
         kind, text = TOLD, re.search(row.warns, run.log)[0]
     else:
         kind, text = SILENT, ""
-    outcome = Outcome(kind, figure, text, residual_of(run))
+    outcome = Outcome(kind, figure, text)
     shutil.rmtree(place)
     kept.write_text(json.dumps(dataclasses.asdict(outcome)))
     return outcome
