@@ -128,6 +128,7 @@ contains
       if (allocated(scene%given_node)) is_bare(scene%given_node) = .false.
       do i = 1, size(scene%rigid)
          is_bare(scene%rigid(i)%node) = .false.
+         if (allocated(scene%rigid(i)%arm)) is_bare(scene%rigid(i)%arm) = .false.
       end do
       do i = 1, size(scene%surface)
          associate (surface => scene%surface(i))

@@ -31,13 +31,14 @@ module emcon_deck_output
       character(len=32) :: longer
    end type output_row_t
 
-   character(len=*), parameter :: of_node = "U V RF", of_element = "S E ENER ELSE ELKE EVOL", &
+   character(len=*), parameter :: of_node = "U V RF UR VR RM", &
+      longer_node = "U V RF UR3 VR3 RM3", of_element = "S E ENER ELSE ELKE EVOL", &
       of_contact = "CDIS CSTR CF", longer_contact = "CDISP CSTRESS CFORCE", &
       of_energy = "ALLKE ALLSE ALLWK ETOTAL"
 
    type(output_row_t), parameter :: output_rows(*) = [ &
-      output_row_t("NODEFILE", output_node_file, of_node, ""), &
-      output_row_t("NODEPRINT", output_node_print, of_node, ""), &
+      output_row_t("NODEFILE", output_node_file, of_node, longer_node), &
+      output_row_t("NODEPRINT", output_node_print, of_node, longer_node), &
       output_row_t("ELFILE", output_element_file, of_element, ""), &
       output_row_t("ELPRINT", output_element_print, of_element, ""), &
       output_row_t("CONTACTFILE", output_contact_file, of_contact, longer_contact), &

@@ -4,8 +4,9 @@ module emcon_deck_rigid
    use emcon_deck_named, only : find_set, hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t
    use emcon_deck_surfaces, only : find_surface, surface_names
-   use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
+   use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
+   use emcon_origin, only : origin_t
    use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
@@ -194,70 +195,82 @@ contains
       end do
    end subroutine mark_rigid
 
-   !> What turns in step `i_step`: with its reference node prescribed, a body is prescribed by its
-   !> frame; with that node free it must not turn, and never have done so.
-   subroutine read_turns(reader, scene, i_step)
-      type(reader_t), intent(inout) :: reader
+   !> What turns: with its reference node prescribed, a body is prescribed by its frame, else by
+   !> nodes of their own that its arms follow.
+   subroutine read_turns(scene)
       type(scene_t), intent(inout) :: scene
-      integer, intent(in) :: i_step              !! from 1
-      integer :: i, a
+      integer :: i_step, i, a
 
-      do i = 1, size(scene%step(i_step)%turn)
-         associate (turn => scene%step(i_step)%turn(i))
-            turn%rigid = findloc(scene%rigid%reference, turn%angle%node, 1)
-            turn%is_about = all([(prescribed_find(scene%step(i_step)%prescribed, &
-               turn%angle%node, a), a = 1, scene%n_dim)] > 0)
-            if (turn%is_about) then
-               call prescribe_frame(scene, i_step, i)
-               cycle
-            end if
-            if (turn%angle%is_frozen .or. .not. abs(turn%angle%value) > 0.0_wp) then
-               if (is_held_before(scene, i_step, turn%rigid)) cycle
-            end if
-            call add_error(reader%log, turn%angle%origin, "*BOUNDARY: the rotation of reference " &
-               // "node " // to_text(scene%node_label(turn%angle%node)) // " is prescribed while " &
-               // "the node is free to move; that is done only with the value 0 in every step " &
-               // "from the first one on; prescribe its degrees of freedom 1 and 2 too")
-         end associate
+      do i_step = 1, size(scene%step)
+         do i = 1, size(scene%step(i_step)%turn)
+            associate (turn => scene%step(i_step)%turn(i))
+               turn%rigid = findloc(scene%rigid%reference, turn%angle%node, 1)
+               if (turn%rigid == 0) cycle
+               turn%is_about = all([(prescribed_find(scene%step(i_step)%prescribed, &
+                  turn%angle%node, a), a = 1, scene%n_dim)] > 0)
+               if (.not. turn%is_about) call add_arms(scene, turn%angle%origin, turn%rigid)
+               call prescribe_turn(scene, i_step, i)
+            end associate
+         end do
       end do
    end subroutine read_turns
 
-   !> Was the body kept from turning in all steps before `i_step`?
-   pure logical function is_held_before(scene, i_step, rigid)
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: i_step, rigid
-      integer :: k
+   !> Nodes at the ends of the arms of rigid body `b`, behind all others, if it has none.
+   subroutine add_arms(scene, origin, b)
+      type(scene_t), intent(inout) :: scene
+      type(origin_t), intent(in) :: origin
+      integer, intent(in) :: b
+      integer :: k, n_dim, n
 
-      is_held_before = .true.
-      do k = 1, i_step - 1
-         associate (turn => scene%step(k)%turn)
-            is_held_before = is_held_before .and. any(turn%rigid == rigid .and. &
-               (turn%angle%is_frozen .or. .not. abs(turn%angle%value) > 0.0_wp))
+      if (allocated(scene%rigid(b)%arm)) return
+      n_dim = scene%n_dim
+      n = size(scene%node_label)
+      associate (rigid => scene%rigid(b), last => maxval([0, scene%node_label]))
+         rigid%arm = [(n + k, k = 1, n_dim)]
+         scene%node_label = [scene%node_label, [(last + k, k = 1, n_dim)]]
+         scene%node_origin = [scene%node_origin, [(origin, k = 1, n_dim)]]
+         scene%x = reshape([scene%x, scene%x(:, rigid%frame(2:))], [n_dim, n + n_dim])
+         call lengthen(scene%u0)
+         call lengthen(scene%v0)
+      end associate
+
+   contains
+
+      subroutine lengthen(field)
+         real(wp), allocatable, intent(inout) :: field(:, :)    !! (n_dim, n_node)
+
+         associate (frame => scene%rigid(b)%frame)
+            field = reshape([field, field(:, frame(2:)) - spread(field(:, frame(1)), 2, n_dim)], &
+               [n_dim, n + n_dim])
          end associate
-      end do
-   end function is_held_before
+      end subroutine lengthen
 
-   !> Prescribe the nodes of the frame of turn `i` but the reference node, which is.
-   pure subroutine prescribe_frame(scene, i_step, i)
+   end subroutine add_arms
+
+   !> Prescribe the nodes of the frame of turn `i` but the reference node, which is; or the arms.
+   pure subroutine prescribe_turn(scene, i_step, i)
       type(scene_t), intent(inout) :: scene
       integer, intent(in) :: i_step, i
-      type(prescribed_t), allocatable :: new(:)
+      type(prescribed_t) :: new(scene%n_dim**2)
       integer :: k, a, n
 
-      associate (turn => scene%step(i_step)%turn(i), n_dim => scene%n_dim)
-         allocate(new(n_dim*n_dim))
+      associate (turn => scene%step(i_step)%turn(i))
          n = 0
-         do k = 2, n_dim + 1
-            do a = 1, n_dim
+         do k = 1, scene%n_dim
+            do a = 1, scene%n_dim
                n = n + 1
                new(n)%origin = turn%angle%origin
-               new(n)%node = scene%rigid(turn%rigid)%frame(k)
+               if (turn%is_about) then
+                  new(n)%node = scene%rigid(turn%rigid)%frame(k + 1)
+               else
+                  new(n)%node = scene%rigid(turn%rigid)%arm(k)
+               end if
                new(n)%dof = a
                new(n)%turn = i
             end do
          end do
       end associate
       scene%step(i_step)%prescribed = [scene%step(i_step)%prescribed, new]
-   end subroutine prescribe_frame
+   end subroutine prescribe_turn
 
 end module emcon_deck_rigid

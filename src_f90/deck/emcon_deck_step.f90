@@ -69,10 +69,10 @@ contains
          if (k > 1) time = time + last%duration
          call read_conditions(reader, i, scene, conditions, requests)
          call conditions_store(conditions, scene%n_dim, scene%step(k))
-         call read_turns(reader, scene, k)
          scene%step(k)%output = requests%output
          last = scene%step(k)
       end do
+      call read_turns(scene)
       call pairs_ask(reader, scene%pair, scene%step)
       call suit_explicit(reader, scene%pair, scene%step)
       call check_massless(reader, scene%step)

@@ -30,6 +30,7 @@ module emcon_march
    use emcon_system, only : system_init
    use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
+   use emcon_turn_record, only : turn_record_init
    use emcon_velocity_update, only : velocity_update_free
    implicit none
    private
@@ -66,6 +67,7 @@ contains
          allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)
+      call turn_record_init(self%state%turns, scene%rigid, scene%x, self%state%u)
       call pair_sums_init(self%state%sums, self%system, scene%pair)
       call active_set_init(self%active, self%system)
       call ledger_init(self%ledger, scene%n_dim)

@@ -23,6 +23,7 @@ module emcon_march_commit
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_term_registry, only : terms_decay
    use emcon_text, only : note_add, notes_t, to_text
+   use emcon_turn_record, only : turn_record_measure
    use emcon_velocity_update, only : push_t, push_weights, velocity_update_apply, &
       velocity_update_push
    implicit none
@@ -58,8 +59,11 @@ contains
          call restitute(self, scene, h, increment%notes, error)
          if (allocated(error)) return
          state%u = state%u + self%ending%du
-         ! Else round-off adds up between the nodes of a rigid body.
-         if (size(scene%rigid) > 0) call follow_links(system, state%u)
+         if (size(scene%rigid) > 0) then
+            call turn_record_measure(state%turns, scene%rigid, self%motion, state%reaction)
+            ! Else round-off adds up between the nodes of a rigid body.
+            call follow_links(system, state%u)
+         end if
          state%v = self%v1
          state%contact = self%newton%contact
          call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &

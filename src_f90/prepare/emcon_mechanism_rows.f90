@@ -50,7 +50,6 @@ contains
          associate (linear => system%space%linear, from => system%space%linear%start(k) + 1, &
                to => system%space%linear%start(k + 1))
             total = sum(abs(linear%weight(from:to)))
-            if (linear%is_off(k)) total = huge(total)
             if (.not. total > 0.0_wp) total = 1.0_wp
             rows%start(m + k + 1) = m + to
             rows%dof(m + from:m + to) = linear%dof(from:to)

@@ -11,6 +11,7 @@ module emcon_quantities
    use emcon_stepper, only : stepper_t
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
    use emcon_term_registry, only : terms_solid
+   use emcon_turn_record, only : turn_record_spin
    use emcon_vtkhdf, only : field_t
    implicit none
    private
@@ -21,8 +22,8 @@ module emcon_quantities
    !> Where the values of a quantity are.
    integer, parameter :: at_nodes = 1, at_elements = 2, at_contacts = 3, at_pairs = 4
 
-   !> Components of a vector, in a row: one for each direction.
-   integer, parameter :: of_vector = 0
+   !> Components of a vector, in a row: one for each direction; of a rotation: for each plane.
+   integer, parameter :: of_vector = 0, of_rotation = -1
 
    !> A variable of decks at one kind of places.
    type :: row_t
@@ -34,10 +35,13 @@ module emcon_quantities
       logical :: is_sparse = .false.             !! the same at most places
    end type row_t
 
-   type(row_t), parameter :: rows(17) = [ &
+   type(row_t), parameter :: rows(20) = [ &
       row_t("U", at_nodes, of_vector, "displacement"), &
       row_t("V", at_nodes, of_vector, "velocity"), &
       row_t("RF", at_nodes, of_vector, "reaction_force", is_sparse=.true.), &
+      row_t("UR", at_nodes, of_rotation, "rotation", is_sparse=.true.), &
+      row_t("VR", at_nodes, of_rotation, "spin", is_sparse=.true.), &
+      row_t("RM", at_nodes, of_rotation, "reaction_moment", is_sparse=.true.), &
       row_t("S", at_nodes, 7, "cauchy_stress", "von_mises"), &
       row_t("S", at_elements, 6), &
       row_t("E", at_elements, 3, "strain"), &
@@ -86,6 +90,7 @@ contains
 
       n = rows(findloc(rows%variable == variable .and. rows%place == place, .true., 1))%n_component
       if (n == of_vector) n = n_dim
+      if (n == of_rotation) n = n_dim*(n_dim - 1)/2
    end function quantity_components
 
    !> The fields of the field file that a variable stands for.
@@ -127,7 +132,8 @@ contains
       row = rows(findloc(rows%variable == variable .and. rows%field /= "", .true., 1))
    end function field_row
 
-   !> U, V, RF: (2, n_node); S: Cauchy stress and von Mises stress (7, n_node).
+   !> U, V, RF: (2, n_node); UR, VR, RM (1, n_node); S: Cauchy stress and von Mises stress (7,
+   !> n_node).
    function node_quantity(stepper, variable) result(values)
       type(stepper_t), intent(in), target :: stepper
       character(len=*), intent(in) :: variable
@@ -146,6 +152,11 @@ contains
          case ("RF")
             values = real(state%reaction, dp)
             call gather_frames(stepper%scene%rigid, values)
+         case ("UR", "VR", "RM")
+            allocate(values(1, size(state%u, 2)), source=0.0_dp)
+            do i = 1, size(stepper%scene%rigid)
+               values(1, stepper%scene%rigid(i)%reference) = turning(stepper, variable, i)
+            end do
          case default
             allocate(stress(6, size(state%u, 2)), values(7, size(state%u, 2)))
             call nodal_stress(solid, state%u, is_large(stepper), stress)
@@ -157,7 +168,26 @@ contains
       end associate
    end function node_quantity
 
-   !> Forces on the nodes of the frame of a rigid body are those on its reference node.
+   !> The angle, the spin, or the moment of the support of rigid body `b`.
+   real(dp) function turning(stepper, variable, b)
+      type(stepper_t), intent(in) :: stepper
+      character(len=*), intent(in) :: variable
+      integer, intent(in) :: b
+
+      associate (state => stepper%march%state, scene => stepper%scene)
+         select case (variable)
+         case ("UR")
+            turning = real(state%turns%angle(b), dp)
+         case ("VR")
+            turning = real(turn_record_spin(scene%rigid(b), scene%x, state%u, state%v), dp)
+         case default
+            turning = real(state%turns%moment(b), dp)
+         end select
+      end associate
+   end function turning
+
+   !> Forces on the nodes of the frame of a rigid body are those on its reference node; those on its
+   !> arms are a moment.
    pure subroutine gather_frames(rigid, values)
       type(rigid_body_t), intent(in) :: rigid(:)
       real(dp), intent(inout) :: values(:, :)
@@ -168,6 +198,7 @@ contains
          total = sum(values(:, rigid(b)%frame), 2)
          values(:, rigid(b)%frame) = 0.0_dp
          values(:, rigid(b)%reference) = total
+         if (allocated(rigid(b)%arm)) values(:, rigid(b)%arm) = 0.0_dp
       end do
    end subroutine gather_frames
 

@@ -16,6 +16,8 @@ module emcon_rigid_bodies
       integer, allocatable :: element(:)             !! ascending
       integer, allocatable :: node(:)                !! ascending; with the reference node
       integer, allocatable :: frame(:)               !! (n_dim + 1) the reference node comes first
+      !> (n_dim) nodes of their own that move as the frame does less its reference node; or none
+      integer, allocatable :: arm(:)
    end type rigid_body_t
 
    !> Nodes nearer to the plane of others than this part of the extent lie in it.

@@ -43,7 +43,7 @@ module emcon_steps
    type :: turn_t
       integer :: rigid = 0                           !! index into `scene_t%rigid`
       type(prescribed_t) :: angle                    !! of the reference node; value in radians
-      !> That node is prescribed too; else it is free, and the body does not turn
+      !> That node is prescribed too, in all directions
       logical :: is_about = .true.
    end type turn_t
 

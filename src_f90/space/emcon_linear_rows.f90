@@ -1,11 +1,11 @@
 !> The linear constraints of a scene as rows over degrees of freedom: rigid bodies, ties, equations.
 !>
 !> Row k: the sum of weight times displacement over its entries is zero. There is a row in each
-!> direction for each node of a rigid body but its reference node, then for each row of each tie,
-!> then the equations. Source: docs/theory.md, sections 11 and 13.
+!> direction for each node of a rigid body that is not in its frame, and for each of its arms, then
+!> for each row of each tie, then the equations. Source: docs/theory.md, sections 11 and 13.
 module emcon_linear_rows
    use emcon_kinds, only : wp
-   use emcon_rigid_bodies, only : rigid_weights
+   use emcon_rigid_bodies, only : rigid_body_t, rigid_weights
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
    use emcon_steps, only : step_t
@@ -16,7 +16,6 @@ module emcon_linear_rows
    type :: linear_rows_t
       integer :: n = 0
       logical, allocatable :: is_used(:)         !! (n) else it follows from others in this step
-      logical, allocatable :: is_off(:)          !! (n) it does not hold in this step
       integer, allocatable :: tie(:)             !! (n) that it is of; 0: an equation; -b: a body
       integer, allocatable :: place(:)           !! (n) row of tie, number of equation, rigid node
       integer, allocatable :: own(:)             !! (n) the freedom to eliminate, if possible
@@ -29,7 +28,7 @@ module emcon_linear_rows
 
 contains
 
-   !> The rows of `scene`, all in use but for those of `is_off`.
+   !> The rows of `scene`, all in use.
    pure subroutine linear_rows_init(self, scene)
       type(linear_rows_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
@@ -39,7 +38,7 @@ contains
       self%n = size(scene%equation)
       most = 0
       do k = 1, size(scene%rigid)
-         associate (n_row => n_dim*(size(scene%rigid(k)%node) - 1))
+         associate (n_row => n_dim*(n_follower(scene%rigid(k)) + n_arm(scene%rigid(k))))
             self%n = self%n + n_row
             most = most + (n_dim + 2)*n_row
          end associate
@@ -51,7 +50,6 @@ contains
       do k = 1, size(scene%equation)
          most = most + size(scene%equation(k)%node)
       end do
-      allocate(self%is_off(self%n), source=.false.)
       allocate(self%tie(self%n), self%place(self%n), self%own(self%n), source=0)
       allocate(self%start(self%n + 1), self%dof(most), source=0)
       allocate(self%size(self%n), self%weight(most), source=0.0_wp)
@@ -72,7 +70,7 @@ contains
                equation%coefficient/maxval(abs(equation%coefficient)))
          end associate
       end do
-      allocate(self%is_used, source=.not. self%is_off)
+      allocate(self%is_used(self%n), source=.true.)
    end subroutine linear_rows_init
 
    !> Append the rows of tie `t` behind row `n`.
@@ -101,61 +99,88 @@ contains
       end associate
    end subroutine add_tie
 
-   !> Append the rows of rigid body `b` behind row `n`: nodes follow its frame, and those of the
-   !> frame follow the reference node in steps in which the body must not turn.
+   !> Nodes of a rigid body that are not in its frame.
+   pure integer function n_follower(rigid)
+      type(rigid_body_t), intent(in) :: rigid
+
+      n_follower = size(rigid%node) - size(rigid%frame)
+   end function n_follower
+
+   pure integer function n_arm(rigid)
+      type(rigid_body_t), intent(in) :: rigid
+
+      n_arm = 0
+      if (allocated(rigid%arm)) n_arm = size(rigid%arm)
+   end function n_arm
+
+   !> Append the rows of rigid body `b` behind row `n`: nodes follow its frame, and arms are what
+   !> its frame moves by less its reference node.
    pure subroutine add_rigid(self, scene, b, n)
       type(linear_rows_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: b
       integer, intent(inout) :: n
-      real(wp) :: weight(size(scene%x, 1) + 1)
-      integer :: i, a, n_dim
+      real(wp) :: weight(size(scene%x, 1) + 1), extent
+      integer :: i
 
-      n_dim = size(scene%x, 1)
-      associate (body => scene%rigid(b))
+      extent = maxval(maxval(scene%x, 2) - minval(scene%x, 2))
+      associate (body => scene%rigid(b), n_dim => size(scene%x, 1))
          do i = 1, size(body%node)
-            if (body%node(i) == body%reference) cycle
+            if (any(body%frame == body%node(i))) cycle
             call rigid_weights(scene%x(:, body%frame), scene%x(:, body%node(i)), weight)
-            do a = 1, n_dim
-               n = n + 1
-               self%tie(n) = -b
-               self%place(n) = body%node(i)
-               self%own(n) = n_dim*(body%node(i) - 1) + a
-               self%size(n) = maxval(maxval(scene%x, 2) - minval(scene%x, 2))
-               self%is_off(n) = any(body%frame == body%node(i))
-               if (self%is_off(n)) then
-                  call add_row(self, n, [self%own(n), n_dim*(body%reference - 1) + a], &
-                     [1.0_wp, -1.0_wp])
-               else
-                  call add_row(self, n, [self%own(n), n_dim*(body%frame - 1) + a], &
-                     [1.0_wp, -weight])
-               end if
-            end do
+            call add_sums(self, n, n_dim, [body%node(i), body%frame], [1.0_wp, -weight], extent)
+            self%tie(n - n_dim + 1:n) = -b
+         end do
+         do i = 1, n_arm(body)
+            call add_sums(self, n, n_dim, [body%arm(i), body%frame(1), body%frame(i + 1)], &
+               [1.0_wp, 1.0_wp, -1.0_wp], extent)
+            self%tie(n - n_dim + 1:n) = -b
          end do
       end associate
    end subroutine add_rigid
 
-   !> Choose the rows of `step`: those that keep a rigid body from turning where that is prescribed
-   !> while its reference node is free, and all that hold in every step. All are in use then.
+   !> Append the same sum over nodes in each direction behind row `n`; the first node is its own.
+   pure subroutine add_sums(self, n, n_dim, node, weight, extent)
+      type(linear_rows_t), intent(inout) :: self
+      integer, intent(inout) :: n
+      integer, intent(in) :: n_dim, node(:)
+      real(wp), intent(in) :: weight(:)          !! (size of node)
+      real(wp), intent(in) :: extent             !! that a row that is not met is measured by
+      integer :: a
+
+      do a = 1, n_dim
+         n = n + 1
+         self%place(n) = node(1)
+         self%own(n) = n_dim*(node(1) - 1) + a
+         self%size(n) = extent
+         call add_row(self, n, n_dim*(node - 1) + a, weight)
+      end do
+   end subroutine add_sums
+
+   !> Choose what is eliminated in `step`: arms follow the frame of their body, but where they are
+   !> prescribed the frame follows them. All rows are in use then.
    pure subroutine linear_rows_choose(self, scene, step)
       type(linear_rows_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
-      integer :: k, n
+      integer :: n, k, node
 
       do n = 1, self%n
          if (self%tie(n) >= 0) cycle
-         associate (body => scene%rigid(-self%tie(n)))
-            self%is_off(n) = any(body%frame == self%place(n))
-         end associate
-         if (.not. (self%is_off(n) .and. allocated(step%turn))) cycle
-         do k = 1, size(step%turn)
-            if (step%turn(k)%rigid == -self%tie(n) .and. .not. step%turn(k)%is_about) then
-               self%is_off(n) = .false.
+         associate (body => scene%rigid(-self%tie(n)), n_dim => size(scene%x, 1))
+            k = 0
+            if (allocated(body%arm)) k = findloc(body%arm, self%place(n), 1)
+            if (k == 0) cycle
+            node = body%arm(k)
+            if (allocated(step%turn)) then
+               if (any(step%turn%rigid == -self%tie(n) .and. .not. step%turn%is_about)) then
+                  node = body%frame(k + 1)
+               end if
             end if
-         end do
+            self%own(n) = n_dim*(node - 1) + 1 + mod(self%own(n) - 1, n_dim)
+         end associate
       end do
-      self%is_used = .not. self%is_off
+      self%is_used = .true.
    end subroutine linear_rows_choose
 
    !> Append row `n`: degrees of freedom ascending, equal ones as one.

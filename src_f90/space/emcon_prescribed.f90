@@ -37,6 +37,7 @@ contains
       real(wp), intent(out) :: v                 !! [L/T]
       real(wp) :: arm(size(u_start, 1)), start(size(u_start, 1)), w(size(u_start, 1)), &
          rate(size(u_start, 1)), begun, angle, spin
+      integer :: node
 
       if (prescribed%turn == 0) then
          call given_motion(scene, step, prescribed, instant, &
@@ -44,10 +45,16 @@ contains
          return
       end if
       associate (turn => step%turn(prescribed%turn), a => prescribed%dof)
-         arm = scene%x(:, prescribed%node) - scene%x(:, turn%angle%node)
-         start = u_start(:, prescribed%node) - u_start(:, turn%angle%node)
-         call given_motion(scene, step, step%prescribed(prescribed_find(step%prescribed, &
-            turn%angle%node, a)), instant, u_start(a, turn%angle%node), u, v)
+         associate (body => scene%rigid(turn%rigid))
+            node = prescribed%node
+            if (.not. turn%is_about) node = body%frame(findloc(body%arm, node, 1) + 1)
+         end associate
+         arm = scene%x(:, node) - scene%x(:, turn%angle%node)
+         start = u_start(:, node) - u_start(:, turn%angle%node)
+         u = 0.0_wp
+         v = 0.0_wp
+         if (turn%is_about) call given_motion(scene, step, step%prescribed(prescribed_find( &
+            step%prescribed, turn%angle%node, a)), instant, u_start(a, turn%angle%node), u, v)
          if (turn%angle%is_frozen) then
             u = u + start(a)
             return

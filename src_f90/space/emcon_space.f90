@@ -98,6 +98,7 @@ contains
       self%is_alive = reshape(is_alive, [lists%n_dim, n_node])
       do i = 1, size(scene%rigid)
          self%is_alive(:, scene%rigid(i)%node) = .true.
+         if (allocated(scene%rigid(i)%arm)) self%is_alive(:, scene%rigid(i)%arm) = .true.
       end do
       allocate(self%unresolved(0))
    end subroutine space_init

@@ -91,6 +91,10 @@ contains
          call restart_exchange(restart, "contact", state%contact)
          call restart_exchange(restart, "reaction", state%reaction)
          call restart_exchange(restart, "internal", state%internal)
+         if (restart_offers(restart, "turned", size(state%turns%angle) > 0)) then
+            call restart_exchange(restart, "turned", state%turns%angle)
+            call restart_exchange(restart, "moment", state%turns%moment)
+         end if
          call restart_exchange(restart, "lam", state%lam)
          call restart_exchange(restart, "is_active", state%is_active)
          call exchange_past(state, restart)

@@ -24,6 +24,7 @@ module emcon_stepper_free
    use emcon_system, only : system_check_response, system_find_energy, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
+   use emcon_turn_record, only : turn_record_init
    use emcon_verdict, only : verdict_move, verdict_t, verdict_update
    implicit none
    private
@@ -206,6 +207,7 @@ contains
          next%contact = 0.0_wp
          call march_past_forget(next)
          next%reaction = 0.0_wp
+         call turn_record_init(next%turns, self%scene%rigid, self%scene%x, next%u)
          call pair_record_init(next%pairs, system)
          call pair_sums_begin(next%sums%sum)
       end associate

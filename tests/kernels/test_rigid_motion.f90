@@ -153,7 +153,6 @@ contains
          allocate(linear%dof(0), linear%weight(0))
       end if
       linear%n = linear%n + 1
-      linear%is_off = spread(.false., 1, linear%n)
       linear%dof = [linear%dof, 2*(node - 1) + dof]
       linear%weight = [linear%weight, weight]
       linear%start = [linear%start, size(linear%dof)]

@@ -179,6 +179,93 @@ def test_driven_rotation(tmp_path):
     assert force == pytest.approx(MASS*2.0*2.0**2, rel=(2.0*0.02)**2)
 
 
+def driven_wheel(method="NULL SPACE"):
+    """A plate whose spin is driven, but whose reference node, off its centre, is free."""
+    deck = alone("*INITIAL CONDITIONS, TYPE=VELOCITY\n100, 1, 0.5\n100, 2, 1.\n"
+                 "*AMPLITUDE, NAME=SPIN\n0., 0., 1., 0.5, 2., 2., 3., 5., 20., 56.\n",
+                 "*BOUNDARY, AMPLITUDE=SPIN\n100, 6, 6, 2.\n"
+                 f"*CONSTRAINT METHOD, TYPE={method}\n", reference=(0.5, 0.25), h=0.02, t_end=6.0)
+    deck.replace("U, V, RF", "U, V, RF, UR, VR, RM")
+    return deck
+
+
+@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
+def test_a_driven_rotation_of_a_body_that_is_free_to_move(method, tmp_path):
+    """No force comes from outside, only a moment, whose work the balance counts; the centre moves as
+    it did at the start."""
+    run = run_deck(driven_wheel(method), tmp_path)
+    fields, history = run.fields(), run.history
+    x = fields.x[:15] + fields["displacement"][:, :15]
+    angle = fields["rotation"][:, 15]
+    expected = 2.0*np.interp(fields.time, [0, 1, 2, 3, 20], [0, 0.5, 2, 5, 56])
+    assert np.abs(angle - expected).max() < 1e-12*expected[-1]
+    for k in (150, -1):
+        arms = (PLACE[:15] - PLACE[-1]) @ turned(expected[k]).T
+        assert np.abs(x[k] - x[k].mean(0) - arms).max() < 1e-12
+    # the centre flies straight on, at the velocity that the first increment leaves it with
+    assert np.abs(np.diff(history["px"][1:])).max() < 1e-12*MASS
+    assert np.abs(np.diff(history["py"][1:])).max() < 1e-12*MASS
+    assert history["px"][-1] == pytest.approx(history["px"][0], rel=1e-12)
+    # A step by phi gives a couple of arms in the middle of it, cos(phi/2) as long, the impulse that
+    # the jump of the spin by 1 takes: I (1 + cos(phi))/2. At constant spin there is none.
+    moment = fields["reaction_moment"][1:, 15]
+    phi = 1.0*0.02
+    assert moment[0]*0.02 == pytest.approx(INERTIA*(1 + math.cos(phi))/2, rel=1e-12)
+    kinks = np.isin(np.arange(len(moment)), [0, 50, 100, 150])
+    assert np.abs(moment[~kinks]).max() < 1e-12*moment.max()
+    assert moment.sum()*0.02 == pytest.approx(6.0*INERTIA, rel=(6.0*0.02)**2)
+    assert balance(history) < 1e-12
+    assert np.abs(fields["reaction_force"]).max() < 1e-10*np.abs(moment).max()
+    spin = fields["spin"][:, 15]
+    late = fields.time > 4.0
+    assert np.abs(spin[late] - 6.0).max() < 1e-9*6.0
+
+
+def test_a_driven_rotation_goes_on_with_the_same_bits(tmp_path):
+    with Stepper(driven_wheel().write(tmp_path/"deck.inp")) as whole:
+        for _ in range(60):
+            whole.step()
+        whole.write_restart(tmp_path/"half.rst.h5")
+        with Stepper.from_restart(tmp_path/"half.rst.h5") as rest:
+            for _ in range(15):
+                whole.step()
+                rest.step()
+            assert (rest.u == whole.u).all() and (rest.v == whole.v).all()
+            assert rest.ledger == whole.ledger
+
+
+def test_a_rotation_driven_after_a_free_turn(tmp_path):
+    """A second step takes a body that spins freely by its rotation, FIXED: the rest of its motion
+    stays what it was."""
+    deck = alone("*INITIAL CONDITIONS, TYPE=VELOCITY\n100, 1, 0.5\n100, 6, 2.\n", t_end=3.0)
+    deck.card += Deck(step("*BOUNDARY, FIXED\n100, 6, 6\n", t_end=1.0)).card
+    deck.card += Deck(step("*BOUNDARY, OP=NEW\n", t_end=1.0)).card
+    deck.replace("U, V, RF", "U, V, RF, UR, VR, RM")
+    run = run_deck(deck, tmp_path)
+    fields, history = run.fields(), run.history
+    angle = fields["rotation"][:, 15]
+    held = angle[(fields.time > 3.0 - 1e-9)]
+    assert np.abs(held - held[0]).max() < 1e-12
+    assert held[0] == pytest.approx(6.0, rel=1e-3)
+    assert np.abs(history["px"] - history["px"][0]).max() < 1e-12*MASS
+    assert balance(history) < 1e-12
+    x = fields.x[:15] + fields["displacement"][-1, :15]
+    assert shape_error(x, PLACE[:15]) < 1e-13
+
+
+def test_a_cam_lifts_a_weight(tmp_path):
+    """Driven at its pivot or by the rotation of a free body: the moment of a pendulum that is
+    held at an angle is m g l sin(angle)."""
+    turn = "*BOUNDARY\n100, 1, 2, 0.\n100, 6, 6, 0.75\n*DLOAD\nBODY, GRAV, 9., 0., -1.\n"
+    deck = alone(cards=turn, reference=(3.0, 0.5), procedure="*STATIC\n0.25, 1.")
+    deck.replace("U, V, RF", "UR3, RM3")
+    fields = run_deck(deck, tmp_path).fields()
+    assert fields["rotation"][-1, 15] == pytest.approx(0.75, rel=1e-14)
+    # the centre is two to the left of the pivot: its weight turns left
+    assert fields["reaction_moment"][-1, 15] == pytest.approx(
+        -MASS*9.0*2.0*math.cos(0.75), rel=1e-12)
+
+
 def test_static_turn(tmp_path):
     """A turn by more than a whole one, then on from there, both ways."""
     turn = "*BOUNDARY\n100, 1, 1, 0.5\n100, 2, 2, 0.\n100, 6, 6, {}\n"
@@ -195,10 +282,14 @@ def test_static_turn(tmp_path):
 
 
 def test_a_guide_lets_a_body_fall_but_not_turn(tmp_path):
-    run = run_deck(alone(cards="*BOUNDARY\n100, 1, 1, 0.\n100, 6, 6, 0.\n"
-                         "*DLOAD\nBODY, GRAV, 8., 0., -1.\n*CLOAD\n100, 6, 3.\n"), tmp_path)
-    u = run.fields()["displacement"][-1]
+    deck = alone(cards="*BOUNDARY\n100, 1, 1, 0.\n100, 6, 6, 0.\n"
+                 "*DLOAD\nBODY, GRAV, 8., 0., -1.\n*CLOAD\n100, 6, 3.\n")
+    deck.replace("U, V, RF", "U, RM")
+    run = run_deck(deck, tmp_path)
+    u = run.fields()["displacement"][-1, :16]
     assert np.abs(u - (0.0, -4.0)).max() < 1e-13*4.0
+    # The guide bears what would turn the body.
+    assert np.abs(run.fields()["reaction_moment"][1:, 15] + 3.0).max() < 1e-12*3.0
     assert balance(run.history) < 1e-13
 
 

@@ -1,0 +1,83 @@
+!> How far rigid bodies have turned, and the moments that their supports exert.
+!>
+!> Where the rotation of a body is prescribed, forces on its arms turn it: their moment about the
+!> reference node is what the support has to give. Source: docs/theory.md, section 13.
+module emcon_turn_record
+   use emcon_kinds, only : wp
+   use emcon_moment_plane, only : moment_of
+   use emcon_motion, only : motion_t
+   use emcon_rigid_bodies, only : rigid_body_t
+   use emcon_turn_plane, only : turned_by
+   implicit none
+   private
+   public :: turn_record_t, turn_record_init, turn_record_measure, turn_record_spin
+
+   type :: turn_record_t
+      real(wp), allocatable :: angle(:)          !! (n_rigid) from the reference positions on
+      !> (n_rigid) of the last step, about the reference node, on the body [M L^2/T^2]
+      real(wp), allocatable :: moment(:)
+   end type turn_record_t
+
+contains
+
+   !> Bodies are where `u` says.
+   pure subroutine turn_record_init(self, rigid, x, u)
+      type(turn_record_t), intent(out) :: self
+      type(rigid_body_t), intent(in) :: rigid(:)             !! with their frames
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      integer :: b
+
+      allocate(self%angle(size(rigid)), self%moment(size(rigid)), source=0.0_wp)
+      do b = 1, size(rigid)
+         self%angle(b) = turned_by(arm_of(rigid(b), 2, x), arm_of(rigid(b), 2, x + u))
+      end do
+   end subroutine turn_record_init
+
+   !> Take over a step; no body turns by more than a half turn in it.
+   pure subroutine turn_record_measure(self, rigid, motion, reaction)
+      type(turn_record_t), intent(inout) :: self
+      type(rigid_body_t), intent(in) :: rigid(:)         !! with their frames
+      type(motion_t), intent(in) :: motion               !! of the step
+      real(wp), intent(in) :: reaction(:, :)             !! (n_dim, n_node) [M L/T^2]
+      real(wp) :: first(size(reaction, 1)), way(size(reaction, 1))
+      integer :: b, k, node
+
+      do b = 1, size(rigid)
+         self%moment(b) = 0.0_wp
+         do k = size(rigid(b)%frame), 2, -1
+            first = arm_of(rigid(b), k, motion%x) + arm_of(rigid(b), k, motion%u0)
+            way = arm_of(rigid(b), k, motion%du)
+            node = rigid(b)%frame(k)
+            self%moment(b) = self%moment(b) + moment_of(first + motion%pose%load_place*way, &
+               reaction(:, node))
+            if (.not. allocated(rigid(b)%arm)) cycle
+            node = rigid(b)%arm(k - 1)
+            self%moment(b) = self%moment(b) + moment_of(first + motion%pose%load_place*way, &
+               reaction(:, node))
+         end do
+         self%angle(b) = self%angle(b) + turned_by(first, first + way)
+      end do
+   end subroutine turn_record_measure
+
+   !> The spin of a body whose nodes move with `v`.
+   pure real(wp) function turn_record_spin(rigid, x, u, v) result(spin)
+      type(rigid_body_t), intent(in) :: rigid            !! with its frame
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(in), contiguous :: v(:, :)            !! (n_dim, n_node) [L/T]
+
+      associate (arm => arm_of(rigid, 2, x) + arm_of(rigid, 2, u))
+         spin = moment_of(arm, arm_of(rigid, 2, v))/sum(arm**2)
+      end associate
+   end function turn_record_spin
+
+   !> From the reference node to node `k` of the frame.
+   pure function arm_of(rigid, k, field) result(arm)
+      type(rigid_body_t), intent(in) :: rigid            !! with its frame
+      integer, intent(in) :: k                           !! 2..n_dim + 1
+      real(wp), intent(in) :: field(:, :)                !! (n_dim, n_node)
+      real(wp) :: arm(size(field, 1))
+
+      arm = field(:, rigid%frame(k)) - field(:, rigid%frame(1))
+   end function arm_of
+
+end module emcon_turn_record
