@@ -330,7 +330,6 @@ def test_any_executor(tmp_path: Path) -> None:
 
 
 def test_a_local_dask_cluster(tmp_path: Path) -> None:
-    pytest.importorskip("distributed", reason="dask.distributed is not installed")
     (example,) = [found for chapter in examples(PAGE.read_text(encoding="utf-8")).values()
                   for found in chapter if found.file == "cluster.py"]
     (tmp_path/"cluster.py").write_text(example.code.text)
