@@ -144,8 +144,22 @@ def test_the_knobs_that_pay_are_named() -> None:
     assert "the cheapest setting is h=0.1, initiation=ADMISSIBLE: 1 s, impulse to 4.5e-02" in words
     assert "12 times cheaper than the deck's own (h=0.01, initiation=PERSISTENT, 12 s)" in words
     assert "h=0.1 alone: 6 times, and the goal is not met" in words
-    assert words.endswith("initiation=ADMISSIBLE alone: 1.2 times")
+    assert ("; initiation=ADMISSIBLE alone: 1.2 times; with h alone the deck's own meets the goal "
+            "at h=0.01, for 12 times the time") in words
     assert goals_met(study)
+
+
+def test_what_the_own_treatment_needs() -> None:
+    """The chosen one against the deck's own: at the step that it needs, or at none that was tried."""
+    near = {**ERRORS, "0.1 P": (2.0, 0.04), "0.01 P": (12.0, 0.2)}
+    study = study_of(near, 0.005, "impulse:0.05")
+    words = goal_words(study, study.references[0], study.goals)
+    assert words.endswith("with h alone the deck's own meets the goal at h=0.1, for 2 times the time")
+    far = {**ERRORS, "0.01 P": (12.0, 0.2)}
+    study = study_of(far, 0.005, "impulse:0.05")
+    words = goal_words(study, study.references[0], study.goals)
+    assert words.endswith("with h alone the deck's own does not meet the goal down to h=0.01, "
+                          "for 12 times the time")
 
 
 def test_each_knob_of_the_choice_is_asked_for_alone() -> None:
@@ -304,6 +318,14 @@ def test_members_are_the_grid_with_the_default() -> None:
     assert plan_of("h=0.02,1e-2").members(["finest"], True)[-1].role == "member"
 
 
+def test_the_own_treatment_is_run_at_all_steps() -> None:
+    members = plan_of("h=0.2,0.1", "initiation=ADMISSIBLE").members([], True)
+    assert [(m.role, *m.settings.values()) for m in members] == [
+        ("member", "0.2", "ADMISSIBLE"), ("member", "0.1", "ADMISSIBLE"),
+        ("default", "0.2", "PERSISTENT"), ("default", "0.1", "PERSISTENT"),
+        ("default", "0.01", "PERSISTENT")]
+
+
 def test_refined_mesh_asks_for_one_more() -> None:
     members = plan_of("h=0.2,0.1").members(["refined-mesh"], False)
     assert [(m.role, m.settings.get("mesh")) for m in members] == [
@@ -320,7 +342,7 @@ def test_a_member_keeps_its_folder_when_a_study_grows() -> None:
 
 
 @pytest.mark.parametrize(("vary", "fixed", "words"), [
-    (["hh=1,2"], {}, "no knob 'hh'.*h, t_end, initiation, and mesh, threads; did you mean h"),
+    (["hh=1,2"], {}, "no knob 'hh'.*h, t_end, initiation, and mesh, threads, deck, precision; did you mean h"),
     (["h=0.1,x"], {}, "numbers above 0"),
     (["h=0.1,0"], {}, "numbers above 0"),
     (["h=0.1,,2"], {}, "a value is empty"),
@@ -329,6 +351,7 @@ def test_a_member_keeps_its_folder_when_a_study_grows() -> None:
     (["h=1"], {"h": "2"}, "varied and set"),
     (["mesh=1,3"], {}, "cutting edges in half"),
     (["threads=0"], {}, "whole numbers above 0"),
+    (["precision=half"], {}, "known are double, single, quad"),
 ])
 def test_wrong_plans(vary: list[str], fixed: dict[str, str], words: str) -> None:
     with pytest.raises(StudyError, match=words):

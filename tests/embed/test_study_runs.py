@@ -71,7 +71,7 @@ def free(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A fall of half a time unit, g = 10, held against closed forms, and on two meshes."""
     folder = tmp_path_factory.mktemp("free")
     values = {"rebound_1": [0.0, -5.0], "position_1": [0.0, -1.25], "momentum": [0.0, -50.0],
-              "rigid_energy_1": 125.0, "vibration": 0.0, "impulse": [0.0, 0.0]}
+              "rigid_energy_1": 125.0, "vibration": 0.0, "impulse": [0.0, 0.0], "force": 0.0}
     (folder/"closed.json").write_text(json.dumps(values))
     done = study(folder, *FREE, "--vary", "mesh=1,2", "--reference", "closed-form:closed.json",
                  "--reference", "finest", "--goal", "rebound:1e-9", "--figures")
@@ -84,7 +84,8 @@ def test_a_free_fall_has_no_error(free: tuple[Path, str]) -> None:
     rows = table(folder)
     assert [row["status"] for row in rows] == ["done"]*len(rows)
     for row in rows:
-        for name in ("rebound", "position", "momentum", "rigid_energy", "vibration", "impulse"):
+        for name in ("rebound", "position", "momentum", "rigid_energy", "vibration", "impulse",
+                     "force"):
             assert float(row[f"error_closed-form_{name}"]) < 1e5*EPSILON, name
     assert "the cheapest setting is" in text and "rebound to" in text
 
@@ -171,6 +172,33 @@ def test_a_program_of_another_precision(tmp_path: Path) -> None:
         ("member", "0.1"), ("member", "0.05"), ("quad", "0.05")]
     assert float(rows[1]["error_quad_displacement"]) == 0.0
     assert "reference quad: quadruple precision at h=0.05" in done.stdout
+
+
+def test_decks_and_precisions_are_knobs(tmp_path: Path) -> None:
+    """Files beside the deck, and programs; of a heavier bar each falls as the other."""
+    text = BAR.read_text()
+    (tmp_path/"bar.inp").write_text(text)
+    (tmp_path/"heavy.inp").write_text(text.replace("*DENSITY\n1.", "*DENSITY\n2."))
+    asked = (*FREE, "--vary", "deck=bar.inp,heavy.inp", "--vary", "precision=double,single",
+             "--single-program", PROGRAM, "--goal", "position:1e-6")
+    study(tmp_path, *asked, deck=tmp_path/"bar.inp")
+    rows = table(tmp_path)
+    found = {(row["deck"], row["precision"], row["h"]): float(row["momentum_y"])
+             for row in rows if row["role"] == "member"}
+    assert len(found) == 8
+    for (deck, _, _), momentum in found.items():
+        assert abs(momentum/(-50.0 if deck == "bar.inp" else -100.0) - 1.0) < 1e-12
+    assert [row["deck"] for row in rows if row["role"] == "default"] == ["bar.inp"]
+    (tmp_path/"heavy.inp").write_text(text)
+    error = study(tmp_path, *asked, deck=tmp_path/"bar.inp", code=2).stderr
+    assert "begun before" in error
+
+
+def test_no_program_of_single_precision(tmp_path: Path) -> None:
+    done = study(tmp_path, *FREE, "--vary", "precision=double,single", "--single-program",
+                 "nowhere", code=2)
+    assert "there is no program of single precision, nowhere" in done.stderr
+    assert "--single-program" in done.stderr
 
 
 def test_no_quadruple_precision(tmp_path: Path) -> None:

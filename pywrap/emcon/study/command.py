@@ -16,13 +16,13 @@ from typing import Any
 from ..results import ResultPaths
 from .accuracy import Run
 from .choice import parse_goals
-from .deck import DeckFile, read_deck
+from .deck import DeckFile, joint_checksum, read_deck
 from .errors import StudyError
 from .execution import (Progress, Task, executor_of, find_program, record_of, run_all, run_member,
                         sweep, version_of)
 from .measures import from_json
-from .plan import (ALONE, QUAD, Member, Plan, make_plan, parse_set, parse_vary, unique,
-                   write_manifest)
+from .plan import (ALONE, DECK, PRECISION, QUAD, Member, Plan, make_plan, parse_set, parse_vary,
+                   unique, write_manifest)
 from .reference import check_references, references_of
 from .report import Study, goals_met, in_words, missing_knobs, rows_of, write_table
 
@@ -31,8 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the command."""
     parser.add_argument("deck", metavar="DECK", type=Path, help="the deck to vary")
     parser.add_argument("--vary", metavar="NAME=V,V,...", action="append", default=[],
-                        help="values of a parameter of the deck, of mesh (edges cut into 1, 2, 4) "
-                        "or threads; may be repeated: all combinations are run")
+                        help="values of a parameter of the deck, of mesh (edges cut into 1, 2, 4), "
+                        "threads, precision (double, single, quad) or deck (files beside DECK, "
+                        "that one if left out); may be repeated: all combinations are run")
     parser.add_argument("--set", metavar="NAME=V", action="append", default=[], dest="fixed",
                         help="the same value in all members")
     parser.add_argument("--reference", metavar="KIND", action="append", default=[],
@@ -58,6 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-figures", action="store_true", help="tables and words alone")
     parser.add_argument("--fresh", action="store_true", help="remove what an earlier study left")
     parser.add_argument("--program", metavar="FILE", help="the program (default: emcon)")
+    parser.add_argument("--single-program", metavar="FILE",
+                        help="the program of single precision")
     parser.add_argument("--quad-program", metavar="FILE",
                         help="the program of quadruple precision")
 
@@ -88,7 +91,14 @@ class _Setup:
     tasks: list[Task]
     folder: Path
     version: str
-    program: str
+    programs: dict[str, str]        #: by precision
+    decks: dict[str, DeckFile]      #: by value of the knob
+
+    def task(self, member: Member, options: argparse.Namespace) -> Task:
+        precision = "quad" if member.role == QUAD else member.settings.get(PRECISION, "double")
+        deck = self.decks.get(member.settings.get(DECK, ""), self.deck)
+        return Task(member, str(self.folder.resolve()), DeckFile(deck.path.resolve(), deck.text),
+                    self.programs[precision], options.repeat, options.time_limit)
 
 
 def run_study(options: argparse.Namespace) -> int:
@@ -105,7 +115,7 @@ def run_study(options: argparse.Namespace) -> int:
     study = _study(setup, options, records, n_run)
     alone = missing_knobs(study)
     if alone:
-        setup = _with_members(setup, alone)
+        setup = _with_members(setup, alone, options)
         more, n_more = _run(setup.tasks[-len(alone):], options)
         study = _study(setup, options, records | more, n_run + n_more)
     return _conclude(setup, study, not options.no_figures)
@@ -122,12 +132,13 @@ def _run(tasks: Sequence[Task], options: argparse.Namespace) -> tuple[dict[int, 
             for task in tasks}, len(waiting)
 
 
-def _with_members(setup: _Setup, settings: Sequence[dict[str, str]]) -> _Setup:
+def _with_members(setup: _Setup, settings: Sequence[dict[str, str]],
+                  options: argparse.Namespace) -> _Setup:
     """With rows at the end of the manifest."""
     new = [Member(len(setup.members) + k, ALONE, values) for k, values in enumerate(settings)]
     members = [*setup.members, *new]
     write_manifest(setup.folder/"manifest.csv", members, setup.plan.knobs)
-    tasks = [replace(setup.tasks[0], member=member) for member in new]
+    tasks = [setup.task(member, options) for member in new]
     return replace(setup, members=members, tasks=[*setup.tasks, *tasks])
 
 
@@ -135,29 +146,35 @@ def _set_up(options: argparse.Namespace) -> _Setup:
     deck = read_deck(options.deck)
     goals = parse_goals(options.goal)
     plan = make_plan(parse_vary(options.vary), parse_set(options.fixed), deck.parameters(),
-                     options.step)
+                     options.step, deck.path.name)
     references = options.reference or ["finest"]
     check_references(references, plan)
-    program = find_program(options.program)
-    of_quad = (find_program(options.quad_program, "release-quad")
-               if "quad" in references else program)
+    programs = _programs(options, plan, references)
+    decks = {name: read_deck(deck.path.parent/name) for name in plan.values(DECK)}
+    decks[deck.path.name] = deck
     members = plan.members(references, bool(goals))
     folder = options.output or Path(f"{deck.name}_study")
-    version = version_of(program)
-    _claim(folder, deck, version, options.fresh)
+    version = version_of(programs["double"])
+    _claim(folder, deck, joint_checksum(decks), version, options.fresh)
     write_manifest(folder/"manifest.csv", members, plan.knobs)
-    tasks = [Task(member, str(folder.resolve()), DeckFile(deck.path.resolve(), deck.text),
-                  of_quad if member.role == QUAD else program, options.repeat,
-                  options.time_limit) for member in members]
-    return _Setup(deck, plan, members, tasks, folder, version, program)
+    setup = _Setup(deck, plan, members, [], folder, version, programs, decks)
+    return replace(setup, tasks=[setup.task(member, options) for member in members])
 
 
-def _claim(folder: Path, deck: DeckFile, version: str, fresh: bool) -> None:
+def _programs(options: argparse.Namespace, plan: Plan, references: Sequence[str]) -> dict[str, str]:
+    """Those that are needed; that of double precision always, it tells the version."""
+    wanted = {"double", *plan.values(PRECISION), *(["quad"] if "quad" in references else [])}
+    named = {"double": options.program, "single": options.single_program,
+             "quad": options.quad_program}
+    return {precision: find_program(named[precision], precision) for precision in wanted}
+
+
+def _claim(folder: Path, deck: DeckFile, checksum: str, version: str, fresh: bool) -> None:
     """Make the folder of the study, or see that what is there is of this deck and program."""
     if fresh:
         shutil.rmtree(folder/"members", ignore_errors=True)
         (folder/"study.json").unlink(missing_ok=True)
-    wanted = {"deck": deck.path.name, "checksum": deck.checksum, "version": version}
+    wanted = {"deck": deck.path.name, "checksum": checksum, "version": version}
     mark = folder/"study.json"
     try:
         found = json.loads(mark.read_text(encoding="utf-8"))
@@ -196,7 +213,7 @@ def _one(setup: _Setup, index: int) -> int:
 def _runs(setup: _Setup, records: Mapping[int, dict[str, Any]]) -> list[Run]:
     return [Run(task.member, records[task.member.index],
                 from_json(records[task.member.index]["measures"]),
-                ResultPaths(task.home/setup.deck.name))
+                ResultPaths(task.home/task.deck.name))
             for task in setup.tasks if records[task.member.index].get("status") == "done"]
 
 

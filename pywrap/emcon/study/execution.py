@@ -22,7 +22,7 @@ from ..results import ResultError, ResultPaths
 from .deck import DeckFile, refined_deck, times_of
 from .errors import StudyError
 from .measures import measure, read_verdict, to_json
-from .plan import MESH, PROGRAM_KNOBS, THREADS, Member, unique
+from .plan import MESH, PRECISIONS, PROGRAM_KNOBS, THREADS, Member, unique
 
 #: The file that a member has once it is whole.
 RECORD = "run.json"
@@ -265,20 +265,25 @@ def bar_text(done: int, failed: int, total: int, seconds: float, width: int = 30
     return f"{text}{f', {failed} failed' if failed else ''}, {seconds:.0f} s"
 
 
-def find_program(named: str | None, folder: str = "release") -> str:
-    """The program: as named, in the source tree, or on the path."""
+def find_program(named: str | None, precision: str = "double") -> str:
+    """The program of a precision: as named, in the source tree, or, of double, on the path."""
+    folder = PRECISIONS[precision]
     built = Path(__file__).resolve().parents[3]/"build"/folder/"emcon"
     choices: Iterable[str | None] = (
-        [named] if named else [str(built), shutil.which("emcon") if folder == "release" else None])
+        [named] if named else [str(built), shutil.which("emcon") if precision == "double" else None])
     for choice in choices:
         found = shutil.which(choice) if choice else None
         if found:
             return str(Path(found).resolve())
-    if folder != "release":
-        raise StudyError(f"--reference quad: there is no program of quadruple precision, {built}; "
-                         "make app PRECISION=quad builds it, --quad-program names another")
+    if precision != "double":
+        raise StudyError(f"there is no program of {_LONG[precision]} precision, {named or built}; "
+                         f"make app PRECISION={precision} builds it, --{precision}-program names "
+                         "another")
     raise StudyError(f"no program {named or 'emcon'}: it is not on the path; make app builds it, "
                      "--program names it")
+
+
+_LONG = {"single": "single", "quad": "quadruple"}
 
 
 def version_of(program: str) -> str:

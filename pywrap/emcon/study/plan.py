@@ -15,8 +15,12 @@ from pathlib import Path
 from .errors import StudyError
 
 #: Knobs that are no parameters of a deck.
-MESH, THREADS = "mesh", "threads"
-PROGRAM_KNOBS = (MESH, THREADS)
+MESH, THREADS, DECK, PRECISION = "mesh", "threads", "deck", "precision"
+PROGRAM_KNOBS = (MESH, THREADS, DECK, PRECISION)
+#: Values of PRECISION, and where the source tree has the program of each.
+PRECISIONS = {"double": "release", "single": "release-single", "quad": "release-quad"}
+#: What these knobs are where they are not named; a deck has to be.
+_PLAIN = {MESH: "1", THREADS: "1", PRECISION: "double"}
 #: Why a member is run.
 MEMBER, DEFAULT, REFERENCE, QUAD = "member", "default", "reference", "quad"
 #: The deck's own setting but for one knob, to tell what that does by itself.
@@ -56,6 +60,11 @@ class Plan:
     def knobs(self) -> tuple[str, ...]:
         return tuple(self.vary)
 
+    def values(self, knob: str) -> tuple[str, ...]:
+        """All that a knob takes in the members."""
+        fixed = (self.fixed[knob],) if knob in self.fixed else ()
+        return tuple(dict.fromkeys((*self.vary.get(knob, ()), *fixed)))
+
     def treatment(self, settings: Mapping[str, str]) -> tuple[str, ...]:
         """Values of all knobs but the one that refines."""
         return tuple(settings[name] for name in self.knobs if name != self.step)
@@ -81,8 +90,9 @@ class Plan:
                 for values in itertools.product(*self.vary.values())]
         if with_default:
             own = self.default_settings()
-            if not any(same_settings(own, settings) for _, settings in rows):
-                rows.append((DEFAULT, own))
+            steps = [{**own, self.step: value} for value in self.vary.get(self.step, ())]
+            rows += [(DEFAULT, wanted) for wanted in (*steps, own)
+                     if not any(same_settings(wanted, settings) for _, settings in rows)]
         best = self.first_treatment()
         if "refined-mesh" in references:
             factors = [int(value) for value in self.vary.get(MESH, (best.get(MESH, "1"),))]
@@ -106,8 +116,7 @@ def as_number(text: str) -> float:
 def same_settings(one: Mapping[str, str], other: Mapping[str, str]) -> bool:
     """Numbers count by value; a mesh that is not named is the deck's own."""
     names = set(one) | set(other)
-    plain = {MESH: "1", THREADS: "1"}
-    return all(_is_same(one.get(n, plain.get(n, "")), other.get(n, plain.get(n, "")))
+    return all(_is_same(one.get(n, _PLAIN.get(n, "")), other.get(n, _PLAIN.get(n, "")))
                for n in names)
 
 
@@ -142,14 +151,14 @@ def _assignment(text: str, option: str) -> tuple[str, str]:
 
 
 def make_plan(vary: dict[str, tuple[str, ...]], fixed: dict[str, str],
-              parameters: Mapping[str, str], step: str) -> Plan:
-    """The plan; raises `StudyError` for knobs that the deck does not have."""
-    known = {**parameters, MESH: "1", THREADS: "1"}
+              parameters: Mapping[str, str], step: str, deck: str = "") -> Plan:
+    """The plan; raises `StudyError` for knobs that the deck, a file `deck`, does not have."""
+    known = {**parameters, **_PLAIN, DECK: deck}
     for name in (*vary, *fixed):
         if name not in known:
             close = get_close_matches(name, known, 1)
             raise StudyError(f"there is no knob '{name}'; known are the parameters of the deck "
-                             f"{', '.join(parameters) or '(none)'}, and {MESH}, {THREADS}"
+                             f"{', '.join(parameters) or '(none)'}, and {', '.join(PROGRAM_KNOBS)}"
                              + (f"; did you mean {close[0]}?" if close else ""))
     both = sorted(set(vary) & set(fixed))
     if both:
@@ -170,6 +179,8 @@ def _check_values(name: str, values: Sequence[str]) -> None:
             times_of(value)
     elif name == THREADS and not all(value.isdigit() and int(value) > 0 for value in values):
         raise StudyError(f"{name}={','.join(values)}: whole numbers above 0")
+    elif name == PRECISION and not set(values) <= set(PRECISIONS):
+        raise StudyError(f"{name}={','.join(values)}: known are {', '.join(PRECISIONS)}")
 
 
 # --- manifest ----------------------------------------------------------------------------------

@@ -142,10 +142,10 @@ def read_closed_form(path: Path) -> dict[str, Any]:
         raise StudyError(f"{path}: an object of measures and values is due, "
                          '{"rebound_1": [0, 10]}')
     for name, value in values.items():
-        if base(name) not in NAMES or base(name) in ("displacement", "force") or (
+        if base(name) not in NAMES or base(name) == "displacement" or (
                 name not in NAMES and base(name) not in ROWS):
             raise StudyError(f"{path}: there is no measure '{name}' with a closed form; known are "
-                             f"{', '.join(n for n in NAMES if n not in ('displacement', 'force'))}"
+                             f"{', '.join(n for n in NAMES if n != 'displacement')}"
                              ", those of one body or pair with its number behind: rebound_2")
         try:
             np.atleast_1d(np.array(value, dtype=np.float64))
