@@ -189,7 +189,7 @@ HOLDERS := $(addprefix emcon_,c c_by_hand model run stepper stepper_query)
 $(HOLDERS:%=$(O)/%.o): private FFLAGS_release := -O0 -g1
 
 # Loops that threads share: with what these need, nothing else is compiled.
-THREADED := $(notdir $(basename $(shell grep -l '!$$omp parallel' $(LIB_SRC))))
+THREADED := $(notdir $(basename $(shell grep -l '!$$omp parallel' $(filter-out $(MADE),$(LIB_SRC)))))
 $(THREADED:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
 
 # Loops over points side by side: a law in numbers that the compiler takes apart, so that it sees the
