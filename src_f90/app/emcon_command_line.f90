@@ -56,13 +56,18 @@ contains
       type(command_t), intent(inout) :: self
       character(len=*), intent(in) :: word
       integer, intent(inout) :: n_plain
+      type(string_t) :: verb(3)
+      character(len=:), allocatable :: near
 
-      if (n_plain == 1 .and. any(word == [character(len=7) :: "run", "check", "restart"])) then
+      verb = [string_t("run"), string_t("check"), string_t("restart")]
+      call nearest_word(self%path, verb, near)
+      if (n_plain == 1 .and. (word == "run" .or. word == "check" .or. word == "restart")) then
          self%verb = word
       else if (len(self%path) == 0) then
          self%path = word
       else
          self%fault = "'" // word // "' is one file too many after '" // self%path // "'"
+         if (len(near) > 0) self%fault = self%fault // "; did you mean " // near // "?"
       end if
    end subroutine take_word
 
@@ -95,17 +100,13 @@ contains
       case ("--json")
          self%options%is_json = .true.
       case ("--output", "--set", "--threads")
-         if (equals == 0) then
-            i = i + 1
-            if (i <= command_argument_count()) call argument(i, value)
-         end if
-         if (len(value) == 0) self%fault = name // " needs a value"
+         if (equals == 0) call take_value(i, value)
+         if (len(value) == 0 .and. name /= "--set") self%fault = name // " needs a value"
          if (name == "--output") then
             call without_slash(value, self%options%folder)
          else if (name == "--threads") then
             call take_threads(self, value)
          else
-            if (index(value, "=") < 2) self%fault = "--set takes NAME=VALUE, not '" // value // "'"
             override(1)%text = value
             self%options%override = [self%options%override, override]
          end if
@@ -115,6 +116,19 @@ contains
          if (len(near) > 0) self%fault = self%fault // "; did you mean " // near // "?"
       end select
    end subroutine take_option
+
+   !> The argument behind number `i`, unless it is an option.
+   subroutine take_value(i, value)
+      integer, intent(inout) :: i                !! moved on to the value
+      character(len=:), allocatable, intent(inout) :: value
+      character(len=:), allocatable :: word
+
+      if (i == command_argument_count()) return
+      call argument(i + 1, word)
+      if (index(word, "--") == 1) return
+      i = i + 1
+      value = word
+   end subroutine take_value
 
    !> Take a number of threads; what there cannot be is a fault.
    subroutine take_threads(self, value)
@@ -174,7 +188,7 @@ contains
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(21)
+      character(len=72) :: line(22)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
@@ -183,7 +197,8 @@ contains
          "", &
          "options:", &
          "  --output DIR       write the results into DIR, not beside the deck", &
-         "  --set NAME=VALUE   set a *PARAMETER of the deck; may be repeated", &
+         "  --set NAME=VALUE   set a *PARAMETER of the deck; may be repeated;", &
+         "                     without a value: lists those that there are", &
          "  --lenient          unsupported output is left out, with warnings", &
          "  --quiet            nothing but errors, warnings and a bad verdict", &
          "  --strict           a bad verdict is exit code 3", &

@@ -37,8 +37,7 @@ contains
       character(len=:), allocatable :: fault
       integer :: i
 
-      call parameters_init(parameters, overrides, fault)
-      if (fault /= "") call add_error(reader%log, origin_t(), fault)
+      call parameters_init(parameters, overrides)
       allocate(reader%card(count_cards(reader)))
       i = 1
       do while (i <= size(reader%line))

@@ -20,6 +20,7 @@ module emcon_deck_parameters
    type :: override_t
       character(len=:), allocatable :: name
       character(len=:), allocatable :: text
+      logical :: is_set = .false.                  !! has a name and a value
       logical :: is_used = .false.
    end type override_t
 
@@ -31,24 +32,20 @@ module emcon_deck_parameters
 
 contains
 
-   !> Start without parameters; `overrides` are texts `NAME=VALUE`. `fault` is empty on success.
-   subroutine parameters_init(self, overrides, fault)
+   !> Start without parameters; `overrides` are texts `NAME=VALUE`.
+   subroutine parameters_init(self, overrides)
       type(parameters_t), intent(out) :: self
       type(string_t), intent(in) :: overrides(:)
-      character(len=:), allocatable, intent(out) :: fault
       integer :: i, i_equal
 
-      fault = ""
       allocate(self%override(size(overrides)))
       do i = 1, size(overrides)
          associate (text => overrides(i)%text)
             i_equal = index(text, "=")
             self%override(i)%name = to_upper(trim(adjustl(text(:max(i_equal - 1, 0)))))
             self%override(i)%text = trim(adjustl(text(i_equal + 1:)))
-            if (.not. is_name(self%override(i)%name) .or. self%override(i)%text == "") then
-               fault = "a parameter is set by NAME=VALUE, not by " // quoted(text)
-               self%override(i)%is_used = .true.
-            end if
+            self%override(i)%is_set = is_name(self%override(i)%name) .and. &
+               self%override(i)%text /= ""
          end associate
       end do
    end subroutine parameters_init
@@ -74,7 +71,7 @@ contains
       end if
       text = trim(adjustl(text(i_equal + 1:)))
       do i = 1, size(self%override)
-         if (self%override(i)%name /= new%name) cycle
+         if (self%override(i)%name /= new%name .or. .not. self%override(i)%is_set) cycle
          text = self%override(i)%text
          self%override(i)%is_used = .true.
       end do
@@ -125,16 +122,38 @@ contains
       text = to_text(value, round_trip_digits)
    end subroutine number_text
 
-   !> What is wrong with the overrides once all is read: one that sets nothing; empty: nothing.
+   !> What is wrong with an override once all is read: it sets nothing; empty: nothing. What could
+   !> be set is told.
    pure subroutine unused_override(self, i, fault)
       type(parameters_t), intent(in) :: self
       integer, intent(in) :: i                     !! 1..size(override)
       character(len=:), allocatable, intent(out) :: fault
+      integer :: k
 
       fault = ""
       if (self%override(i)%is_used) return
-      fault = "the deck has no parameter " // quoted(self%override(i)%name) &
-         // suggestion(self%override(i)%name, parameter_list(self%table))
+      if (self%override(i)%is_set) then
+         fault = "the deck has no parameter " // quoted(self%override(i)%name) &
+            // suggestion(self%override(i)%name, parameter_list(self%table))
+      else
+         fault = "a parameter of the deck is set by NAME=VALUE"
+      end if
+      if (self%table%n == 0) then
+         fault = fault // " (it has no *PARAMETER)"
+      else
+         fault = fault // " (known: "
+         do k = 1, self%table%n
+            associate (item => self%table%item(k))
+               if (k > 1) fault = fault // ", "
+               if (item%is_number) then
+                  fault = fault // item%name // "=" // to_text(item%value)
+               else
+                  fault = fault // item%name // "=" // item%text
+               end if
+            end associate
+         end do
+         fault = fault // ")"
+      end if
    end subroutine unused_override
 
    !> Put the values of parameters in the place of `<name>`. `fault` is empty on success.

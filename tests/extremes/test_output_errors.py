@@ -69,6 +69,24 @@ def test_code_2(tmp_path, arguments):
     assert not list(tmp_path.iterdir()), "something was written"
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["chek", DECK], "did you mean check?"),
+        ([DECK, "--set"], "known: H=0.01, T_END=8"),
+        ([DECK, "--set", "--output", "out"], "known: H=0.01, T_END=8"),
+        ([DECK, "--set", "hh=1"], "did you mean H? (known: H=0.01"),
+        (["restart", "no_such.rst.h5"], "no_such.rst.h5: there is no such file"),
+        ([DECK, "--output", "--quiet"], "--output needs a value"),
+    ],
+)
+def test_a_slip_is_told_with_what_is_known(tmp_path, arguments, words):
+    done = emcon(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
 # ---- folders ------------------------------------------------------------------------------------
 
 

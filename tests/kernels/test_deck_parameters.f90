@@ -229,7 +229,7 @@ contains
       real(wp) :: value
       logical :: ok
 
-      call parameters_init(parameters, [string_t ::], fault)
+      call parameters_init(parameters, [string_t ::])
       call parameter_define(parameters, "n = 2 + 3   # a remark", fault)
       call parameter_define(parameters, "Long_Name = n/2", fault)
       call parameter_define(parameters, "method = NULL SPACE", fault)
@@ -257,18 +257,20 @@ contains
 
       given(1)%text = "H = 1/4"
       given(2)%text = "typo=1"
-      call parameters_init(parameters, given, fault)
-      call check_equal(error, fault, "", "well-formed")
+      call parameters_init(parameters, given)
       call parameter_define(parameters, "h = 0.1", fault)
       call parameter_define(parameters, "twice = 2*h", fault)
       call check_line(error, parameters, "<h>, <twice>", "0.25, 0.5")
       call unused_override(parameters, 1, fault)
       call check_equal(error, fault, "", "used")
       call unused_override(parameters, 2, fault)
-      call check_true(error, fault /= "", "not used")
+      call check_equal(error, fault, "the deck has no parameter 'TYPO' (known: H=0.25, " // &
+         "TWICE=0.5)", "not used")
       given(1)%text = "h"
-      call parameters_init(parameters, given(:1), fault)
-      call check_true(error, fault /= "", "no value")
+      call parameters_init(parameters, given(:1))
+      call unused_override(parameters, 1, fault)
+      call check_equal(error, fault, "a parameter of the deck is set by NAME=VALUE (it has no " // &
+         "*PARAMETER)", "no value")
    end subroutine test_overrides
 
 end module test_deck_parameters
