@@ -1,8 +1,9 @@
 !> The command line of the program.
 module emcon_command_line
    use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
    use emcon_run, only : run_options_t
-   use emcon_text, only : nearest_word, string_t
+   use emcon_text, only : nearest_word, read_real, string_t
    use emcon_threads, only : threads_check
    implicit none
    private
@@ -45,11 +46,27 @@ contains
       if (len(self%path) == 0) self%fault = "no file is named"
       if (self%options%is_json .and. self%verb /= "check") self%fault = &
          "--json is for emcon check; a run writes NAME.json"
-      if (self%verb == "restart" .and. (size(self%options%override) > 0 .or. &
-         len(self%options%folder) > 0 .or. self%options%is_lenient)) then
-         self%fault = "a restart goes on as it was: it takes --quiet, --strict and --threads only"
-      end if
+      call check_restart(self)
    end subroutine command_read
+
+   !> What a restart takes, and nothing else does.
+   subroutine check_restart(self)
+      type(command_t), intent(inout) :: self
+      logical :: has_more
+
+      associate (options => self%options)
+         has_more = options%further%until > 0.0_wp .or. allocated(options%further%path)
+         if (self%verb /= "restart") then
+            if (has_more) self%fault = "--until and --steps are for emcon restart"
+         else if (size(options%override) > 0 .or. options%is_lenient) then
+            self%fault = "a restart goes on with the parameters of its run: it takes " // &
+               "--output, --until, --steps, --quiet, --strict and --threads only"
+         else if (has_more .and. len(options%folder) == 0) then
+            self%fault = "with --until or --steps a restart makes results of its own: name a " // &
+               "folder with --output"
+         end if
+      end associate
+   end subroutine check_restart
 
    !> A word that is no option: the verb, or the file.
    subroutine take_word(self, word, n_plain)
@@ -99,13 +116,17 @@ contains
          self%options%is_strict = .true.
       case ("--json")
          self%options%is_json = .true.
-      case ("--output", "--set", "--threads")
+      case ("--output", "--set", "--threads", "--until", "--steps")
          if (equals == 0) call take_value(i, value)
          if (len(value) == 0 .and. name /= "--set") self%fault = name // " needs a value"
          if (name == "--output") then
             call without_slash(value, self%options%folder)
          else if (name == "--threads") then
             call take_threads(self, value)
+         else if (name == "--until") then
+            call take_until(self, value)
+         else if (name == "--steps") then
+            self%options%further%path = value
          else
             override(1)%text = value
             self%options%override = [self%options%override, override]
@@ -130,6 +151,18 @@ contains
       value = word
    end subroutine take_value
 
+   !> Take a later end; what is none is a fault.
+   subroutine take_until(self, value)
+      type(command_t), intent(inout) :: self
+      character(len=*), intent(in) :: value
+      logical :: is_number
+
+      if (len(self%fault) > 0) return
+      call read_real(value, self%options%further%until, is_number)
+      if (is_number) is_number = self%options%further%until > 0.0_wp
+      if (.not. is_number) self%fault = "--until takes a time, not '" // value // "'"
+   end subroutine take_until
+
    !> Take a number of threads; what there cannot be is a fault.
    subroutine take_threads(self, value)
       type(command_t), intent(inout) :: self
@@ -151,7 +184,7 @@ contains
    subroutine near_option(name, near)
       character(len=*), intent(in) :: name
       character(len=:), allocatable, intent(out) :: near
-      type(string_t) :: known(9)
+      type(string_t) :: known(11)
 
       known(1)%text = "--output"
       known(2)%text = "--set"
@@ -162,6 +195,8 @@ contains
       known(7)%text = "--strict"
       known(8)%text = "--json"
       known(9)%text = "--threads"
+      known(10)%text = "--until"
+      known(11)%text = "--steps"
       call nearest_word(name, known, near)
    end subroutine near_option
 
@@ -188,7 +223,7 @@ contains
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(22)
+      character(len=72) :: line(24)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
@@ -204,6 +239,8 @@ contains
          "  --strict           a bad verdict is exit code 3", &
          "  --threads N        N threads, not as many as OMP_NUM_THREADS says, or", &
          "                     one: the same results, to the last bit", &
+         "  --until T          restart: the last step ends at the time T; and", &
+         "  --steps FILE       it goes on with these steps, both with --output", &
          "  --json             what check reports as one JSON object", &
          "  --version, --help", &
          "", &

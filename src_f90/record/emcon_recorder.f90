@@ -65,7 +65,8 @@ contains
       real(dp), allocatable :: mass(:)
       integer :: k
 
-      call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run)
+      call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run, &
+         stepper%until)
       call choose_fields(self, stepper%scene)
       call find_cells(stepper%scene, cell_node, vtk_type)
       call vtkhdf_create(self%fields, base // ".vtkhdf", real(stepper%scene%x, dp), cell_node, &
@@ -119,7 +120,8 @@ contains
       character(len=:), allocatable :: run
       type(column_t), allocatable :: column(:)
 
-      call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run)
+      call run_mark(stepper%source%line, stepper%override, stepper%is_lenient, run, &
+         stepper%until)
       call choose_fields(self, stepper%scene)
       call vtkhdf_resume(self%fields, base // ".vtkhdf", run, self%field, n_frame, error)
       if (allocated(error)) return

@@ -2,6 +2,7 @@
 module emcon_run
    use emcon_blas, only : blas_single_thread
    use emcon_build, only : build_differences, build_list
+   use emcon_deck_further, only : further_t
    use emcon_errors, only : err_analysis, err_file, err_input, err_interrupt, error_t, raise
    use emcon_files, only : file_exists, file_remove, make_directory, survive_file_size_limit
    use emcon_heap, only : heap_keep
@@ -45,6 +46,7 @@ module emcon_run
       logical :: is_quiet = .false.
       logical :: is_strict = .false.             !! a bad verdict is an error
       logical :: is_json = .false.               !! what `check` tells is one JSON object
+      type(further_t) :: further                 !! what a restart is to do beside its deck
    end type run_options_t
 
    !> What a run has to tell at its end.
@@ -122,7 +124,6 @@ contains
       type(run_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
       type(run_t), allocatable :: run
-      type(increment_t) :: nothing
 
       allocate(run)
       run%wall_start = wall_seconds()
@@ -138,20 +139,31 @@ contains
          options%folder, error)
       if (.not. allocated(error)) call log_open(run%log, run%base // ".log", .false., error)
       if (allocated(error)) return
+      call begin_results(run, path, report, error)
+      call march_on(run, options, is_interrupted, report, error)
+   end subroutine run_deck
+
+   !> Files that begin with the present state, and the head of the log.
+   subroutine begin_results(run, path, report, error)
+      type(run_t), intent(inout) :: run
+      character(len=*), intent(in) :: path       !! of what the run was read from
+      type(run_report_t), intent(in) :: report
+      type(error_t), allocatable, intent(out) :: error
+      type(increment_t) :: nothing
+
       call recorder_open(run%recorder, run%stepper, run%base, error)
       ! The state of an earlier run does not belong to the results that begin here.
       if (.not. allocated(error)) call file_remove(run%base // ".rst.h5", error)
       if (.not. allocated(error)) call file_remove(run%base // ".json", error)
-      if (.not. allocated(error)) then
-         call run_parts_mark(run%parts, part_output)
-         call log_start(run%log, run%stepper, report%diagnostic, path)
-         call run_parts_mark(run%parts, part_read)
-         call recorder_write(run%recorder, run%stepper, nothing, run%parts%marked, error)
-      end if
-      call march_on(run, options, is_interrupted, report, error)
-   end subroutine run_deck
+      if (allocated(error)) return
+      call run_parts_mark(run%parts, part_output)
+      call log_start(run%log, run%stepper, report%diagnostic, path)
+      call run_parts_mark(run%parts, part_read)
+      call recorder_write(run%recorder, run%stepper, nothing, run%parts%marked, error)
+   end subroutine begin_results
 
-   !> Go on from the restart file `path`.
+   !> Go on from the restart file `path`: in the files of the run, or with `folder` in files of its
+   !> own.
    subroutine run_restart(path, options, is_interrupted, report, error)
       character(len=*), intent(in) :: path
       type(run_options_t), intent(in) :: options
@@ -159,46 +171,83 @@ contains
       type(run_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
       type(run_t), allocatable :: run
-      type(restart_t) :: restart
       type(string_t), allocatable :: build(:)
       type(notes_t) :: differences
-      integer :: n_row, n_frame, i
+      integer :: n_row, n_frame
+      logical :: branches
 
       allocate(run)
       run%wall_start = wall_seconds()
-      i = index(path, ".rst.h5", back=.true.)
-      if (i < 2 .or. i /= len(path) - 6) then
-         call raise(error, err_input, path // ": a restart file is called NAME.rst.h5")
-         return
-      end if
-      run%base = path(:i - 1)
-      report%base = run%base
-      if (.not. file_exists(path)) call raise(error, err_input, path // ": there is no such file")
-      if (.not. allocated(error)) call log_open(run%log, run%base // ".log", .true., error)
+      branches = len(options%folder) > 0
+      call restart_base(path, options, run%base, error)
       if (allocated(error)) return
-      call restart_read(restart, path, error)
-      if (.not. allocated(error)) call stepper_load(run%stepper, restart, error)
-      if (.not. allocated(error)) then
-         call exchange_files(restart, n_row, n_frame, build)
-         call restart_check(restart, error)
-      end if
-      if (allocated(error)) then
-         if (error%code /= err_file) error%code = err_input
-         return
-      end if
+      report%base = run%base
+      call load_run(run, path, options, n_row, n_frame, build, error)
+      if (allocated(error)) return
+      if (branches) call make_directory(options%folder, error)
+      if (.not. allocated(error)) call log_open(run%log, run%base // ".log", .not. branches, error)
+      if (allocated(error)) return
       call run_parts_mark(run%parts, part_read)
       call move_diagnostics(run, report)
       call build_differences(build, path // ": warning: ", differences)
-      call log_lines(run%log, "", differences)
       if (differences%n > 0) report%diagnostic = [report%diagnostic, &
          differences%item(:differences%n)]
-      call recorder_resume(run%recorder, run%stepper, run%base, n_row, n_frame, error)
+      if (branches) then
+         call begin_results(run, path, report, error)
+      else
+         call recorder_resume(run%recorder, run%stepper, run%base, n_row, n_frame, error)
+      end if
       if (allocated(error)) return
+      call log_lines(run%log, "", differences)
       call log_line(run%log, "resumed after increment " // &
          to_text(run%stepper%march%state%increment) // ", time " // &
          to_text(run%stepper%march%state%time, 9))
       call march_on(run, options, is_interrupted, report, error)
    end subroutine run_restart
+
+   !> Path of the results without extension: that of the restart file, or its name in the folder
+   !> asked for, which must be another one.
+   subroutine restart_base(path, options, base, error)
+      character(len=*), intent(in) :: path
+      type(run_options_t), intent(in) :: options
+      character(len=:), allocatable, intent(out) :: base
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      i = index(path, ".rst.h5", back=.true.)
+      if (i < 2 .or. i /= len(path) - 6) then
+         call raise(error, err_input, path // ": a restart file is called NAME.rst.h5")
+      else if (.not. file_exists(path)) then
+         call raise(error, err_input, path // ": there is no such file")
+      end if
+      if (allocated(error)) return
+      call result_base(path(:i - 1) // ".inp", options, base)
+      if (len(options%folder) > 0 .and. is_result(path, base)) call raise(error, err_input, &
+         path // ": the results would overwrite those of the run; choose another folder with " // &
+         "--output")
+   end subroutine restart_base
+
+   !> The model and the state in the restart file `path`, and what of its files belongs to it.
+   subroutine load_run(run, path, options, n_row, n_frame, build, error)
+      type(run_t), intent(inout) :: run
+      character(len=*), intent(in) :: path
+      type(run_options_t), intent(in) :: options
+      integer, intent(out) :: n_row, n_frame
+      type(string_t), allocatable, intent(out) :: build(:)
+      type(error_t), allocatable, intent(out) :: error
+      type(restart_t) :: restart
+
+      n_row = 0
+      n_frame = 0
+      call restart_read(restart, path, error)
+      if (.not. allocated(error)) call stepper_load(run%stepper, restart, error, options%further)
+      if (.not. allocated(error)) then
+         call exchange_files(restart, n_row, n_frame, build)
+         call restart_check(restart, error)
+      end if
+      if (.not. allocated(error)) return
+      if (error%code /= err_file) error%code = err_input
+   end subroutine load_run
 
    subroutine move_diagnostics(run, report)
       type(run_t), intent(inout) :: run

@@ -2,6 +2,7 @@
 !> steppers live side by side.
 module emcon_stepper
    use emcon_deck, only : deck_read
+   use emcon_deck_further, only : further_until
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, err_interrupt, error_t, raise
@@ -31,6 +32,7 @@ module emcon_stepper
       type(deck_source_t) :: source              !! the deck as read, for restart files
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.
+      real(wp), allocatable :: until(:)          !! total time at which steps end; 0: as they say
       logical :: is_read = .false.               !! `scene` is complete
       logical :: may_cut = .true.                !! a host can try a step again in smaller parts
       type(string_t), allocatable :: diagnostic(:)   !! errors and warnings of the deck
@@ -107,6 +109,8 @@ contains
       self%diagnostic = diagnostics_texts(diagnostics)
       self%is_read = diagnostics%n_errors == 0
       if (.not. self%is_read) call raise(error, err_input, self%diagnostic(1)%text)
+      if (.not. (self%is_read .and. allocated(self%until))) return
+      call further_until(self%scene, self%until, error)
    end subroutine stepper_read_source
 
    !> Build the model of the scene that was read, and begin its first step. After an error there is

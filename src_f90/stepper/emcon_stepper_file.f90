@@ -2,6 +2,7 @@
 !>
 !> What is exchanged is saved, or loaded; each array is named once, and keeps its bits.
 module emcon_stepper_file
+   use emcon_deck_further, only : further_append, further_t, further_until
    use emcon_deck_source, only : deck_source_t
    use emcon_diagnostics, only : diagnostics_t
    use emcon_errors, only : err_input, error_t, raise
@@ -38,10 +39,11 @@ contains
 
    !> Build the model of a restart file and put it into the state that was saved. Forces and mass
    !> are not in the file: `self` has to have them, given for the same deck.
-   subroutine stepper_load(self, restart, error)
+   subroutine stepper_load(self, restart, error, further)
       type(stepper_t), intent(inout) :: self
       type(restart_t), intent(inout) :: restart      !! as it was
       type(error_t), allocatable, intent(out) :: error
+      type(further_t), intent(in), optional :: further   !! what it is to do beside
       type(diagnostics_t) :: diagnostics
 
       call restart_rewind(restart)
@@ -51,18 +53,39 @@ contains
       call exchange_source(self, restart)
       call restart_check(restart, error)
       if (allocated(error)) return
+      if (present(further)) then
+         if (allocated(further%path)) call further_append(self%source, further%path, error)
+         if (allocated(error)) return
+      end if
       diagnostics%file_name = self%source%file_name
       call stepper_read_source(self, diagnostics, error)
+      if (present(further) .and. .not. allocated(error)) then
+         if (further%until > 0.0_wp) call take_until(self, further%until, error)
+      end if
       if (.not. allocated(error)) call stepper_build(self, error)
       if (allocated(error)) return
       call exchange_state(self, restart)
       call restart_check(restart, error)
+      if (present(further) .and. .not. allocated(error)) call check_until(self, further%until, &
+         error)
       if (.not. allocated(error)) call march_resume(self%march, self%scene, error)
       if (allocated(error)) return
       ! What the last increment has measured, measured anew, differs by roundings.
       call restart_rewind(restart)
       call exchange_state(self, restart)
    end subroutine stepper_load
+
+   !> A later end lies ahead.
+   subroutine check_until(self, until, error)
+      type(stepper_t), intent(in) :: self
+      real(wp), intent(in) :: until              !! 0: none was asked for [T]
+      type(error_t), allocatable, intent(out) :: error
+
+      associate (time => self%march%state%time)
+         if (until > 0.0_wp .and. .not. until > time) call raise(error, err_input, "--until " // &
+            to_text(until) // ": the run is at time " // to_text(time) // " already")
+      end associate
+   end subroutine check_until
 
    subroutine exchange_source(self, restart)
       type(stepper_t), intent(inout) :: self
@@ -74,7 +97,25 @@ contains
       call restart_list(restart, "deck_file_name", self%source%file_name)
       call restart_list(restart, "override", self%override)
       call restart_exchange(restart, "is_lenient", self%is_lenient)
+      if (restart_offers(restart, "until", allocated(self%until))) then
+         if (.not. allocated(self%until)) allocate(self%until(restart_size(restart, "until")))
+         call restart_exchange(restart, "until", self%until)
+      end if
    end subroutine exchange_source
+
+   !> Let the last step end when it is asked to, as what is given beside the deck.
+   subroutine take_until(self, until, error)
+      type(stepper_t), intent(inout) :: self     !! read
+      real(wp), intent(in) :: until              !! > 0 [T]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), allocatable :: all(:)
+
+      allocate(all(size(self%scene%step)), source=0.0_wp)
+      if (allocated(self%until)) all(:size(self%until)) = self%until
+      all(size(all)) = until
+      call move_alloc(all, self%until)
+      call further_until(self%scene, self%until, error)
+   end subroutine take_until
 
    subroutine exchange_state(self, restart)
       type(stepper_t), intent(inout) :: self
