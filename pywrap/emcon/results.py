@@ -197,7 +197,7 @@ def energy_drift(history: NDArray[np.void]) -> tuple[Array, float]:
 class Bodies:
     """Mass and momenta of each body, rows as in the history."""
 
-    mass: Array     #: (n_body) [M]
+    mass: Array     #: (n_body) [M], 0 of profiles and quasi-static bodies
     px: Array       #: (n_row, n_body) [M L/T]
     py: Array       #: (n_row, n_body) [M L/T]
     lz: Array       #: (n_row, n_body) about the origin [M L^2/T]
@@ -226,7 +226,7 @@ def read_bodies(paths: ResultPaths) -> Bodies | None:
             return None
     mass = mass.ravel()
     fits = momentum.ndim == 3 and momentum.shape[1:] == (len(mass), 3) and len(momentum) > 0
-    if not (fits and len(mass) and (mass > 0.0).all()):
+    if not (fits and (mass >= 0.0).all() and (mass > 0.0).any()):
         return None
     return Bodies(mass, momentum[..., 0], momentum[..., 1], momentum[..., 2])
 

@@ -8,18 +8,19 @@ import math
 from pathlib import Path
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 from emcon.mesh import block, disc, refine
-from emcon.results import Bodies
+from emcon.results import Bodies, ResultPaths, read_bodies
 from emcon.study import StudyError
 from emcon.study.accuracy import (Limit, Run, common_nodes, difference, fitted_order, limit_of,
                                   observed_order)
 from emcon.study.choice import cheapest, pareto_front, parse_goals
 from emcon.study.deck import DeckFile, read_deck, refined_deck
 from emcon.study.execution import Progress, bar_text
-from emcon.study.measures import (Measured, _of_history, _of_pairs, body_geometry, rigid_energy,
-                                  windowed)
+from emcon.study.measures import (Measured, _of_history, _of_pairs, _per_mass, body_geometry,
+                                  rigid_energy, windowed)
 from emcon.study.plan import Member, make_plan, parse_vary, read_manifest, write_manifest
 from emcon.study.reference import Reference
 from emcon.study.report import Study, goal_words, goals_met, missing_knobs
@@ -288,6 +289,21 @@ def test_inertia_of_a_disc_of_chords() -> None:
     found = body_geometry(fields_of(mesh), np.zeros(len(mesh.nodes), dtype=int), None,
                           np.ones(1))
     assert found.inertia[0] == pytest.approx(4.0/6.0*(2.0 + math.cos(2.0*math.pi/n)), rel=1e-13)
+
+
+def test_a_body_without_mass_has_no_velocity(tmp_path: Path) -> None:
+    """A profile, say: the other body is measured all the same."""
+    paths = ResultPaths(tmp_path/"run")
+    with h5py.File(paths.history, "w") as file:
+        file["sets/BODIES/MASS"] = np.array([[2.0, 0.0]])
+        file["sets/BODIES/MOMENTUM"] = np.array([[[6.0, 8.0, 1.0], [0.0, 0.0, 0.0]]]*3)
+    bodies = read_bodies(paths)
+    assert bodies is not None and bodies.main() == 0
+    p = np.stack([bodies.px, bodies.py], axis=2)
+    assert np.array_equal(_per_mass(p, bodies.mass[:, None])[-1], [[3.0, 4.0], [0.0, 0.0]])
+    with h5py.File(paths.history, "a") as file:
+        file["sets/BODIES/MASS"][...] = [[-2.0, 1.0]]
+    assert read_bodies(paths) is None
 
 
 def test_energy_of_a_rigid_motion() -> None:

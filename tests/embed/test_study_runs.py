@@ -189,6 +189,11 @@ def test_decks_and_precisions_are_knobs(tmp_path: Path) -> None:
     for (deck, _, _), momentum in found.items():
         assert abs(momentum/(-50.0 if deck == "bar.inp" else -100.0) - 1.0) < 1e-12
     assert [row["deck"] for row in rows if row["role"] == "default"] == ["bar.inp"]
+    (tmp_path/"third.inp").write_text(text)              # decks may be added, not changed
+    more = [str(option).replace("heavy.inp", "heavy.inp,third.inp") for option in asked]
+    assert "were there" in study(tmp_path, *more, deck=tmp_path/"bar.inp").stdout
+    error = study(tmp_path, *FREE, deck=tmp_path/"third.inp", code=2).stderr
+    assert "third.inp, or what it includes, changed" in error
     (tmp_path/"heavy.inp").write_text(text)
     error = study(tmp_path, *asked, deck=tmp_path/"bar.inp", code=2).stderr
     assert "begun before" in error

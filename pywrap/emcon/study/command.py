@@ -16,7 +16,7 @@ from typing import Any
 from ..results import ResultPaths
 from .accuracy import Run
 from .choice import parse_goals
-from .deck import DeckFile, joint_checksum, read_deck
+from .deck import DeckFile, read_deck
 from .errors import StudyError
 from .execution import (Progress, Task, executor_of, find_program, record_of, run_all, run_member,
                         sweep, version_of)
@@ -155,7 +155,7 @@ def _set_up(options: argparse.Namespace) -> _Setup:
     members = plan.members(references, bool(goals))
     folder = options.output or Path(f"{deck.name}_study")
     version = version_of(programs["double"])
-    _claim(folder, deck, joint_checksum(decks), version, options.fresh)
+    _claim(folder, deck.path.name, decks, version, options.fresh)
     write_manifest(folder/"manifest.csv", members, plan.knobs)
     setup = _Setup(deck, plan, members, [], folder, version, programs, decks)
     return replace(setup, tasks=[setup.task(member, options) for member in members])
@@ -169,34 +169,39 @@ def _programs(options: argparse.Namespace, plan: Plan, references: Sequence[str]
     return {precision: find_program(named[precision], precision) for precision in wanted}
 
 
-def _claim(folder: Path, deck: DeckFile, checksum: str, version: str, fresh: bool) -> None:
-    """Make the folder of the study, or see that what is there is of this deck and program."""
+def _claim(folder: Path, main: str, decks: Mapping[str, DeckFile], version: str,
+           fresh: bool) -> None:
+    """Make the folder of the study, or see that what is there is of these decks and program.
+
+    Values of the knob `deck` may be added, beside that of the study, `main`.
+    """
     if fresh:
         shutil.rmtree(folder/"members", ignore_errors=True)
         (folder/"study.json").unlink(missing_ok=True)
-    wanted = {"deck": deck.path.name, "checksum": checksum, "version": version}
+    checksums = {name: deck.checksum for name, deck in decks.items()}
     mark = folder/"study.json"
     try:
         found = json.loads(mark.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        found = None
+        found = {"version": version, "deck": main, "checksums": {}}
     except (OSError, ValueError) as problem:
         raise StudyError(f"cannot read {mark}: {problem}; --fresh begins anew") from None
-    if found is None:
-        (folder/"members").mkdir(parents=True, exist_ok=True)
-        part = folder/f"study.json.{unique()}"
-        part.write_text(json.dumps(wanted) + "\n", encoding="utf-8")
-        part.replace(mark)
-        return
-    changed = [what for name, what in (("checksum", f"the deck {deck.path}, or what it includes,"),
-                                       ("version", "the program"))
-               if found.get(name) != wanted[name]]
+    known = found.get("checksums", {})
+    changed = [f"the deck {decks[name].path}, or what it includes," for name in decks
+               if known.get(name, checksums[name]) != checksums[name]
+               or (name == main and found.get("deck") != main)]
+    changed += ["the program"] if found.get("version") != version else []
     if changed:
         told = (f" ({found.get('version')} then, {version} now)"
                 if found.get("version") != version else "")
         raise StudyError(f"{folder} holds a study begun before {' and '.join(changed)} changed"
                          f"{told}: its members cannot be compared with new ones. Give another "
                          "--output, --fresh to run all members anew, or bring back what changed")
+    (folder/"members").mkdir(parents=True, exist_ok=True)
+    part = folder/f"study.json.{unique()}"
+    wanted = {"deck": main, "version": version, "checksums": {**known, **checksums}}
+    part.write_text(json.dumps(wanted) + "\n", encoding="utf-8")
+    part.replace(mark)
 
 
 def _one(setup: _Setup, index: int) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -56,14 +55,6 @@ class DeckFile:
 def read_deck(path: Path) -> DeckFile:
     """The deck in `path`; raises `StudyError` where it, or what it includes, cannot be read."""
     return DeckFile(path, "".join(line + "\n" for line in _lines(path, 0)))
-
-
-def joint_checksum(decks: Mapping[str, DeckFile]) -> str:
-    """Of one deck its own, of several one of all."""
-    if len(decks) == 1:
-        return next(iter(decks.values())).checksum
-    text = "".join(f"{name} {decks[name].checksum}\n" for name in sorted(decks))
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _lines(path: Path, depth: int) -> list[str]:

@@ -18,7 +18,7 @@ from ..results import (Array, Bodies, ResultPaths, read_bodies, read_history, re
 NAMES = {
     "displacement": "displacements of the nodes, over all frames [L]",
     "position": "how far the centre of a body has gone at the last frame [L]",
-    "rebound": "velocity of the centre of a body at the end [L/T]",
+    "rebound": "velocity of the centre of a body at the end, 0 without mass [L/T]",
     "impulse": "impulse of a pair on its slave surface, over the run [M L/T]",
     "duration": "how long a pair was in contact [T]",
     "force": "force of a pair over time, means of windows of the run [M L/T^2]",
@@ -58,7 +58,8 @@ def measure(paths: ResultPaths, windows: int = WINDOWS) -> dict[str, Measured]:
     bodies = read_bodies(paths)
     found = {**_of_history(history), **_of_pairs(history, windows), **_of_verdict(paths)}
     if bodies is not None:
-        v = np.stack([bodies.px, bodies.py], axis=2)/bodies.mass[:, None]
+        p = np.stack([bodies.px, bodies.py], axis=2)
+        v = _per_mass(p, bodies.mass[:, None])
         found["rebound"] = _of_rows(v[-1], v)
     pairs = read_pairs(paths)
     if pairs is not None:
@@ -73,6 +74,12 @@ def measure(paths: ResultPaths, windows: int = WINDOWS) -> dict[str, Measured]:
             found |= _of_fields(fields, history, bodies)
     return {name: found[name] for name in NAMES if name in found
             and np.isfinite(found[name].rows).all()}
+
+
+def _per_mass(values: Array, mass: Array) -> Array:
+    """Of a body without mass 0."""
+    found: Array = np.divide(values, mass, out=np.zeros_like(values), where=mass > 0.0)
+    return found
 
 
 def _of_rows(rows: Array, over_time: Array | None = None) -> Measured:
@@ -234,7 +241,7 @@ def rigid_energy(bodies: Bodies, row: int, at: Geometry) -> Array:
     """Kinetic energy of translation and rotation of each body, (n_body)."""
     p = np.column_stack([bodies.px[row], bodies.py[row]])
     spin = bodies.lz[row] - (at.centre[:, 0]*p[:, 1] - at.centre[:, 1]*p[:, 0])
-    moved: Array = 0.5*(p**2).sum(axis=1)/bodies.mass
+    moved: Array = _per_mass(0.5*(p**2).sum(axis=1), bodies.mass)
     turned = np.divide(0.5*spin**2, at.inertia, out=np.zeros_like(spin), where=at.inertia > 0.0)
     return moved + turned
 
