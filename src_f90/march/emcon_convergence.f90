@@ -66,13 +66,13 @@ module emcon_convergence
 
 contains
 
-   !> Set up for solves to `tolerance`.
+   !> Set up for solves to `tolerance`; none is asked for that only round-off could meet.
    pure subroutine convergence_init(self, tolerance, maximum)
       type(convergence_t), intent(out) :: self
       real(wp), intent(in) :: tolerance          !! > 0, of the relative residual
       integer, intent(in) :: maximum             !! iterations at most
 
-      self%tolerance = tolerance
+      self%tolerance = max(tolerance, kept_floor)
       self%maximum = maximum
       allocate(self%history((1 + kept_for_tangent)*maximum + most_polish + 3), source=0.0_wp)
       call convergence_begin(self)

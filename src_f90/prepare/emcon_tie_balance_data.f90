@@ -11,7 +11,7 @@ module emcon_tie_balance_data
    use emcon_couplings, only : tie_rows_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : err_internal, error_t, raise
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : dp, hp, wp
    use emcon_solver_registry, only : solver_create, solver_default
    use emcon_sort, only : find_sorted, unique_sorted
    use emcon_sparse_solver, only : matrix_general, solver_box_t
@@ -24,19 +24,19 @@ module emcon_tie_balance_data
       integer :: n_other = 0
       integer, allocatable :: other(:)           !! (n_other) ascending nodes that have no row
       integer, allocatable :: d_row(:), d_column(:)   !! entries of D
-      real(wp), allocatable :: d_value(:)        !! [L]
+      real(hp), allocatable :: d_value(:)        !! [L]
       integer, allocatable :: start(:)           !! (n_row + 1) entries of M before each row
       integer, allocatable :: column(:)          !! entries of M, 1..n_other
-      real(wp), allocatable :: m_value(:)        !! [L]
-      real(wp), allocatable :: size(:)           !! (n_row) [L]
+      real(hp), allocatable :: m_value(:)        !! [L]
+      real(hp), allocatable :: size(:)           !! (n_row) [L]
       integer, allocatable :: neighbour(:, :)    !! (2, n_row) row before and after; 0: an end
       integer, allocatable :: edge(:, :)         !! (2, n_edge) slave edges: rows, or -others
-      real(wp), allocatable :: x_other(:, :)     !! (2, n_other) [L]
-      real(wp), allocatable :: s_master(:, :)    !! (2, n_other) -s of the master chain [L]
-      real(wp), allocatable :: x(:, :)           !! (2, n_row) slave nodes, D x = M x_other [L]
-      real(wp), allocatable :: multiplier(:, :)  !! (2, n_row)
-      real(wp), allocatable :: residual(:, :)    !! (2, n_other) M^T L - s_g [L]
-      real(wp) :: force = 0.0_wp                 !! largest |s_g| [L]
+      real(hp), allocatable :: x_other(:, :)     !! (2, n_other) [L]
+      real(hp), allocatable :: s_master(:, :)    !! (2, n_other) -s of the master chain [L]
+      real(hp), allocatable :: x(:, :)           !! (2, n_row) slave nodes, D x = M x_other [L]
+      real(hp), allocatable :: multiplier(:, :)  !! (2, n_row)
+      real(hp), allocatable :: residual(:, :)    !! (2, n_other) M^T L - s_g [L]
+      real(hp) :: force = 0.0_hp                 !! largest |s_g| [L]
       type(solver_box_t), private :: side(2)     !! D and its transpose
    end type tie_balance_t
 
@@ -46,10 +46,10 @@ contains
    subroutine tie_balance_init(self, rows, x, slave_edge, master_edge, cover, error)
       type(tie_balance_t), intent(inout) :: self
       type(tie_rows_t), intent(in) :: rows
-      real(wp), intent(in) :: x(:, :)            !! (2, n_node) positions [L]
+      real(hp), intent(in) :: x(:, :)            !! (2, n_node) positions [L]
       integer, intent(in) :: slave_edge(:, :)    !! (2, n) first and last node
       integer, intent(in) :: master_edge(:, :)   !! (2, n) first and last node
-      real(wp), intent(in) :: cover(:, :)        !! (2, n) int N_C over what is covered, per length
+      real(hp), intent(in) :: cover(:, :)        !! (2, n) int N_C over what is covered, per length
       type(error_t), allocatable, intent(out) :: error
       integer :: row_of(size(x, 2)), slave(2*size(slave_edge, 2))
       integer :: i, k
@@ -60,10 +60,10 @@ contains
       row_of(rows%slave) = [(k, k = 1, self%n_row)]
       self%other = unique_sorted([pack(rows%node, row_of(rows%node) == 0), &
          pack(slave, row_of(slave) == 0), &
-         pack(master_edge, spread(sum(cover, 1) > 0.0_wp, 1, 2))])
+         pack(master_edge, spread(sum(cover, 1) > 0.0_hp, 1, 2))])
       self%n_other = size(self%other)
       self%x_other = x(:, self%other)
-      self%size = rows%size
+      self%size = real(rows%size, hp)
       self%neighbour = rows%neighbour
       allocate(self%x(2, self%n_row), self%multiplier(2, self%n_row))
       allocate(self%residual(2, self%n_other))
@@ -85,7 +85,7 @@ contains
       type(tie_rows_t), intent(in) :: rows
       integer, intent(in) :: row_of(:)           !! (n_node)
       integer, allocatable :: place(:), column(:)
-      real(wp), allocatable :: value(:)
+      real(hp), allocatable :: value(:)
       integer :: i, j, k, n, n_d, side, beside(3), most
 
       most = 0
@@ -97,7 +97,7 @@ contains
       end do
       allocate(place(self%n_other), source=0)
       allocate(column(most), self%start(self%n_row + 1), source=0)
-      allocate(value(most), source=0.0_wp)
+      allocate(value(most), source=0.0_hp)
       n_d = count(row_of(rows%node) > 0)
       allocate(self%d_row(n_d), self%d_column(n_d), self%d_value(n_d))
       n = 0
@@ -112,7 +112,7 @@ contains
                   n_d = n_d + 1
                   self%d_row(n_d) = k
                   self%d_column(n_d) = j
-                  self%d_value(n_d) = rows%weight(i)
+                  self%d_value(n_d) = real(rows%weight(i), hp)
                else if (j == 0) then
                   j = find_sorted(self%other, rows%node(i))
                   if (place(j) <= self%start(k)) then
@@ -120,7 +120,8 @@ contains
                      place(j) = n
                      column(n) = j
                   end if
-                  if (side == 1) value(place(j)) = value(place(j)) - rows%weight(i)
+                  if (side == 1) value(place(j)) = value(place(j)) &
+                     - real(rows%weight(i), hp)
                end if
             end do
          end do
@@ -141,14 +142,14 @@ contains
    !> -int N_C dX along the covered parts of the master edges.
    pure subroutine add_master(self, x, master_edge, cover)
       type(tie_balance_t), intent(inout) :: self
-      real(wp), intent(in) :: x(:, :), cover(:, :)
+      real(hp), intent(in) :: x(:, :), cover(:, :)
       integer, intent(in) :: master_edge(:, :)
-      real(wp) :: a(2)
+      real(hp) :: a(2)
       integer :: i, k, j
 
-      allocate(self%s_master(2, self%n_other), source=0.0_wp)
+      allocate(self%s_master(2, self%n_other), source=0.0_hp)
       do i = 1, size(master_edge, 2)
-         if (.not. sum(cover(:, i)) > 0.0_wp) cycle
+         if (.not. sum(cover(:, i)) > 0.0_hp) cycle
          a = x(:, master_edge(2, i)) - x(:, master_edge(1, i))
          do k = 1, 2
             j = find_sorted(self%other, master_edge(k, i))
@@ -199,12 +200,12 @@ contains
    !> largest force.
    subroutine tie_balance_residual(self, largest, error)
       type(tie_balance_t), intent(inout) :: self
-      real(wp), intent(out) :: largest
+      real(hp), intent(out) :: largest
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: rhs(2, self%n_row), s(2, self%n_row), target(2, self%n_other), half(2)
+      real(hp) :: rhs(2, self%n_row), s(2, self%n_row), target(2, self%n_other), half(2)
       integer :: i, j, k
 
-      rhs = 0.0_wp
+      rhs = 0.0_hp
       do k = 1, self%n_row
          do i = self%start(k) + 1, self%start(k + 1)
             rhs(:, k) = rhs(:, k) + self%m_value(i)*self%x_other(:, self%column(i))
@@ -212,10 +213,10 @@ contains
       end do
       call solve(self, 1, rhs, self%x, error)
       if (allocated(error)) return
-      s = 0.0_wp
+      s = 0.0_hp
       target = self%s_master
       do i = 1, size(self%edge, 2)
-         half = 0.5_wp*(position(self, self%edge(2, i)) - position(self, self%edge(1, i)))
+         half = 0.5_hp*(position(self, self%edge(2, i)) - position(self, self%edge(1, i)))
          do k = 1, 2
             j = self%edge(k, i)
             if (j > 0) then
@@ -242,7 +243,7 @@ contains
    pure function position(self, k) result(x)
       type(tie_balance_t), intent(in) :: self
       integer, intent(in) :: k
-      real(wp) :: x(2)
+      real(hp) :: x(2)
 
       if (k > 0) then
          x = self%x(:, k)
@@ -251,19 +252,20 @@ contains
       end if
    end function position
 
-   !> D y = rhs (side 1), or D^T y = rhs (2): by the factors in dp, refined to wp.
+   !> D y = rhs (side 1), or D^T y = rhs (2): by the factors in dp, refined.
    subroutine solve(self, side, rhs, y, error)
       type(tie_balance_t), intent(inout) :: self
       integer, intent(in) :: side
-      real(wp), intent(in) :: rhs(:, :)          !! (2, n_row)
-      real(wp), intent(out) :: y(:, :)           !! (2, n_row)
+      real(hp), intent(in) :: rhs(:, :)          !! (2, n_row)
+      real(hp), intent(out) :: y(:, :)           !! (2, n_row)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_refine = 3
-      real(wp) :: r(self%n_row), dy(self%n_row)
+      real(hp) :: r(self%n_row)
+      real(wp) :: dy(self%n_row)
       integer :: d, i, pass
 
       do d = 1, 2
-         y(d, :) = 0.0_wp
+         y(d, :) = 0.0_hp
          do pass = 0, n_refine
             r = rhs(d, :)
             do i = 1, size(self%d_value)
@@ -273,9 +275,9 @@ contains
                   r(self%d_column(i)) = r(self%d_column(i)) - self%d_value(i)*y(d, self%d_row(i))
                end if
             end do
-            call self%side(side)%solver%solve(r, dy, error)
+            call self%side(side)%solver%solve(real(r, wp), dy, error)
             if (allocated(error)) return
-            y(d, :) = y(d, :) + dy
+            y(d, :) = y(d, :) + real(dy, hp)
          end do
       end do
    end subroutine solve

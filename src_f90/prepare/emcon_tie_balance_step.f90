@@ -11,7 +11,7 @@
 module emcon_tie_balance_step
    use emcon_band_blocks, only : band_blocks_factorise, band_blocks_init, band_blocks_place, &
       band_blocks_solve, band_blocks_t
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : dp, hp, wp
    use emcon_power_scaling, only : power_of_two
    use emcon_tie_balance_data, only : tie_balance_t
    use emcon_tie_balance_order, only : balance_order
@@ -25,23 +25,24 @@ module emcon_tie_balance_step
       integer :: n_condition = 0
       integer :: n_entry = 0
       integer, allocatable :: row(:), column(:)  !! entries of the conditions
-      real(wp), allocatable :: value(:), rhs(:)
+      real(hp), allocatable :: value(:), rhs(:)
       logical, allocatable :: is_idle(:)         !! (n_condition) left out
-      real(wp), allocatable :: norm2(:)          !! (n_condition) sum of squares over z
+      real(hp), allocatable :: norm2(:)          !! (n_condition) sum of squares over z
       integer, allocatable :: rank(:)            !! (n_unknown + n_condition) place in the band
       type(band_blocks_t) :: band
    end type balance_step_t
 
    !> Moves cost more than changes of M, so that slave nodes stay and the problem is nearly linear.
-   real(wp), parameter :: move_weight = 1.0e4_wp
+   real(hp), parameter :: move_weight = 1.0e4_hp
    !> Factor of the squares, far below 1: the factors then pivot on the conditions, and weak ones
    !> count by their size, not by its square.
    real(dp), parameter :: square_weight = 1.0e-10_dp
    !> Diagonal at the forces, relative to the squares of their conditions: round-off over it is
    !> how far dependent conditions disturb z.
-   real(dp), parameter :: diagonal = 1.0e-8_dp
+   real(dp), parameter :: diagonal = 1.0e-8_dp &
+      *sqrt(max(1.0_dp, real(epsilon(1.0_wp), dp)/epsilon(1.0_dp)))
    !> Across a straight chain nothing but rounding of the positions is left: so many of it.
-   real(wp), parameter :: idle_tol = 256.0_wp*epsilon(1.0_wp)
+   real(hp), parameter :: idle_tol = 256.0_hp*real(epsilon(1.0_wp), hp)
 
 contains
 
@@ -62,26 +63,26 @@ contains
    subroutine balance_step_do(self, tie, largest)
       type(balance_step_t), intent(inout) :: self
       type(tie_balance_t), intent(inout) :: tie
-      real(wp), intent(out) :: largest
+      real(hp), intent(out) :: largest
       real(dp) :: rhs(self%n_unknown + self%n_condition), y(self%n_unknown + self%n_condition)
       integer :: k
 
       self%n_entry = 0
-      self%rhs = 0.0_wp
+      self%rhs = 0.0_hp
       self%is_idle = .false.
-      self%norm2 = 0.0_wp
+      self%norm2 = 0.0_hp
       call put_geometry(self, tie)
       call put_forces(self, tie)
       if (.not. allocated(self%rank)) call find_order(self, tie)
       rhs(:self%n_unknown) = 0.0_dp
       rhs(self%n_unknown + 1:) = merge(0.0_dp, real(self%rhs, dp), self%is_idle)
       call solve_band(self, tie, rhs, y)
-      largest = -1.0_wp
+      largest = -1.0_hp
       if (self%band%is_singular) return
       do k = 1, tie%n_row
          associate (i => tie%start(k) + 1, j => tie%start(k + 1))
-            tie%m_value(i:j) = tie%m_value(i:j) + tie%size(k)*real(y(i:j), wp)
-            largest = max(largest, real(sum(abs(y(i:j))), wp))
+            tie%m_value(i:j) = tie%m_value(i:j) + tie%size(k)*real(y(i:j), hp)
+            largest = max(largest, real(sum(abs(y(i:j))), hp))
          end associate
       end do
    end subroutine balance_step_do
@@ -90,7 +91,7 @@ contains
    pure subroutine put(self, row, column, value)
       type(balance_step_t), intent(inout) :: self
       integer, intent(in) :: row, column
-      real(wp), intent(in) :: value
+      real(hp), intent(in) :: value
 
       self%n_entry = self%n_entry + 1
       self%row(self%n_entry) = row
@@ -103,11 +104,11 @@ contains
       type(balance_step_t), intent(inout) :: self
       type(tie_balance_t), intent(in) :: tie
       integer :: d, i, j, k, n, p, q, n_z
-      real(wp) :: total(tie%n_row)
+      real(hp) :: total(tie%n_row)
 
       n = tie%n_row
       n_z = size(tie%column)
-      total = 0.0_wp
+      total = 0.0_hp
       do i = 1, size(tie%d_value)
          j = tie%d_row(i)
          k = tie%d_column(i)
@@ -121,7 +122,7 @@ contains
       do k = 1, n
          do i = tie%start(k) + 1, tie%start(k + 1)
             total(k) = total(k) - tie%m_value(i)
-            call put(self, k, i, 1.0_wp)
+            call put(self, k, i, 1.0_hp)
             do d = 1, 2
                call put(self, d*n + k, i, &
                   -(tie%x_other(d, tie%column(i)) - tie%x(d, k))/tie%size(k))
@@ -138,7 +139,7 @@ contains
                if (k < 0) cycle
                do d = 1, 2
                   call put(self, (d + 2)*n + j, n_z + (d - 1)*n + k, &
-                     merge(0.5_wp, -0.5_wp, q == 1)*(tie%size(k)/tie%size(j)))
+                     merge(0.5_hp, -0.5_hp, q == 1)*(tie%size(k)/tie%size(j)))
                end do
             end do
          end do
@@ -149,7 +150,7 @@ contains
    subroutine put_forces(self, tie)
       type(balance_step_t), intent(inout) :: self
       type(tie_balance_t), intent(in) :: tie
-      real(wp) :: frame(2, 2, tie%n_other), length(tie%n_other), value
+      real(hp) :: frame(2, 2, tie%n_other), length(tie%n_other), value
       integer :: c, d, f, i, j, k, n, p, q, n_z, row
 
       n = tie%n_row
@@ -176,7 +177,7 @@ contains
                q = 3 - p
                do d = 1, 2
                   call put(self, 5*n + (f - 1)*tie%n_other + c, n_z + (d - 1)*n + j, &
-                     merge(0.5_wp, -0.5_wp, q == 2)*tie%size(j)/length(c)*frame(d, f, c))
+                     merge(0.5_hp, -0.5_hp, q == 2)*tie%size(j)/length(c)*frame(d, f, c))
                end do
             end do
          end do
@@ -191,13 +192,13 @@ contains
    !> Unit vectors along and across the force of each node, and the length of chain it stands for.
    pure subroutine find_frames(tie, frame, length)
       type(tie_balance_t), intent(in) :: tie
-      real(wp), intent(out) :: frame(:, :, :)    !! (2, along or across, n_other)
-      real(wp), intent(out) :: length(:)         !! (n_other) [L]
-      real(wp) :: force(2, tie%n_other), norm
+      real(hp), intent(out) :: frame(:, :, :)    !! (2, along or across, n_other)
+      real(hp), intent(out) :: length(:)         !! (n_other) [L]
+      real(hp) :: force(2, tie%n_other), norm
       integer :: c, i, k
 
-      force = 0.0_wp
-      length = 0.0_wp
+      force = 0.0_hp
+      length = 0.0_hp
       do k = 1, tie%n_row
          do i = tie%start(k) + 1, tie%start(k + 1)
             c = tie%column(i)
@@ -205,13 +206,13 @@ contains
             length(c) = length(c) + abs(tie%m_value(i))
          end do
       end do
-      where (.not. length > 0.0_wp) length = maxval(tie%size)
+      where (.not. length > 0.0_hp) length = maxval(tie%size)
       do c = 1, tie%n_other
          norm = norm2(force(:, c))
-         if (norm > 0.0_wp) then
+         if (norm > 0.0_hp) then
             frame(:, 1, c) = force(:, c)/norm
          else
-            frame(:, 1, c) = [1.0_wp, 0.0_wp]
+            frame(:, 1, c) = [1.0_hp, 0.0_hp]
          end if
          frame(:, 2, c) = [-frame(2, 1, c), frame(1, 1, c)]
       end do
@@ -221,9 +222,9 @@ contains
    pure subroutine find_idle(self, tie, length)
       type(balance_step_t), intent(inout) :: self
       type(tie_balance_t), intent(in) :: tie
-      real(wp), intent(in) :: length(:)
+      real(hp), intent(in) :: length(:)
       integer :: c, f, row, n_user(tie%n_other), i
-      real(wp) :: rounding
+      real(hp) :: rounding
 
       n_user = 0
       do i = 1, size(tie%column)
@@ -234,7 +235,7 @@ contains
          do c = 1, tie%n_other
             row = 5*tie%n_row + (f - 1)*tie%n_other + c
             self%is_idle(row) = sqrt(self%norm2(row)) <= &
-               rounding/length(c)*sqrt(real(n_user(c), wp))
+               rounding/length(c)*sqrt(real(n_user(c), hp))
          end do
       end do
    end subroutine find_idle

@@ -121,6 +121,7 @@ contains
       type(stepper_t), intent(in) :: stepper
       type(body_t), intent(inout) :: body(:)
       type(csr_t) :: mass
+      real(wp) :: m
       integer :: i, k, b
 
       call terms_mass(stepper%march%system%term, mass)
@@ -132,10 +133,11 @@ contains
             b = stepper%march%system%space%body(i)
             do k = mass%row_start(i) + 1, mass%row_start(i + 1)
                if (b == 0) cycle
-               body(b)%mass = body(b)%mass + mass%value(k)
-               body(b)%center = body(b)%center + mass%value(k)*x(:, i)
+               m = real(mass%value(k), wp)
+               body(b)%mass = body(b)%mass + m
+               body(b)%center = body(b)%center + m*x(:, i)
                body(b)%inertia = body(b)%inertia &
-                  + mass%value(k)*dot_product(x(:, i), x(:, mass%column(k) + 1))
+                  + m*dot_product(x(:, i), x(:, mass%column(k) + 1))
             end do
          end do
       end associate

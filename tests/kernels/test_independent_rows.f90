@@ -97,7 +97,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: round_off = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
       real(wp), parameter :: distance(6) = merge([1.0_wp, 1.0e6_wp, 1.0e9_wp, 1.0e12_wp, &
-         1.0e13_wp, 1.0e15_wp], [1.0_wp, 1.0e2_wp, 1.0e3_wp, 4.0e3_wp, 1.0e4_wp, 2.0e6_wp], &
+         1.0e13_wp, 1.0e15_wp], [1.0_wp, 4.0e3_wp, 8.0e3_wp, 1.6e4_wp, 3.0e4_wp, 2.0e6_wp], &
          round_off < 1.0e-10_wp)*round_off
       type(problem_t) :: problem
       type(independent_rows_t) :: rows

@@ -136,8 +136,9 @@ contains
       scene%v0(2, :) = 2.0_wp*scene%x(1, :)
    end subroutine make_spin
 
-   !> Two iterations do not suffice for h = 0.1, but for a part of it: all conserved, in parts as in
-   !> whole increments, and every increment ends where it would have without a cut.
+   !> Two iterations do not suffice for h, but for a part of it: all conserved, in parts as in whole
+   !> increments, and every increment ends where it would have without a cut. To the digits of
+   !> single precision they suffice for 0.1.
    subroutine test_cut(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -145,7 +146,7 @@ contains
       type(increment_t) :: increment
       type(ledger_t) :: start
       integer :: k, n_cut
-      real(wp), parameter :: h = 0.1_wp
+      real(wp), parameter :: h = merge(0.1_wp, 0.2_wp, eps < 1.0e-10_wp)
 
       call make_spin(scene, h, 10, 2)
       call begin(scene, march, error)

@@ -7,14 +7,22 @@ module test_rigid_motion
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_system, only : system_init, system_t
+   use emcon_text, only : to_text
    use small_scenes, only : add_block, add_step, block_node, block_t, clamp, make_block, &
       make_two_blocks, prescribe
    implicit none
    private
    public :: collect_rigid_motion
 
-   !> Length of short ties beside blocks of size 1. Ranks are found in double.
-   real(wp), parameter :: short = sqrt(max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)))
+   !> Ranks are found in double, of positions and weights that are rounded to `wp`; what is below the
+   !> root of some hundred epsilon, times the distance in sizes of a body, is no motion. That of one
+   !> body of n in a row is 1/n^1.5 of what it is of all.
+   logical, parameter :: is_fine = epsilon(1.0_wp) < 1.0e-10_wp
+   !> Length of short ties beside blocks of size 1: the root of epsilon.
+   real(wp), parameter :: short = merge(sqrt(max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))), &
+      0.125_wp, is_fine)
+   real(wp), parameter :: far = merge(1.0e8_wp, 10.0_wp, is_fine)
+   integer, parameter :: n_chain = merge(20, 8, is_fine), n_many = merge(300, 12, is_fine)
 
 contains
 
@@ -123,7 +131,7 @@ contains
       call check_true(error, index(text, "element 5 ") > 0, "element 5 is in '" // text // "'")
    end subroutine test_contact
 
-   !> Two neighbours held in a small corner, 1e8 elements away: held is held.
+   !> Two neighbours held in a small corner, far away: held is held.
    subroutine test_far(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -132,7 +140,7 @@ contains
       character(len=:), allocatable :: text
 
       call make_block(scene, "CPE4", [20, 20], block)
-      scene%x = scene%x + 1.0e8_wp
+      scene%x = scene%x + far
       call add_step(scene, .true., 1.0_wp, 1)
       call clamp(scene%step(1), [1])
       call prescribe(scene%step(1), 2, 2, 0.0_wp)
@@ -208,6 +216,20 @@ contains
       system%space%linear = linear
    end subroutine make_chain
 
+   !> "the bodies of elements 1, 3, 6, 8 and 10 more, tied to each other, are": ten are named.
+   subroutine name_chain(n, who)
+      integer, intent(in) :: n                       !! blocks
+      character(len=:), allocatable, intent(out) :: who
+      integer :: i
+
+      who = "the bodies of elements 1"
+      do i = 2, min(n, 10)
+         who = who // ", " // to_text(1 + 5*((i - 1)/2) + 2*mod(i - 1, 2))
+      end do
+      if (n > 10) who = who // " and " // to_text(n - 10) // " more"
+      who = who // ", tied to each other, are"
+   end subroutine name_chain
+
    !> Tie the left or right side of `slave`, of three cells, to the side of `master`, of two.
    subroutine tie_facing(scene, linear, slave, master, is_right)
       type(scene_t), intent(inout) :: scene
@@ -261,8 +283,8 @@ contains
       call check_text(error, system, scene, "", "held, each block alone is not")
    end subroutine test_tied
 
-   !> Nodes are put on the other side to epsilon of the distance from the origin, 1e8: a rotation
-   !> of both blocks violates the ties by that much.
+   !> Nodes are put on the other side to epsilon of the distance from the origin: a rotation of both
+   !> blocks violates the ties by that much.
    subroutine test_tied_far(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -272,7 +294,7 @@ contains
 
       call make_chain(scene, system, 2, block, error)
       if (allocated(error)) return
-      scene%x = scene%x + 1.0e8_wp
+      scene%x = scene%x + far
       call tie_facing(scene, linear, block(2), block(1), .false.)
       call check_text(error, system, scene, &
          "the bodies of elements 1, 3, tied to each other, are", "move in x, move in y, rotate")
@@ -283,7 +305,7 @@ contains
       call check_text(error, system, scene, "", "held")
    end subroutine test_tied_far
 
-   !> Two nodes at a distance of the root of epsilon: its square would be lost in round-off.
+   !> Two nodes at a distance whose square would be lost in round-off.
    subroutine test_short_tie(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -304,7 +326,8 @@ contains
       call check_text(error, system, scene, "the body of element 3 is", "rotate")
    end subroutine test_short_tie
 
-   !> Two blocks tied over the root of epsilon stand askew by as much; a third one is tied to both.
+   !> Two blocks tied over the short length stand askew by round-off over it; a third one is tied to
+   !> both.
    subroutine test_behind_short_tie(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -333,17 +356,17 @@ contains
    subroutine test_chain(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
-      type(block_t) :: block(20)
+      type(block_t) :: block(n_chain)
       type(system_t) :: system
-      character(len=*), parameter :: who = "the bodies of elements 1, 3, 6, 8, 11, 13, 16, 18, " &
-         // "21, 23 and 10 more, tied to each other, are"
+      character(len=:), allocatable :: who
 
-      call make_chain(scene, system, 20, block, error)
+      call name_chain(n_chain, who)
+      call make_chain(scene, system, n_chain, block, error)
       if (allocated(error)) return
       call check_text(error, system, scene, who, "move in x, move in y, rotate")
       call prescribe(scene%step(1), block_node(block(7), 0, 0), 2, 0.0_wp)
       call check_text(error, system, scene, who, "move in x, rotate")
-      call prescribe(scene%step(1), block_node(block(20), 1, 0), 1, 0.0_wp)
+      call prescribe(scene%step(1), block_node(block(n_chain), 1, 0), 1, 0.0_wp)
       call check_text(error, system, scene, who, "rotate")
       call prescribe(scene%step(1), block_node(block(1), 0, 0), 2, 0.0_wp)
       call check_text(error, system, scene, "", "held at three blocks")
@@ -555,13 +578,13 @@ contains
    !> What the last of 300 blocks in a row does depends on all ties before it.
    subroutine test_many(error)
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: n = 300
+      integer, parameter :: n = n_many
       type(scene_t) :: scene
       type(block_t) :: block(n)
       type(system_t) :: system
-      character(len=*), parameter :: who = "the bodies of elements 1, 3, 6, 8, 11, 13, 16, 18, " &
-         // "21, 23 and 290 more, tied to each other, are"
+      character(len=:), allocatable :: who
 
+      call name_chain(n, who)
       call make_chain(scene, system, n, block, error)
       if (allocated(error)) return
       call check_text(error, system, scene, who, "move in x, move in y, rotate")

@@ -284,8 +284,10 @@ contains
          call tie_balance(chains%rows, chains%x, chains%slave_edge, chains%master_edge, report, &
             raised)
          call check_true(error, .not. allocated(raised), what // ": no error")
-         call check_near(error, report%before, unbalance, tol, 1.0_wp, what // ": found before")
-         call check_true(error, report%is_balanced .and. report%is_changed, what // ": balanced")
+         call check_near(error, real(report%before, wp), unbalance, tol, 1.0_wp, &
+            what // ": found before")
+         call check_true(error, report%is_balanced, what // ": balanced")
+         call check_true(error, report%is_changed .or. unbalance <= tol, what // ": changed")
          call find_unbalance(error, chains, share, unbalance)
          call check_near(error, unbalance, 0.0_wp, tol, 1.0_wp, what // ": left")
          call relocate(error, chains, g, after)
@@ -396,7 +398,7 @@ contains
       call tie_balance(chains%rows, chains%x, chains%slave_edge, chains%master_edge, report, raised)
       call check_true(error, .not. allocated(raised), "no error")
       call check_true(error, .not. report%is_balanced .and. .not. report%is_changed, "told")
-      call check_true(error, report%after > tol, "the residual stands")
+      call check_true(error, real(report%after, wp) > tol, "the residual stands")
       call check_near(error, chains%rows%weight, before%weight, 0.0_wp, 1.0_wp, "weights")
    end subroutine test_apart
 
