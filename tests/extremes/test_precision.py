@@ -5,10 +5,14 @@
 
 import json
 import subprocess
+import sys
 
 import numpy as np
 import pytest
 from scene_tools import CRASH, DECKS, ROOT, Run, overrides
+
+sys.path.append(str(ROOT / "tests" / "scenes"))
+from plain_scenes import AUTO, Scene, below  # noqa: E402
 
 #: Round-off of a real, what the energy may be off by, and the bar of the verdict. Sums over some
 #: hundred increments of some thousand terms take 1e4 epsilon.
@@ -82,6 +86,36 @@ def test_energy_is_kept_to_the_digits_of_the_precision(runs, scene, precision):
     assert error < ENERGY*EPSILON[precision] and error < BAR[precision]
     assert all(reason.startswith("bodies overlap") for reason in verdict["reasons"])
     assert verdict["unconverged"] < ENERGY*EPSILON[precision]
+
+
+#: Increments by the time that a wave takes through an element of the disc: from a twentieth to
+#: some ten; the last follows the error, between all of them.
+INCREMENTS = {"0.001": 0.02, "0.005": 0.1, "0.02": 0.3, "0.1": 0.6, "0.25": 1.0, "adaptive": 0.1}
+
+
+@pytest.mark.parametrize("increment", INCREMENTS)
+@pytest.mark.parametrize("precision", EPSILON)
+def test_an_impact_keeps_energy_with_any_increment(tmp_path, precision, increment):
+    """A disc falls askew on a block; energy to the bar of the verdict, at each end of increment."""
+    h = 0.02 if increment == "adaptive" else float(increment)
+    scene = Scene(h, INCREMENTS[increment])
+    scene.disc("DISC", (0.1, 0.501), 0.5, (4, 2), velocity=(0.3, -1.0))
+    scene.block("BLOCK", (-1, -0.5), (2, 0.5), (6, 2)).hold("BLOCK", below(-0.5))
+    deck = scene.deck(AUTO)
+    if increment == "adaptive":
+        deck.replace("*DYNAMIC, DIRECT", "*DYNAMIC")
+        deck.insert("*TIME INTEGRATION, TOLERANCE=1e-2", before="*CONSTRAINT METHOD")
+    done = call(precision, deck.write(tmp_path / "disc.inp"), "--quiet", "--output", tmp_path)
+    assert done.returncode == 0, done.stderr
+    run = Run(tmp_path / "disc", done.stderr)
+    verdict, history = run.verdict, run.history
+    if increment == "adaptive":
+        assert len(np.unique(np.diff(history["time"]).round(9))) > 1
+    assert history["strain"].max() > 0.01*history["kinetic"][0], "it has met the block"
+    assert verdict["largest_energy_error"]/verdict["largest_energy"] < BAR[precision]
+    # The sums of the file, which holds doubles, whatever the verdict says.
+    off = np.abs(history["total"] - history["contact_work"] - history["total"][0])
+    assert off.max() < max(BAR[precision], 64*EPSILON["double"])*history["total"][0]
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -192,8 +192,8 @@ contains
       width_of = min(1.0_wp, frame_project(frame, 1)) - max(0.0_wp, frame_project(frame, 2))
    end function width_of
 
-   !> Are the ends of the slave edge covered, and is anything of it? Of a point: on which side of the
-   !> ends of the master edge does it lie?
+   !> Are the ends of the slave edge covered, and is anything of it? Of a point: on which side of
+   !> the ends of the master edge does it lie?
    pure function ends_of(kind, stencil, x) result(is_within)
       integer, intent(in) :: kind
       type(pair_stencil_t), intent(in) :: stencil
@@ -344,8 +344,8 @@ contains
          stencil%weight = 1.0_wp/[1.9_wp, 2.0_wp]
          value = moments(stencil, x, 10)
          total = sqrt(1.0_wp + slope**2) + asinh(slope)/slope
-         ! What Gauss's rule of n points misses of sqrt(1 + (slope x)^2), singular at i/slope, in the
-         ! ellipse up to there: 64/15 max/((1 - rho^-2) rho^(2 n)).
+         ! What Gauss's rule of n points misses of sqrt(1 + (slope x)^2), singular at i/slope, in
+         ! the ellipse up to there: 64/15 max/((1 - rho^-2) rho^(2 n)).
          rho = 1.0_wp/slope + sqrt(1.0_wp/slope**2 + 1.0_wp)
          missed = 64.0_wp/15.0_wp*sqrt(2.0_wp)/((1.0_wp - rho**(-2))*rho**20)
          call check_near(error, value(moment_gap), 0.25_wp*total, tol + missed, 1.0_wp, "gap")

@@ -14,9 +14,9 @@ module test_rigid_motion
    private
    public :: collect_rigid_motion
 
-   !> Ranks are found in double, of positions and weights that are rounded to `wp`; what is below the
-   !> root of some hundred epsilon, times the distance in sizes of a body, is no motion. That of one
-   !> body of n in a row is 1/n^1.5 of what it is of all.
+   !> Ranks are found in double, of positions and weights that are rounded to `wp`; what is below
+   !> the root of some hundred epsilon, times the distance in sizes of a body, is no motion. That of
+   !> one body of n in a row is 1/n^1.5 of what it is of all.
    logical, parameter :: is_fine = epsilon(1.0_wp) < 1.0e-10_wp
    !> Length of short ties beside blocks of size 1: the root of epsilon.
    real(wp), parameter :: short = merge(sqrt(max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))), &
