@@ -6,7 +6,7 @@ module emcon_inertia
    use emcon_csr, only : csr_find, csr_from_elements, csr_t
    use emcon_element_lists, only : element_lists
    use emcon_errors, only : error_t
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : dp, hp, wp
    use emcon_motion, only : motion_t
    use emcon_lumped_mass, only : lumped_mass
    use emcon_reduction, only : freedom_numbers, reduction_fold, reduction_slot
@@ -26,6 +26,8 @@ module emcon_inertia
       logical, allocatable :: is_bare(:)         !! (n_node) it has none of its own
       type(csr_t), private :: given, added       !! (n_node x n_node) beside it [M]
       type(csr_t), private :: consistent, lumped     !! (n_node x n_node) one of them is `mass` [M]
+      !> Their values in the precision of the state, and those of `mass`
+      real(wp), allocatable, private :: consistent_value(:), lumped_value(:), mass_value(:)
       integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of these
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains
@@ -74,6 +76,7 @@ contains
       type(solid_t), intent(in) :: solid
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: start(:), list(:), slot(:), pair(:, :), added(:, :)
+      real(hp), allocatable :: value(:)
       integer :: e, i, j, k, n
 
       call list_pairs(self%given, pair)
@@ -85,19 +88,23 @@ contains
       start = [start, [(n + 1 + 2*i, i = 1, size(self%pair, 2))]]
       call csr_from_elements(self%mass, solid%n_node, start, list, slot, error)
       if (allocated(error)) return
+      allocate(value(size(self%mass%column)), source=0.0_hp)
       k = 0
       do e = 1, solid%n_element
          n = start(e + 1) - start(e)
          do j = 1, n
             do i = 1, n
                k = k + 1
-               self%mass%value(slot(k)) = self%mass%value(slot(k)) + real(solid%mass(i, j, e), dp)
+               value(slot(k)) = value(slot(k)) + real(solid%mass(i, j, e), hp)
             end do
          end do
       end do
-      call add_beside(self%mass, self%given)
-      call add_beside(self%mass, self%added)
+      call add_beside(self%mass, self%given, value)
+      call add_beside(self%mass, self%added, value)
+      self%mass%value = real(value, dp)
       self%consistent = self%mass
+      self%consistent_value = real(value, wp)
+      self%mass_value = self%consistent_value
       call lump(self, solid)
    end subroutine add_up
 
@@ -106,6 +113,7 @@ contains
       type(inertia_t), intent(inout) :: self
       type(solid_t), intent(in) :: solid
       real(wp) :: share(size(solid%node, 1))
+      real(hp) :: value(solid%n_node)
       integer :: e, i
 
       associate (lumped => self%lumped)
@@ -113,44 +121,47 @@ contains
          lumped%n_col = solid%n_node
          lumped%row_start = [(i, i = 0, solid%n_node)]
          lumped%column = [(i - 1, i = 1, solid%n_node)]
-         if (allocated(lumped%value)) deallocate(lumped%value)
-         allocate(lumped%value(solid%n_node), source=0.0_dp)
+         value = 0.0_hp
          do e = 1, solid%n_element
             associate (n => solid%geometry(e)%n_node)
                call lumped_mass(solid%mass(:n, :n, e), share(:n))
                do i = 1, n
-                  associate (to => lumped%value(solid%node(i, e)))
-                     to = to + real(share(i), dp)
+                  associate (to => value(solid%node(i, e)))
+                     to = to + real(share(i), hp)
                   end associate
                end do
             end associate
          end do
-         call add_rows(lumped%value, self%given)
-         call add_rows(lumped%value, self%added)
+         call add_rows(value, self%given)
+         call add_rows(value, self%added)
+         lumped%value = real(value, dp)
+         self%lumped_value = real(value, wp)
       end associate
    end subroutine lump
 
    !> Add the sums of the rows of `part`.
    pure subroutine add_rows(total, part)
-      real(dp), intent(inout) :: total(:)        !! (n_node)
+      real(hp), intent(inout) :: total(:)        !! (n_node)
       type(csr_t), intent(in) :: part
       integer :: i
 
       do i = 1, part%n_row
-         total(i) = total(i) + sum(part%value(part%row_start(i) + 1:part%row_start(i + 1)))
+         total(i) = total(i) &
+            + real(sum(part%value(part%row_start(i) + 1:part%row_start(i + 1))), hp)
       end do
    end subroutine add_rows
 
    !> Add a matrix whose pairs are in the pattern.
-   pure subroutine add_beside(mass, part)
-      type(csr_t), intent(inout) :: mass
+   pure subroutine add_beside(mass, part, value)
+      type(csr_t), intent(in) :: mass            !! the pattern
       type(csr_t), intent(in) :: part
+      real(hp), intent(inout) :: value(:)        !! of the pattern
       integer :: i, k
 
       do i = 1, part%n_row
          do k = part%row_start(i) + 1, part%row_start(i + 1)
-            associate (to => mass%value(csr_find(mass, i, part%column(k) + 1)))
-               to = to + part%value(k)
+            associate (to => value(csr_find(mass, i, part%column(k) + 1)))
+               to = to + real(part%value(k), hp)
             end associate
          end do
       end do
@@ -201,8 +212,10 @@ contains
 
       if (scene%step(i_step)%scheme%is_explicit) then
          self%mass = self%lumped
+         self%mass_value = self%lumped_value
       else
          self%mass = self%consistent
+         self%mass_value = self%consistent_value
       end if
       allocate(number, source=freedom_numbers(space%numbering))
       n_dim = size(space%is_alive, 1)
@@ -267,7 +280,7 @@ contains
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
 
       call rows_times(size(field, 1), self%mass%n_row, self%mass%row_start, self%mass%column, &
-         self%mass%value, field, product)
+         self%mass_value, field, product)
    end subroutine inertia_times
 
    !> Rows of a sparse matrix times vectors, two directions at a time: the rows are read once.
@@ -276,10 +289,10 @@ contains
       integer, intent(in) :: n_row                           !! as many as columns
       integer, intent(in) :: row_start(n_row + 1)            !! from 0
       integer, intent(in), contiguous :: column(:)           !! from 0
-      real(dp), intent(in), contiguous :: value(:)
+      real(wp), intent(in), contiguous :: value(:)
       real(wp), intent(in) :: field(n_dim, 0:n_row - 1)
       real(wp), intent(out) :: product(n_dim, n_row)
-      real(wp) :: m, first, second
+      real(wp) :: first, second
       integer :: i, k, a, b
 
       do a = 1, n_dim, n_way
@@ -288,9 +301,8 @@ contains
             first = 0.0_wp
             second = 0.0_wp
             do k = row_start(i) + 1, row_start(i + 1)
-               m = real(value(k), wp)
-               first = first + m*field(a, column(k))
-               second = second + m*field(b, column(k))
+               first = first + value(k)*field(a, column(k))
+               second = second + value(k)*field(b, column(k))
             end do
             product(a, i) = first
             product(b, i) = second
