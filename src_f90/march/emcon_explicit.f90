@@ -39,36 +39,39 @@ module emcon_explicit
 
 contains
 
-   !> Set up for an explicit step: all unknowns need mass, and the increment has a limit.
+   !> Set up for an explicit step: all unknowns need mass, and the increment has a limit, unless the
+   !> state knows it: within a step it is looked at now and then.
    subroutine explicit_prepare(self, scene, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
-      logical :: is_bounded
+      logical :: is_known, is_bounded
 
       self%newton%correction%kept%most_products = most_products
       call check_mass(self, scene, error)
       if (allocated(error)) return
-      associate (explicit => self%explicit, step => scene%step(self%state%i_step))
-         call motion_init(explicit%place, scene%x)
+      associate (place => self%explicit%place, step => scene%step(self%state%i_step), &
+            limit => self%state%critical_h)
+         call motion_init(place, scene%x)
          call rest_at(self, instant_t(), self%state%u)
-         call critical_bound(self%system, explicit%place, explicit%limit, explicit%element, &
-            is_bounded)
-         if (step%h > explicit%limit .or. .not. is_bounded) call critical_sharp(self%system, &
-            explicit%place, explicit%limit, error)
-         if (allocated(error)) return
-         if (.not. explicit%limit < huge(explicit%limit)) return
+         is_known = limit > 0.0_wp
+         if (.not. is_known) then
+            self%state%budget = 0.0_wp
+            call critical_bound(self%system, place, limit, self%state%critical_element, is_bounded)
+            if (step%h > limit .or. .not. is_bounded) call critical_sharp(self%system, place, &
+               limit, error)
+            if (allocated(error)) return
+         end if
+         if (.not. limit < huge(limit)) return
          call limit_text(self, scene, text)
-         if (step%h > explicit%limit) then
+         if (step%h > limit .and. .not. is_known) then
             call raise(error, err_input, where_text(scene, step%origin) // ": error: the " // &
                "increment " // to_text(step%h) // " is larger than " // text // ": an " // &
                "explicit step grows without bound; give a smaller increment, or an implicit step")
             return
          end if
-         call note_add(self%system%notes, text // "; h is " // to_text(step%h/explicit%limit, 3) &
-            // " of it")
-         explicit%budget = 0.0_wp
+         call note_add(self%system%notes, text // "; h is " // to_text(step%h/limit, 3) // " of it")
       end associate
    end subroutine explicit_prepare
 
@@ -78,9 +81,9 @@ contains
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(out) :: text
 
-      text = "the critical step " // to_text(self%explicit%limit)
-      if (self%explicit%element > 0) text = text // " (the fastest element is " // &
-         to_text(scene%element_label(self%explicit%element)) // ")"
+      text = "the critical step " // to_text(self%state%critical_h)
+      if (self%state%critical_element > 0) text = text // " (the fastest element is " // &
+         to_text(scene%element_label(self%state%critical_element)) // ")"
    end subroutine limit_text
 
    !> Each unknown has mass: it is kept where that is a diagonal.
@@ -89,6 +92,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       real(dp), allocatable :: value(:)
+      real(wp), dimension(size(scene%x, 1), size(scene%x, 2)) :: weight
       integer :: k
 
       call terms_mass_values(self%system%term, value)
@@ -103,7 +107,9 @@ contains
          end do
          if (allocated(self%explicit%mass)) deallocate(self%explicit%mass)
          if (size(value) > numbering%n_unknown .or. numbering%n_dependent > 0) return
-         allocate(self%explicit%mass, source=real(value, wp))
+         call mass_times(self%system, 1.0_wp + 0.0_wp*self%state%u, weight)
+         allocate(self%explicit%mass(numbering%n_unknown))
+         call pick_unknowns(numbering, weight, self%explicit%mass)
       end associate
    end subroutine check_mass
 
@@ -155,7 +161,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
 
-      if (part%h <= self%explicit%limit) return
+      if (part%h <= self%state%critical_h) return
       call limit_text(self, scene, text)
       call raise(error, err_analysis, "the analysis stops at time " // &
          to_text(part%start%total_time, 9) // ": the increment " // to_text(part%h) // &
@@ -174,8 +180,8 @@ contains
       associate (explicit => self%explicit)
          call critical_bound(self%system, explicit%place, bound, element, is_bounded)
          if (part%h <= bound .and. is_bounded) return
-         call critical_sharp(self%system, explicit%place, explicit%limit, error)
-         explicit%element = element
+         call critical_sharp(self%system, explicit%place, self%state%critical_h, error)
+         self%state%critical_element = element
       end associate
    end subroutine find_limit
 
@@ -311,24 +317,27 @@ contains
       end do
    end function way_of
 
-   !> An error if there is far more energy than was put in.
+   !> An error if there is far more energy than was put in, or none that is a number.
    subroutine check_growth(self, work, error)
       type(march_t), intent(inout) :: self
       real(wp), intent(in) :: work               !! of the step, its size [M L^2/T^2]
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: energy, momentum(size(self%v1, 1), size(self%v1, 2))
+      character(len=:), allocatable :: text
 
-      associate (explicit => self%explicit)
+      associate (budget => self%state%budget)
          call mass_times(self%system, self%v1, momentum)
          energy = 0.5_wp*sum(self%v1*momentum) + abs(sum(self%ending%energy)) &
             + abs(self%ending%potential)
-         if (.not. explicit%budget > 0.0_wp) explicit%budget = energy
-         explicit%budget = explicit%budget + work
-         if (energy <= most_growth*explicit%budget) return
+         if (.not. budget > 0.0_wp) budget = energy
+         budget = budget + work
+         if (energy <= min(most_growth*budget, huge(energy))) return
+         text = "its energy is not finite"
+         if (energy <= huge(energy)) text = "its energy " // to_text(energy) // " is " // &
+            to_text(energy/budget, 3) // " times what was put in"
          call raise(error, err_analysis, "the analysis stops at time " // &
-            to_text(self%state%time, 9) // ": the explicit step grows without bound, its energy " &
-            // to_text(energy) // " is " // to_text(energy/explicit%budget, 3) // " times " // &
-            "what was put in; give a smaller increment")
+            to_text(self%state%time, 9) // ": the explicit step grows without bound, " // text // &
+            "; give a smaller increment")
       end associate
    end subroutine check_growth
 

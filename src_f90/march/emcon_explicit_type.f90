@@ -8,8 +8,6 @@ module emcon_explicit_type
    public :: explicit_t
 
    type :: explicit_t
-      real(wp) :: limit = huge(1.0_wp)           !! of the step, at the start of the deck's step [T]
-      integer :: element = 0                     !! the fastest one
       !> (n_unknown) what unknowns weigh, where the mass between them is a diagonal [M]
       real(wp), allocatable :: mass(:)
       logical :: is_free = .false.               !! nothing was held in the step
@@ -23,7 +21,6 @@ module emcon_explicit_type
       type(constraint_set_t) :: set              !! that holds velocities there
       integer, allocatable :: row(:)             !! (set%n) and their places in the set of the step
       real(wp), allocatable :: mu(:)             !! (constraints of the step) multipliers there
-      real(wp) :: budget = 0.0_wp                !! energy that there may be [M L^2/T^2]
    end type explicit_t
 
 end module emcon_explicit_type

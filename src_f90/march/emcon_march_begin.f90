@@ -64,6 +64,7 @@ contains
       self%state%n_easy = 0
       self%state%n_before = self%state%increment
       self%state%start_time = self%state%time
+      self%state%critical_h = 0.0_wp
       call march_past_forget(self%state)
       if (.not. scene%step(i_step)%scheme%masses_resist) self%state%v = 0.0_wp
       call system_begin_step(self%system, scene, i_step, error)
@@ -154,7 +155,10 @@ contains
       if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
          self%system%notes, error)
       if (.not. allocated(error)) call check_held(self, scene, error)
+      self%state%critical_h = 0.0_wp
       if (.not. allocated(error)) call prepare(self, scene, error)
+      before%critical_h = self%state%critical_h
+      before%critical_element = self%state%critical_element
       self%state = before
       self%state%base = factor_base_t()
       self%ledger = ledger_before

@@ -41,6 +41,10 @@ module emcon_state
       real(wp) :: h_before = 0.0_wp              !! size of the last step; 0: there is none [T]
       real(wp), allocatable :: load(:, :)        !! (n_dim, n_node) external forces
       real(wp), allocatable :: past(:, :, :)     !! (n_dim, n_node, n_past) as the scheme has it
+      ! of explicit steps:
+      real(wp) :: critical_h = 0.0_wp            !! the critical step as last found; 0: not yet [T]
+      integer :: critical_element = 0            !! the fastest one
+      real(wp) :: budget = 0.0_wp                !! energy that there may be [M L^2/T^2]
       type(factor_base_t) :: base                !! of the factor that is kept over steps
       type(step_control_t) :: control            !! of the size of increments
    end type state_t

@@ -212,7 +212,7 @@ contains
       associate (step => stepper%scene%step(k), march => stepper%march)
          call row_put(row, "h", step%h, ": h = #")
          if (step%scheme%is_explicit .and. march%state%i_step == k) call row_put(row, &
-            "critical_h", march%explicit%limit, ", critical h = #")
+            "critical_h", march%state%critical_h, ", critical h = #")
          call row_put(row, "courant_number", step%h/transit, ", # times the shortest transit")
          call row_put(row, "recommended_h", transit, "; recommended where waves matter: h = #")
          if (step%h > many_transits*transit) call row_put(row, "remark", &

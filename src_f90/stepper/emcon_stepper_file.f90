@@ -141,6 +141,7 @@ contains
          call exchange_past(state, restart)
          if (restart_offers(restart, "has_mass", any(state%has_mass))) call restart_exchange( &
             restart, "has_mass", state%has_mass)
+         call exchange_bounds(state, restart)
       end associate
       call exchange_base(self%march%state%base, self%march%state%u, restart)
       call exchange_pairs(self%march%state%pairs, restart)
@@ -148,6 +149,20 @@ contains
       call verdict_exchange(self%verdict, restart)
       call exchange_control(self%march%state, restart)
    end subroutine exchange_state
+
+   !> What bounds explicit steps.
+   subroutine exchange_bounds(state, restart)
+      type(state_t), intent(inout) :: state
+      type(restart_t), intent(inout) :: restart
+
+      if (restart_offers(restart, "critical_h", state%critical_h > 0.0_wp)) then
+         call restart_exchange(restart, "critical_h", state%critical_h)
+         call restart_exchange(restart, "critical_element", state%critical_element)
+         call restart_exchange(restart, "budget", state%budget)
+      else
+         state%critical_h = 0.0_wp
+      end if
+   end subroutine exchange_bounds
 
    !> What the scheme looks back on.
    subroutine exchange_past(state, restart)

@@ -290,6 +290,53 @@ def test_rigid_body_turns(tmp_path):
     np.testing.assert_allclose(np.hypot(*corner.T), 2.0, rtol=1e-13)
 
 
+# ---- growth without bound
+
+
+def crushed():
+    """Thrown together so fast that it stiffens within a few increments, before it is looked at."""
+    deck = block((2, 1), velocity=lambda x, _: (50*(x - 0.5), 0), step=LAST)
+    deck.set_parameter("h", 0.027)
+    deck.set_parameter("t_end", 3)
+    return deck
+
+
+def test_energy_that_grows_without_bound_ends_the_analysis(tmp_path):
+    done, run = attempt(crushed(), tmp_path, (), {})
+    assert done.returncode == 3
+    found = re.search(r"stops at time (\S+): the explicit step grows without bound, its energy (\S+) "
+                      r"is (\S+) times what was put in; give a smaller increment", done.stderr)
+    assert found, done.stderr
+    time, energy, factor = map(float, found.groups())
+    # No load does work: what was put in is the energy at the start, or that of the first increment.
+    history = run.history
+    assert factor > 1e6 and energy/history["total"][:2].max() == pytest.approx(factor, rel=0.3)
+    assert history["total"].max() <= 1e6*history["total"][:2].max()
+    assert time == pytest.approx(history["time"][-1], abs=1e-8)
+    assert run.verdict["verdict"] != "good"
+
+
+@pytest.mark.parametrize("power", [155, 200, 306])
+def test_energy_that_is_no_number_ends_the_analysis(tmp_path, power):
+    deck = block((2, 1), velocity=lambda x, _: (10.0**power*(x - 0.5), 0), step=LAST, **LINEAR)
+    done, _ = attempt(deck, tmp_path, (), {"h": 0.015, "t_end": 3})
+    assert done.returncode == 3
+    assert "the explicit step grows without bound, its energy is not finite" in done.stderr
+
+
+@pytest.mark.parametrize("every", [1, 5, 11])
+def test_what_bounds_the_step_is_in_the_restart_file(tmp_path, every):
+    """From the last file on, whose increment is far above the critical step by then, the run ends as
+    it does in one go: with the same words, the energy that was put in among them."""
+    deck = crushed()
+    deck.insert(f"*RESTART, WRITE, FREQUENCY={every}")
+    whole, run = attempt(deck, tmp_path, (), {})
+    assert whole.returncode == 3
+    done = emcon("restart", run.file(".rst.h5"), "--quiet")
+    assert done.returncode == 3
+    assert done.stderr == whole.stderr
+
+
 # ---- the same bits
 
 
