@@ -7,6 +7,7 @@ import csv
 import json
 import os
 import re
+import shutil
 import signal
 import stat
 import subprocess
@@ -393,6 +394,22 @@ def test_another_version_is_refused(tmp_path: Path) -> None:
     other = program(tmp_path, "echo emcon 99.0\n")
     error = study(tmp_path, *FREE, "--program", other, code=2).stderr
     assert re.search(r"before the program changed \(emcon [\d.]+.* then, emcon 99.0 now\)", error)
+
+
+def test_another_build_of_the_version_is_refused(tmp_path: Path) -> None:
+    """A program that was built anew between two calls, its version as it was."""
+    here = tmp_path/"emcon"
+    shutil.copy(PROGRAM, here)
+    study(tmp_path, *FREE, "--program", here)
+    before = stamps(tmp_path)
+    study(tmp_path, *FREE, "--program", here)
+    with here.open("ab") as file:
+        file.write(b"\0")
+    error = study(tmp_path, *FREE, "--program", here, code=2).stderr
+    assert "before the program changed (built anew: double precision)" in error and "--fresh" in error
+    assert stamps(tmp_path) == before
+    study(tmp_path, *FREE, "--program", here, "--fresh")
+    assert stamps(tmp_path) != before
 
 
 @pytest.mark.parametrize(("options", "words"), [

@@ -18,8 +18,8 @@ from .accuracy import Run
 from .choice import parse_goals
 from .deck import DeckFile, read_deck
 from .errors import StudyError
-from .execution import (Progress, Task, executor_of, find_program, record_of, run_all, run_member,
-                        sweep, version_of)
+from .execution import (Progress, Task, build_of, executor_of, find_program, record_of, run_all,
+                        run_member, sweep, version_of)
 from .measures import from_json
 from .plan import (ALONE, DECK, PRECISION, QUAD, Member, Plan, make_plan, parse_set, parse_vary,
                    unique, write_manifest)
@@ -155,7 +155,8 @@ def _set_up(options: argparse.Namespace) -> _Setup:
     members = plan.members(references, bool(goals))
     folder = options.output or Path(f"{deck.name}_study")
     version = version_of(programs["double"])
-    _claim(folder, deck.path.name, decks, version, options.fresh)
+    builds = {precision: build_of(path) for precision, path in programs.items()}
+    _claim(folder, deck.path.name, decks, (version, builds), options.fresh)
     write_manifest(folder/"manifest.csv", members, plan.knobs)
     setup = _Setup(deck, plan, members, [], folder, version, programs, decks)
     return replace(setup, tasks=[setup.task(member, options) for member in members])
@@ -169,12 +170,14 @@ def _programs(options: argparse.Namespace, plan: Plan, references: Sequence[str]
     return {precision: find_program(named[precision], precision) for precision in wanted}
 
 
-def _claim(folder: Path, main: str, decks: Mapping[str, DeckFile], version: str,
-           fresh: bool) -> None:
+def _claim(folder: Path, main: str, decks: Mapping[str, DeckFile],
+           program: tuple[str, Mapping[str, str]], fresh: bool) -> None:
     """Make the folder of the study, or see that what is there is of these decks and program.
 
-    Values of the knob `deck` may be added, beside that of the study, `main`.
+    Values of the knob `deck` may be added, beside that of the study, `main`; precisions too.
+    `program`: its version, and the checksums of its builds by precision.
     """
+    version, builds = program
     if fresh:
         shutil.rmtree(folder/"members", ignore_errors=True)
         (folder/"study.json").unlink(missing_ok=True)
@@ -190,16 +193,20 @@ def _claim(folder: Path, main: str, decks: Mapping[str, DeckFile], version: str,
     changed = [f"the deck {decks[name].path}, or what it includes," for name in decks
                if known.get(name, checksums[name]) != checksums[name]
                or (name == main and found.get("deck") != main)]
-    changed += ["the program"] if found.get("version") != version else []
+    built = found.get("builds", {})
+    anew = [name for name in builds if built.get(name, builds[name]) != builds[name]]
+    changed += ["the program"] if found.get("version") != version or anew else []
     if changed:
         told = (f" ({found.get('version')} then, {version} now)"
-                if found.get("version") != version else "")
+                if found.get("version") != version else
+                f" (built anew: {' and '.join(anew)} precision)" if anew else "")
         raise StudyError(f"{folder} holds a study begun before {' and '.join(changed)} changed"
                          f"{told}: its members cannot be compared with new ones. Give another "
                          "--output, --fresh to run all members anew, or bring back what changed")
     (folder/"members").mkdir(parents=True, exist_ok=True)
     part = folder/f"study.json.{unique()}"
-    wanted = {"deck": main, "version": version, "checksums": {**known, **checksums}}
+    wanted = {"deck": main, "version": version, "checksums": {**known, **checksums},
+              "builds": {**built, **builds}}
     part.write_text(json.dumps(wanted) + "\n", encoding="utf-8")
     part.replace(mark)
 

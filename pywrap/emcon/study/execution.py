@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import json
 import os
@@ -284,6 +285,14 @@ def find_program(named: str | None, precision: str = "double") -> str:
 
 
 _LONG = {"single": "single", "quad": "quadruple"}
+
+
+def build_of(program: str) -> str:
+    """A checksum of the program: the same version may have been built anew."""
+    try:
+        return hashlib.sha256(Path(program).read_bytes()).hexdigest()[:16]
+    except OSError as problem:
+        raise StudyError(f"cannot read {program}: {problem.strerror}") from None
 
 
 def version_of(program: str) -> str:
