@@ -76,7 +76,8 @@ KERNEL_SRC := $(wildcard tests/kernels/*.f90 tests/kernels/*.F90)
 ifeq ($(LICENSE),permissive)
 UMFPACK_CFLAGS :=
 UMFPACK_LIBS :=
-GPL := %emcon_umfpack.f90 %emcon_cholmod.f90 %emcon_cholmod_shim.c %test_umfpack.f90 %test_cholmod.f90
+GPL := %emcon_umfpack.f90 %emcon_cholmod.f90 %emcon_cholmod_shim.c %test_umfpack.f90 %test_cholmod.f90 \
+	%test_supernodal.f90
 LIB_SRC := $(filter-out $(GPL),$(LIB_SRC))
 LIB_C := $(filter-out $(GPL),$(LIB_C))
 KERNEL_SRC := $(filter-out $(GPL),$(KERNEL_SRC))
@@ -203,7 +204,8 @@ $(LANES:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd -fno-trappi
 	sra-max-propagations=1000 sra-max-scalarization-size-Ospeed=2000) $(VECTOR)
 
 # Loops over all unknowns in each correction, several at a time: the bits are the same here too.
-STREAMS := $(addprefix emcon_,inertia kept_factor lane_sums mixing motion newton numbering system term vectors)
+STREAMS := $(addprefix emcon_,inertia kept_factor lane_sums mixing motion newton numbering \
+	supernodal_factor supernodal_solve system term vectors)
 $(STREAMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 $(VECTOR)
 
 # Numbers with many derivatives, added and multiplied term by term: several terms at a time.

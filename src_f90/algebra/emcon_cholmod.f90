@@ -4,6 +4,9 @@
 !> the power of two that brings the first diagonal entry into [1/2, 1), unless that was done before:
 !> without it a factor 2 on the matrix would become sqrt(2) in the factor, and units would change
 !> bits.
+!>
+!> Where halves may be rough and columns are long, CHOLMOD orders and we factorise, in single
+!> precision (`emcon_supernodal_factor`), unless a matrix asks for more digits.
 module emcon_cholmod
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_int, c_null_ptr, c_ptr
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
@@ -14,16 +17,29 @@ module emcon_cholmod
    use emcon_power_scaling, only : power_of_two
    use emcon_sparse_solver, only : matrix_definite, solver_check_square, solver_check_values, &
       solver_raise, sparse_solver_t
+   use emcon_supernodal_factor, only : supernodal_factor_t, supernodal_factorise, supernodal_free
+   use emcon_supernodal_solve, only : supernodal_backward, supernodal_error, supernodal_forward, &
+      supernodal_reach
+   use emcon_supernodes, only : supernodes_init, supernodes_is_stack, supernodes_t
    implicit none
    private
    public :: cholmod_t
 
    integer(c_int), parameter :: cholmod_ok = 0, cholmod_not_posdef = 1, cholmod_out_of_memory = -2
 
+   !> Operations for each entry of a factor from which on dense blocks pay.
+   real(dp), parameter :: least_density = 32.0_dp
+   !> A rough factor may be wrong by so much: less than what a kept one is after a few increments.
+   real(dp), parameter :: roughest = 2.0_dp**(-6)
+
    type, extends(sparse_solver_t) :: cholmod_t
       integer, private :: first_slot = 0                     !! of the entry (1, 1); 0: not there
       type(csr_t), private :: scaled                         !! the pattern, and half_scale*value
       real(dp), allocatable, private :: rhs(:), x(:)
+      logical :: is_rough = .false.                          !! the last factors have halves alone
+      type(supernodes_t), private :: nodes                   !! none: only factors of CHOLMOD
+      type(supernodal_factor_t), private :: rough
+      real(dp), allocatable, private :: zero(:)              !! (n) zeros between calls
       logical, private :: is_factorised = .false.
       type(c_ptr), private :: handle = c_null_ptr
    contains
@@ -98,6 +114,30 @@ module emcon_cholmod
          integer(c_int) :: status
       end function emcon_cholmod_reach
 
+      function emcon_cholmod_density(handle) result(density) bind(c)
+         import :: c_double, c_ptr
+         implicit none
+         type(c_ptr), value :: handle
+         real(c_double) :: density
+      end function emcon_cholmod_density
+
+      function emcon_cholmod_nodes(handle, n, ap, ai, counts) result(status) bind(c)
+         import :: c_int, c_ptr
+         implicit none
+         type(c_ptr), value :: handle
+         integer(c_int), value :: n
+         integer(c_int), intent(in) :: ap(*), ai(*)
+         integer(c_int), intent(inout) :: counts(*)
+         integer(c_int) :: status
+      end function emcon_cholmod_nodes
+
+      subroutine emcon_cholmod_take_nodes(handle, order, first, row_start, row) bind(c)
+         import :: c_int, c_ptr
+         implicit none
+         type(c_ptr), value :: handle
+         integer(c_int), intent(inout) :: order(*), first(*), row_start(*), row(*)
+      end subroutine emcon_cholmod_take_nodes
+
       subroutine emcon_cholmod_free(handle) bind(c)
          import :: c_ptr
          implicit none
@@ -128,11 +168,34 @@ contains
          status = emcon_cholmod_analyse(self%handle, int(matrix%n_row, c_int), &
             self%scaled%row_start, self%scaled%column)
       end if
+      if (status == cholmod_ok .and. self%needs_halves .and. self%may_be_rough) then
+         if (emcon_cholmod_density(self%handle) >= least_density) call find_nodes(self, status)
+      end if
       self%n_analysis = self%n_analysis + 1
       if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "ordering", int(status), &
          status == cholmod_out_of_memory, self%scaled)
       if (allocated(error)) call self%free()
    end subroutine cholmod_analyse
+
+   !> The nodes of the factor.
+   subroutine find_nodes(self, status)
+      class(cholmod_t), intent(inout) :: self
+      integer(c_int), intent(out) :: status
+      integer, allocatable :: order(:), first(:), row_start(:), row(:)
+      integer(c_int) :: counts(2)
+
+      associate (a => self%scaled)
+         status = emcon_cholmod_nodes(self%handle, int(a%n_row, c_int), a%row_start, a%column, &
+            counts)
+         if (status /= cholmod_ok) return
+         allocate(order(a%n_row), first(counts(1) + 1), row_start(counts(1) + 1), row(counts(2)), &
+            source=0)
+         call emcon_cholmod_take_nodes(self%handle, order, first, row_start, row)
+         call supernodes_init(self%nodes, a, order, first, row_start, row)
+         if (.not. supernodes_is_stack(self%nodes)) self%nodes = supernodes_t()
+         allocate(self%zero(a%n_row), source=0.0_dp)
+      end associate
+   end subroutine find_nodes
 
    subroutine cholmod_factorise(self, value, error)
       class(cholmod_t), intent(inout) :: self
@@ -151,6 +214,8 @@ contains
       if (value(self%first_slot) <= 0.0_dp) return
       if (.not. self%is_scaled) self%half_scale = power_of_two(-exponent(value(self%first_slot)))
       self%scaled%value = self%half_scale*value
+      call factorise_nodes(self)
+      if (self%is_rough) return
       call blas_enter(fp_status)
       associate (a => self%scaled)
          status = emcon_cholmod_factorise(self%handle, int(a%n_row, c_int), a%row_start, a%column, &
@@ -166,6 +231,24 @@ contains
       self%n_factor = int(n_factor, int64)
    end subroutine cholmod_factorise
 
+   !> Rough factors, where there are nodes and they are good enough.
+   subroutine factorise_nodes(self)
+      class(cholmod_t), intent(inout) :: self    !! `scaled` is set
+
+      self%is_rough = .false.
+      if (self%nodes%n_node == 0) return
+      call supernodal_factorise(self%rough, self%nodes, self%scaled%value, self%is_rough)
+      if (self%is_rough) self%is_rough = supernodal_error(self%rough, self%nodes, self%scaled) &
+         <= roughest
+      if (.not. self%is_rough) then
+         call supernodal_free(self%rough)
+         return
+      end if
+      self%is_singular = .false.
+      self%is_factorised = .true.
+      self%n_factor = self%nodes%value_start(self%nodes%n_node + 1)
+   end subroutine factorise_nodes
+
    subroutine cholmod_solve(self, rhs, x, error)
       class(cholmod_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: rhs(:)
@@ -176,6 +259,9 @@ contains
 
       if (.not. self%is_factorised) then
          call raise(error, err_internal, "cholmod_solve: there is no factorisation")
+         return
+      else if (self%is_rough) then
+         call raise(error, err_internal, "cholmod_solve: rough factors have halves alone")
          return
       end if
       self%rhs = self%half_scale*real(rhs, dp)
@@ -202,6 +288,16 @@ contains
       integer(c_int) :: status
       type(ieee_status_type) :: fp_status
 
+      if (self%is_rough .and. is_second) then
+         self%x = rhs
+         call supernodal_backward(self%rough, self%nodes, self%x)
+         x(self%nodes%order) = self%x
+         return
+      else if (self%is_rough) then
+         x = rhs(self%nodes%order)
+         call supernodal_forward(self%rough, self%nodes, x)
+         return
+      end if
       call blas_enter(fp_status)
       status = emcon_cholmod_half(self%handle, int(size(rhs), c_int), &
          merge(1_c_int, 0_c_int, is_second), rhs, x)
@@ -221,6 +317,11 @@ contains
       integer(c_int) :: status, n
       type(ieee_status_type) :: fp_status
 
+      if (self%is_rough) then
+         call supernodal_reach(self%rough, self%nodes, self%nodes%place(column + 1), value, &
+            n_reached, index, x, self%zero)
+         return
+      end if
       call blas_enter(fp_status)
       status = emcon_cholmod_reach(self%handle, int(self%scaled%n_row, c_int), &
          int(size(column), c_int), column, value, n, index, x)
@@ -236,6 +337,10 @@ contains
       call emcon_cholmod_free(self%handle)
       self%handle = c_null_ptr
       if (allocated(self%rhs)) deallocate(self%rhs, self%x)
+      if (allocated(self%zero)) deallocate(self%zero)
+      call supernodal_free(self%rough)
+      self%nodes = supernodes_t()
+      self%is_rough = .false.
       self%scaled = csr_t()
       self%is_factorised = .false.
       self%is_singular = .false.

@@ -1,11 +1,13 @@
 /* CHOLMOD behind an opaque pointer: cholmod_common differs from release to release, and its
    options are struct members, so Fortran cannot bind to it directly. */
 #include <stdlib.h>
+#include <string.h>
 #include <suitesparse/cholmod.h>
 
 typedef struct {
    cholmod_common c;
    cholmod_factor *l;
+   cholmod_factor *nodes;         /* between their analysis and their reading */
    cholmod_dense *x, *y, *e;      /* solution and workspaces of cholmod_solve2, kept */
    cholmod_sparse *reached;       /* and the entries that a sparse right-hand side reaches */
    int *place;                    /* of each unknown in the order of the factor */
@@ -53,6 +55,48 @@ int emcon_cholmod_analyse(void *handle, int n, int *ap, int *ai)
    free(h->place);
    h->place = NULL;
    return h->c.status;
+}
+
+/* Operations of a factorisation for each entry of the factor, as analysed. */
+double emcon_cholmod_density(void *handle)
+{
+   const emcon_cholmod_t *h = handle;
+   return h->c.lnz > 0 ? h->c.fl/h->c.lnz : 0;
+}
+
+/* The pattern of the factor in the same order, by columns that are taken together: in `counts` how
+   many of these nodes there are, and rows of all of them. */
+int emcon_cholmod_nodes(void *handle, int n, int *ap, int *ai, int *counts)
+{
+   emcon_cholmod_t *h = handle;
+   cholmod_sparse a = view(n, ap, ai, NULL);
+   const int supernodal = h->c.supernodal, n_methods = h->c.nmethods,
+             ordering = h->c.method[0].ordering;
+   int status;
+   h->c.supernodal = CHOLMOD_SUPERNODAL;
+   h->c.nmethods = 1;
+   h->c.method[0].ordering = CHOLMOD_GIVEN;
+   h->nodes = cholmod_analyze_p(&a, h->l->Perm, NULL, 0, &h->c);
+   status = h->c.status;
+   h->c.supernodal = supernodal;
+   h->c.nmethods = n_methods;
+   h->c.method[0].ordering = ordering;
+   if (status != CHOLMOD_OK) return status;
+   counts[0] = (int)h->nodes->nsuper;
+   counts[1] = (int)h->nodes->ssize;
+   return status;
+}
+
+/* What `emcon_cholmod_nodes` has found, all from 0; it is freed here. */
+void emcon_cholmod_take_nodes(void *handle, int *order, int *first, int *row_start, int *row)
+{
+   emcon_cholmod_t *h = handle;
+   const cholmod_factor *l = h->nodes;
+   memcpy(order, l->Perm, l->n*sizeof *order);
+   memcpy(first, l->super, (l->nsuper + 1)*sizeof *first);
+   memcpy(row_start, l->pi, (l->nsuper + 1)*sizeof *row_start);
+   memcpy(row, l->s, l->ssize*sizeof *row);
+   cholmod_free_factor(&h->nodes, &h->c);
 }
 
 /* Status of CHOLMOD; the figures are set if it is 0. */
@@ -172,6 +216,7 @@ void emcon_cholmod_free(void *handle)
    emcon_cholmod_t *h = handle;
    if (h == NULL) return;
    cholmod_free_factor(&h->l, &h->c);
+   cholmod_free_factor(&h->nodes, &h->c);
    cholmod_free_dense(&h->x, &h->c);
    cholmod_free_dense(&h->y, &h->c);
    cholmod_free_dense(&h->e, &h->c);

@@ -34,6 +34,7 @@ module emcon_diagonal_blocks
 
    type :: diagonal_blocks_t
       class(sparse_solver_t), allocatable :: kind      !! solvers are copies of it; it has halves
+      logical :: may_be_rough = .false.          !! as of solvers, set before `blocks_analyse`
       integer :: n_thread = 1                    !! that may work on the blocks
       integer :: n_block = 0
       integer :: n_factor = 0                    !! factors of blocks made of this pattern
@@ -65,6 +66,7 @@ contains
          if (.not. self%is_symmetric) return
          allocate(self%block(b)%solver, source=self%kind)
          self%block(b)%solver%needs_halves = .true.
+         self%block(b)%solver%may_be_rough = self%may_be_rough
          self%block(b)%solver%is_scaled = .true.
          call self%block(b)%solver%analyse(self%block(b)%matrix, error)
          if (allocated(error)) return

@@ -31,6 +31,8 @@ module emcon_sparse_solver
       integer :: n_negative = -1              !! pivots < 0 of a symmetric matrix; < 0: not counted
       integer(int64) :: n_factor = 0_int64    !! nonzeros of the factors
       logical :: needs_halves = .false.       !! set before `analyse`, if it `has_halves`
+      !> Set before `analyse`, with `needs_halves`: those of a matrix near to it will do
+      logical :: may_be_rough = .false.
       logical :: is_scaled = .false.          !! set before `factorise`: `half_scale` stays 1
       real(dp) :: half_scale = 1.0_dp         !! > 0, L L^T of the halves is that times A
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused

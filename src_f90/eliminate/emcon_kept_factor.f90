@@ -62,6 +62,7 @@ contains
          if (self%blocks%kind%choice /= choice) call blocks_free(self%blocks)
       end if
       call solver_create(choice, matrix_definite, self%blocks%kind, given)
+      self%blocks%may_be_rough = .true.
       call kept_factor_forget(self)
    end subroutine kept_factor_set_up
 

@@ -16,6 +16,7 @@ program main
    use test_diagonal_blocks, only : collect_diagonal_blocks
    use test_kept_factor, only : collect_kept_factor
    use test_cholmod, only : collect_cholmod
+   use test_supernodal, only : collect_supernodal
 #endif
    use test_constraints, only : collect_constraints
    use test_correction, only : collect_correction
@@ -118,6 +119,7 @@ program main
    call run("diagonal_blocks", collect_diagonal_blocks)
    call run("kept_factor", collect_kept_factor)
    call run("cholmod", collect_cholmod)
+   call run("supernodal", collect_supernodal)
 #endif
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)

@@ -1,0 +1,274 @@
+!> Substitution with a factor of dense blocks: each half alone, and for sparse right-hand sides.
+!>
+!> Numbers of single precision are taken in double; sums run over eight lanes in a fixed order.
+module emcon_supernodal_solve
+   use, intrinsic :: iso_fortran_env, only : sp => real32
+   use emcon_csr, only : csr_t
+   use emcon_kinds, only : dp
+   use emcon_supernodal_factor, only : supernodal_factor_t
+   use emcon_supernodes, only : n_lane, n_side, supernodes_t
+   implicit none
+   private
+   public :: supernodal_forward, supernodal_backward, supernodal_reach, supernodal_error
+
+contains
+
+   !> y = L^-1 y
+   pure subroutine supernodal_forward(self, nodes, y)
+      type(supernodal_factor_t), intent(in) :: self
+      type(supernodes_t), intent(in) :: nodes
+      real(dp), intent(inout), contiguous :: y(:)      !! (n)
+      real(dp) :: t(nodes%widest + n_lane)
+      integer :: s
+
+      do s = 1, nodes%n_node
+         call forward_node(self, nodes, s, y, t)
+      end do
+   end subroutine supernodal_forward
+
+   !> The part of node `s`.
+   pure subroutine forward_node(self, nodes, s, y, t)
+      type(supernodal_factor_t), intent(in) :: self
+      type(supernodes_t), intent(in) :: nodes
+      integer, intent(in) :: s
+      real(dp), intent(inout), contiguous :: y(:)      !! (n)
+      real(dp), intent(out), contiguous :: t(:)        !! work space
+      integer :: i, m, n, n_lanes, at
+
+      n = nodes%first(s + 1) - nodes%first(s)
+      m = nodes%row_start(s + 1) - nodes%row_start(s) - n
+      n_lanes = (m + n_lane - 1)/n_lane
+      call forward_triangle(n, self%value(nodes%value_start(s) + 1:), y(nodes%first(s) + 1:))
+      if (m == 0) return
+      call multiply(n_lanes, n, self%value(nodes%value_start(s) + n*(n + 1)/2 + 1:), &
+         y(nodes%first(s) + 1:), t)
+      at = nodes%row_start(s) + n
+      do i = 1, m
+         y(nodes%row(at + i)) = y(nodes%row(at + i)) - t(i)
+      end do
+   end subroutine forward_node
+
+   !> x = M x with a packed triangle.
+   pure subroutine forward_triangle(n, m, x)
+      integer, intent(in) :: n
+      real(sp), intent(in) :: m(*)
+      real(dp), intent(inout) :: x(n)
+      integer :: i, j, k
+
+      k = n*(n + 1)/2
+      do j = n, 1, -1
+         k = k - (n - j + 1)
+         do i = j + 1, n
+            x(i) = x(i) + m(k + 1 + i - j)*x(j)
+         end do
+         x(j) = m(k + 1)*x(j)
+      end do
+   end subroutine forward_triangle
+
+   !> t = B x
+   pure subroutine multiply(n_lanes, n, b, x, t)
+      integer, intent(in) :: n_lanes, n
+      real(sp), intent(in) :: b(*)
+      real(dp), intent(in) :: x(n)
+      real(dp), intent(out) :: t(n_lane, n_lanes)
+      integer :: j, k
+
+      t = 0.0_dp
+      k = 0
+      do j = 1, n - n_side + 1, n_side
+         call add_side(n_lanes, b(k + 1), x(j), t)
+         k = k + n_side*n_lane*n_lanes
+      end do
+      j = modulo(n, n_side)
+      if (j > 0) call add_columns(n_lanes, j, b(k + 1), x(n - j + 1), t)
+   end subroutine multiply
+
+   !> t = t + B x for `n_side` columns.
+   pure subroutine add_side(n_lanes, b, x, t)
+      integer, intent(in) :: n_lanes
+      real(sp), intent(in) :: b(n_lane, n_side, n_lanes)
+      real(dp), intent(in) :: x(n_side)
+      real(dp), intent(inout) :: t(n_lane, n_lanes)
+      integer :: i, k
+
+      do k = 1, n_lanes
+         do i = 1, n_lane
+            t(i, k) = t(i, k) + ((b(i, 1, k)*x(1) + b(i, 2, k)*x(2)) &
+               + (b(i, 3, k)*x(3) + b(i, 4, k)*x(4)))
+         end do
+      end do
+   end subroutine add_side
+
+   !> t = t + B x for the `n` columns that are left.
+   pure subroutine add_columns(n_lanes, n, b, x, t)
+      integer, intent(in) :: n_lanes, n
+      real(sp), intent(in) :: b(n_lane, n, n_lanes)
+      real(dp), intent(in) :: x(n)
+      real(dp), intent(inout) :: t(n_lane, n_lanes)
+      integer :: i, j, k
+
+      do k = 1, n_lanes
+         do j = 1, n
+            do i = 1, n_lane
+               t(i, k) = t(i, k) + b(i, j, k)*x(j)
+            end do
+         end do
+      end do
+   end subroutine add_columns
+
+   !> y = L^-T y
+   pure subroutine supernodal_backward(self, nodes, y)
+      type(supernodal_factor_t), intent(in) :: self
+      type(supernodes_t), intent(in) :: nodes
+      real(dp), intent(inout), contiguous :: y(:)      !! (n)
+      real(dp) :: t(nodes%widest + n_lane)
+      integer :: s, i, m, n, at
+
+      do s = nodes%n_node, 1, -1
+         n = nodes%first(s + 1) - nodes%first(s)
+         at = nodes%row_start(s) + n
+         m = nodes%row_start(s + 1) - at
+         do i = 1, m
+            t(i) = y(nodes%row(at + i))
+         end do
+         t(m + 1:m + n_lane - 1) = 0.0_dp
+         call subtract_products((m + n_lane - 1)/n_lane, n, &
+            self%value(nodes%value_start(s) + n*(n + 1)/2 + 1:), t, y(nodes%first(s) + 1:))
+         call backward_triangle(n, self%value(nodes%value_start(s) + 1:), y(nodes%first(s) + 1:))
+      end do
+   end subroutine supernodal_backward
+
+   !> x = x - B^T t, backwards through memory.
+   pure subroutine subtract_products(n_lanes, n, b, t, x)
+      integer, intent(in) :: n_lanes, n
+      real(sp), intent(in) :: b(*)
+      real(dp), intent(in) :: t(n_lane, n_lanes)
+      real(dp), intent(inout) :: x(n)
+      integer :: j, k
+
+      k = n*n_lane*n_lanes
+      j = modulo(n, n_side)
+      if (j > 0) then
+         k = k - j*n_lane*n_lanes
+         call subtract_columns(n_lanes, j, b(k + 1), t, x(n - j + 1))
+      end if
+      do j = n - j - n_side + 1, 1, -n_side
+         k = k - n_side*n_lane*n_lanes
+         call subtract_side(n_lanes, b(k + 1), t, x(j))
+      end do
+   end subroutine subtract_products
+
+   !> x = x - B^T t for `n_side` columns.
+   pure subroutine subtract_side(n_lanes, b, t, x)
+      integer, intent(in) :: n_lanes
+      real(sp), intent(in) :: b(n_lane, n_side, n_lanes)
+      real(dp), intent(in) :: t(n_lane, n_lanes)
+      real(dp), intent(inout) :: x(n_side)
+      real(dp) :: part(n_lane, n_side)
+      integer :: i, k
+
+      part = 0.0_dp
+      do k = n_lanes, 1, -1
+         do i = 1, n_lane
+            part(i, 1) = part(i, 1) + b(i, 1, k)*t(i, k)
+            part(i, 2) = part(i, 2) + b(i, 2, k)*t(i, k)
+            part(i, 3) = part(i, 3) + b(i, 3, k)*t(i, k)
+            part(i, 4) = part(i, 4) + b(i, 4, k)*t(i, k)
+         end do
+      end do
+      do i = 1, n_side
+         x(i) = x(i) - sum(part(:n_lane/2, i) + part(n_lane/2 + 1:, i))
+      end do
+   end subroutine subtract_side
+
+   !> x = x - B^T t for the `n` columns that are left.
+   pure subroutine subtract_columns(n_lanes, n, b, t, x)
+      integer, intent(in) :: n_lanes, n
+      real(sp), intent(in) :: b(n_lane, n, n_lanes)
+      real(dp), intent(in) :: t(n_lane, n_lanes)
+      real(dp), intent(inout) :: x(n)
+      real(dp) :: part(n_lane)
+      integer :: i, j, k
+
+      do j = 1, n
+         part = 0.0_dp
+         do k = n_lanes, 1, -1
+            do i = 1, n_lane
+               part(i) = part(i) + b(i, j, k)*t(i, k)
+            end do
+         end do
+         x(j) = x(j) - sum(part(:n_lane/2) + part(n_lane/2 + 1:))
+      end do
+   end subroutine subtract_columns
+
+   !> x = M^T x with a packed triangle.
+   pure subroutine backward_triangle(n, m, x)
+      integer, intent(in) :: n
+      real(sp), intent(in) :: m(*)
+      real(dp), intent(inout) :: x(n)
+      real(dp) :: total
+      integer :: i, j, k
+
+      k = 0
+      do j = 1, n
+         total = m(k + 1)*x(j)
+         do i = j + 1, n
+            total = total + m(k + 1 + i - j)*x(i)
+         end do
+         x(j) = total
+         k = k + n - j + 1
+      end do
+   end subroutine backward_triangle
+
+   !> L^-1 of a sparse right-hand side: what of it is not zero, column by column of the nodes on the
+   !> ways from its entries to the roots.
+   pure subroutine supernodal_reach(self, nodes, column, value, n_reached, index, x, y)
+      type(supernodal_factor_t), intent(in) :: self
+      type(supernodes_t), intent(in) :: nodes
+      integer, intent(in), contiguous :: column(:)     !! (m) columns of the entries
+      real(dp), intent(in), contiguous :: value(:)     !! (m)
+      integer, intent(out) :: n_reached
+      integer, intent(inout), contiguous :: index(:)   !! (n) columns of the solution, from 0
+      real(dp), intent(inout), contiguous :: x(:)      !! (n) and values, the first n_reached
+      real(dp), intent(inout), contiguous :: y(:)      !! (n) zeros
+      real(dp) :: t(nodes%widest + n_lane)
+      integer :: at(size(column)), s, j, k
+
+      n_reached = 0
+      do k = 1, size(column)
+         at(k) = nodes%of(column(k))
+         y(column(k)) = value(k)
+      end do
+      do
+         s = minval(at, mask=at > 0)
+         if (s > nodes%n_node) return
+         call forward_node(self, nodes, s, y, t)
+         do j = nodes%first(s) + 1, nodes%first(s + 1)
+            n_reached = n_reached + 1
+            index(n_reached) = j - 1
+            x(n_reached) = y(j)
+            y(j) = 0.0_dp
+         end do
+         where (at == s) at = nodes%parent(s)
+      end do
+   end subroutine supernodal_reach
+
+   !> The largest error of L^-T L^-1 A x for x = 1 everywhere: a motion of a body as a whole, which
+   !> has the smallest forces of all, is what is lost first.
+   pure real(dp) function supernodal_error(self, nodes, matrix)
+      type(supernodal_factor_t), intent(in) :: self
+      type(supernodes_t), intent(in) :: nodes
+      type(csr_t), intent(in) :: matrix
+      real(dp) :: y(nodes%n)
+      integer :: i
+
+      do i = 1, nodes%n
+         y(nodes%place(i)) = sum(matrix%value(matrix%row_start(i) + 1:matrix%row_start(i + 1)))
+      end do
+      call supernodal_forward(self, nodes, y)
+      call supernodal_backward(self, nodes, y)
+      supernodal_error = huge(supernodal_error)
+      if (all(y == y)) supernodal_error = maxval(abs(y - 1.0_dp))
+   end function supernodal_error
+
+end module emcon_supernodal_solve

@@ -1,0 +1,225 @@
+!> Rough factors by dense blocks: what they solve, sparse right-hand sides, units, and matrices that
+!> ask for more digits.
+module test_supernodal
+   use check, only : check_near, check_true, test_case_t
+   use emcon_cholmod, only : cholmod_t
+   use emcon_csr, only : csr_find, csr_multiply, csr_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_sparse_solver, only : matrix_definite
+   use sparse_samples, only : quad_mesh_matrix
+   implicit none
+   private
+   public :: collect_supernodal
+
+   !> A mesh whose factor has long enough columns.
+   integer, parameter :: n_x = 60, n_y = 60, n = 2*(n_x + 1)*(n_y + 1)
+   !> Round-off of a factorisation, for matrices whose condition is below 1e4.
+   real(wp), parameter :: tol = 1.0e4_wp*max(real(epsilon(1.0_dp), wp), epsilon(1.0_wp))
+   real(wp), parameter :: rough_tol = 1.0e4_wp*epsilon(1.0)
+
+contains
+
+   subroutine collect_supernodal(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("both halves solve", test_solve), &
+         test_case_t("a sparse right-hand side has the bits of a full one", test_reach), &
+         test_case_t("powers of two keep the bits", test_powers_of_two), &
+         test_case_t("short columns have no blocks", test_small), &
+         test_case_t("a large condition asks for all digits", test_condition), &
+         test_case_t("so do numbers out of range", test_range), &
+         test_case_t("not positive definite", test_indefinite)]
+   end subroutine collect_supernodal
+
+   subroutine test_solve(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(cholmod_t) :: solver
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (.not. allocated(error)) call prepare(solver, a, error)
+      if (allocated(error)) return
+      call check_true(error, solver%is_rough, "the factors are rough")
+      if (.not. allocated(error)) call check_solution(solver, a, rough_tol, error)
+      call solver%free()
+   end subroutine test_solve
+
+   subroutine test_reach(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: column(3) = [17, n/2, n/2 + 3]
+      type(csr_t) :: a
+      type(cholmod_t) :: solver
+      real(dp) :: value(3), b(n), x(n), y(n), part(n)
+      integer :: index(n), m, i_time
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (.not. allocated(error)) call prepare(solver, a, error)
+      if (allocated(error)) return
+      do i_time = 1, 2
+         call random_number(value)
+         b = 0.0_dp
+         b(column + 1) = value
+         call solver%solve_half(.false., b, y, error)
+         if (.not. allocated(error)) call solver%reach_half(column, value, m, index, part, error)
+         if (allocated(error)) return
+         x = 0.0_dp
+         x(index(:m) + 1) = part(:m)
+         call check_near(error, real(x, wp), real(y, wp), 0.0_wp, 1.0_wp, "L^-1 P b")
+         if (.not. allocated(error)) call check_true(error, m < n/4, "most of it is zero")
+         if (allocated(error)) return
+      end do
+      call solver%free()
+   end subroutine test_reach
+
+   subroutine test_powers_of_two(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: powers(4) = [-600, -60, 37, 600]
+      type(csr_t) :: a, scaled
+      type(cholmod_t) :: solver
+      real(dp) :: b(n), x(n), y(n)
+      integer :: i_power
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (.not. allocated(error)) call prepare(solver, a, error)
+      if (allocated(error)) return
+      call random_number(b)
+      call solve(solver, b, x, error)
+      if (allocated(error)) return
+      scaled = a
+      do i_power = 1, size(powers)
+         scaled%value = scale(a%value, powers(i_power))
+         call prepare(solver, scaled, error)
+         if (.not. allocated(error)) call solve(solver, b, y, error)
+         if (allocated(error)) return
+         call check_near(error, real(y, wp), real(x, wp), 0.0_wp, 1.0_wp, "x of 2^k A")
+         if (allocated(error)) return
+      end do
+      call solver%free()
+   end subroutine test_powers_of_two
+
+   subroutine test_small(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(cholmod_t) :: solver
+
+      call quad_mesh_matrix(10, 9, 0.0_dp, a, error)
+      if (.not. allocated(error)) call prepare(solver, a, error)
+      if (allocated(error)) return
+      call check_true(error, .not. solver%is_rough, "the factors are not rough")
+      if (.not. allocated(error)) call check_solution(solver, a, tol, error)
+      call solver%free()
+   end subroutine test_small
+
+   !> Off the diagonal -1, rows that sum to 1e-9 of what they have: a condition of 1e9 at least,
+   !> which double precision bears. Then rows whose sums are larger.
+   subroutine test_condition(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(dp), parameter :: rest = 1.0e-9_dp
+      type(csr_t) :: a
+      type(cholmod_t) :: solver
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (allocated(error)) return
+      call fill(a, rest)
+      call prepare(solver, a, error)
+      if (allocated(error)) return
+      call check_true(error, .not. solver%is_rough, "the factors are not rough")
+      if (.not. allocated(error)) call check_solution(solver, a, tol, error)
+      if (allocated(error)) return
+      call fill(a, 0.1_dp)
+      call prepare(solver, a, error)
+      if (allocated(error)) return
+      call check_true(error, solver%is_rough, "and then they are")
+      if (.not. allocated(error)) call check_solution(solver, a, rough_tol, error)
+      call solver%free()
+   end subroutine test_condition
+
+   !> One unknown is held by what squares to more than single precision has.
+   subroutine test_range(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(cholmod_t) :: solver
+      integer :: slot
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (allocated(error)) return
+      slot = csr_find(a, 9, 9)
+      a%value(slot) = scale(a%value(slot), 70)
+      call prepare(solver, a, error)
+      if (allocated(error)) return
+      call check_true(error, .not. (solver%is_rough .or. solver%is_singular), "all digits")
+      if (.not. allocated(error)) call check_solution(solver, a, tol, error)
+      call solver%free()
+   end subroutine test_range
+
+   subroutine test_indefinite(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(cholmod_t) :: solver
+
+      call quad_mesh_matrix(n_x, n_y, 0.0_dp, a, error)
+      if (allocated(error)) return
+      a%value(csr_find(a, n, n)) = -1.0_dp
+      call prepare(solver, a, error)
+      if (allocated(error)) return
+      call check_true(error, solver%is_singular, "found not positive definite")
+      call solver%free()
+   end subroutine test_indefinite
+
+   !> -1 off the diagonal; rows sum to `rest` times their number of entries.
+   pure subroutine fill(a, rest)
+      type(csr_t), intent(inout) :: a
+      real(dp), intent(in) :: rest
+      integer :: i
+
+      a%value = -1.0_dp
+      do i = 1, a%n_row
+         a%value(csr_find(a, i, i)) = (1.0_dp + rest)*(a%row_start(i + 1) - a%row_start(i)) - 1.0_dp
+      end do
+   end subroutine fill
+
+   !> A x = b, for random b.
+   subroutine check_solution(solver, a, allowed, error)
+      type(cholmod_t), intent(inout) :: solver
+      type(csr_t), intent(in) :: a
+      real(wp), intent(in) :: allowed            !! of the largest x
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp) :: b(n), x(n)
+      real(wp) :: y(n)
+
+      call random_number(b(:a%n_row))
+      call solve(solver, b(:a%n_row), x(:a%n_row), error)
+      if (allocated(error)) return
+      call csr_multiply(a, real(x(:a%n_row), wp), y(:a%n_row))
+      y(:a%n_row) = real(solver%half_scale, wp)*y(:a%n_row)
+      call check_near(error, y(:a%n_row), real(b(:a%n_row), wp), allowed, &
+         1.0_wp + maxval(real(abs(x(:a%n_row)), wp)), "A x")
+   end subroutine check_solution
+
+   subroutine prepare(solver, a, error)
+      type(cholmod_t), intent(inout) :: solver
+      type(csr_t), intent(in) :: a
+      type(error_t), allocatable, intent(out) :: error
+
+      solver%symmetry = matrix_definite
+      solver%needs_halves = .true.
+      solver%may_be_rough = .true.
+      call solver%analyse(a, error)
+      if (.not. allocated(error)) call solver%factorise(a%value, error)
+   end subroutine prepare
+
+   !> By both halves.
+   subroutine solve(solver, b, x, error)
+      type(cholmod_t), intent(inout) :: solver
+      real(dp), intent(in), contiguous :: b(:)
+      real(dp), intent(inout), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: y(size(b))
+
+      call solver%solve_half(.false., b, y, error)
+      if (.not. allocated(error)) call solver%solve_half(.true., y, x, error)
+   end subroutine solve
+
+end module test_supernodal
