@@ -39,7 +39,6 @@ module emcon_cholmod
       logical :: is_rough = .false.                          !! the last factors have halves alone
       type(supernodes_t), private :: nodes                   !! none: only factors of CHOLMOD
       type(supernodal_factor_t), private :: rough
-      real(dp), allocatable, private :: zero(:)              !! (n) zeros between calls
       logical, private :: is_factorised = .false.
       type(c_ptr), private :: handle = c_null_ptr
    contains
@@ -121,13 +120,14 @@ module emcon_cholmod
          real(c_double) :: density
       end function emcon_cholmod_density
 
-      function emcon_cholmod_nodes(handle, n, ap, ai, counts) result(status) bind(c)
+      function emcon_cholmod_nodes(handle, n, ap, ai, n_node, n_row) &
+         result(status) bind(c)
          import :: c_int, c_ptr
          implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
-         integer(c_int), intent(inout) :: counts(*)
+         integer(c_int), intent(inout) :: n_node, n_row
          integer(c_int) :: status
       end function emcon_cholmod_nodes
 
@@ -182,18 +182,16 @@ contains
       class(cholmod_t), intent(inout) :: self
       integer(c_int), intent(out) :: status
       integer, allocatable :: order(:), first(:), row_start(:), row(:)
-      integer(c_int) :: counts(2)
+      integer(c_int) :: n_node, n_row
 
       associate (a => self%scaled)
          status = emcon_cholmod_nodes(self%handle, int(a%n_row, c_int), a%row_start, a%column, &
-            counts)
+            n_node, n_row)
          if (status /= cholmod_ok) return
-         allocate(order(a%n_row), first(counts(1) + 1), row_start(counts(1) + 1), row(counts(2)), &
-            source=0)
+         allocate(order(a%n_row), first(n_node + 1), row_start(n_node + 1), row(n_row), source=0)
          call emcon_cholmod_take_nodes(self%handle, order, first, row_start, row)
          call supernodes_init(self%nodes, a, order, first, row_start, row)
          if (.not. supernodes_is_stack(self%nodes)) self%nodes = supernodes_t()
-         allocate(self%zero(a%n_row), source=0.0_dp)
       end associate
    end subroutine find_nodes
 
@@ -319,7 +317,7 @@ contains
 
       if (self%is_rough) then
          call supernodal_reach(self%rough, self%nodes, self%nodes%place(column + 1), value, &
-            n_reached, index, x, self%zero)
+            n_reached, index, x)
          return
       end if
       call blas_enter(fp_status)
@@ -337,7 +335,6 @@ contains
       call emcon_cholmod_free(self%handle)
       self%handle = c_null_ptr
       if (allocated(self%rhs)) deallocate(self%rhs, self%x)
-      if (allocated(self%zero)) deallocate(self%zero)
       call supernodal_free(self%rough)
       self%nodes = supernodes_t()
       self%is_rough = .false.

@@ -64,9 +64,9 @@ double emcon_cholmod_density(void *handle)
    return h->c.lnz > 0 ? h->c.fl/h->c.lnz : 0;
 }
 
-/* The pattern of the factor in the same order, by columns that are taken together: in `counts` how
-   many of these nodes there are, and rows of all of them. */
-int emcon_cholmod_nodes(void *handle, int n, int *ap, int *ai, int *counts)
+/* The pattern of the factor in the same order, by columns that are taken together: how many of these
+   nodes there are, and rows of all of them. */
+int emcon_cholmod_nodes(void *handle, int n, int *ap, int *ai, int *n_node, int *n_row)
 {
    emcon_cholmod_t *h = handle;
    cholmod_sparse a = view(n, ap, ai, NULL);
@@ -82,8 +82,8 @@ int emcon_cholmod_nodes(void *handle, int n, int *ap, int *ai, int *counts)
    h->c.nmethods = n_methods;
    h->c.method[0].ordering = ordering;
    if (status != CHOLMOD_OK) return status;
-   counts[0] = (int)h->nodes->nsuper;
-   counts[1] = (int)h->nodes->ssize;
+   *n_node = (int)h->nodes->nsuper;
+   *n_row = (int)h->nodes->ssize;
    return status;
 }
 

@@ -9,7 +9,7 @@ module emcon_supernodal_factor
       ieee_support_underflow_control
    use emcon_blas, only : blas_enter, blas_leave, ieee_status_type
    use emcon_kinds, only : dp, int64
-   use emcon_supernodes, only : n_lane, n_side, supernodes_t
+   use emcon_supernodes, only : n_lane, n_side, packed_size, supernodes_t
    implicit none
    private
    public :: supernodal_factor_t, supernodal_factorise, supernodal_free
@@ -23,6 +23,7 @@ module emcon_supernodal_factor
       real(sp), allocatable :: value(:)
       real(sp), allocatable :: front(:)          !! (widest**2) work space
       real(sp), allocatable :: stack(:)          !! (n_stacked) updates that wait
+      real(dp), allocatable :: zero(:)           !! (n) zeros between calls
    end type supernodal_factor_t
 
    interface
@@ -78,6 +79,7 @@ contains
       if (.not. is_definite) return
       if (.not. allocated(self%value)) allocate(self%value(nodes%value_start(nodes%n_node + 1)), &
          self%front(int(nodes%widest, int64)**2), self%stack(nodes%n_stacked))
+      if (.not. allocated(self%zero)) allocate(self%zero(nodes%n), source=0.0_dp)
       call blas_enter(status)
       is_gradual = .true.
       if (ieee_support_underflow_control(1.0_sp)) then
@@ -127,7 +129,7 @@ contains
    pure subroutine supernodal_free(self)
       type(supernodal_factor_t), intent(inout) :: self
 
-      if (allocated(self%value)) deallocate(self%value, self%front, self%stack)
+      if (allocated(self%value)) deallocate(self%value, self%front, self%stack, self%zero)
    end subroutine supernodal_free
 
    !> The entries of the matrix in the front of node `s`.
@@ -157,7 +159,7 @@ contains
 
       from = nodes%row_start(s) + nodes%first(s + 1) - nodes%first(s)
       m = nodes%row_start(s + 1) - from
-      top = top - int(m, int64)*(m + 1)/2
+      top = top - packed_size(m)
       call extend_add(n_row, m, nodes%above(from + 1:from + m), self%stack(top + 1:), self%front)
    end subroutine take_update
 

@@ -6,7 +6,7 @@ module emcon_supernodal_solve
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp
    use emcon_supernodal_factor, only : supernodal_factor_t
-   use emcon_supernodes, only : n_lane, n_side, supernodes_t
+   use emcon_supernodes, only : n_lane, n_side, packed_size, supernodes_t
    implicit none
    private
    public :: supernodal_forward, supernodal_backward, supernodal_reach, supernodal_error
@@ -22,13 +22,13 @@ contains
       integer :: s
 
       do s = 1, nodes%n_node
-         call forward_node(self, nodes, s, y, t)
+         call forward_node(self%value, nodes, s, y, t)
       end do
    end subroutine supernodal_forward
 
    !> The part of node `s`.
-   pure subroutine forward_node(self, nodes, s, y, t)
-      type(supernodal_factor_t), intent(in) :: self
+   pure subroutine forward_node(value, nodes, s, y, t)
+      real(sp), intent(in), contiguous :: value(:)     !! of the factor
       type(supernodes_t), intent(in) :: nodes
       integer, intent(in) :: s
       real(dp), intent(inout), contiguous :: y(:)      !! (n)
@@ -38,9 +38,9 @@ contains
       n = nodes%first(s + 1) - nodes%first(s)
       m = nodes%row_start(s + 1) - nodes%row_start(s) - n
       n_lanes = (m + n_lane - 1)/n_lane
-      call forward_triangle(n, self%value(nodes%value_start(s) + 1:), y(nodes%first(s) + 1:))
+      call forward_triangle(n, value(nodes%value_start(s) + 1:), y(nodes%first(s) + 1:))
       if (m == 0) return
-      call multiply(n_lanes, n, self%value(nodes%value_start(s) + n*(n + 1)/2 + 1:), &
+      call multiply(n_lanes, n, value(nodes%value_start(s) + packed_size(n) + 1:), &
          y(nodes%first(s) + 1:), t)
       at = nodes%row_start(s) + n
       do i = 1, m
@@ -55,7 +55,7 @@ contains
       real(dp), intent(inout) :: x(n)
       integer :: i, j, k
 
-      k = n*(n + 1)/2
+      k = int(packed_size(n))
       do j = n, 1, -1
          k = k - (n - j + 1)
          do i = j + 1, n
@@ -89,12 +89,13 @@ contains
       real(sp), intent(in) :: b(n_lane, n_side, n_lanes)
       real(dp), intent(in) :: x(n_side)
       real(dp), intent(inout) :: t(n_lane, n_lanes)
-      integer :: i, k
+      integer :: i, j, k
 
       do k = 1, n_lanes
-         do i = 1, n_lane
-            t(i, k) = t(i, k) + ((b(i, 1, k)*x(1) + b(i, 2, k)*x(2)) &
-               + (b(i, 3, k)*x(3) + b(i, 4, k)*x(4)))
+         do j = 1, n_side
+            do i = 1, n_lane
+               t(i, k) = t(i, k) + b(i, j, k)*x(j)
+            end do
          end do
       end do
    end subroutine add_side
@@ -133,7 +134,7 @@ contains
          end do
          t(m + 1:m + n_lane - 1) = 0.0_dp
          call subtract_products((m + n_lane - 1)/n_lane, n, &
-            self%value(nodes%value_start(s) + n*(n + 1)/2 + 1:), t, y(nodes%first(s) + 1:))
+            self%value(nodes%value_start(s) + packed_size(n) + 1:), t, y(nodes%first(s) + 1:))
          call backward_triangle(n, self%value(nodes%value_start(s) + 1:), y(nodes%first(s) + 1:))
       end do
    end subroutine supernodal_backward
@@ -165,21 +166,27 @@ contains
       real(dp), intent(in) :: t(n_lane, n_lanes)
       real(dp), intent(inout) :: x(n_side)
       real(dp) :: part(n_lane, n_side)
-      integer :: i, k
+      integer :: i, j, k
 
       part = 0.0_dp
       do k = n_lanes, 1, -1
-         do i = 1, n_lane
-            part(i, 1) = part(i, 1) + b(i, 1, k)*t(i, k)
-            part(i, 2) = part(i, 2) + b(i, 2, k)*t(i, k)
-            part(i, 3) = part(i, 3) + b(i, 3, k)*t(i, k)
-            part(i, 4) = part(i, 4) + b(i, 4, k)*t(i, k)
+         do j = 1, n_side
+            do i = 1, n_lane
+               part(i, j) = part(i, j) + b(i, j, k)*t(i, k)
+            end do
          end do
       end do
-      do i = 1, n_side
-         x(i) = x(i) - sum(part(:n_lane/2, i) + part(n_lane/2 + 1:, i))
+      do j = 1, n_side
+         x(j) = x(j) - sum_of(part(:, j))
       end do
    end subroutine subtract_side
+
+   !> The sum over lanes.
+   pure real(dp) function sum_of(part)
+      real(dp), intent(in) :: part(n_lane)
+
+      sum_of = sum(part(:n_lane/2) + part(n_lane/2 + 1:))
+   end function sum_of
 
    !> x = x - B^T t for the `n` columns that are left.
    pure subroutine subtract_columns(n_lanes, n, b, t, x)
@@ -197,7 +204,7 @@ contains
                part(i) = part(i) + b(i, j, k)*t(i, k)
             end do
          end do
-         x(j) = x(j) - sum(part(:n_lane/2) + part(n_lane/2 + 1:))
+         x(j) = x(j) - sum_of(part)
       end do
    end subroutine subtract_columns
 
@@ -222,32 +229,31 @@ contains
 
    !> L^-1 of a sparse right-hand side: what of it is not zero, column by column of the nodes on the
    !> ways from its entries to the roots.
-   pure subroutine supernodal_reach(self, nodes, column, value, n_reached, index, x, y)
-      type(supernodal_factor_t), intent(in) :: self
+   pure subroutine supernodal_reach(self, nodes, column, value, n_reached, index, x)
+      type(supernodal_factor_t), intent(inout) :: self
       type(supernodes_t), intent(in) :: nodes
       integer, intent(in), contiguous :: column(:)     !! (m) columns of the entries
       real(dp), intent(in), contiguous :: value(:)     !! (m)
       integer, intent(out) :: n_reached
       integer, intent(inout), contiguous :: index(:)   !! (n) columns of the solution, from 0
       real(dp), intent(inout), contiguous :: x(:)      !! (n) and values, the first n_reached
-      real(dp), intent(inout), contiguous :: y(:)      !! (n) zeros
       real(dp) :: t(nodes%widest + n_lane)
       integer :: at(size(column)), s, j, k
 
       n_reached = 0
       do k = 1, size(column)
          at(k) = nodes%of(column(k))
-         y(column(k)) = value(k)
+         self%zero(column(k)) = value(k)
       end do
       do
          s = minval(at, mask=at > 0)
          if (s > nodes%n_node) return
-         call forward_node(self, nodes, s, y, t)
+         call forward_node(self%value, nodes, s, self%zero, t)
          do j = nodes%first(s) + 1, nodes%first(s + 1)
             n_reached = n_reached + 1
             index(n_reached) = j - 1
-            x(n_reached) = y(j)
-            y(j) = 0.0_dp
+            x(n_reached) = self%zero(j)
+            self%zero(j) = 0.0_dp
          end do
          where (at == s) at = nodes%parent(s)
       end do

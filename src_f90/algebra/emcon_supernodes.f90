@@ -9,7 +9,8 @@ module emcon_supernodes
    use emcon_kinds, only : int64
    implicit none
    private
-   public :: supernodes_t, supernodes_init, supernodes_is_stack, n_lane, n_side
+   public :: supernodes_t, supernodes_init, supernodes_is_stack, packed_size, &
+      n_lane, n_side
 
    !> Of the block below a triangle so many rows, filled up by zeros, and columns are kept together.
    integer, parameter :: n_lane = 8, n_side = 4
@@ -66,11 +67,18 @@ contains
       call find_stack(self)
    end subroutine supernodes_init
 
+   !> Entries of a packed triangle: half of n (n + 1).
+   pure integer(int64) function packed_size(n)
+      integer, intent(in) :: n
+
+      packed_size = shiftr(int(n, int64)*(n + 1), 1)
+   end function packed_size
+
    !> Entries of a node: the packed lower triangle, and the block below it.
    pure integer(int64) function n_value(n_column, n_row)
       integer, intent(in) :: n_column, n_row
 
-      n_value = int(n_column, int64)*(n_column + 1)/2 &
+      n_value = packed_size(n_column) &
          + int(n_column, int64)*(n_lane*((n_row - n_column + n_lane - 1)/n_lane))
    end function n_value
 
@@ -149,10 +157,9 @@ contains
    pure integer(int64) function n_update(self, s)
       type(supernodes_t), intent(in) :: self
       integer, intent(in) :: s
-      integer(int64) :: m
 
-      m = self%row_start(s + 1) - self%row_start(s) - (self%first(s + 1) - self%first(s))
-      n_update = m*(m + 1)/2
+      n_update = packed_size(self%row_start(s + 1) - self%row_start(s) &
+         - (self%first(s + 1) - self%first(s)))
    end function n_update
 
    !> Do the nodes stand in an order in which updates can be stacked?

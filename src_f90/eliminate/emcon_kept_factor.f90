@@ -8,6 +8,7 @@
 !> which is zero only where residual and defects are: the age of L makes the way longer, not its
 !> end another one. Source: docs/theory.md, section 8.
 module emcon_kept_factor
+   use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, blocks_reach, &
@@ -199,33 +200,41 @@ contains
       type(kept_factor_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
-      integer :: i, j, k, n
+      integer :: k
 
       self%bend = 0.0_dp
       do k = set%n_linear + 1, set%n
-         associate (item => set%item(k))
-            n = size(item%g, 1)
-            do j = 1, item%n_node
-               if (.not. moves(item%node(j))) cycle
-               do i = 1, item%n_node
-                  if (moves(item%node(i))) self%bend(k) = max(self%bend(k), &
-                     real(maxval(abs(item%h(n*(i - 1) + 1:n*i, n*(j - 1) + 1:n*j))), dp))
-               end do
-            end do
-         end associate
+         self%bend(k) = bend_of(set%item(k), size(set%item(k)%g, 1)*set%item(k)%n_node, numbering)
       end do
-
-   contains
-
-      !> Does a node follow any unknown?
-      pure logical function moves(node)
-         integer, intent(in) :: node
-
-         moves = any(numbering%column(numbering%start(n*(node - 1) + 1) + 1: &
-            numbering%start(n*node + 1)) > 0)
-      end function moves
-
    end subroutine kept_factor_look
+
+   !> The largest second derivative of a constraint among the unknowns, but for what itself takes
+   !> up: forces along its gradient change its multiplier, and motions along it are none.
+   pure real(dp) function bend_of(item, n, numbering)
+      type(condition_t), intent(in) :: item
+      integer, intent(in) :: n                   !! coordinates of its nodes
+      type(numbering_t), intent(in) :: numbering
+      real(wp) :: h(n, n), g(n), c(n)
+      integer :: i, k, n_dim
+
+      n_dim = size(item%g, 1)
+      h = item%h(:n, :n)
+      g = reshape(item%g(:, :item%n_node), [n])
+      c = reshape(item%c(:, :item%n_node), [n])
+      do i = 1, n
+         k = n_dim*(item%node((i - 1)/n_dim + 1) - 1) + modulo(i - 1, n_dim) + 1
+         if (any(numbering%column(numbering%start(k) + 1:numbering%start(k + 1)) > 0)) cycle
+         h(i, :) = 0.0_wp
+         h(:, i) = 0.0_wp
+         g(i) = 0.0_wp
+         c(i) = 0.0_wp
+      end do
+      if (any(abs(g) > 0.0_wp)) g = g/norm2(g)
+      if (any(abs(c) > 0.0_wp)) c = c/norm2(c)
+      h = h - spread(g, 2, n)*spread(matmul(g, h), 1, n)
+      h = h - spread(matmul(h, c), 2, n)*spread(c, 1, n)
+      bend_of = real(maxval(abs(h)), dp)
+   end function bend_of
 
    !> Is what the factor does not know, the curvature of the constraints as last looked at, small
    !> beside it, by their present multipliers?

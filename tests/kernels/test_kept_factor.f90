@@ -24,7 +24,8 @@ contains
          test_case_t("no correction where nothing is left", test_fixed_point), &
          test_case_t("no factor of a pattern that is not symmetric", test_pattern), &
          test_case_t("no factor of what is not definite", test_indefinite), &
-         test_case_t("strong curvature is told", test_curvature)]
+         test_case_t("strong curvature is told", test_curvature), &
+         test_case_t("a constraint takes up what is along its gradients", test_along)]
    end subroutine collect_kept_factor
 
    !> [K, G^T; G, 0] [dq; -mu] = -[r; c] by LAPACK, with K = (N + N^T)/2.
@@ -128,6 +129,40 @@ contains
       call check_true(error, .not. kept_factor_serves(kept, problem%set, .false.), "far too large")
       call kept_factor_free(kept)
    end subroutine test_curvature
+
+   !> Forces along the discrete gradient, and what only a motion along the one at the end would see:
+   !> h = g a^T + b c^T, however large. One that is neither is told.
+   subroutine test_along(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      real(wp), allocatable :: g(:), c(:), a(:)
+      logical :: is_fit
+      integer :: i, k, n
+
+      call prepare(problem, kept, is_fit, error)
+      if (allocated(error)) return
+      problem%set%lam = 1.0e3_wp
+      do k = 1, problem%set%n
+         associate (item => problem%set%item(k))
+            n = size(item%g, 1)*item%n_node
+            g = reshape(item%g(:, :item%n_node), [n])
+            c = reshape(item%c(:, :item%n_node), [n])
+            a = [(sin(1.0_wp*(i + k)), i = 1, n)]
+            item%h(:n, :n) = spread(g, 2, n)*spread(a, 1, n) + spread(a, 2, n)*spread(c, 1, n)
+         end associate
+      end do
+      call kept_factor_look(kept, problem%set, problem%numbering)
+      call check_true(error, kept_factor_serves(kept, problem%set, .true.), "the constraints' own")
+      if (allocated(error)) return
+      associate (item => problem%set%item(1))
+         n = size(item%g, 1)*item%n_node
+         item%h(:n, :n) = transpose(item%h(:n, :n))
+      end associate
+      call kept_factor_look(kept, problem%set, problem%numbering)
+      call check_true(error, .not. kept_factor_serves(kept, problem%set, .true.), "across them")
+      call kept_factor_free(kept)
+   end subroutine test_along
 
    !> The factor of a problem, with its constraints.
    subroutine prepare(problem, kept, is_fit, error)

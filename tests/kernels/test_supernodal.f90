@@ -1,6 +1,7 @@
 !> Rough factors by dense blocks: what they solve, sparse right-hand sides, units, and matrices that
 !> ask for more digits.
 module test_supernodal
+   use, intrinsic :: iso_fortran_env, only : real32
    use check, only : check_near, check_true, test_case_t
    use emcon_cholmod, only : cholmod_t
    use emcon_csr, only : csr_find, csr_multiply, csr_t
@@ -16,7 +17,7 @@ module test_supernodal
    integer, parameter :: n_x = 60, n_y = 60, n = 2*(n_x + 1)*(n_y + 1)
    !> Round-off of a factorisation, for matrices whose condition is below 1e4.
    real(wp), parameter :: tol = 1.0e4_wp*max(real(epsilon(1.0_dp), wp), epsilon(1.0_wp))
-   real(wp), parameter :: rough_tol = 1.0e4_wp*epsilon(1.0)
+   real(wp), parameter :: rough_tol = 1.0e4_wp*epsilon(1.0_real32)
 
 contains
 
