@@ -265,9 +265,10 @@ contains
       type(supernodal_factor_t), intent(in) :: self
       type(supernodes_t), intent(in) :: nodes
       type(csr_t), intent(in) :: matrix
-      real(dp) :: y(nodes%n)
+      real(dp), allocatable :: y(:)              ! not on the stack of a thread
       integer :: i
 
+      allocate(y(nodes%n))
       do i = 1, nodes%n
          y(nodes%place(i)) = sum(matrix%value(matrix%row_start(i) + 1:matrix%row_start(i + 1)))
       end do
