@@ -56,6 +56,19 @@ def line_of(row, outcomes):
 
 
 HEAD = ("what", "tried", "holds", "largest figure", "else the program says", "limit")
+ILL_HEAD = ("what", "(6)", "(6), multipliers scaled", "(7)", "residual, at most")
+
+
+def ill_line_of(row, outcomes):
+    """Condition numbers where they are largest, each, and the largest residual of runs that hold."""
+    known = [(value, o.ill) for value, o in zip(row.values, outcomes, strict=True) if o.ill]
+    if not known:
+        return None
+    worst = [max(((ill[k], value) for value, ill in known), key=lambda pair: pair[0])
+             for k in range(3)]
+    residual = max((o.residual for o in outcomes if o.kind == HOLDS), default=float("nan"))
+    return (row.what, *(f"{figure:.0e} ({text_of(value)})" for figure, value in worst),
+            f"{residual:.0e}")
 
 
 def main():
@@ -65,22 +78,26 @@ def main():
     options = parser.parse_args()
     rows = [row for row in ROWS if not options.rows or row.name in options.rows]
     folder = folder_of_program()
-    lines, n_silent = [], 0
+    lines, ill_lines, n_silent = [], [], 0
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = [[pool.submit(run_case, row, value, folder) for value in row.values] for row in rows]
+        futures = [[pool.submit(run_case, row, value, folder, True) for value in row.values] for row in rows]
         for row, future in zip(rows, futures, strict=True):
             start = time.monotonic()
             outcomes = [f.result() for f in future]
             n_silent += sum(o.kind == SILENT for o in outcomes)
             lines.append(line_of(row, outcomes))
+            ill_lines += [line for line in [ill_line_of(row, outcomes)] if line]
             print(f"{row.name} ({time.monotonic() - start:.0f} s)", flush=True)
             for value, o in zip(row.values, outcomes, strict=True):
-                print(f"   {text_of(value):>14}  {o.kind:6}  {o.figure:.1e}  {o.text}", flush=True)
+                print(f"   {text_of(value):>14}  {o.kind:6}  {o.figure:.1e}  {o.text}"
+                      f"  {o.residual:.0e}  {' '.join(f'{c:.0e}' for c in o.ill or ())}", flush=True)
     if options.update:
         text = PAGE.read_text()
-        mark = re.compile(r"(<!-- extremes -->\n).*?(<!-- end -->)", re.DOTALL)
-        made = "\n".join(table(HEAD, lines))
-        PAGE.write_text(mark.sub(lambda match: match[1] + made + "\n" + match[2], text))
+        for name, head, rows in (("extremes", HEAD, lines), ("conditions", ILL_HEAD, ill_lines)):
+            mark = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+            made = "\n".join(table(head, rows))
+            text = mark.sub(lambda match, made=made: match[1] + made + "\n" + match[2], text)
+        PAGE.write_text(text)
     return n_silent
 
 

@@ -2,12 +2,16 @@
 
 import sys
 
+import numpy as np
 import pytest
-from scene_tools import ROOT
+from emcon import Stepper
+from scene_tools import EPSILON, ROOT
 
 sys.path[:0] = [str(ROOT / "tests" / "bench"), str(ROOT / "tests" / "scenes")]
 from extremes import ROWS, text_of  # noqa: E402
 from limits.common import HOLDS, SILENT, run_case  # noqa: E402
+from limits.conditions import condition, conditions, matrices  # noqa: E402
+from limits.impacts import NODES, stiffer  # noqa: E402
 
 CASES = [pytest.param(row, k, id=f"{row.name}-{text_of(row.values[k]).replace(' ', '-')}")
          for row in ROWS for k in row.tested()]
@@ -19,3 +23,44 @@ def test_holds_or_says_why_not(row, k, tmp_path):
     assert outcome.kind != SILENT, outcome
     assert k >= row.reach or outcome.kind == HOLDS, outcome
     assert outcome.kind == HOLDS or outcome.text, outcome
+
+
+# ---- condition numbers
+
+
+def test_the_estimate_is_near_the_condition_number():
+    """Of the inverse a lower bound, seldom below a third."""
+    random = np.random.default_rng(3)
+    for n in (1, 5, 40):
+        for spread in (0, 4, 8):
+            a = random.standard_normal((n, n))*10.0**random.uniform(-spread, 0, n)
+            exact = np.linalg.cond(a, 1)
+            assert exact/3 <= condition(a)*(1 + 1e-6) <= exact*(1 + 1e-3)
+    assert condition(np.array([[1.0, 2.0], [2.0, 4.0]])) == np.inf
+
+
+@pytest.mark.parametrize("ratio", [1, 1e6])
+def test_both_matrices_give_the_same_step(tmp_path, ratio):
+    """The saddle point solved by numpy, and du of (7), for a random residual, no gaps left."""
+    with Stepper(stiffer(ratio).write(tmp_path/"disc.inp"), **NODES) as stepper:
+        while not stepper.active.any():
+            made = stepper.step()
+        tangent, force, gap, p, df = (part.toarray() for part in matrices(stepper, made.h))
+    assert 0 < len(force) < len(tangent)
+    np.testing.assert_allclose(p.T @ force.T, 0, atol=16*EPSILON)
+    np.testing.assert_allclose(gap @ df, 0, atol=16*EPSILON)
+    n, unit = len(tangent), abs(np.diag(tangent)).max()
+    residual = np.random.default_rng(5).standard_normal(n)
+    saddle = np.block([[tangent, -unit*force.T], [unit*gap, np.zeros((len(gap), len(gap)))]])
+    step = np.linalg.solve(saddle, np.concatenate([-residual, np.zeros(len(gap))]))[:n]
+    other = df @ np.linalg.solve(p.T @ tangent @ df, -p.T @ residual)
+    bound = 16*EPSILON*np.linalg.cond(saddle)
+    np.testing.assert_allclose(other, step, rtol=0, atol=bound*np.abs(step).max())
+
+
+def test_the_null_space_has_the_smaller_condition(tmp_path):
+    """Both grow with the ratio of stiffness; the saddle point as printed by far the most."""
+    ill = [conditions(stiffer(ratio).write(tmp_path/"disc.inp"), NODES) for ratio in (1, 1e6)]
+    for saddle, scaled, reduced in ill:
+        assert 1 <= reduced < 1.1*scaled < scaled*100 < saddle
+    assert ill[1][2] > 1e3*ill[0][2]

@@ -14,6 +14,8 @@ import shutil
 import numpy as np
 from scene_tools import Deck, Run, emcon, overrides
 
+from .conditions import conditions
+
 HOLDS, TOLD, SILENT = "holds", "told", "silent"
 #: Of the largest energy or momentum: what the scheme promises.
 EXACT = 1e-10
@@ -51,11 +53,18 @@ class Row:
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """Of one run: how it ended, its figure (nan: there is none) and what the program said."""
+    """Of one run: how it ended, its figure (nan: there is none), what the program said, and the
+    largest residual that a solve was left with.
+
+    ill     condition numbers of an increment in contact, if asked for: of (6), of (6) with scaled
+            multipliers, of (7)
+    """
 
     kind: str
     figure: float
     text: str
+    residual: float = float("nan")
+    ill: tuple | None = None
 
 
 def shorter(text):
@@ -67,7 +76,26 @@ def shorter(text):
     return text.strip().splitlines()[0][:160] if text.strip() else ""
 
 
-def run_case(row, value, folder):
+#: A line of the log lists so many residuals of a solve, the first ones.
+LISTED = 15
+#: Tolerance of Newton's method.
+TOLERANCE = 1e-10
+
+
+def attained(run, verdict):
+    """What the relative residuals that solves of increments have ended with are at most.
+
+    Of a solve with more than the log lists the verdict tells what was above the tolerance.
+    """
+    made = re.compile(r"^ *\d+(?: +\S+){8}((?: +\d\.\dE[-+]\d+)+)$")
+    with open(run.file(".log")) as file:
+        lists = [found[1].split() for found in map(made.match, file) if found]
+    beyond = max(TOLERANCE, verdict.get("unconverged", 0.0))
+    return max((beyond if len(listed) == LISTED else float(listed[-1]) for listed in lists),
+               default=float("nan"))
+
+
+def run_case(row, value, folder, with_conditions=False):
     """Run a value of a row; an earlier outcome of the same deck and program is taken as it is."""
     deck = row.deck(value)
     key = hashlib.sha256(json.dumps([deck.text(), str(row.parameters)]).encode()).hexdigest()[:16]
@@ -92,7 +120,11 @@ def run_case(row, value, folder):
         kind, text = TOLD, re.search(row.warns, run.log)[0]
     else:
         kind, text = SILENT, ""
-    outcome = Outcome(kind, figure, text)
+    residual = attained(run, verdict) if run.file(".log").exists() else float("nan")
+    ill = None
+    if with_conditions and done.returncode == 0:
+        ill = conditions(place / "deck.inp", row.parameters)
+    outcome = Outcome(kind, figure, text, residual, ill)
     shutil.rmtree(place)
     kept.write_text(json.dumps(dataclasses.asdict(outcome)))
     return outcome
