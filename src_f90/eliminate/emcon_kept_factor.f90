@@ -48,7 +48,7 @@ module emcon_kept_factor
       real(dp), allocatable, private :: l(:, :)      !! (n, n) Cholesky factor of W^T W
       real(dp), allocatable, private :: y(:), x(:)   !! (n_unknown)
       real(dp), allocatable, private :: mu(:)        !! (n)
-      real(dp), allocatable, private :: bend(:)      !! (n) largest second derivative of each [1/L]
+      real(dp), allocatable, private :: bend(:)      !! (n) of each, per multiplier [T^2/(M L)]
    end type kept_factor_t
 
 contains
@@ -204,37 +204,48 @@ contains
 
       self%bend = 0.0_dp
       do k = set%n_linear + 1, set%n
-         self%bend(k) = bend_of(set%item(k), size(set%item(k)%g, 1)*set%item(k)%n_node, numbering)
+         self%bend(k) = bend_of(self, set%item(k), size(set%item(k)%g, 1)*set%item(k)%n_node, &
+            numbering)
       end do
    end subroutine kept_factor_look
 
-   !> The largest second derivative of a constraint among the unknowns, but for what itself takes
-   !> up: forces along its gradient change its multiplier, and motions along it are none.
-   pure real(dp) function bend_of(item, n, numbering)
+   !> The largest second derivative of a constraint among the unknowns, beside the stiffness of both
+   !> that it joins, but for what the constraint itself takes up: forces along its gradient change
+   !> its multiplier, and motions along it are none.
+   pure real(dp) function bend_of(self, item, n, numbering)
+      type(kept_factor_t), intent(in) :: self
       type(condition_t), intent(in) :: item
       integer, intent(in) :: n                   !! coordinates of its nodes
       type(numbering_t), intent(in) :: numbering
-      real(wp) :: h(n, n), g(n), c(n)
+      real(dp) :: h(n, n), g(n), c(n), soft(n)
       integer :: i, k, n_dim
 
       n_dim = size(item%g, 1)
-      h = item%h(:n, :n)
-      g = reshape(item%g(:, :item%n_node), [n])
-      c = reshape(item%c(:, :item%n_node), [n])
+      h = real(item%h(:n, :n), dp)
+      g = real(reshape(item%g(:, :item%n_node), [n]), dp)
+      c = real(reshape(item%c(:, :item%n_node), [n]), dp)
       do i = 1, n
          k = n_dim*(item%node((i - 1)/n_dim + 1) - 1) + modulo(i - 1, n_dim) + 1
-         if (any(numbering%column(numbering%start(k) + 1:numbering%start(k + 1)) > 0)) cycle
-         h(i, :) = 0.0_wp
-         h(:, i) = 0.0_wp
-         g(i) = 0.0_wp
-         c(i) = 0.0_wp
+         soft(i) = softness(self, numbering%column(numbering%start(k) + 1:numbering%start(k + 1)))
       end do
-      if (any(abs(g) > 0.0_wp)) g = g/norm2(g)
-      if (any(abs(c) > 0.0_wp)) c = c/norm2(c)
-      h = h - spread(g, 2, n)*spread(matmul(g, h), 1, n)
-      h = h - spread(matmul(h, c), 2, n)*spread(c, 1, n)
-      bend_of = real(maxval(abs(h)), dp)
+      if (any(soft*abs(g) > 0.0_dp)) h = h - spread(g, 2, n) &
+         *spread(matmul(soft*g, h)/dot_product(soft*g, g), 1, n)
+      if (any(soft*abs(c) > 0.0_dp)) h = h - spread(matmul(h, soft*c) &
+         /dot_product(soft*c, c), 2, n)*spread(c, 1, n)
+      bend_of = sqrt(maxval(h*h*spread(soft, 2, n)*spread(soft, 1, n)))
    end function bend_of
+
+   !> One over the stiffness of the softest unknown that a coordinate follows; 0 if it follows none.
+   pure real(dp) function softness(self, unknown)
+      type(kept_factor_t), intent(in) :: self
+      integer, intent(in) :: unknown(:)          !! <= 0: none
+      integer :: i
+
+      softness = 0.0_dp
+      do i = 1, size(unknown)
+         if (unknown(i) > 0) softness = max(softness, 1.0_dp/self%diagonal(unknown(i)))
+      end do
+   end function softness
 
    !> Is what the factor does not know, the curvature of the constraints as last looked at, small
    !> beside it, by their present multipliers?
@@ -242,17 +253,13 @@ contains
       type(kept_factor_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: is_near             !! the multipliers are about those of the solution
-      real(dp) :: curved, most
+      real(dp) :: most
       integer :: k
 
       kept_factor_serves = .true.
       most = merge(most_curved, most_curved_far, is_near)
       do k = set%n_linear + 1, set%n
-         associate (rows => set%force_rows)
-            curved = real(abs(set%lam(k)), dp)*self%bend(k)
-            if (any(curved > most*self%diagonal(rows%column(rows%row_start(k) + 1: &
-               rows%row_start(k + 1)) + 1))) kept_factor_serves = .false.
-         end associate
+         if (real(abs(set%lam(k)), dp)*self%bend(k) > most) kept_factor_serves = .false.
       end do
    end function kept_factor_serves
 
