@@ -141,7 +141,10 @@ contains
          if (.not. allocated(error)) call evaluate_damped(self, system, set, motion, &
             .not. self%correction%kept%is_made, status, error)
          if (allocated(error)) return
-         if (status /= newton_converged) exit
+         if (status /= newton_converged) then
+            if (self%n_solve == 0) return        ! Newton's method finds no forces there either
+            exit
+         end if
          call measure(self, system, set, norm, defect, is_rounding)
          if (self%correction%n_redundant > 0) status = newton_redundant
          if (status /= newton_converged) return

@@ -43,3 +43,11 @@ def test_without_polish_it_ends_at_the_tolerance(tmp_path, kind):
               for run in (rough, fine)]
     assert errors[1] < 16*EPSILON*n < errors[0] < tolerance*n
     assert "corrections end where the residual is within 1.00000E-08" in rough.log
+
+
+def test_a_guess_without_forces_leaves_the_factor(tmp_path):
+    """In long increments elements are turned inside out on the way of the velocities: the step
+    begins from rest, and the factor of those before serves on."""
+    kept = run("ring.inp", "KEPT", tmp_path, h=0.16, t_end=3.2)
+    counts = kept.verdict["counts"]
+    assert max(counts["factorisations"], counts["tangents"]) < kept.verdict["increments"]
