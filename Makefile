@@ -319,6 +319,8 @@ trade: .venv/test.stamp  ## write the tables and the figure of docs/trade.md ane
 	$(BUILDING) app
 	$(PY) tests/bench/trade.py --update
 	$(PY) tests/bench/trade_knobs.py --update
+	$(PY) tests/bench/trade_first.py --update
+	$(PY) tests/bench/trade_studies.py --update
 
 extremes: .venv/test.stamp  ## drive everything to its extremes; write the table of docs/stability.md anew
 	$(BUILDING) app

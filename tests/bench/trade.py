@@ -58,8 +58,8 @@ def simplified(deck, body, kind):
     return deck
 
 
-def ring(kind):
-    deck = Deck.read(DECKS / "ring.inp")
+def ring(kind, path=DECKS / "ring.inp"):
+    deck = Deck.read(path)
     if kind not in ("rigid", PROFILE):
         return simplified(deck, "BLOCK", kind)
     body = rigid("BLOCK", (0, -5), True)

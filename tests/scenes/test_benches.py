@@ -1,5 +1,6 @@
 """The benches, the book's generator and the generators of decks run: in short forms."""
 
+import re
 import subprocess
 import sys
 
@@ -10,6 +11,8 @@ BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
 
 import bench_targets  # noqa: E402
+import trade_first  # noqa: E402
+import trade_studies  # noqa: E402
 from bench_counts import rises  # noqa: E402
 from floors import factor_columns  # noqa: E402
 from peers.ring import ring_of  # noqa: E402
@@ -81,6 +84,50 @@ def test_table_of_simplifications():
     lines = run(BENCH / "trade.py", "--rounds", "1", "gears").splitlines()
     assert len(lines) == 8 and all(line.count("|") == 11 for line in lines)
     assert all("e-1" in line for line in lines[2:])                 # the balances close
+
+
+def test_table_of_first_contact(tmp_path, monkeypatch):
+    """A row of docs/trade.md: both treatments, three increments; what is there is not run again."""
+    monkeypatch.setattr(trade_first, "KEPT", tmp_path)
+    lines, runs = trade_first.lines_of(["punch"])
+    assert len(lines) == 3 and lines[2].count("|") == 10 and len(runs) == 6
+    assert all(r["energy"][0][0] < 1e-12 and r["verdict"] == "good" for r in runs.values())
+    monkeypatch.setattr(trade_first, "run", None)
+    assert trade_first.lines_of(["punch"])[0] == lines
+
+
+def test_force_of_the_bar_in_closed_form():
+    """Over a period contact gives what gravity takes: mass 10, g 10, 16/3."""
+    means = trade_studies.closed_form(16/3)["force"]
+    assert sum(means[::2]) == 0.0
+    assert sum(means[1::2])*16/3/50 == pytest.approx(10*10*16/3, rel=1e-14)
+    assert trade_studies.force_of_bar(1.2, 1.2 + 1e-6) == pytest.approx(360, rel=1e-6)
+    assert trade_studies.force_of_bar(4.0, 4.0 + 1e-6) == pytest.approx(400, rel=1e-6)
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
+def test_orders_of_a_power(order):
+    """Slopes of errors, each the mean of two increments, that grow as a power of the increment."""
+    sizes = (0.04, 0.02, 0.01)
+    rows = [{"h": f"{k*h:.6g}", "own_force": repr(3.0*(k*h)**order)} for h in sizes
+            for k in (1, trade_studies.BESIDE)]
+    slope, last = trade_studies.slope_of(rows, "force", sizes)
+    assert float(slope) == order
+    beside = trade_studies.BESIDE**(order/2)
+    assert float(last) == pytest.approx(3.0*0.01**order*beside, rel=0.05)
+
+
+def test_goal_of_the_bar(tmp_path, monkeypatch):
+    """The force of each increment to 5 %: with massless surfaces, and with massive ones never."""
+    monkeypatch.setattr(trade_studies, "FOLDER", tmp_path)
+    steps = (0.02, 0.005)
+    words, rows, command = trade_studies.goal_of_bar(tmp_path, 2, steps=steps, decks=("bar.inp",))
+    assert len([row for row in rows if row["role"] == "member"]) >= 8
+    told = " ".join(line for line in words.splitlines() if line.startswith("goal scatter"))
+    assert re.search(r"the cheapest setting is .*initiation=MASSLESS.*h=0.005", told)
+    assert "with h alone the deck's own does not meet the goal down to h=0.005" in told
+    assert "initiation=MASSLESS alone: " in told
+    assert command.startswith("python -m emcon study bar.inp --vary deck=bar.inp")
 
 
 @pytest.mark.parametrize("generator", sorted(p.name for p in DECKS.glob("make_*.py")))

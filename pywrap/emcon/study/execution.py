@@ -270,8 +270,8 @@ def find_program(named: str | None, precision: str = "double") -> str:
     """The program of a precision: as named, in the source tree, or, of double, on the path."""
     folder = PRECISIONS[precision]
     built = Path(__file__).resolve().parents[3]/"build"/folder/"emcon"
-    choices: Iterable[str | None] = (
-        [named] if named else [str(built), shutil.which("emcon") if precision == "double" else None])
+    on_path = shutil.which("emcon") if precision == "double" else None
+    choices: Iterable[str | None] = [named] if named else [str(built), on_path]
     for choice in choices:
         found = shutil.which(choice) if choice else None
         if found:
