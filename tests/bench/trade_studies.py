@@ -26,7 +26,9 @@ from book.common import COLOURS, axes, save, table  # isort: skip, `trade` says 
 from scene_tools import DECKS, Deck
 from verification import update
 
-FOLDER = ROOT / "build" / "trade" / str(int(PROGRAM.stat().st_mtime)) if PROGRAM.exists() else None
+#: By both programs: a study does not go on with another one.
+FOLDER = ROOT / "build" / "trade" / "-".join(str(int(program.stat().st_mtime))
+                                             for program in (PROGRAM, SINGLE) if program.exists())
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT / "pywrap"), "OMP_NUM_THREADS": "1",
                "OPENBLAS_NUM_THREADS": "1", "MPLBACKEND": "agg"}
 TREATMENTS = ("MASSLESS", "PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE")
