@@ -19,8 +19,9 @@ from timing import usage
 #: two gradients (64), two C (18), invariants (10), a difference of logarithms (25), coefficients
 #: (15), stress (12), mean gradient and its product (16), forces (32), at each point.
 FLOPS = 4*192
-#: Of a kept entry of the factor, with its row.
-ENTRY = 12
+#: Of a kept entry of the factor: of double precision with its row, of single precision in a dense
+#: block; these are taken from so many operations for each entry on.
+ENTRY, BLOCK_ENTRY, LEAST_DENSITY = 12, 4, 32
 #: Vectors that a correction and its mixing read and write.
 VECTORS = 30
 PHASES = ("residual", "assemble", "factorise", "solve", "vectors")
@@ -73,12 +74,14 @@ def least_times(size, counts):
     ring = ring_of(*map(cells, size))
     n, column = len(ring.element), factor_columns(ring)
     held = int(column.sum())
-    flops, speed = rates(held*ENTRY)
+    work = float((column.astype(float)**2).sum())
+    entry = BLOCK_ENTRY if work >= LEAST_DENSITY*held else ENTRY
+    flops, speed = rates(held*entry)
     tangent = n*64*8*2 + 18*ring.unknowns*8
     least = {"residual": counts["residuals"]*n*FLOPS/flops,
              "assemble": counts["tangents"]*tangent/speed,
-             "factorise": counts["factorisations"]*float((column.astype(float)**2).sum())/flops,
-             "solve": counts["solutions"]*2*held*ENTRY/speed,
+             "factorise": counts["factorisations"]*work/flops,
+             "solve": counts["solutions"]*2*held*entry/speed,
              "vectors": counts["solutions"]*VECTORS*8*ring.unknowns/speed}
     return {name: least[name]/INCREMENTS for name in PHASES}, held, flops, speed
 
