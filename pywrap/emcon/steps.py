@@ -78,9 +78,16 @@ class Step(Cards):
 
     # --- settings --------------------------------------------------------------------------
 
-    def constraint_method(self, type: str) -> Step:
-        """`*CONSTRAINT METHOD`: NULL SPACE (default) or SADDLE POINT."""
-        return self._card("CONSTRAINT METHOD", {"TYPE": type})
+    def constraint_method(self, type: str, *, stiffness: Number | None = None,
+                          factor: Number | None = None, tolerance: Number | None = None) -> Step:
+        """`*CONSTRAINT METHOD`: NULL SPACE (default), SADDLE POINT, PENALTY or AUGMENTED LAGRANGE.
+
+        stiffness       of the last two: pressure by penetration [M/(L T)^2]
+        factor          or that by the stiffness of the elements (1)
+        tolerance       of AUGMENTED LAGRANGE: what is left of gaps, by the edge (1e-8)
+        """
+        return self._card("CONSTRAINT METHOD", {"TYPE": type, "STIFFNESS": stiffness,
+                                                "FACTOR": factor, "TOLERANCE": tolerance})
 
     def contact_initiation(self, type: str = "PERSISTENT", *,
                            gap_tolerance: Number | None = None) -> Step:

@@ -80,12 +80,14 @@ typedef struct emcon_ledger {
    double potential; /* of forces that are given from outside by their energy */
    double external_work;
    double contact_work;
-   double total;     /* kinetic + strain + potential - external_work */
+   double total;     /* kinetic + strain + potential + contact_energy - external_work */
    double px, py;    /* momentum */
    double lz;        /* angular momentum about the origin */
    double stabilization;   /* work of what *CONTACT CONTROLS, STABILIZE bears: round-off */
    double restitution_loss;   /* of contact work: what impacts took by RESTITUTION, >= 0 */
    double scheme_loss;        /* what the damping of the scheme took, >= 0 */
+   double damping_loss;       /* what *DAMPING of materials took, >= 0 */
+   double contact_energy;     /* what contact by penalty stores, >= 0 */
 } emcon_ledger;
 
 /* A sparse matrix by rows: row i has the entries row_start[i] to row_start[i + 1] - 1 of `column`

@@ -42,6 +42,8 @@ contains
          ledger%stabilization = real(from%stabilization, c_double)
          ledger%restitution_loss = real(from%restitution, c_double)
          ledger%scheme_loss = real(from%decay, c_double)
+         ledger%damping_loss = real(from%damping, c_double)
+         ledger%contact_energy = real(from%contact_energy, c_double)
       end associate
    end subroutine model_ledger
 

@@ -40,6 +40,7 @@ module emcon_contact
       logical :: may_sharpen = .false.                !! of polygons: convex corners are rounded
       logical :: is_sharp = .false.                   !! but not in this step
       logical :: meets_statics = .false.              !! a step of the deck is static
+      logical :: gives_way = .false.                  !! it stores what it takes: a penalty
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
@@ -63,6 +64,9 @@ module emcon_contact
       procedure :: suit_steps
       procedure :: linearise
       procedure :: has_looked
+      procedure :: own_area
+      procedure :: share
+      procedure :: mean_gap
       procedure(configure_interface), deferred :: configure
       procedure(begin_interface), deferred :: begin_step
       procedure(measure_interface), deferred :: measure
@@ -142,6 +146,35 @@ contains
       self%clearance = clearance
       self%n_look = 1 + mod(self%n_look, huge(self%n_look) - 1)
    end subroutine has_looked
+
+   !> Area that belongs to each constraint in the reference configuration.
+   pure subroutine own_area(self, x, area)
+      class(contact_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)    !! (2, n_node) reference positions [L]
+      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
+      real(wp) :: length(size(area)), u(size(x, 1), size(x, 2))
+
+      u = 0.0_wp
+      call self%area(x, u, area, length)
+   end subroutine own_area
+
+   !> What the values of constraint `i` are to be multiplied by to be the same function in all
+   !> steps.
+   pure real(wp) function share(self, i)
+      class(contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+
+      share = 1.0_wp
+   end function share
+
+   !> The gap at the end of the step, as in `state`, of constraint `i` whose value there is `gap`.
+   pure real(wp) function mean_gap(self, i, gap)
+      class(contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in) :: gap                !! [L]
+
+      mean_gap = gap
+   end function mean_gap
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push

@@ -41,6 +41,9 @@ module emcon_weighted
       procedure :: measure => weighted_measure
       procedure :: evaluate => weighted_evaluate
       procedure :: area => weighted_area
+      procedure :: own_area => weighted_own_area
+      procedure :: share => weighted_share
+      procedure :: mean_gap => weighted_mean_gap
       procedure(measure_interface), deferred :: measure_edges
       procedure(form_interface), deferred :: form_edge
    end type weighted_t
@@ -128,7 +131,10 @@ contains
             area = area + part_area
          end do
          associate (state => self%state(i))
+            ! What stores energy is followed as long as there is any to give back.
             least = least_cover*self%whole(i)
+            self%scale(i) = max(area(0), least)
+            if (self%gives_way) least = tiny(least)
             state%is_near = maxval(area) > 0.0_wp
             state%is_covered = .true.
             state%is_over = area(1) >= least
@@ -140,7 +146,6 @@ contains
             if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset
             if (state%is_arriving) state%was_open = is_open(self, i)
             if (state%is_over) state%gap1 = gap(1)/area(1) - self%offset
-            self%scale(i) = max(area(0), least)
             self%cover(i) = area(1)
          end associate
       end do
@@ -196,5 +201,30 @@ contains
       area = self%scale*self%thickness
       length = self%cover
    end subroutine weighted_area
+
+   pure subroutine weighted_own_area(self, x, area)
+      class(weighted_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)    !! (2, n_node) [L]
+      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
+
+      area = self%whole*self%thickness
+   end subroutine weighted_own_area
+
+   !> Integrals of gaps are functions of the positions alone; their means know what was covered.
+   pure real(wp) function weighted_share(self, i) result(share)
+      class(weighted_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+
+      share = self%scale(i)/self%whole(i)
+   end function weighted_share
+
+   pure real(wp) function weighted_mean_gap(self, i, gap) result(mean_gap)
+      class(weighted_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in) :: gap                !! integral by what was covered at the start [L]
+
+      mean_gap = 0.0_wp
+      if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
+   end function weighted_mean_gap
 
 end module emcon_weighted

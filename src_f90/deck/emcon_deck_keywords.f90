@@ -94,7 +94,8 @@ module emcon_deck_keywords
       keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER,!FOLLOWER," &
          // "!SECTOR"), &
       keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER"), &
-      keyword_t("CONSTRAINT METHOD", in_step, "TYPE=", has_data=.false.), &
+      keyword_t("CONSTRAINT METHOD", in_step, "TYPE=,STIFFNESS=,FACTOR=,TOLERANCE=", &
+         has_data=.false.), &
       keyword_t("CONTACT INITIATION", in_step, "TYPE=,GAPTOLERANCE=", has_data=.false.), &
       keyword_t("MORTAR", in_step, "INTEGRATION=,POINTS=,MULTIPLIER=,NORMAL=,FEATUREANGLE=", &
          has_data=.false.), &

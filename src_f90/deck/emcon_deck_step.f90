@@ -18,6 +18,7 @@ module emcon_deck_step
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
    use emcon_deck_rigid, only : read_turns
    use emcon_deck_scheme, only : check_schemes, read_scheme
+   use emcon_deck_softness, only : check_softness, read_constraint_method
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
@@ -78,6 +79,7 @@ contains
       call check_massless(reader, scene%step)
       call check_schemes(reader, scene%pair, scene%step)
       call check_restitution(reader, scene%pair, scene%step)
+      call check_softness(reader, scene%pair, scene%step)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
       end if
@@ -90,6 +92,7 @@ contains
 
       step%nlgeom = last%nlgeom
       step%constraint_method = last%constraint_method
+      step%softness = last%softness
       step%initiation = last%initiation
       step%gap_tolerance = last%gap_tolerance
       step%contact = last%contact
@@ -288,23 +291,6 @@ contains
             // " is less than the increment " // to_text(value(1)))
       end if
    end subroutine check_times
-
-   subroutine read_constraint_method(reader, card, step)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(step_t), intent(inout) :: step
-      character(len=:), allocatable :: known
-
-      select case (option_name(card, "TYPE"))
-      case ("")
-         step%constraint_method = option_default("method")
-      case ("PENALTY", "AUGMENTEDLAGRANGE")
-         call option_words("method", known)
-         call refuse_option(reader, card, "TYPE", known, "not in this version")
-      case default
-         call choose_option(reader, card, "TYPE", "method", step%constraint_method)
-      end select
-   end subroutine read_constraint_method
 
    subroutine read_newton(reader, card, step)
       type(reader_t), intent(inout) :: reader

@@ -32,6 +32,7 @@ module emcon_correction
       integer, allocatable :: redundant(:)       !! (n_redundant) their places in the set
       logical, allocatable :: is_near(:)         !! (n_redundant) they depend on others nearly only
       logical :: uses_null_space = .false.       !! for the last constraints
+      logical :: knows_multipliers = .false.     !! for the last constraints: no unknowns
       logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
@@ -99,8 +100,13 @@ contains
       type(constraint_set_t), intent(in) :: set
 
       self%n_redundant = 0
+      self%knows_multipliers = .true.
       if (set%n == 0) then
          self%fell_back = .false.
+         return
+      end if
+      if (allocated(set%soft)) then
+         call lay_out_soft(self, system, set)
          return
       end if
       call stopwatch_start(self%clock)
@@ -124,8 +130,30 @@ contains
             self%is_near = null_space%rows%is_near(:self%n_redundant)
          end if
       end associate
+      self%knows_multipliers = self%uses_null_space
       call stopwatch_stop(self%clock)
    end subroutine correction_lay_out
+
+   !> Contacts that give way depend on no others. Their null space is that of no contact: what they
+   !> push is in the saddle point, or in the kept factor.
+   subroutine lay_out_soft(self, system, set)
+      type(correction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+
+      self%uses_null_space = .false.
+      self%knows_multipliers = set%n_held == 0
+      if (.not. has_pattern(self, set)) call take_pattern(self, set)
+      if (set%n_held == 0) return
+      associate (rows => self%null_space%rows)
+         call independent_rows_find(rows, set, system%space%numbering)
+         self%redundant = pack(rows%redundant(:rows%n_redundant), &
+            rows%redundant(:rows%n_redundant) <= set%n_held)
+         self%is_near = pack(rows%is_near(:rows%n_redundant), &
+            rows%redundant(:rows%n_redundant) <= set%n_held)
+         self%n_redundant = size(self%redundant)
+      end associate
+   end subroutine lay_out_soft
 
    !> The constraints stand on the unknowns that the layout was made for.
    pure logical function has_pattern(self, set)
@@ -189,7 +217,7 @@ contains
       end do
       call constraints_add_curvature(set, system%space%numbering, self%merged)
       call stopwatch_stop(self%clock)
-      self%is_reduced = self%method == method_null_space
+      self%is_reduced = self%method == method_null_space .and. .not. allocated(set%soft)
       self%obstacle = obstacle_none
       if (self%is_reduced) then
          call null_space_factorise(self%null_space, set, self%merged, is_singular, error)

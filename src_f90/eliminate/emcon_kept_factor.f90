@@ -30,7 +30,8 @@ module emcon_kept_factor
    real(dp), parameter :: most_curved = 0.5_dp
    !> Multipliers of a first guess may be several times too large.
    real(dp), parameter :: most_curved_far = 4.0_dp*most_curved
-
+   !> A contact that gives way is that much softer or stiffer than what it pushes at, at most.
+   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
@@ -46,6 +47,7 @@ module emcon_kept_factor
       integer, allocatable, private :: index(:)      !! (>= start(n + 1)) rows, from 0
       real(dp), allocatable, private :: w(:)         !! (>= start(n + 1))
       real(dp), allocatable, private :: l(:, :)      !! (n, n) Cholesky factor of W^T W
+      real(dp), allocatable, private :: product(:, :)   !! (n, n) W^T W, of contacts that give way
       real(dp), allocatable, private :: y(:), x(:)   !! (n_unknown)
       real(dp), allocatable, private :: mu(:)        !! (n)
       real(dp), allocatable, private :: bend(:)      !! (n) of each, per multiplier [T^2/(M L)]
@@ -152,8 +154,32 @@ contains
       end do
       self%n_forward = self%n_forward + set%n
       call fill_products(self)
-      call dense_cholesky(self%l, is_fit)
+      if (allocated(set%soft)) then
+         self%product = self%l
+         call soften(self, set, is_fit)
+      else
+         call dense_cholesky(self%l, is_fit)
+      end if
    end subroutine kept_factor_take
+
+   !> Factorise W^T W with the compliance of contacts that give way, for their present slopes: none
+   !> without slope pushes, and all are soft enough for the factor.
+   subroutine soften(self, set, is_fit)
+      type(kept_factor_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(out) :: is_fit
+      real(dp) :: stiffness
+      integer :: k
+
+      self%l = self%product
+      do k = set%n_held + 1, set%n
+         associate (diagonal => self%l(k, k))
+            stiffness = real(set%soft(k)%slope, dp)*self%blocks%scale*diagonal
+            diagonal = diagonal*(1.0_dp + max(rounding, 1.0_dp/max(stiffness, rounding)))
+         end associate
+      end do
+      call dense_cholesky(self%l, is_fit)
+   end subroutine soften
 
    !> Room for `n` entries of W; what there is stays.
    pure subroutine make_room(self, n)
@@ -272,7 +298,9 @@ contains
       real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
       type(error_t), allocatable, intent(out) :: error
       integer :: k, j
+      logical :: is_fit
 
+      if (allocated(set%soft)) call soften(self, set, is_fit)
       self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return

@@ -4,7 +4,8 @@
 !> entry of N, makes all blocks of one size and one unit. Source: docs/theory.md, eq. (17). Where N
 !> is symmetric and the gradients are the directions of forces, as in statics, and the solver has
 !> a use for it, the lower rows are taken with the other sign: then the matrix is symmetric, and
-!> has at least one negative eigenvalue for each constraint, or these depend on each other.
+!> has at least one negative eigenvalue for each constraint, or these depend on each other. A
+!> contact that gives way has its compliance, 1 by its slope, on the diagonal of the last block.
 module emcon_saddle_point
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_find, csr_from_entries, csr_t
@@ -22,7 +23,7 @@ module emcon_saddle_point
 
    type :: saddle_point_t
       type(csr_t) :: full                        !! (n_unknown + n) square
-      integer, allocatable :: slot(:)            !! N, then Gb^T, then G1
+      integer, allocatable :: slot(:)            !! N, then Gb^T, then G1, then compliances
       integer, allocatable :: diagonal(:)        !! (n_unknown) entries of N
       real(dp) :: scale = 1.0_dp
       class(sparse_solver_t), allocatable :: solver
@@ -65,12 +66,13 @@ contains
       type(csr_t), intent(in) :: matrix                  !! pattern of N
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: row(:), column(:)
-      integer :: i, n, n_matrix, n_rows
+      integer :: i, n, n_matrix, n_rows, n_soft
 
       n = matrix%n_row
       n_matrix = size(matrix%column)
       n_rows = set%force_rows%row_start(set%n + 1)
-      allocate(row(n_matrix + 2*n_rows), column(n_matrix + 2*n_rows))
+      n_soft = merge(set%n - set%n_held, 0, allocated(set%soft))
+      allocate(row(n_matrix + 2*n_rows + n_soft), column(n_matrix + 2*n_rows + n_soft))
       do i = 1, n
          row(matrix%row_start(i) + 1:matrix%row_start(i + 1)) = i
       end do
@@ -83,7 +85,9 @@ contains
          end associate
       end do
       row(n_matrix + 1:n_matrix + n_rows) = set%force_rows%column(:n_rows) + 1
-      column(n_matrix + n_rows + 1:) = set%force_rows%column(:n_rows) + 1
+      column(n_matrix + n_rows + 1:n_matrix + 2*n_rows) = set%force_rows%column(:n_rows) + 1
+      row(n_matrix + 2*n_rows + 1:) = [(n + i, i = set%n - n_soft + 1, set%n)]
+      column(n_matrix + 2*n_rows + 1:) = row(n_matrix + 2*n_rows + 1:)
       call csr_from_entries(self%full, n + set%n, n + set%n, row, column, self%slot)
       if (.not. allocated(self%solver)) call saddle_point_reset(self, solver_default)
       if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%diagonal)
@@ -117,6 +121,12 @@ contains
          self%full%value(self%slot(n_matrix + k)) = -self%scale*set%force_rows%value(k)
          self%full%value(self%slot(n_matrix + n_rows + k)) = self%scale*set%gap_rows%value(k)
       end do
+      if (allocated(set%soft)) then
+         do k = set%n_held + 1, set%n
+            self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_held)) = self%scale &
+               *(self%scale/max(real(set%soft(k)%slope, dp), rounding*self%scale))
+         end do
+      end if
       self%is_symmetric = is_mirrored(self, set, matrix)
       if (self%is_symmetric) then
          call factorise_symmetric(self, set%n, n_matrix + n_rows, is_singular, error)

@@ -7,6 +7,7 @@ module emcon_active_set
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest, motion_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
+   use emcon_softness, only : softness_select, softness_state_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
    use emcon_travel, only : largest_motion, travel_t, travel_to
@@ -17,13 +18,13 @@ module emcon_active_set
    public :: active_set_let_go, active_set_put_off, active_set_drop, touch_tol, most_sets
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
-      step_passes_event
+      step_passes_event, step_loose
 
    !> How a step ended; the first four are those of Newton's method, whose fifth does not end one.
    integer, parameter :: step_done = 0, step_refused = 1, step_diverged = 2, step_singular = 3, &
       step_cycling = 5, step_too_far = 6, step_stands_off = 7, step_not_held = 8, &
       step_overlaps = 9, step_unbalanced = 10, step_rough = 11, step_strikes = 12, &
-      step_passes_event = 13
+      step_passes_event = 13, step_loose = 14
 
    !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
@@ -72,6 +73,7 @@ module emcon_active_set
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
       real(wp) :: left(0:1) = 0.0_wp
+      type(softness_state_t) :: softness         !! how stiff contacts are that give way
       type(holding_t) :: holding                 !! bodies that contact alone holds, in statics
       type(travel_t) :: travel                   !! of all nodes, over the steps
       type(outlook_t), allocatable :: outlook(:) !! (n_contact)
@@ -156,6 +158,7 @@ contains
       self%n_tried = 0
       self%n_stale = 0
       self%n_early = 0
+      self%softness%n_augmentation = 0
       self%only_adds = .false.
       self%one_by_one = .false.
       self%comes_and_goes = .false.
@@ -264,9 +267,14 @@ contains
             self%set%is_kept(k) = (self%holds_gap .and. .not. self%closes(self%set%id(k))) .or. &
                (.not. self%pushes_out .and. &
                gap%gap0 < self%set%target(k) - touch_tol*gap%size)
+            if (self%softness%is_on .and. .not. self%softness%augments) then
+               self%set%is_kept(k) = .false.
+            end if
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate
       end do
+      call softness_select(self%softness, system, self%set, self%masses_resist .and. &
+         .not. motion%pose%pushes_at_end)
    end subroutine active_set_select
 
    !> Newton's method has not converged: let go of the contacts that pull in its last iterate, each

@@ -10,7 +10,8 @@
 !> docs/theory.md, section 6.
 module emcon_active_set_solve
    use emcon_active_set, only : active_set_drop, active_set_let_go, active_set_put_off, &
-      active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_not_held
+      active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_loose, &
+      step_not_held
    use emcon_active_set_update, only : active_set_advance, active_set_leave, most_early
    use emcon_errors, only : error_t
    use emcon_gaps, only : pair_search
@@ -21,6 +22,7 @@ module emcon_active_set_solve
       newton_solve, newton_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
+   use emcon_softness, only : most_augmentations, softness_augment
    use emcon_system, only : system_t
    implicit none
    private
@@ -52,12 +54,11 @@ contains
          self%before = motion%du
          newton%looks_early = self%masses_resist .and. .not. self%only_adds &
             .and. self%n_early < most_early
-         call newton_solve(newton, system, self%set, motion, status, error)
+         call solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
          do k = 1, self%set%n
             self%lam(self%set%id(k)) = self%set%lam(k)
          end do
-         self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (status == newton_redundant) then
             associate (redundant => newton%correction%redundant, is_near => &
                   newton%correction%is_near)
@@ -89,6 +90,30 @@ contains
          if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> Solve with the present set. Contacts that give way and are pushed back are solved again with
+   !> the multipliers that came out, until nothing is left of their gaps.
+   subroutine solve(self, system, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_done
+      integer :: i
+
+      do i = 1, most_augmentations
+         call newton_solve(newton, system, self%set, motion, status, error)
+         if (allocated(error)) return
+         self%n_newton = self%n_newton + newton%convergence%n_iteration
+         if (status /= newton_converged) return
+         newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
+         call softness_augment(self%softness, self%set, is_done)
+         if (is_done) return
+      end do
+      status = step_loose
+   end subroutine solve
 
    !> Begin the step again with convex corners that are not rounded: in statics, where a node that
    !> is pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.

@@ -100,7 +100,7 @@ contains
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then
                   k = k + 1
-                  call look_at_active(self, contact%state(i), k, self%was_active(id), status)
+                  call look_at_active(self, contact, i, k, status)
                   changes = is_let_go(self, system, contact, i, k)
                   if (changes .and. self%holding%is_needed) self%holding%has_pulled(id) = .true.
                else
@@ -145,25 +145,28 @@ contains
       choice = choice_t(id, pulls, amount)
    end subroutine weigh
 
-   !> Can the step stand on constraint `k` of the set, which acts? If its stencil has moved on, the
-   !> step is solved again with that for the motion that came out.
-   pure subroutine look_at_active(self, gap, k, was_active, status)
+   !> Can the step stand on constraint `k` of the set, the `i`-th of `contact`, which acts? If its
+   !> stencil has moved on, the step is solved again with that for the motion that came out.
+   pure subroutine look_at_active(self, contact, i, k, status)
       type(active_set_t), intent(inout) :: self
-      type(gap_state_t), intent(in) :: gap
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i                   !! its number in `contact`
       integer, intent(in) :: k
-      logical, intent(in) :: was_active          !! in the step before
       integer, intent(inout) :: status
       real(wp) :: held
       logical :: is_new
 
-      if (.not. gap%is_covered) status = step_too_far
-      ! A new contact may not be held at a larger distance than the deck allows.
-      is_new = self%holds_gap .and. .not. (was_active .or. self%closes(self%set%id(k)))
-      if (is_new .and. self%gap_tolerance > 0.0_wp &
-         .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
-      held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
-      self%is_stale = self%is_stale .or. &
-         (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
+      associate (gap => contact%state(i))
+         if (.not. gap%is_covered) status = step_too_far
+         ! A new contact may not be held at a larger distance than the deck allows.
+         is_new = self%set%is_kept(k) .and. .not. self%was_active(self%set%id(k))
+         if (is_new .and. self%gap_tolerance > 0.0_wp &
+            .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
+         held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
+         if (allocated(self%set%soft)) held = held + contact%mean_gap(i, self%set%soft(k)%left)
+         self%is_stale = self%is_stale .or. &
+            (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
+      end associate
    end subroutine look_at_active
 
    !> Has constraint `k` of the set, the `i`-th of `contact`, lost its surface, or does it pull?
@@ -200,13 +203,16 @@ contains
             if (self%may_cut .and. gap%gap1 < min(gap%gap0, allowed(1)) - touch_tol*gap%size) then
                status = step_too_far
             end if
+         else if (gap%is_arriving .and. contact%gives_way) then
+            closes = gap%gap1 < allowed(1) .and. gap%gap1 > -contact%deepest_start*gap%size
          else if (gap%is_arriving .and. self%masses_resist .and. .not. may_arrive(gap)) then
             return
          else if (gap%is_arriving .and. self%masses_resist .and. self%may_cut) then
             status = step_too_far
          else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%deepest_start*gap%size) then
-            closes = .not. gap%gap1 - allowed(1) >= -gap_noise*gap%size
+            closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, contact%gives_way) &
+               *gap%size
          end if
       end associate
    end subroutine look_at_open

@@ -137,7 +137,7 @@ contains
 
       is_fit = self%knows_set
       if (.not. is_fit) then
-         if (set%n > 0 .and. .not. correction%uses_null_space) return
+         if (.not. correction%knows_multipliers) return
          if (.not. correction%kept%is_made) then
             call kept_factor_renew(correction%kept, system%matrix, error)
             if (allocated(error)) return

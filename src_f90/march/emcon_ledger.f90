@@ -13,8 +13,8 @@ module emcon_ledger
    !> Dimensions of space, at most.
    integer, parameter :: most_dim = 3
 
-   !> total = kinetic + strain + potential - external_work stays constant up to the work of contact:
-   !> docs/theory.md, eqs. (23) and (24).
+   !> total = kinetic + strain + potential + contact_energy - external_work stays constant up to the
+   !> work of contact, and what damping takes: docs/theory.md, eqs. (23) and (24).
    type :: ledger_t
       real(wp) :: kinetic = 0.0_wp               !! [M L^2/T^2]
       real(wp) :: strain = 0.0_wp
@@ -26,6 +26,8 @@ module emcon_ledger
       !> Of contact work: what impacts with a restitution below 1 took, since the start, >= 0
       real(wp) :: restitution = 0.0_wp
       real(wp) :: decay = 0.0_wp                 !! taken by the scheme, since the start
+      real(wp) :: damping = 0.0_wp               !! taken by damped materials, since the start
+      real(wp) :: contact_energy = 0.0_wp        !! that contact by penalty stores
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]
       real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]
@@ -57,7 +59,8 @@ contains
       self%kinetic = 0.5_wp*sum(state%v*self%work)
       self%strain = sum(state%energy)
       self%potential = state%potential
-      self%total = self%kinetic + self%strain + self%potential - self%external_work
+      self%total = self%kinetic + self%strain + self%potential + self%contact_energy &
+         - self%external_work
       self%momentum = sum(self%work, dim=2)
       self%angular = 0.0_wp
       do i = 1, size(x, 2)

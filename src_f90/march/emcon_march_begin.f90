@@ -28,11 +28,12 @@ module emcon_march_begin
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_create, scheme_given
+   use emcon_softness, only : softness_begin_step
    use emcon_solver_registry, only : solver_given
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
-   use emcon_steps, only : initiation_massless, initiation_persistent, method_saddle_point, &
-      newton_kept, step_t
+   use emcon_steps, only : initiation_massless, initiation_persistent, method_null_space, &
+      method_penalty, method_saddle_point, newton_kept, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_find_energy, &
       system_respond
    use emcon_term, only : role_internal
@@ -169,7 +170,6 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(overlap_t) :: overlap
       integer :: i
 
       associate (step => scene%step(self%state%i_step), state => self%state)
@@ -192,14 +192,9 @@ contains
                call contact%configure(scene%x, options_of(i))
             end associate
          end do
-         call active_set_overclosure(self%active, self%system, scene%x, state%u_start, &
-            step%resolves_overclosure)
-         self%meant_overlap = 0.0_wp
-         if (step%resolves_overclosure) then
-            call judge_step(self%judge, scene%x, state%u_start, at_rest(state%u), overlap)
-            self%meant_overlap = overlap%depth
-            call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
-         end if
+         call softness_begin_step(self%active%softness, self%system, scene, step, error)
+         if (allocated(error)) return
+         call begin_overclosure(self, scene, step)
          call begin_massless(self, scene, step, error)
          if (allocated(error)) return
          call begin_times(self, scene, step)
@@ -224,6 +219,22 @@ contains
       end function options_of
 
    end subroutine prepare
+
+   !> What is closed at the start, and what of it the step is to resolve.
+   subroutine begin_overclosure(self, scene, step)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(overlap_t) :: overlap
+
+      call active_set_overclosure(self%active, self%system, scene%x, self%state%u_start, &
+         step%resolves_overclosure)
+      self%meant_overlap = 0.0_wp
+      if (.not. step%resolves_overclosure) return
+      call judge_step(self%judge, scene%x, self%state%u_start, at_rest(self%state%u), overlap)
+      self%meant_overlap = overlap%depth
+      call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
+   end subroutine begin_overclosure
 
    !> The grid of the step, who controls sizes on it, and the time where it is taken up.
    subroutine begin_times(self, scene, step)
@@ -268,7 +279,7 @@ contains
       active%masses_resist = step%scheme%masses_resist
       active%pushes_out = .not. active%masses_resist
       active%holds_gap = any(step%initiation == [initiation_persistent, initiation_massless]) &
-         .and. active%masses_resist
+         .and. active%masses_resist .and. step%constraint_method /= method_penalty
       active%closes = .false.
       active%gap_tolerance = step%gap_tolerance
       active%holding = holding_t()
@@ -329,7 +340,7 @@ contains
       type(step_t), intent(in) :: step
       integer :: i, method
 
-      method = merge(step%constraint_method, method_saddle_point, self%system%space%is_reduced)
+      method = merge(method_null_space, method_saddle_point, self%system%space%is_reduced)
       if (step%solver /= solver_given) then
          call correction_reset(self%newton%correction, method, step%solver)
          call velocity_update_reset(self%velocity_update, step%solver)

@@ -18,6 +18,7 @@ module emcon_march_commit
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
+   use emcon_softness, only : softness_depth, softness_stored
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update
    use emcon_term, only : role_external, role_inertia, role_internal
@@ -75,7 +76,7 @@ contains
          state%potential = self%ending%potential
          if (self%newton%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             trim(correction_reason(self%newton%correction)) // ": solved as a saddle point")
-         call stand_off_add(increment%stand_off, system, set, h)
+         call tell_gaps(self, h, increment)
          increment%is_guarded = increment%is_guarded .or. &
             any(set%id > system%first_constraint(system%n_pair + 1))
          associate (reached => self%newton%convergence)
@@ -93,6 +94,18 @@ contains
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
+
+   !> What contacts stand off and give way by, and how often they were pushed again.
+   pure subroutine tell_gaps(self, h, increment)
+      type(march_t), intent(in) :: self
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      type(increment_t), intent(inout) :: increment
+
+      call stand_off_add(increment%stand_off, self%system, self%active%set, h)
+      increment%give = max(increment%give, softness_depth(self%active%set))
+      increment%n_augmentation = max(increment%n_augmentation, &
+         self%active%softness%n_augmentation)
+   end subroutine tell_gaps
 
    !> The velocities at the end, and no reaction where they are unknown.
    subroutine find_velocities(self)
@@ -146,6 +159,9 @@ contains
          do k = 1, set%n
             state%is_active(set%id(k)) = .true.
             state%lam(set%id(k)) = set%lam(k)
+            ! What has opened stores nothing that a later step could give back.
+            if (set%is_stored .and. k > set%n_held) state%is_active(set%id(k)) = &
+               set%item(k)%gap1 < 0.0_wp
          end do
          if (.not. layer%is_settled) return
          state%is_active(layer%n_before + 1:) = layer%acts
@@ -279,9 +295,20 @@ contains
                + 0.5_wp*sum((state%internal + part(role_internal)%force)*motion%du)
          end if
          self%ledger%contact_work = self%ledger%contact_work + contact_work
+         call book_stored(self)
          if (motion%pose%dissipation > 0.0_wp) self%ledger%decay = self%ledger%decay &
             + terms_decay(self%system%term)
       end associate
    end subroutine book_work
+
+   !> What penalties store is of the balance: contact work is what is made or taken beyond it.
+   subroutine book_stored(self)
+      type(march_t), intent(inout) :: self
+      real(wp) :: energy
+
+      energy = softness_stored(self%active%softness, self%active%set)
+      self%ledger%contact_work = self%ledger%contact_work + (energy - self%ledger%contact_energy)
+      self%ledger%contact_energy = energy
+   end subroutine book_stored
 
 end module emcon_march_commit

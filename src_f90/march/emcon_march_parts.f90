@@ -1,8 +1,8 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
    use emcon_active_set, only : step_cycling, step_diverged, step_done, step_not_held, &
-      step_overlaps, step_passes_event, step_refused, step_rough, step_singular, step_stands_off, &
-      step_strikes, step_too_far, step_unbalanced
+      step_loose, step_overlaps, step_passes_event, step_refused, step_rough, step_singular, &
+      step_stands_off, step_strikes, step_too_far, step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_march_begin, only : march_renumber
@@ -11,6 +11,7 @@ module emcon_march_parts
    use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
+   use emcon_softness, only : most_augmentations
    use emcon_system, only : system_may_hold, system_t
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
    implicit none
@@ -208,6 +209,9 @@ contains
       case (step_strikes)
          text = "contact begins or ends: the error is " // to_text(self%finding%ratio, 3) // &
             " times TOLERANCE"
+      case (step_loose)
+         text = "gaps do not close to TOLERANCE of *CONSTRAINT METHOD in " // &
+            to_text(most_augmentations) // " augmentations; give a larger FACTOR"
       case (step_passes_event)
          text = "contact begins or ends in it"
       case default

@@ -266,7 +266,7 @@ contains
       integer :: pair
 
       goes_in = .false.
-      if (overlap%depth <= deepest_new) return
+      if (overlap%depth <= deepest_new .or. self%active%softness%is_on) return
       do pair = 1, size(self%system%contact)
          associate (contact => self%system%contact(pair)%contact, &
                is_active => self%active%is_active(self%system%first_constraint(pair) + 1:))

@@ -28,6 +28,8 @@ module emcon_march_types
       integer :: n_newton = 0                    !! iterations, over all cuts and active sets
       integer :: n_cut = 0
       integer :: n_active = 0
+      integer :: n_augmentation = 0              !! of contact, the most of its steps
+      real(wp) :: give = 0.0_wp                  !! how deep contact has given way, by the edge
       logical :: is_guarded = .false.            !! guards act in it
       integer :: n_held = 0                      !! contacts held closed that come and go
       type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge

@@ -33,6 +33,8 @@ module emcon_verdict
    !> So far, per edge, bodies may be in each other: corners of master surfaces are rounded over a
    !> tenth of that, coordinates of decks by less. And so far that the run has failed.
    real(wp), parameter :: touching = 1.0e-3_wp, far_behind = 0.1_wp
+   !> What contact gives way by is told; so many times that is deeper, whichever edge counts.
+   real(wp), parameter :: most_give = 2.0_wp
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
 
@@ -55,6 +57,9 @@ module emcon_verdict
       type(stand_off_t) :: stand_off
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: stabilization = 0.0_wp         !! work of what STABILIZE bears
+      real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
+      real(wp) :: give_time = 0.0_wp             !! [T]
+      integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
       integer :: n_newton = 0
       integer :: n_cut = 0
       integer :: n_guarded = 0                   !! increments in which guards act
@@ -92,8 +97,7 @@ contains
       type(verdict_t), intent(inout) :: self
       type(ledger_t), intent(in) :: before, after
 
-      associate (change => (after%total - after%contact_work + after%decay) &
-            - (before%total - before%contact_work + before%decay))
+      associate (change => kept_by(after) - kept_by(before))
          self%total0 = self%total0 + change
          self%reference = self%reference + change
          self%shown_reference = self%shown_reference + change
@@ -121,6 +125,11 @@ contains
                self%place)
          end if
          self%stabilization = march%ledger%stabilization
+         if (increment%give > self%give) then
+            self%give = increment%give
+            self%give_time = state%time
+         end if
+         self%most_augmentations = max(self%most_augmentations, increment%n_augmentation)
          if (increment%unconverged > self%unconverged) then
             self%unconverged = increment%unconverged
             self%unconverged_time = state%time
@@ -170,7 +179,7 @@ contains
       real(wp) :: kept
 
       associate (ledger => march%ledger)
-         kept = ledger%total - ledger%contact_work + ledger%decay
+         kept = kept_by(ledger)
          self%largest_energy = max(self%largest_energy, ledger%kinetic + ledger%strain)
          self%largest_drift = max(self%largest_drift, abs(kept - self%total0))
       end associate
@@ -178,7 +187,12 @@ contains
          self%has_dynamics = .true.
          self%dynamic_drift = max(self%dynamic_drift, abs(kept - self%reference))
          self%shown_reference = kept
-         self%contact_reference = march%ledger%contact_work
+         if (march%active%set%is_stored) then
+            self%contact_made = max(self%contact_made, &
+               march%ledger%contact_work - self%contact_reference)
+         else
+            self%contact_reference = march%ledger%contact_work
+         end if
       else
          self%reference = kept
          if (march%scheme%row%masses_resist) then
@@ -191,6 +205,13 @@ contains
          end if
       end if
    end subroutine follow_energy
+
+   !> What stays, but for what the works of loads and of contact do not tell.
+   pure real(wp) function kept_by(ledger) result(kept)
+      type(ledger_t), intent(in) :: ledger
+
+      kept = ledger%total - ledger%contact_work + ledger%decay + ledger%damping
+   end function kept_by
 
    !> Count a warning, and keep it if it is another one than those before.
    pure subroutine add_warning(self, text)
@@ -225,10 +246,16 @@ contains
       if (self%contact_made > half_digits*self%largest_energy) call note_add(self%reasons, &
          "contact has made an energy of " // to_text(self%contact_made, 3) // ", " // &
          to_text(self%contact_made/self%largest_energy, 3) // " of the largest, which bodies " // &
-         "that touch cannot do; SCHEME=ENERGY MOMENTUM makes none")
-      if (self%deepest > touching) call note_add(self%reasons, "bodies overlap by " // &
+         "that touch cannot do; SCHEME=ENERGY MOMENTUM makes none" // trim(merge( &
+         ", but where a penalty meets other edges than before", repeat(" ", 51), &
+         self%give > 0.0_wp)))
+      if (self%deepest > touching + most_give*self%give) call note_add(self%reasons, &
+         "bodies overlap by " // &
          to_text(self%deepest, 3) // " of an edge at time " // to_text(self%deepest_time, 9) // &
          ", " // self%place)
+      if (self%give > far_behind) call note_add(self%reasons, "contact gives way by up to " // &
+         to_text(self%give, 3) // " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too " &
+         // "small")
       if (self%unconverged > half_digits) call note_add(self%reasons, "a residual of " // &
          to_text(self%unconverged, 3) // " was accepted at time " // &
          to_text(self%unconverged_time, 9))
@@ -246,7 +273,8 @@ contains
       type(verdict_t), intent(in) :: self
       logical, intent(in) :: is_strict           !! whatever is bad is a failure
 
-      verdict_is_failure = self%deepest > far_behind .or. (is_strict .and. self%reasons%n > 0)
+      verdict_is_failure = max(self%deepest, self%give) > far_behind .or. &
+         (is_strict .and. self%reasons%n > 0)
    end function verdict_is_failure
 
    !> The verdict in a line.
@@ -269,7 +297,12 @@ contains
             to_text(self%shown_drift/self%largest_energy, 3) // " of the largest energy (shown, " &
             // "not judged), "
          if (allocated(self%largest_force)) then
-            if (size(self%largest_force) > 0) line = line // "nothing penetrates, "
+            if (self%give > 0.0_wp) then
+               line = line // "contact gives way by up to " // to_text(self%give, 3) // &
+                  " of an edge and no more penetrates, "
+            else if (size(self%largest_force) > 0) then
+               line = line // "nothing penetrates, "
+            end if
          end if
          line = line // "all residuals are within the tolerance"
       end if
@@ -299,10 +332,7 @@ contains
                ", strain " // to_text(ledger%strain, 9) // ", external work " // &
                to_text(ledger%external_work, 9) // ", contact work " // &
                to_text(ledger%contact_work, 9))
-            if (ledger%restitution > 0.0_wp) call note_add(lines, "impacts took an energy of " // &
-               to_text(ledger%restitution, 9) // " (RESTITUTION), part of contact work")
-            if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "the damping of the scheme " // &
-               "took an energy of " // to_text(ledger%decay, 9))
+            call add_losses(self, ledger, lines)
             call note_add(lines, "total at start " // to_text(self%total0, 12) // ", at end " // &
                to_text(ledger%total, 12))
             call note_add(lines, "largest error of the energy balance " // &
@@ -339,6 +369,25 @@ contains
       call verdict_line(self, text)
       call note_add(lines, text)
    end subroutine verdict_balance_lines
+
+   !> What was taken besides, and what contact gave way by.
+   subroutine add_losses(self, ledger, lines)
+      type(verdict_t), intent(in) :: self
+      type(ledger_t), intent(in) :: ledger
+      type(notes_t), intent(inout) :: lines
+
+      if (ledger%restitution > 0.0_wp) call note_add(lines, "impacts took an energy of " // &
+         to_text(ledger%restitution, 9) // " (RESTITUTION), part of contact work")
+      if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "the damping of the scheme took an " // &
+         "energy of " // to_text(ledger%decay, 9))
+      if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "the damping of materials took " // &
+         "an energy of " // to_text(ledger%damping, 9))
+      if (self%give > 0.0_wp) call note_add(lines, "contact gave way by " // &
+         to_text(self%give, 3) // " of an edge at time " // to_text(self%give_time, 9) // &
+         "; it stores an energy of " // to_text(ledger%contact_energy, 9))
+      if (self%most_augmentations > 0) call note_add(lines, "augmentations " // &
+         to_text(self%most_augmentations) // " at most in a solve")
+   end subroutine add_losses
 
    !> What linear sections have met.
    subroutine add_small(small, scene, lines)

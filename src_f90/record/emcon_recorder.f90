@@ -28,11 +28,12 @@ module emcon_recorder
    !> Frames of a deck that asks for no field output.
    integer, parameter :: default_frames = 100
 
-   type(column_t), parameter :: columns(20) = [column_t("increment", .true.), column_t("time"), &
+   type(column_t), parameter :: columns(22) = [column_t("increment", .true.), column_t("time"), &
       column_t("h"), column_t("kinetic"), column_t("strain"), column_t("external_work"), &
       column_t("contact_work"), column_t("stabilization"), &
-      column_t("restitution_loss"), column_t("scheme_loss"), column_t("total"), column_t("px"), &
-      column_t("py"), column_t("lz"), column_t("active", .true.), column_t("newton", .true.), &
+      column_t("restitution_loss"), column_t("scheme_loss"), column_t("damping_loss"), &
+      column_t("contact_energy"), column_t("total"), column_t("px"), column_t("py"), &
+      column_t("lz"), column_t("active", .true.), column_t("newton", .true.), &
       column_t("cuts", .true.), column_t("penetration"), column_t("stand_off"), column_t("cpu")]
 
    !> What is written if no step asks for fields: of solids, and behind them of contact.
@@ -198,7 +199,8 @@ contains
             real(state%time, dp), real(increment%h, dp), real(ledger%kinetic, dp), &
             real(ledger%strain, dp), real(ledger%external_work, dp), &
             real(ledger%contact_work, dp), real(ledger%stabilization, dp), &
-            real(ledger%restitution, dp), real(ledger%decay, dp), real(ledger%total, dp), &
+            real(ledger%restitution, dp), real(ledger%decay, dp), real(ledger%damping, dp), &
+            real(ledger%contact_energy, dp), real(ledger%total, dp), &
             real(ledger%momentum, dp), &
             real(ledger%angular, dp), &
             real(increment%n_active, dp), real(increment%n_newton, dp), &

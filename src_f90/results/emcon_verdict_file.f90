@@ -83,6 +83,8 @@ contains
          call json_number(line, "stabilization", ledger%stabilization)
          call json_number(line, "restitution_loss", ledger%restitution)
          call json_number(line, "scheme_loss", ledger%decay)
+         call json_number(line, "damping_loss", ledger%damping)
+         call json_number(line, "contact_energy", ledger%contact_energy)
          call json_number(line, "total", ledger%total)
       end associate
       call json_number(line, "total_at_start", self%total0)
@@ -91,6 +93,12 @@ contains
       call json_number(line, "penetration", self%deepest)
       call json_number(line, "penetration_time", self%deepest_time)
       call json_text(line, "penetration_place", self%place)
+      if (self%give > 0.0_wp) then
+         call json_number(line, "give", self%give)
+         call json_number(line, "give_time", self%give_time)
+      end if
+      if (self%most_augmentations > 0) call json_number(line, "augmentations", &
+         real(self%most_augmentations, wp))
       call json_number(line, "stand_off", self%stand_off%largest)
       call json_number(line, "mean_stand_off", stand_off_mean(self%stand_off))
       call json_number(line, "unconverged", self%unconverged)
@@ -149,6 +157,11 @@ contains
       if (restart_offers(restart, "linear_range", size(self%small%section) > 0)) then
          call restart_exchange(restart, "linear_range", self%small%rotation)
          call restart_exchange(restart, "linear_strain", self%small%strain)
+      end if
+      if (restart_offers(restart, "give", self%give > 0.0_wp .or. self%most_augmentations > 0)) then
+         call restart_exchange(restart, "give", self%give)
+         call restart_exchange(restart, "give", self%give_time)
+         call restart_exchange(restart, "augmentations", self%most_augmentations)
       end if
       call exchange_texts(self, restart)
    end subroutine verdict_exchange

@@ -15,7 +15,8 @@ module emcon_options
    use emcon_solver_registry, only : solvers
    use emcon_steps, only : events_nodes, events_pairs, initiation_admissible, &
       initiation_massless, initiation_persistent, initiation_velocity_update, &
-      method_null_space, method_saddle_point, newton_full, newton_kept, step_t
+      method_augmented_lagrange, method_null_space, method_penalty, method_saddle_point, &
+      newton_full, newton_kept, step_t
    implicit none
    private
    public :: option_row_t, n_option_row, option_row, option_code, option_default, option_words, &
@@ -61,6 +62,9 @@ module emcon_options
       option_row_t("initiation", initiation_massless, "MASSLESS", "", "", ""), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
+      option_row_t("method", method_penalty, "PENALTY", "", "by penalty", ""), &
+      option_row_t("method", method_augmented_lagrange, "AUGMENTED LAGRANGE", "", &
+         "by an augmented Lagrangian", ""), &
       option_row_t("newton", newton_kept, "KEPT", "", "", ""), &
       option_row_t("newton", newton_full, "FULL", "", "a tangent in each iteration", ""), &
       option_row_t("events", events_pairs, "PAIR", "", "of pairs", ""), &

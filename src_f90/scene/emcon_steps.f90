@@ -8,11 +8,11 @@ module emcon_steps
    use emcon_solver_registry, only : solver_default
    implicit none
    private
-   public :: prescribed_t, turn_t, load_t, scheme_choice_t, step_t
+   public :: prescribed_t, turn_t, load_t, scheme_choice_t, softness_t, step_t
    public :: load_point, load_pressure, load_gravity, load_moment
    public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
       initiation_massless
-   public :: method_null_space, method_saddle_point
+   public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
    public :: prescribed_find
@@ -20,7 +20,8 @@ module emcon_steps
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
       initiation_velocity_update = 3, initiation_massless = 4
-   integer, parameter :: method_null_space = 1, method_saddle_point = 2
+   integer, parameter :: method_null_space = 1, method_saddle_point = 2, method_penalty = 3, &
+      method_augmented_lagrange = 4
    integer, parameter :: newton_kept = 1, newton_full = 2
    integer, parameter :: events_pairs = 1, events_nodes = 2
 
@@ -67,6 +68,14 @@ module emcon_steps
       character(len=:), allocatable :: name          !! in the deck
    end type scheme_choice_t
 
+   !> Contact that gives way: *CONSTRAINT METHOD, TYPE=PENALTY or AUGMENTED LAGRANGE.
+   type :: softness_t
+      type(origin_t) :: origin
+      real(wp) :: stiffness = 0.0_wp                 !! pressure by penetration [M/(L T)^2]; 0: by
+      real(wp) :: factor = 1.0_wp                    !! this, times that of the elements
+      real(wp) :: tolerance = 1.0e-8_wp              !! of gaps, by the edge: AUGMENTED LAGRANGE
+   end type softness_t
+
    type :: step_t
       type(origin_t) :: origin
       type(scheme_row_t) :: scheme                   !! code 0: no procedure was read
@@ -83,6 +92,7 @@ module emcon_steps
       real(wp) :: event_fraction = 0.0_wp            !! of h, in which events lie; 0: anywhere
       integer :: events = events_pairs               !! one of `events_`
       integer :: constraint_method = method_null_space
+      type(softness_t) :: softness
       integer :: solver = solver_default             !! one of `solver_`
       character(len=:), allocatable :: solver_name   !! of `solver_given`, upper case, no blanks
       type(origin_t) :: solver_origin

@@ -8,7 +8,7 @@ module emcon_space
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : method_null_space
+   use emcon_steps, only : method_saddle_point
    implicit none
    private
    public :: space_t, space_init, space_begin_step
@@ -123,7 +123,7 @@ contains
                self%unresolved)
             self%linear%is_used(self%unresolved%row) = .false.
          end if
-         self%is_reduced = step%constraint_method == method_null_space
+         self%is_reduced = step%constraint_method /= method_saddle_point
       end associate
       if (self%is_reduced .and. self%linear%n > 0) then
          self%numbering = self%linked

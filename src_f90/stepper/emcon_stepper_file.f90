@@ -286,6 +286,16 @@ contains
       else
          ledger%decay = 0.0_wp
       end if
+      if (restart_offers(restart, "damping", is_written=abs(ledger%damping) > 0.0_wp)) then
+         call restart_exchange(restart, "damping", ledger%damping)
+      else
+         ledger%damping = 0.0_wp
+      end if
+      if (restart_offers(restart, "stored", is_written=ledger%contact_energy > 0.0_wp)) then
+         call restart_exchange(restart, "stored", ledger%contact_energy)
+      else
+         ledger%contact_energy = 0.0_wp
+      end if
    end subroutine exchange_ledger
 
    subroutine exchange_pairs(pairs, restart)

@@ -10,6 +10,7 @@ module emcon_constraints
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
+   use emcon_soft_law, only : soft_augmented, soft_penalty, soft_t
    use emcon_system, only : system_t
    use emcon_vectors, only : vector_zero
    implicit none
@@ -31,6 +32,9 @@ module emcon_constraints
       logical, allocatable :: is_firm(:)
       real(wp), allocatable :: lam(:)            !! (n) multipliers [M L/T^2]
       real(wp), allocatable :: defect(:)         !! (n) f(q1), what is left of the gap to the target
+      !> (n) contacts that give way, whose multipliers follow from gaps; not there: none
+      type(soft_t), allocatable :: soft(:)
+      logical :: is_stored = .false.             !! by discrete gradients of what these store
       type(csr_t) :: force_rows                  !! (n x n_unknown) discrete gradients
       type(csr_t) :: gap_rows                    !! (n x n_unknown) gradients at the end
    end type constraint_set_t
@@ -54,6 +58,7 @@ contains
       self%n_linear = 0
       self%n_held = 0
       self%id = id
+      if (allocated(self%soft)) deallocate(self%soft)
       if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, &
          self%is_firm, self%lam, self%defect)
       allocate(self%item(self%n), self%is_kept(self%n), self%is_firm(self%n))
@@ -98,6 +103,7 @@ contains
       do k = 1, self%n
          self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
       end do
+      if (allocated(self%soft)) call give_way(self)
 
    contains
 
@@ -114,6 +120,24 @@ contains
       end subroutine linearise
 
    end subroutine constraints_evaluate
+
+   !> The multipliers of contacts that give way; they have no defect.
+   pure subroutine give_way(self)
+      type(constraint_set_t), intent(inout) :: self
+      integer :: k
+
+      do k = self%n_held + 1, self%n
+         associate (soft => self%soft(k), item => self%item(k))
+            soft%left = self%defect(k)
+            if (self%is_stored) then
+               call soft_penalty(soft, item%gap0, item%gap1, self%lam(k))
+            else
+               call soft_augmented(soft, self%lam(k))
+            end if
+            self%defect(k) = 0.0_wp
+         end associate
+      end do
+   end subroutine give_way
 
    !> Gradients of the active constraints as rows over the unknowns: those by all freedoms, times T.
    subroutine constraints_rows(self, numbering)

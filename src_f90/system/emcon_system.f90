@@ -19,7 +19,7 @@ module emcon_system
    use emcon_reduction, only : reduction_add
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_alone, lists_begin, lists_t, space_begin_step, space_init, space_t
-   use emcon_steps, only : method_null_space
+   use emcon_steps, only : method_saddle_point
    use emcon_stiffening, only : stiffening_add, stiffening_set, stiffening_t
    use emcon_term, only : response_begin, response_init, response_t, role_external, &
       role_inertia, role_internal, term_box_t
@@ -153,7 +153,7 @@ contains
          deallocate(slot)
          allocate(slot(first(size(first))), source=0)
       end if
-      if (scene%step(i_step)%constraint_method == method_null_space &
+      if (scene%step(i_step)%constraint_method /= method_saddle_point &
          .and. .not. self%space%is_reduced) call note_add(self%notes, &
          "ties or equations with long rows: solved with their multipliers, as a saddle point; " &
          // "dual multipliers keep rows short")

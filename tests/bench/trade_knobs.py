@@ -78,6 +78,9 @@ KNOBS = (
     ("`*NEWTON, TYPE=FULL`", {"newton": "FULL"}),
     ("`POLISH=NO`, 1e-8", {"polish": "NO", "tolerance": "1e-8"}),
     ("`SADDLE POINT`", {"method": "SADDLE POINT"}),
+    ("`PENALTY`", {"method": "PENALTY"}),
+    ("`PENALTY, FACTOR=10`", {"method": "PENALTY, FACTOR=10"}),
+    ("`AUGMENTED LAGRANGE`", {"method": "AUGMENTED LAGRANGE"}),
     ("`PRECISION=single`", {"program": SINGLE}),
 )
 

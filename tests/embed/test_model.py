@@ -257,6 +257,8 @@ def everything() -> Model:
     step.load([2, "N"], 2, 0.5, amplitude="AMP", op="MOD")
     step.pressure("E", 1, 0.5, amplitude="AMP", op="NEW").gravity(0, 9.81, (0.0, -1.0))
     step.constraint_method("<method>")
+    step.constraint_method("AUGMENTED LAGRANGE", stiffness=1e3, tolerance=1e-6)
+    step.constraint_method("PENALTY", factor=2)
     step.contact_initiation("PERSISTENT", gap_tolerance=0.1)
     step.contact_interference(amplitude="AMP")
     step.contact_controls(stabilize=True).contact_controls(stabilize=False)

@@ -21,6 +21,8 @@ DIMENSION = {
     "stabilization": (2, 1, -2),
     "restitution_loss": (2, 1, -2),
     "scheme_loss": (2, 1, -2),
+    "damping_loss": (2, 1, -2),
+    "contact_energy": (2, 1, -2),
     "total": (2, 1, -2),
     "px": (1, 1, -1),
     "py": (1, 1, -1),
@@ -94,7 +96,7 @@ def assert_same_bits(run, reference, units):
 
 
 @pytest.mark.parametrize("units", UNITS)
-@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
+@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT", "PENALTY", "AUGMENTED LAGRANGE"])
 def test_history_has_the_same_bits(tmp_path, reference, units, method):
     parameters = {"h": 0.05, "t_end": 1.5, "frame": 0.5, "method": method}
     run = run_deck(in_units(*units, **parameters), tmp_path)

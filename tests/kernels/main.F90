@@ -71,6 +71,7 @@ program main
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
    use test_shape, only : collect_shape
+   use test_soft_law, only : collect_soft_law
    use test_solid, only : collect_solid
    use test_solvers, only : collect_solvers
    use test_stepper_free, only : collect_stepper_free
@@ -136,6 +137,7 @@ program main
    call run("law_points", collect_law_points)
    call run("element", collect_element)
    call run("corotated", collect_corotated)
+   call run("soft_law", collect_soft_law)
    call run("solid", collect_solid)
    call run("chain", collect_chain)
    call run("search", collect_search)

@@ -1,0 +1,78 @@
+!> *CONSTRAINT METHOD: how contact is held, and how stiff it is where it gives way.
+module emcon_deck_softness
+   use emcon_deck_options, only : choose_option
+   use emcon_deck_reader, only : card_error, card_t, has_option, option_name, option_real, reader_t
+   use emcon_diagnostics, only : add_error
+   use emcon_interactions, only : contact_pair_t
+   use emcon_kinds, only : wp
+   use emcon_options, only : option_default
+   use emcon_steps, only : initiation_massless, initiation_velocity_update, &
+      method_augmented_lagrange, method_penalty, softness_t, step_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: read_constraint_method, check_softness
+
+contains
+
+   !> The method of this step and later ones; each card says all of it anew.
+   subroutine read_constraint_method(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+
+      if (option_name(card, "TYPE") == "") step%constraint_method = option_default("method")
+      call choose_option(reader, card, "TYPE", "method", step%constraint_method)
+      step%softness = softness_t(card%origin)
+      call option_real(reader, card, "STIFFNESS", step%softness%stiffness)
+      call option_real(reader, card, "FACTOR", step%softness%factor)
+      call option_real(reader, card, "TOLERANCE", step%softness%tolerance)
+      if (has_option(card, "STIFFNESS") .and. has_option(card, "FACTOR")) call card_error(reader, &
+         card, "either STIFFNESS or FACTOR is to be given")
+      if ((has_option(card, "STIFFNESS") .or. has_option(card, "FACTOR")) .and. .not. &
+         any(step%constraint_method == [method_penalty, method_augmented_lagrange])) then
+         call card_error(reader, card, "STIFFNESS and FACTOR are of TYPE=PENALTY and " // &
+            "AUGMENTED LAGRANGE: with the others contact does not give way")
+      end if
+      if (.not. has_option(card, "TOLERANCE")) return
+      if (step%constraint_method /= method_augmented_lagrange) then
+         call card_error(reader, card, "TOLERANCE is of TYPE=AUGMENTED LAGRANGE")
+      else if (step%softness%tolerance >= 1.0_wp) then
+         call card_error(reader, card, "TOLERANCE is relative to an edge and must be below 1")
+      end if
+   end subroutine read_constraint_method
+
+   !> What gives way stores energy and takes its time: it has no velocities that jump, and no
+   !> surfaces without mass.
+   subroutine check_softness(reader, pair, step)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(step_t), intent(in) :: step(:)
+      integer :: k
+
+      do k = 1, size(step)
+         associate (method => step(k)%constraint_method, initiation => step(k)%initiation)
+            if (.not. step(k)%scheme%masses_resist) cycle
+            if (.not. any(method == [method_penalty, method_augmented_lagrange])) cycle
+            if (initiation == initiation_massless) call refuse( &
+               "*CONTACT INITIATION, TYPE=MASSLESS: surfaces without mass hold their gaps exactly")
+            if (initiation == initiation_velocity_update) call refuse("*CONTACT INITIATION, " // &
+               "TYPE=VELOCITY UPDATE: what is left of gaps would count as energy that impacts took")
+            if (method /= method_penalty) cycle
+            if (any(pair%restitution < 1.0_wp)) call refuse("RESTITUTION below 1: a penalty has " &
+               // "no instant at which velocities jump")
+         end associate
+      end do
+
+   contains
+
+      subroutine refuse(what)
+         character(len=*), intent(in) :: what
+
+         call add_error(reader%log, step(k)%softness%origin, "*CONSTRAINT METHOD of step " // &
+            to_text(k) // " does not go with " // what // "; use TYPE=NULL SPACE")
+      end subroutine refuse
+
+   end subroutine check_softness
+
+end module emcon_deck_softness

@@ -1,0 +1,197 @@
+!> Contact that gives way: how stiff each constraint of a step is, by the deck or by the elements at
+!> the surfaces. Source: docs/theory.md, eqs. (20a) to (20e).
+module emcon_softness
+   use emcon_constraints, only : constraint_place, constraint_set_t
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : dp, wp
+   use emcon_scene, only : scene_t, where_text
+   use emcon_soft_law, only : soft_energy
+   use emcon_steps, only : method_augmented_lagrange, method_penalty, step_t
+   use emcon_system, only : system_t
+   use emcon_term_registry, only : terms_mass
+   use emcon_text, only : note_add, to_text
+   implicit none
+   private
+   public :: softness_state_t, softness_begin_step, softness_select, softness_augment, &
+      softness_stored, softness_depth
+
+   !> Solves with multipliers that are given, at most.
+   integer, parameter, public :: most_augmentations = 50
+   !> By default an augmented Lagrangian is so much stiffer than what it pushes at.
+   real(wp), parameter :: augmented_factor = 3.0_wp
+
+   type :: softness_state_t
+      logical :: is_on = .false.                 !! contact gives way in this step
+      logical :: augments = .false.              !! and is pushed back: AUGMENTED LAGRANGE
+      real(wp) :: tolerance = 0.0_wp             !! of that, by the edge
+      integer :: n_augmentation = 0              !! in the last increment
+      real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
+   end type softness_state_t
+
+contains
+
+   !> Set up for `step`, whose contacts are laid out.
+   subroutine softness_begin_step(self, system, scene, step, error)
+      type(softness_state_t), intent(out) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: inner(size(scene%x, 2)), mass(size(scene%x, 2))
+      integer :: k
+
+      self%augments = step%constraint_method == method_augmented_lagrange
+      self%is_on = (self%augments .or. step%constraint_method == method_penalty) .and. &
+         size(system%contact) > 0
+      do k = 1, size(system%contact)
+         system%contact(k)%contact%gives_way = .false.
+      end do
+      if (.not. self%is_on) return
+      self%tolerance = step%softness%tolerance
+      allocate(self%stiffness(system%n_constraint), source=0.0_wp)
+      inner = 0.0_wp
+      do k = 1, size(system%term)
+         call system%term(k)%term%add_stiffness(inner)
+      end do
+      mass = 0.0_wp
+      if (self%augments .and. step%scheme%masses_resist) call find_mass(system, mass)
+      inner = inner + 2.0_wp*mass/step%h**2
+      do k = 1, size(system%contact)
+         call set_contact(self, system, scene, step, k, inner, error)
+         if (allocated(error)) return
+      end do
+   end subroutine softness_begin_step
+
+   !> Mass at each node: the sums of rows.
+   subroutine find_mass(system, mass)
+      type(system_t), intent(in) :: system
+      real(wp), intent(out) :: mass(:)           !! (n_node) [M]
+      type(csr_t) :: between
+      integer :: i
+
+      call terms_mass(system%term, between)
+      mass = 0.0_wp
+      do i = 1, between%n_row
+         mass(i) = real(sum(between%value(between%row_start(i) + 1:between%row_start(i + 1))), wp)
+      end do
+   end subroutine find_mass
+
+   !> The stiffness of contact `k`: one pressure by penetration for all of its nodes, that of the
+   !> deck, or the mean of `inner` at its slave nodes by their area, or else at the master's. Where
+   !> nodes of both sides push each side has half of it.
+   subroutine set_contact(self, system, scene, step, k, inner, error)
+      type(softness_state_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      integer, intent(in) :: k
+      real(wp), intent(in) :: inner(:)           !! (n_node) stiffness of what stands there [M/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: area(system%contact(k)%contact%n_constraint), by_area, factor
+
+      factor = step%softness%factor
+      if (self%augments) factor = augmented_factor*factor
+      associate (contact => system%contact(k)%contact, before => system%first_constraint(k), &
+            given => step%softness%stiffness)
+         call contact%own_area(scene%x, area)
+         if (.not. sum(area) > 0.0_wp) then
+            call raise(error, err_input, where_text(scene, step%softness%origin) // ": error: " &
+               // "*CONSTRAINT METHOD: a slave surface made of nodes has no area to give way " // &
+               "by; name its elements and faces, or use TYPE=NULL SPACE")
+            return
+         end if
+         by_area = given
+         if (.not. given > 0.0_wp) by_area = factor*sum(inner(contact%node))/sum(area)
+         if (.not. by_area > 0.0_wp) by_area = factor*of_opposite(system, k, inner)/sum(area)
+         if (.not. by_area > 0.0_wp) then
+            call raise(error, err_input, where_text(scene, step%softness%origin) // ": error: " &
+               // "*CONSTRAINT METHOD: no elastic element stands on either surface of a contact " &
+               // "pair: give its STIFFNESS, pressure by penetration")
+            return
+         end if
+         contact%gives_way = .not. self%augments .and. step%scheme%masses_resist
+         self%stiffness(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
+            contact%both_sides)*by_area
+         if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) // &
+            " gives way by a stiffness of " // to_text(by_area, 9) // ", pressure by penetration")
+      end associate
+   end subroutine set_contact
+
+   !> The stiffness at the nodes of the other side of contact `k`, if these are some contact's.
+   pure real(wp) function of_opposite(system, k, inner) result(total)
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: k
+      real(wp), intent(in) :: inner(:)           !! (n_node)
+      integer :: i
+
+      total = 0.0_wp
+      do i = 1, size(system%contact)
+         if (i == k .or. abs(system%contact(i)%of_pair) /= abs(system%contact(k)%of_pair)) cycle
+         total = total + sum(inner(system%contact(i)%contact%node))
+      end do
+   end function of_opposite
+
+   !> Let the contacts of `set` give way, whose targets and multipliers stand.
+   subroutine softness_select(self, system, set, is_stored)
+      type(softness_state_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(inout) :: set
+      logical, intent(in) :: is_stored           !! pushes are discrete gradients of what is stored
+      integer :: k, pair, i
+
+      if (.not. self%is_on .or. set%n == 0) return
+      if (.not. allocated(set%soft)) allocate(set%soft(set%n))
+      set%is_stored = is_stored .and. .not. self%augments
+      do k = 1, set%n
+         call constraint_place(system, set%id(k), pair, i)
+         if (pair == 0) cycle
+         set%soft(k)%stiffness = self%stiffness(set%id(k)) &
+            *system%contact(pair)%contact%share(i)**2
+         if (self%augments) set%soft(k)%base = set%lam(k)
+      end do
+   end subroutine softness_select
+
+   !> Take the multipliers as those to push with; `is_done` if that has closed what was left of the
+   !> gaps.
+   pure subroutine softness_augment(self, set, is_done)
+      type(softness_state_t), intent(inout) :: self
+      type(constraint_set_t), intent(inout) :: set
+      logical, intent(out) :: is_done            !! else the step is to be solved again
+      integer :: k
+
+      is_done = .true.
+      if (.not. self%augments .or. .not. allocated(set%soft)) return
+      self%n_augmentation = self%n_augmentation + 1
+      do k = set%n_held + 1, set%n
+         if (abs(set%soft(k)%left) > self%tolerance*set%item(k)%size) is_done = .false.
+         set%soft(k)%base = set%lam(k)
+      end do
+   end subroutine softness_augment
+
+   !> What the contacts of `set` store at the end of the step [M L^2/T^2].
+   pure real(wp) function softness_stored(self, set) result(energy)
+      type(softness_state_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      energy = 0.0_wp
+      if (self%augments .or. .not. allocated(set%soft)) return
+      do k = set%n_held + 1, set%n
+         energy = energy + soft_energy(set%soft(k), set%item(k)%gap1)
+      end do
+   end function softness_stored
+
+   !> How deep the contacts of `set` have given way, by the edge: the largest.
+   pure real(wp) function softness_depth(set) result(depth)
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      depth = 0.0_wp
+      if (.not. allocated(set%soft)) return
+      do k = set%n_held + 1, set%n
+         depth = max(depth, -set%soft(k)%left/set%item(k)%size)
+      end do
+   end function softness_depth
+
+end module emcon_softness

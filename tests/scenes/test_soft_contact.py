@@ -1,0 +1,230 @@
+"""`*CONSTRAINT METHOD, TYPE=PENALTY` and `AUGMENTED LAGRANGE`: contact that gives way."""
+
+import math
+
+import numpy as np
+import pytest
+from plain_scenes import BOTH, ONE, UNGUARDED, Scene
+from scene_tools import DECKS, attempt, run_deck
+from test_contact_output import data_sets, restart
+from test_statics import E, FORCE, FORMULATIONS, NU, ROUNDED, displacement, tower
+
+METHOD = "*CONSTRAINT METHOD, TYPE=<method>"
+PENALTY, AUGMENTED = "PENALTY", "AUGMENTED LAGRANGE"
+
+
+def soft(deck, options):
+    """`deck` with options of its constraint method; the method is its parameter still."""
+    deck.replace(METHOD, f"{METHOD}, {options}")
+    return deck
+
+
+def balance(history):
+    """Largest error of the energy, and the most that contact has made or taken, by the largest."""
+    scale = (history["kinetic"] + history["strain"]).max()
+    total = history["total"] - history["contact_work"]
+    return np.abs(total - total[0]).max()/scale, np.abs(history["contact_work"]).max()/scale
+
+
+# ---- one mass on a spring -----------------------------------------------------------------------
+
+MASS, SPEED, STIFFNESS, GAP = 2.0, 0.25, 200.0, 0.03
+OMEGA = math.sqrt(STIFFNESS/MASS)
+REBOUND = GAP/SPEED + math.pi/OMEGA              # when it is back at a gap of 0
+
+
+def falling(h, t_end):
+    """A rigid square of side 1 falls flat onto a fixed one."""
+    scene = Scene(h, t_end)
+    scene.block("A", (0.0, GAP), (1.0, 1.0), (2, 2), density=MASS, velocity=(0.0, -SPEED))
+    scene.block("B", (-0.5, -1.0), (2.0, 1.0), (2, 1)).hold("B", lambda x, y: True)
+    scene.side("FOOT", "A", lambda x, y: y < GAP + 1e-9)
+    scene.side("HEAD", "B", lambda x, y: y > -1e-9)
+    scene.pairs = [("FOOT", "HEAD")]
+    deck = scene.deck(UNGUARDED)
+    deck.replace("*SURFACE INTERACTION", f"*NODE\n900, 0.5, {0.5 + GAP}\n*RIGID BODY, ELSET=A, "
+                 f"REF NODE=900\n*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY\n900, 0., 0., {-SPEED}\n"
+                 f"0.5, {0.5 + GAP}\n*BOUNDARY\n900, 1\n900, 6\n*SURFACE INTERACTION")
+    return soft(deck, f"STIFFNESS={STIFFNESS}")
+
+
+def place(history):
+    """Momentum of the square, and where it is, by the momentum: exact for the scheme."""
+    v = history["py"]/MASS
+    way = np.concatenate([[0.0], np.cumsum(0.5*(v[1:] + v[:-1])*np.diff(history["time"]))])
+    return v, GAP + way
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_a_mass_on_the_spring_of_a_penalty(formulation, tmp_path):
+    """It rebounds as fast as it came, after half a period: of second order in h."""
+    t_end, late = REBOUND + 0.3, []
+    for h in (0.02, 0.01, 0.005):
+        run = run_deck(falling(h, t_end), tmp_path/str(h), method=PENALTY, formulation=formulation)
+        history = run.history
+        error, made = balance(history)
+        assert max(error, made) < 1e-12
+        v, gap = place(history)
+        assert v[-1] == pytest.approx(SPEED, rel=1e-12)
+        late.append(abs(gap[-1] - SPEED*(t_end - REBOUND)))
+        # The most that is stored, and the deepest place, between two times.
+        depth = SPEED/OMEGA
+        assert -gap.min() == pytest.approx(depth, rel=(OMEGA*h)**2)
+        assert history["contact_energy"].max() == pytest.approx(0.5*STIFFNESS*gap.min()**2,
+                                                                rel=1e-11)
+    # Entering and leaving fall into steps at places of their own: the mean order of two halvings.
+    assert math.log2(late[0]/late[2])/2 > 1.5, late
+
+
+# ---- energy and momenta -------------------------------------------------------------------------
+
+
+def discs(sides):
+    scene = Scene(0.02, 1.0)
+    scene.disc("A", (-0.6, 0.0), 0.5, (8, 3), velocity=(1.0, 0.0), spin=0.5)
+    scene.disc("B", (0.6, 0.3), 0.5, (8, 3), velocity=(-0.5, 0.0), density=2.0)
+    scene.pairs = [("A", "B")]
+    return scene.deck(sides)
+
+
+@pytest.mark.parametrize("factor", [0.1, 1, 10])
+@pytest.mark.parametrize(("formulation", "sides"), [
+    ("NODE TO SURFACE", ONE), ("NODE TO SURFACE", BOTH), ("SEGMENT", ONE)])
+def test_a_penalty_keeps_energy_and_momenta(formulation, sides, factor, tmp_path):
+    done, run = attempt(soft(discs(sides), f"FACTOR={factor}"), tmp_path, (),
+                        {"method": PENALTY, "formulation": formulation})
+    history = run.history
+    assert history["active"].max() > 1 and history["active"][-1] == 0
+    assert history["contact_energy"].max() > 1e-3*history["kinetic"][0]
+    assert history["contact_energy"][-1] == 0
+    assert max(balance(history)) < 1e-12
+    scale = np.abs(history["lz"]).max() + np.abs(history["px"]).max()
+    for name in ("px", "py", "lz"):
+        assert np.abs(history[name] - history[name][0]).max() < 1e-12*scale, name
+    if sides != BOTH:
+        return
+    # The nodes of both sides push: nothing goes in farther than they give way, which is told.
+    is_deep = run.verdict["give"] > 0.1
+    assert is_deep is (factor == 0.1)
+    assert done.returncode == (3 if is_deep else 0)
+    assert [text.startswith("contact gives way by up to") for text in run.verdict["reasons"]] \
+        == [True]*is_deep
+    assert f"contact gives way by up to {run.verdict['give']:.3g}"[:30] in run.log
+
+
+@pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])
+def test_a_penalty_with_integrated_gaps_on_a_flat_surface(smoothing, tmp_path):
+    """Which edges a gap is made of does not change there: energy as for nodes."""
+    run = run_deck(DECKS/"ring.inp", tmp_path, h=0.02, t_end=1.5, method=PENALTY,
+                   formulation="MORTAR", smoothing=smoothing)
+    assert run.history["active"].max() > 2
+    assert max(balance(run.history)) < 1e-12
+
+
+@pytest.mark.parametrize("initiation", ["PERSISTENT", "ADMISSIBLE"])
+def test_an_augmented_lagrangian_is_what_the_null_space_is(initiation, tmp_path):
+    """Gaps are held to TOLERANCE, and so the motion; its loss of energy is in contact work."""
+    runs = []
+    for method, options in (("NULL SPACE", None), (AUGMENTED, "TOLERANCE=1e-4"),
+                            (AUGMENTED, "TOLERANCE=1e-10")):
+        deck = discs(ONE) if options is None else soft(discs(ONE), options)
+        runs.append(run_deck(deck, tmp_path/str(options), method=method, initiation=initiation,
+                             formulation="NODE TO SURFACE", t_end=0.26))
+        assert runs[-1].history["active"][-1] >= 3 and runs[-1].history["cuts"].sum() == 0
+    hard, *others = (run.fields()["displacement"][-1] for run in runs)
+    rough, fine = (np.abs(u - hard).max()/np.abs(hard).max() for u in others)
+    assert fine < 1e-7 < rough < 0.1
+    for run, tolerance in zip(runs[1:], (1e-4, 1e-10)):
+        assert balance(run.history)[0] < 1e-12
+        assert 0 < run.verdict["give"] <= tolerance
+        assert run.verdict["augmentations"] >= 2
+    assert runs[2].verdict["augmentations"] > runs[1].verdict["augmentations"]
+
+
+@pytest.mark.parametrize("scheme", ["MIDPOINT", "TRAPEZOIDAL", "GENERALIZED ALPHA", "BDF2",
+                                    "ENERGY DECAYING"])
+def test_other_schemes_push_by_a_penalty_too(scheme, tmp_path):
+    """Those that push at the end of a step make or take energy by it, and the column tells."""
+    deck = discs(BOTH)
+    deck.replace(METHOD, f"*TIME INTEGRATION, SCHEME={scheme}\n{METHOD}")
+    _, run = attempt(deck, tmp_path, (), {"method": PENALTY, "formulation": "NODE TO SURFACE",
+                                          "h": 0.01})
+    made = balance(run.history)[1]
+    for name in ("px", "py"):
+        assert np.abs(run.history[name] - run.history[name][0]).max() < 1e-12
+    assert (made < 1e-12) == (scheme in ("MIDPOINT", "ENERGY DECAYING"))
+    assert made < 0.2
+
+
+# ---- statics ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
+@pytest.mark.parametrize("gap", [0.0, 0.1])
+def test_a_uniform_pressure_gives_way_evenly(tmp_path, formulation, gap):
+    """Patch test: the upper square goes in by pressure over stiffness, all else as without."""
+    stiffness = 50.0*E
+    text = tower([gap], formulation, step="*CONTACT FILE\nCDIS, CSTR")
+    text = text.replace("*CLOAD", f"*CONSTRAINT METHOD, TYPE=PENALTY, STIFFNESS={stiffness}\n*CLOAD")
+    (tmp_path/"deck.inp").write_text(text)
+    run = run_deck(tmp_path/"deck.inp", tmp_path)
+    shortening, give = 2*(1 - NU**2)*FORCE/E, FORCE/stiffness
+    top = displacement(run, 1)[-1, :, 1]
+    assert np.allclose(top, -gap - shortening - give, rtol=0, atol=ROUNDED*shortening)
+    gaps = run.fields()["contact_gap"][-1]
+    # Of the width, the contact surface keeps all but FORCE/E.
+    assert np.allclose(gaps[~np.isnan(gaps)], -give, rtol=4*FORCE/E, atol=0)
+
+
+def test_a_penalty_tends_to_the_exact_contact(tmp_path):
+    """What is left falls as 1 over the stiffness; an augmented Lagrangian leaves TOLERANCE."""
+    found = {}
+    for name in ("NULL SPACE", "PENALTY, FACTOR=1", "PENALTY, FACTOR=100", AUGMENTED,
+                 f"{AUGMENTED}, FACTOR=0.1"):
+        text = tower([0.05], held="{name}_ONE, 1", turn=0.05, nlgeom=True, load=-30.0)
+        text = text.replace("*CLOAD", f"*CONSTRAINT METHOD, TYPE={name}\n*CLOAD")
+        folder = tmp_path/str(len(found))
+        folder.mkdir()
+        (folder/"deck.inp").write_text(text)
+        found[name] = run_deck(folder/"deck.inp", folder).fields()["displacement"][-1]
+    hard = found.pop("NULL SPACE")
+    rough, fine, *held = (np.abs(u - hard).max() for u in found.values())
+    assert rough/fine == pytest.approx(100, rel=0.1)
+    assert max(held) < 1e-7
+
+
+# ---- bits ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", [PENALTY, AUGMENTED])
+def test_restart_in_contact_gives_the_same_bits(tmp_path, method):
+    deck = discs(ONE)
+    deck.replace("*NODE FILE", "*RESTART, WRITE, FREQUENCY=8\n*NODE FILE")
+    k = deck.find("*STEP")
+    second = [(head, list(data)) for head, data in deck.card[k:]]
+    deck.card[k + 1] = (deck.card[k + 1][0], ["<h>, 0.32"])
+    second[second.index(("*RESTART, WRITE, FREQUENCY=8", []))] = (
+        "*RESTART, WRITE, FREQUENCY=0", [])
+    deck.card += second
+    run = run_deck(deck, tmp_path/"whole", method=method, formulation="NODE TO SURFACE")
+    history = run.history
+    n = int(np.searchsorted(history["time"], 0.32 - 1e-9))
+    assert history["active"][n] > 0
+    (tmp_path/"copy").mkdir()
+    copy = restart(run, tmp_path/"copy")
+    assert f"resumed after increment {n}" in copy.log
+    assert copy.digits() == run.digits()
+    assert data_sets(copy.file(".h5")) == data_sets(run.file(".h5"))
+
+
+def test_the_stiffness_is_told_and_follows_the_material(tmp_path):
+    """By default it is that of the elements at the slave nodes, over their area: E by edge."""
+    told = []
+    for stiffness in (100.0, 400.0):
+        deck = discs(ONE)
+        deck.map_numbers("*HYPERELASTIC", lambda words, e=stiffness: [str(e), words[1]])
+        run = run_deck(deck, tmp_path/str(stiffness), method=PENALTY)
+        told.append(float(run.log.split("gives way by a stiffness of ")[1].split(",")[0]))
+    assert told[1] == pytest.approx(4*told[0], rel=1e-8)
+    edge = math.pi/32
+    assert 100/edge < told[0] < 20*100/edge
