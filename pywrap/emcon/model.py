@@ -275,11 +275,13 @@ class Model(Cards):
     # --- materials -------------------------------------------------------------------------
 
     def material(self, name: str, *, density: Number | None = None,
+                 damping: tuple[Number, Number] | None = None,
                  user: Sequence[Number] | None = None, law: PointFunction | None = None,
                  **constants: Sequence[Number] | None) -> Model:
         """`*MATERIAL` with one law, or none where bodies are rigid; stresses in [M/(L T^2)].
 
         density             [M/L^3]; required in dynamic steps and for gravity
+        damping             by mass [1/T] and by moduli [T]: `*DAMPING, ALPHA=, BETA=`
         constants           those of a law of the library, `elastic=(E, nu)`, by the name of the law:
                             `emcon.options.LAWS` and docs/deck.md list them
         law                 a function of strains (n, 3), E11, E22, 2 E12 of Green and Lagrange (the
@@ -307,6 +309,8 @@ class Model(Cards):
             text += card(kind, options, [numbers[k:k + 8] for k in range(0, len(numbers), 8)])
         if law is not None:
             self.give_law(name, law)
+        if damping is not None:
+            text += card("DAMPING", dict(zip(("ALPHA", "BETA"), damping, strict=True)))
         self._add(text if density is None else text + card("DENSITY", rows=[(density,)]))
         return self
 

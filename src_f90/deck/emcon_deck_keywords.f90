@@ -58,6 +58,7 @@ module emcon_deck_keywords
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
       keyword_t("DENSITY", in_model, "!DEPENDENCIES:0"), &
+      keyword_t("DAMPING", in_model, "ALPHA=,BETA=,!COMPOSITE,!STRUCTURAL:0", has_data=.false.), &
       keyword_t("ELASTIC", in_model, "TYPE=,~MODULI,!DEPENDENCIES:0"), &
       keyword_t("HYPERELASTIC", in_model, "N=,!POLYNOMIAL,!REDUCEDPOLYNOMIAL," &
          // "!ARRUDA-BOYCE,!VANDERWAALS,!MARLOW,~MODULI,!DEPENDENCIES:0"), &
@@ -139,7 +140,6 @@ module emcon_deck_keywords
       keyword_t("VISCOELASTIC", in_model, "", "materials are elastic"), &
       keyword_t("HYPERFOAM", in_model, "", "use *HYPERELASTIC, NEO HOOKE"), &
       keyword_t("DEPVAR", in_model, "", "materials have no state variables"), &
-      keyword_t("DAMPING", in_both, "", "there is no damping: energy is to be conserved"), &
       keyword_t("EXPANSION", in_model, "", no_thermal), &
       keyword_t("CONDUCTIVITY", in_model, "", no_thermal), &
       keyword_t("SPECIFIC HEAT", in_model, "", no_thermal), &

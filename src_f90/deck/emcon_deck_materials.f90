@@ -1,5 +1,6 @@
 !> *MATERIAL with its cards, and *SOLID SECTION.
 module emcon_deck_materials
+   use emcon_deck_damping, only : read_damping
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, is_blank, next_line
    use emcon_deck_named, only : find_set, hint_at_set, set_names
@@ -39,12 +40,14 @@ contains
             select case (card%name)
             case ("MATERIAL")
                call start_material(reader, card, scene, n)
-            case ("DENSITY", "ELASTIC", "HYPERELASTIC", "USERMATERIAL")
+            case ("DENSITY", "DAMPING", "ELASTIC", "HYPERELASTIC", "USERMATERIAL")
                if (n == 0) then
                   if (.not. reader%doubt_names) call card_error(reader, card, &
                      "there is no *MATERIAL before")
                else if (card%name == "DENSITY") then
                   call read_density(reader, card, scene%material(n))
+               else if (card%name == "DAMPING") then
+                  call read_damping(reader, card, scene%material(n))
                else if (scene%material(n)%law /= 0) then
                   call card_error(reader, card, "material " // scene%material(n)%name &
                      // " has a law already")

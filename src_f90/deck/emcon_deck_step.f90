@@ -8,6 +8,7 @@ module emcon_deck_step
       conditions_t
    use emcon_deck_contact_settings, only : check_massless, check_restitution, check_statics, &
       pairs_ask, read_controls, read_initiation, read_interference
+   use emcon_deck_damping, only : check_damping
    use emcon_deck_explicit, only : check_explicit_cards, suit_explicit
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
@@ -80,6 +81,7 @@ contains
       call check_schemes(reader, scene%pair, scene%step)
       call check_restitution(reader, scene%pair, scene%step)
       call check_softness(reader, scene%pair, scene%step)
+      call check_damping(reader, scene)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
       end if

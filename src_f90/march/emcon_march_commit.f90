@@ -269,7 +269,7 @@ contains
    !> taken as linear over the step.
    subroutine book_work(self)
       type(march_t), intent(inout) :: self
-      real(wp) :: contact_work
+      real(wp) :: contact_work, decay, damping
       integer :: k
 
       associate (state => self%state, part => self%system%response%part, &
@@ -296,8 +296,9 @@ contains
          end if
          self%ledger%contact_work = self%ledger%contact_work + contact_work
          call book_stored(self)
-         if (motion%pose%dissipation > 0.0_wp) self%ledger%decay = self%ledger%decay &
-            + terms_decay(self%system%term)
+         call terms_decay(self%system%term, decay, damping)
+         self%ledger%decay = self%ledger%decay + decay
+         self%ledger%damping = self%ledger%damping + damping
       end associate
    end subroutine book_work
 

@@ -17,6 +17,9 @@ module emcon_materials
       integer :: law = 0                             !! of a row of `law_rows`; 0: none was given
       real(wp), allocatable :: constant(:)           !! as the row of the law names them | any
       real(wp) :: density = 0.0_wp                   !! [M/L^3]
+      type(origin_t) :: damping_origin
+      real(wp) :: alpha = 0.0_wp                     !! damping by mass [1/T]
+      real(wp) :: beta = 0.0_wp                      !! damping by moduli [T]
    end type material_t
 
    type :: section_t

@@ -25,6 +25,7 @@ module emcon_scheme
       logical :: takes_jumps = .true.            !! velocities may jump where a step ends
       logical :: takes_massless = .true.         !! nodes may be without mass
       logical :: dissipates = .false.            !! elements take energy
+      logical :: takes_damping = .true.          !! materials may be damped
       logical :: is_accelerated = .false.        !! the past is the acceleration
       integer :: n_past = 0                      !! fields that are kept of the steps before
       type(setting_t) :: setting

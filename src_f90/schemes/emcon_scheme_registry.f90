@@ -31,15 +31,18 @@ module emcon_scheme_registry
       scheme_row_t(scheme_midpoint, "DYNAMIC", "MIDPOINT", "mid-point rule", &
          masses_resist=.true., takes_massless=.false.), &
       scheme_row_t(scheme_trapezoidal, "DYNAMIC", "TRAPEZOIDAL", "trapezoidal rule", &
-         masses_resist=.true., takes_jumps=.false., takes_massless=.false.), &
+         masses_resist=.true., takes_jumps=.false., takes_massless=.false., &
+         takes_damping=.false.), &
       scheme_row_t(scheme_generalized_alpha, "DYNAMIC", "GENERALIZED ALPHA", &
          "generalised-alpha method", masses_resist=.true., takes_jumps=.false., &
-         takes_massless=.false., is_accelerated=.true., n_past=1, &
+         takes_massless=.false., takes_damping=.false., is_accelerated=.true., n_past=1, &
          setting=setting_t("ALPHA", -0.05_wp)), &
       scheme_row_t(scheme_bdf2, "DYNAMIC", "BDF2", "backward differences", &
-         masses_resist=.true., takes_jumps=.false., takes_massless=.false., n_past=2), &
+         masses_resist=.true., takes_jumps=.false., takes_massless=.false., &
+         takes_damping=.false., n_past=2), &
       scheme_row_t(scheme_central_difference, "DYNAMIC", "CENTRAL DIFFERENCE", &
-         "central differences", masses_resist=.true., is_explicit=.true.), &
+         "central differences", masses_resist=.true., takes_damping=.false., &
+         is_explicit=.true.), &
       scheme_row_t(scheme_energy_decaying, "DYNAMIC", "ENERGY DECAYING", &
          "energy-decaying scheme", masses_resist=.true., takes_massless=.false., &
          dissipates=.true., n_past=1, setting=setting_t("DISSIPATION", 0.125_wp))]

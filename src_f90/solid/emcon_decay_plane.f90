@@ -1,7 +1,8 @@
-!> Stress of elements against strain increments that change from step to step, where the scheme asks
-!> for it: chi/2 C (dE - dE_before), with the moduli C at rest.
+!> Forces of elements that take energy: against strain increments that change from step to step,
+!> chi/2 C (dE - dE_before), where the scheme asks for it; of damped materials against the rate of
+!> strain, beta C dE/h, and against velocity, alpha M du/h. C are the moduli at rest.
 !>
-!> Source: docs/theory.md, eqs. (4e) to (4g).
+!> Source: docs/theory.md, eqs. (4e) to (4g), (11a) and (11b).
 module emcon_decay_plane
    use emcon_csr, only : csr_t
    use emcon_element, only : element_motion_t, element_point, point_motion_t
@@ -22,11 +23,16 @@ module emcon_decay_plane
 
    type, extends(term_t) :: decay_term_t
       type(solid_t), private :: solid
-      logical, allocatable, private :: is_damped(:)      !! (n_element) it has moduli, and deforms
+      logical, allocatable, private :: is_damped(:)      !! (n_element) it may take energy
+      logical, allocatable, private :: deforms(:)        !! (n_element) and has moduli
+      real(wp), allocatable, private :: alpha(:)         !! (n_element) of its material [1/T]
+      real(wp), allocatable, private :: beta(:)          !! (n_element) of its material [T]
       real(wp), allocatable, private :: moduli(:, :, :)  !! (3, 3, n_law) at rest [M/(L T^2)]
       logical, private :: nlgeom = .true.
       integer, allocatable, private :: slot(:)           !! element matrices by columns
-      real(wp) :: work = 0.0_wp                  !! of the last motion's forces [M L^2/T^2]
+      ! Of the last motion's forces [M L^2/T^2]:
+      real(wp) :: work = 0.0_wp                  !! taken by the scheme
+      real(wp) :: damping = 0.0_wp               !! taken by materials
    contains
       procedure :: lay_out
       procedure :: begin_step
@@ -36,10 +42,11 @@ module emcon_decay_plane
 
 contains
 
-   !> The elements of `solid` that deform by a law of EMCON.
-   subroutine decay_term_init(self, solid)
+   !> The elements of `solid` that deform by a law of EMCON, and those that have mass.
+   subroutine decay_term_init(self, solid, scene)
       type(decay_term_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
+      type(scene_t), intent(in) :: scene
       real(wp), parameter :: rest(n_strain) = 0.0_wp
       type(law_response_t) :: state
       integer :: k
@@ -47,14 +54,20 @@ contains
       self%role = role_internal
       self%solid = solid
       allocate(self%moduli(n_strain, n_strain, size(solid%law)), source=0.0_wp)
-      allocate(self%is_damped(solid%n_element), source=.false.)
+      allocate(self%deforms(solid%n_element), source=.false.)
       do k = 1, size(solid%law)
          if (.not. allocated(solid%law(k)%law)) cycle
          call law_response_plane(solid%law(k)%law, rest, rest, state)
          ! By the end of a step of no size.
          self%moduli(:, :, k) = 2.0_wp*state%tangent
-         self%is_damped = self%is_damped .or. (solid%law_of == k .and. .not. solid%is_rigid)
+         self%deforms = self%deforms .or. (solid%law_of == k .and. .not. solid%is_rigid)
       end do
+      associate (material => scene%section(scene%element_section)%material)
+         self%alpha = scene%material(material)%alpha
+         self%beta = merge(scene%material(material)%beta, 0.0_wp, self%deforms)
+      end associate
+      self%is_damped = self%alpha > 0.0_wp .or. self%beta > 0.0_wp
+      if (any(scene%step%scheme%dissipates)) self%is_damped = self%is_damped .or. self%deforms
    end subroutine decay_term_init
 
    !> The freedoms of each element.
@@ -82,7 +95,7 @@ contains
       self%slot = slot
    end subroutine begin_step
 
-   !> Forces of a motion; none where the scheme has no dissipation.
+   !> Forces of a motion; none where masses do not resist.
    subroutine respond(self, motion, response, value, side)
       class(decay_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion                     !! placed
@@ -91,11 +104,13 @@ contains
       integer :: e, first
 
       self%work = 0.0_wp
-      if (.not. motion%pose%dissipation > 0.0_wp) return
+      self%damping = 0.0_wp
+      if (.not. motion%pose%mass_scale > 0.0_wp) return
       first = 0
       do e = 1, self%solid%n_element
          if (.not. self%is_damped(e)) cycle
-         call add_element(self, e, first, motion, response, value, side)
+         if (self%deforms(e)) call add_element(self, e, first, motion, response, value, side)
+         if (self%alpha(e) > 0.0_wp) call add_drag(self, e, first, motion, response, value, side)
          first = first + (size(motion%du, 1)*self%solid%geometry(e)%n_node)**2
       end do
    end subroutine respond
@@ -131,9 +146,11 @@ contains
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
       type(element_motion_t) :: now, before
       type(point_motion_t) :: point, last
-      real(wp) :: c(n_strain, n_strain), s(n_strain), way(n_strain), f(size(motion%du, 1))
+      real(wp), dimension(n_strain, n_strain) :: c, viscous
+      real(wp) :: s(n_strain), rate(n_strain), f(size(motion%du, 1))
       integer :: g, i
 
+      if (.not. (motion%pose%dissipation > 0.0_wp .or. self%beta(e) > 0.0_wp)) return
       call gather(self, e, motion, now, before)
       associate (geometry => self%solid%geometry(e), total => response%part(self%role))
          do g = 1, geometry%n_gp
@@ -141,9 +158,13 @@ contains
             call element_point(geometry, g, before, last)
             c = 0.5_wp*motion%pose%dissipation*geometry%weight(g) &
                *self%moduli(:, :, self%solid%law_of(e))
-            way = point%dstrain - motion%pose%recalled*last%dstrain
-            s = matmul(c, way)
+            viscous = (self%beta(e)*motion%pose%mass_scale)*geometry%weight(g) &
+               *self%moduli(:, :, self%solid%law_of(e))
+            s = matmul(c, point%dstrain - motion%pose%recalled*last%dstrain)
+            rate = matmul(viscous, point%dstrain)
             self%work = self%work + dot_product(s, point%dstrain)
+            self%damping = self%damping + dot_product(rate, point%dstrain)
+            s = s + rate
             do i = 1, geometry%n_node
                f = matmul(point%f_mid, traction(s, geometry%gradient(:, i, g)))
                associate (node => self%solid%node(i, e))
@@ -153,10 +174,42 @@ contains
                end associate
             end do
             if (present(value)) call add_tangent(self%slot(first + 1:), &
-               geometry%gradient(:, :geometry%n_node, g), c, point, value, side)
+               geometry%gradient(:, :geometry%n_node, g), c + viscous, point, value, side)
          end do
       end associate
    end subroutine add_element
+
+   !> Add the drag of the mass of element `e`, and its derivatives to the places from `first` on.
+   pure subroutine add_drag(self, e, first, motion, response, value, side)
+      type(decay_term_t), intent(inout) :: self
+      integer, intent(in) :: e, first
+      type(motion_t), intent(in) :: motion
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)
+      real(wp) :: f(size(motion%du, 1)), part
+      integer :: i, j, a, place, n_dim
+
+      n_dim = size(f)
+      associate (node => self%solid%node(:, e), n => self%solid%geometry(e)%n_node, &
+            total => response%part(self%role))
+         do j = 1, n
+            do i = 1, n
+               part = self%alpha(e)*motion%pose%mass_scale*self%solid%mass(i, j, e)
+               f = part*motion%du(:, node(j))
+               self%damping = self%damping + dot_product(f, motion%du(:, node(i)))
+               total%force(:, node(i)) = total%force(:, node(i)) + f
+               if (response%with_sizes) total%magnitude(:, node(i)) = &
+                  total%magnitude(:, node(i)) + abs(f)
+               if (.not. present(value)) cycle
+               do a = 1, n_dim
+                  place = self%slot(first + (n_dim*(j - 1) + a - 1)*n_dim*n + n_dim*(i - 1) + a)
+                  if (place > 0) value(place) = value(place) + real(part, dp)
+                  if (place < 0) side(-place) = side(-place) + real(part, dp)
+               end do
+            end do
+         end do
+      end associate
+   end subroutine add_drag
 
    !> Stress times a gradient.
    pure function traction(s, gradient) result(t)
@@ -201,7 +254,7 @@ contains
       class(decay_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = .not. (motion%pose%dissipation > 0.0_wp .and. (self%nlgeom .or. &
+      is_symmetric = .not. (motion%pose%mass_scale > 0.0_wp .and. (self%nlgeom .or. &
          any(self%solid%is_corotated)))
    end function is_symmetric
 

@@ -35,7 +35,7 @@ contains
       type(host_t), intent(in), optional :: given
       integer :: n, i, first
       logical :: has_linear, turns               ! there are linear elements, corotated ones
-      logical :: decays                          ! elements take energy in some step
+      logical :: decays                          ! elements take energy
 
       n = 0
       if (present(given)) then
@@ -43,7 +43,8 @@ contains
       end if
       has_linear = any(scene%section(scene%element_section)%kinematics == kinematics_linear)
       turns = any(scene%section(scene%element_section)%kinematics == kinematics_corotated)
-      decays = any(scene%step%scheme%dissipates)
+      decays = any(scene%step%scheme%dissipates) .or. any(scene%material%alpha > 0.0_wp .or. &
+         scene%material%beta > 0.0_wp)
       first = n_own + count([has_linear, turns, decays])
       allocate(term(first + n))
       allocate(inertia_t :: term(of_inertia)%term)
@@ -108,7 +109,7 @@ contains
          type is (corotated_term_t)
             call corotated_term_init(part, solid, size(scene%x, 1))
          type is (decay_term_t)
-            call decay_term_init(part, solid)
+            call decay_term_init(part, solid, scene)
          end select
       end do
    end subroutine create_own
@@ -207,19 +208,22 @@ contains
       end select
    end subroutine terms_mass_values
 
-   !> What the damping of the scheme has taken in the last motion [M L^2/T^2].
-   pure real(wp) function terms_decay(term) result(work)
+   !> What the damping of the scheme has taken in the last motion, and that of materials.
+   pure subroutine terms_decay(term, work, damping)
       type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+      real(wp), intent(out) :: work, damping     !! [M L^2/T^2]
       integer :: k
 
       work = 0.0_wp
+      damping = 0.0_wp
       do k = n_own + 1, size(term)
          select type (part => term(k)%term)
          type is (decay_term_t)
             work = part%work
+            damping = part%damping
          end select
       end do
-   end function terms_decay
+   end subroutine terms_decay
 
    !> M field, in all directions.
    pure subroutine terms_mass_times(term, field, product)

@@ -234,7 +234,7 @@ def everything() -> Model:
     model.surface("S3", nodes=[0, 1]).surface("S4", edges=[[0, 1], [1, 2]])
     model.material("A", elastic=(1.0, 0.3), density=1.0).material("B", neo_hooke=(1.0, 0.1))
     model.material("C", coupled_neo_hooke=(1.0, 0.1)).material("D", user=range(10))
-    model.material("E", mooney_rivlin=(1.0, 0.1, 0.1))
+    model.material("E", mooney_rivlin=(1.0, 0.1, 0.1), damping=(0.1, 0.2))
     model.material("F", yeoh=(1.0, 0.0, 0.1, 0.1, 0.0, 0.0))
     model.material("G", ogden=(1.0, 2.0, 0.1, -2.0, 0.1, 3.0, 0.1, 0.0, 0.2))
     model.section("A", "E", thickness=2.0, kinematics="LINEAR", massless=True)
