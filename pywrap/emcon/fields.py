@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 from .hdf5 import Array, ResultError, guarded, open_file, read
 
 
+#: Cells of VTK files with a node in the middle of each side: of six and of eight nodes.
+QUADRATIC = (22, 23)
+
+
 class FieldFile:
     """Fields over time of one run (NAME.vtkhdf), read when asked for.
 
@@ -55,7 +59,9 @@ class FieldFile:
                 or (np.diff(offsets) <= 0).any() or not len(connectivity)
                 or connectivity.min() < 0 or connectivity.max() >= n_node):
             raise ResultError(f"{self.path}: the mesh in it is broken")
-        self.cells: list[NDArray[np.int64]] = np.split(connectivity, offsets[1:-1])
+        self.cells: list[NDArray[np.int64]] = [
+            _outline(cell, kind) for cell, kind
+            in zip(np.split(connectivity, offsets[1:-1]), read(root, "Types"))]
         self.point_fields = self._names("PointData")
         self.cell_fields = self._names("CellData")
         if not len(self.times):
@@ -231,3 +237,11 @@ class FieldSeries:
             chosen = slice(start, start + n) if row is None else start + int(row) % n
             values: Array = np.asarray(data[chosen], dtype=np.float64)
         return np.asarray(values[tuple(rest if row is None else rest[1:])])
+
+
+def _outline(cell: NDArray[np.int64], kind: int) -> NDArray[np.int64]:
+    """The nodes of a cell along its outline: quadratic ones have the middles behind the corners."""
+    if kind not in QUADRATIC:
+        return cell
+    half = len(cell)//2
+    return np.column_stack([cell[:half], cell[half:]]).ravel()

@@ -32,7 +32,6 @@ from .errors import InputError
 from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_function,
                     check_solid, count_nodes)
 from .given_matrices import give_masses, given_mass
-from .mesh.checks import KINDS
 from .options import LAWS, words
 from .steps import Step
 
@@ -44,6 +43,10 @@ if TYPE_CHECKING:
 _LARGEST_TEXT = 2**31 - 1
 #: The interaction of pairs that name none.
 _FRICTIONLESS = "FRICTIONLESS CONTACT"
+
+
+#: Nodes of an element, by kind.
+KINDS = {"CPE3": 3, "CPE4": 4, "CPE4H": 4, "CPE6": 6, "CPE8": 8, "CPE8R": 8}
 
 
 class Model(Cards):
@@ -101,8 +104,9 @@ class Model(Cards):
         """The model of one mesh, with the sets ALL of its nodes and of its elements.
 
         nodes            (n, 2) positions [L]
-        elements         (m, 3) or (m, 4) rows of `nodes`, counter-clockwise; or by kind, CPE3 and
-                         CPE4; None where `given_forces` stand for elements
+        elements         (m, 3) or (m, 4) rows of `nodes`, counter-clockwise; or by kind, CPE3,
+                         CPE4, CPE4H, CPE6, CPE8, CPE8R; None where `given_forces` stand for
+                         elements
         node_labels      (n,) whole numbers from 1 on, each once; default 1..n
         element_labels   (m,), or by kind; default 1.. in the order of `elements`
         """
@@ -126,7 +130,7 @@ class Model(Cards):
             if kind and array.ndim == 2 and array.shape[1] != KINDS[kind]:
                 raise InputError(f"elements of {kind} have {KINDS[kind]} nodes, not "
                                  f"{array.shape[1]}")
-            model.add_elements(array, labels=labels[kind])
+            model.add_elements(array, labels=labels[kind], kind=kind or None)
         return model
 
     @classmethod
@@ -196,21 +200,26 @@ class Model(Cards):
         return np.arange(first, first + len(x)) if self._nodes.rows else label
 
     def add_elements(self, corners: ArrayLike, *, labels: ArrayLike | None = None,
-                     name: str = "ALL") -> NDArray[np.int64]:
-        """`*ELEMENT`: elements of three nodes (m, 3), CPE3, or of four (m, 4), CPE4.
+                     name: str = "ALL", kind: str | None = None) -> NDArray[np.int64]:
+        """`*ELEMENT`: elements of three nodes (m, 3), CPE3, or of four (m, 4), CPE4, or of a kind.
 
-        corners   nodes, counter-clockwise
+        corners   nodes, counter-clockwise; of CPE6 and CPE8 with those between them behind
         labels    (m,), as with `add_nodes`
         name      of the element set that they are in
+        kind      CPE3, CPE4, CPE4H, CPE6, CPE8 or CPE8R
 
         Returns the rows (m,) of the elements.
         """
         array = array_of(corners, "elements")
         n = array.shape[-1] if array.ndim == 2 else 0
-        if n not in (3, 4):
+        if kind is not None and n != KINDS.get(kind):
+            raise InputError(f"elements of {kind} are an (m, {KINDS[kind]}) array of nodes, not "
+                             f"{array.shape}" if kind in KINDS else f"{kind!r} is no kind of "
+                             f"element; known are {', '.join(words('element'))}")
+        if kind is None and n not in (3, 4):
             raise InputError(f"elements are an (m, 3) or (m, 4) array of nodes, not {array.shape}")
         nodes = self._nodes.labels(array, "elements", (None, n))
-        head = card("ELEMENT", {"TYPE": f"CPE{n}", "ELSET": name})
+        head = card("ELEMENT", {"TYPE": kind or f"CPE{n}", "ELSET": name})
         first = self._elements.count
         label = self._elements.extend(len(nodes), labels)
         self._add(head + (table(label, *nodes.T) if len(nodes) else ""))

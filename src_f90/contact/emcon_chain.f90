@@ -9,7 +9,7 @@ module emcon_chain
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_edges, only : faces_of_edges, surface_edges
    use emcon_text, only : to_text
    implicit none
    private
@@ -199,15 +199,18 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       real(wp), allocatable, intent(out) :: thickness(:)   !! (size of `node`) [L]
+      integer, allocatable :: face(:)
       integer :: i, side
 
       allocate(thickness(size(self%node)), source=1.0_wp)
-      if (allocated(surface%edge)) return
+      if (allocated(surface%edge) .or. surface%is_nodal) return
+      call faces_of_edges(scene, surface, face)
       do i = 1, size(self%node)
          do side = 1, 2
             associate (e => self%node_edge(side, i))
                if (e == 0) cycle
-               thickness(i) = scene%section(scene%element_section(surface%element(e)))%thickness
+               thickness(i) = scene%section(scene%element_section( &
+                  surface%element(face(e))))%thickness
             end associate
          end do
       end do

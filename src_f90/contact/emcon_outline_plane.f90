@@ -8,6 +8,7 @@ module emcon_outline_plane
    use emcon_chain, only : chain_init, chain_t
    use emcon_errors, only : error_t
    use emcon_joints, only : chain_join
+   use emcon_face_edges_plane, only : face_edges, n_face_edge
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
@@ -160,19 +161,29 @@ contains
       integer, allocatable :: order(:)
       real(dp), allocatable :: key(:)
       logical, allocatable :: is_free(:)
-      integer :: e, f, n
+      integer :: e, f, k, n
 
       n = 0
-      allocate(edge(2, sum(scene%kind(scene%element_kind)%n_face)))
+      do e = 1, size(scene%element_kind)
+         associate (kind => scene%kind(scene%element_kind(e)))
+            n = n + kind%n_face*n_face_edge(kind)
+         end associate
+      end do
+      allocate(edge(2, n))
+      n = 0
       allocate(thickness(size(edge, 2)))
       do e = 1, size(scene%element_kind)
          associate (kind => scene%kind(scene%element_kind(e)))
             do f = 1, kind%n_face
-               edge(:, n + f) = scene%element_node(kind%face_node(:, f), e)
+               associate (new => face_edges(kind, f), before => n + (f - 1)*n_face_edge(kind))
+                  do k = 1, size(new, 2)
+                     edge(:, before + k) = scene%element_node(new(:, k), e)
+                  end do
+               end associate
             end do
-            thickness(n + 1:n + kind%n_face) = &
-               minval(lengths(scene, edge(:, n + 1:n + kind%n_face)))
-            n = n + kind%n_face
+            k = n + kind%n_face*n_face_edge(kind)
+            thickness(n + 1:k) = minval(lengths(scene, edge(:, n + 1:k)))
+            n = k
          end associate
       end do
       key = real(minval(edge, 1), dp)*real(size(scene%x, 2) + 1, dp) + real(maxval(edge, 1), dp)

@@ -26,6 +26,7 @@ module emcon_deck
    use emcon_deck_rigid, only : read_rigid_bodies
    use emcon_deck_sets, only : read_sets
    use emcon_deck_source, only : deck_open, deck_source_t
+   use emcon_deck_sides_plane, only : check_sides
    use emcon_deck_step, only : read_steps
    use emcon_deck_surfaces, only : read_surfaces
    use emcon_deck_tables, only : read_amplitudes, read_time_points
@@ -94,6 +95,7 @@ contains
       call read_equations(reader, scene)
       call read_steps(reader, scene)
       call check_shapes(reader, scene)
+      call check_sides(reader, scene)
       call check_materials(reader, scene)
       call check_nodes(reader, scene)
       call check_linear(reader, scene)

@@ -51,24 +51,23 @@ contains
       type(scene_t), intent(in) :: scene
       type(adjacency_t), intent(in) :: adjacency
       integer, intent(in) :: element, face
-      integer :: i, k, other, n_face_node, node
+      integer :: i, k, other
       logical :: has_all
 
       n_neighbours = 0
       associate (kind => scene%kind(scene%element_kind(element)))
-         n_face_node = kind%n_face_node
-         node = scene%element_node(kind%face_node(1, face), element)
-         if (node == 0) return
-         do i = adjacency%first(node), adjacency%first(node + 1) - 1
-            other = adjacency%element(i)
-            if (other == element) cycle
-            has_all = .true.
-            do k = 2, n_face_node
-               has_all = has_all .and. any(scene%element_node(:, other) &
-                  == scene%element_node(kind%face_node(k, face), element))
+         associate (node => scene%element_node(kind%face(face), element))
+            if (node(1) == 0) return
+            do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
+               other = adjacency%element(i)
+               if (other == element) cycle
+               has_all = .true.
+               do k = 2, size(node)
+                  has_all = has_all .and. any(scene%element_node(:, other) == node(k))
+               end do
+               if (has_all) n_neighbours = n_neighbours + 1
             end do
-            if (has_all) n_neighbours = n_neighbours + 1
-         end do
+         end associate
       end associate
    end function n_neighbours
 
@@ -86,9 +85,8 @@ contains
       do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
          associate (e => adjacency%element(i))
             do k = 1, scene%kind(scene%element_kind(e))%n_face
-               associate (ends => scene%element_node( &
-                  scene%kind(scene%element_kind(e))%face_node(:, k), e))
-                  if (any(ends /= node) .and. any(ends(2:1:-1) /= node)) cycle
+               associate (own => scene%element_node(scene%kind(scene%element_kind(e))%face(k), e))
+                  if (any(own(:2) /= node) .and. any(own(2:1:-1) /= node)) cycle
                end associate
                n_element = n_element + 1
                element = e

@@ -8,7 +8,7 @@ module emcon_deck_element_kinds
    use emcon_element_kind, only : element_kind_t, find_element_kind, user_element_row
    use emcon_element_registry, only : element_kinds_create
    use emcon_scene, only : scene_t
-   use emcon_shape, only : max_element_nodes
+   use emcon_shape, only : max_plane_nodes
    use emcon_text, only : to_text
    implicit none
    private
@@ -55,8 +55,8 @@ contains
       n_face = 0
       n_axis = n_dim
       if (.not. has_option(card, "NODES")) call card_error(reader, card, "NODES= is missing")
-      call option_count(reader, card, "NODES", 1, n_node, max_element_nodes)
-      call option_count(reader, card, "FACES", 0, n_face, max_element_nodes)
+      call option_count(reader, card, "NODES", 1, n_node, max_plane_nodes)
+      call option_count(reader, card, "FACES", 0, n_face, max_plane_nodes)
       call option_count(reader, card, "COORDINATES", n_dim, n_axis, n_dim)
       call check_freedoms(reader, card, n_dim)
       if (n_node == 0) return

@@ -19,8 +19,8 @@ module emcon_deck_mesh
 
    !> Element types of Abaqus and CalculiX that are not read.
    character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
-      "CPE4R", "CPE4H", "CPE4RH", "CPE4I", "CPE3H", "CPE6", "CPE6M", "CPE8", "CPE8R", &
-      "CPS4R", "CPS4I", "CPS6", "CPS8", "CPS8R", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
+      "CPE4R", "CPE4RH", "CPE4I", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
+      "CPS4R", "CPS4I", "CPS8R", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
       "CAX8R", "C3D4", "C3D4H", "C3D6", "C3D8", "C3D8R", "C3D8I", "C3D8H", "C3D10", "C3D10M", &
       "C3D15", "C3D20", "C3D20R", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
@@ -35,6 +35,7 @@ module emcon_deck_mesh
 
    type(substitute_t), parameter :: substitutes(*) = [ &
       substitute_t("CPS3", "CPE3"), substitute_t("CPS4", "CPE4"), &
+      substitute_t("CPS6", "CPE6"), substitute_t("CPS8", "CPE8"), &
       substitute_t("T2D2", ""), substitute_t("T3D2", "")]
    !> A line is no element of the scene: an edge between two nodes that surfaces may name.
    integer, parameter :: kind_line = -1

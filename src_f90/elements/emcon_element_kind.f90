@@ -1,14 +1,13 @@
 !> What a scene has to know of an element kind: its name, its nodes, its faces, its shape.
 module emcon_element_kind
-   use emcon_shape, only : max_element_nodes, shape_t
+   use emcon_shape, only : shape_t
    implicit none
    private
-   public :: element_row_t, element_kind_t, face_shape, max_face_nodes, find_element_kind, &
+   public :: element_row_t, element_kind_t, face_room, max_face_nodes, find_element_kind, &
       user_element_row
 
-   integer, parameter :: max_faces = max_element_nodes, max_face_nodes = 2
-   !> Extents of `face_node`.
-   integer, parameter :: face_shape(*) = [max_face_nodes, max_faces]
+   !> Room for the nodes of all faces of an element: six of eight nodes.
+   integer, parameter :: face_room(1) = [48], max_face_nodes = 8
    !> Cells of the VTK file format.
    integer, parameter :: vtk_points = 2, vtk_polygon = 7
 
@@ -17,12 +16,17 @@ module emcon_element_kind
       character(len=8) :: name = ""
       integer :: n_dim = 0
       integer :: n_node = 0
-      integer :: n_corner = 0                               !! of a convex polygon, first nodes
+      integer :: n_corner = 0                    !! of a convex polygon, first nodes
       integer :: n_face = 0
       integer :: n_face_node = 0
-      integer :: face_node(max_face_nodes, max_faces) = 0   !! local nodes of face S1, S2, ...
-      integer :: vtk_type = 0                               !! cell number of VTK files
-      integer :: n_vtk = 0                                  !! nodes of that cell, the first
+      !> local nodes of face S1, then S2, ...: corners in their order, then those between them
+      integer :: face_node(face_room(1)) = 0
+      integer :: vtk_type = 0                    !! cell number of VTK files
+      integer :: n_vtk = 0                       !! nodes of that cell, the first
+      logical :: has_mean_volume = .false.       !! volume resists in the mean over the element
+   contains
+      procedure :: face
+      procedure :: may_lock
    end type element_row_t
 
    !> A row with its shape, which a program gives if the row is of a *USER ELEMENT.
@@ -31,6 +35,23 @@ module emcon_element_kind
    end type element_kind_t
 
 contains
+
+   !> Local nodes of a face.
+   pure function face(self, i) result(node)
+      class(element_row_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1 to n_face
+      integer :: node(self%n_face_node)
+
+      node = self%face_node(self%n_face_node*(i - 1) + 1:self%n_face_node*i)
+   end function face
+
+   !> Does it resist a change of volume at more points than its shape can follow? So do elements
+   !> with nodes at their corners alone, but those where the mean resists.
+   pure logical function may_lock(self)
+      class(element_row_t), intent(in) :: self
+
+      may_lock = self%n_node == self%n_corner .and. .not. self%has_mean_volume
+   end function may_lock
 
    !> Index of the kind called `name` (upper case) in `kind`, 0 if there is none.
    pure integer function find_element_kind(kind, name)
@@ -48,7 +69,7 @@ contains
    !> next goes a face. Without faces it is drawn as its nodes.
    pure function user_element_row(name, n_node, n_face) result(row)
       character(len=*), intent(in) :: name       !! upper case
-      integer, intent(in) :: n_node              !! 1 to `max_element_nodes`
+      integer, intent(in) :: n_node              !! 1 to `max_plane_nodes`
       integer, intent(in) :: n_face              !! 0, or 3 to `n_node`
       type(element_row_t) :: row
       integer :: i
@@ -59,7 +80,9 @@ contains
       row%n_face = n_face
       row%n_face_node = 2
       do i = 1, n_face
-         row%face_node(:, i) = [i, 1 + mod(i, n_face)]
+         associate (last => row%n_face_node*i)
+            row%face_node(last - row%n_face_node + 1:last) = [i, 1 + mod(i, n_face)]
+         end associate
       end do
       row%vtk_type = merge(vtk_polygon, vtk_points, n_face > 0)
       row%n_vtk = merge(n_face, n_node, n_face > 0)

@@ -7,10 +7,10 @@ module emcon_shape
    use emcon_text, only : to_text
    implicit none
    private
-   public :: max_element_nodes, shape_t, shape_table_t, shape_tabulate, shape_fault
+   public :: max_element_nodes, max_plane_nodes, shape_t, shape_table_t, shape_tabulate, shape_fault
 
-   !> Most nodes of an element: work space for one element has room for these.
-   integer, parameter :: max_element_nodes = 9
+   !> Most nodes of an element, and of one in the plane: work space for one has room for these.
+   integer, parameter :: max_element_nodes = 20, max_plane_nodes = 9
 
    type, abstract :: shape_t
    contains

@@ -5,7 +5,7 @@
 !> tangent follow here for all laws. In terms of E nothing cancels at small strains, as
 !> det C - 1 = 2 e1 + 4 e2 + 8 e3. Source: docs/theory.md, eq. (7).
 module emcon_law
-   use emcon_dgrad3, only : dg_t, dg_variable
+   use emcon_dgrad3, only : dg_sqrt, dg_t, dg_variable, operator(+), operator(/)
    use emcon_invariants, only : isochoric_excess, volume_energy, volume_excess
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
@@ -13,11 +13,15 @@ module emcon_law
    private
    public :: law_t, law_box_t, law_points_t, law_response_t, n_lane
    public :: law_response_plane, law_respond_one, law_hold_one, volume_excess
+   public :: change_points_t, law_change_points, no_volume
    public :: claim, isochoric_excess, lame_constants, take_elastic, volume_energy
 
    !> Points that are computed side by side. No lane knows of another: the bits of a point depend
    !> neither on its place nor on how many lanes the machine takes at a time.
    integer, parameter :: n_lane = 8
+   !> A law leaves out what resists a change of volume by making it so many powers of two smaller,
+   !> below all round-off: loops over points would divide by a D of 0 before they look.
+   integer, parameter :: no_volume = 60
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
@@ -28,6 +32,9 @@ module emcon_law
       procedure(energy_interface), deferred :: energy
       procedure :: respond => law_respond
       procedure :: hold => law_hold
+      procedure :: divide => law_divide
+      procedure :: change => law_change
+      procedure :: volume => law_volume
    end type law_t
 
    !> For arrays of laws of different types.
@@ -70,6 +77,14 @@ module emcon_law
       real(wp) :: stress_33(n_lane) = 0.0_wp     !! set by `hold`
       real(wp) :: tangent(n_lane, 3, 3) = 0.0_wp
    end type law_points_t
+
+   !> Change of volume v of points side by side: `energy` is v at the end, `stress` its discrete
+   !> gradient, `tangent` the derivative of that.
+   type, extends(law_points_t) :: change_points_t
+      real(wp) :: start(n_lane) = 0.0_wp         !! v at the start
+      real(wp) :: by(n_lane) = 0.0_wp            !! its increment, to relative accuracy
+      real(wp) :: at_end(n_lane, 3) = 0.0_wp     !! gradient at the end
+   end type change_points_t
 
 contains
 
@@ -145,6 +160,59 @@ contains
       points%stress(l, :) = response%stress
       points%stress_33(l) = response%stress_33
    end subroutine law_hold_one
+
+   !> The law without what resists a change of volume: W = rest + U(v). Here: that W has no such
+   !> parts.
+   subroutine law_divide(self, rest)
+      class(law_t), intent(in) :: self
+      class(law_t), allocatable, intent(out) :: rest   !! not allocated: the law has no parts
+
+      associate (unused => self)
+      end associate
+   end subroutine law_divide
+
+   !> The change of volume v that U is of: J - 1.
+   pure function law_change(self, e1, e2, e3) result(v)
+      class(law_t), intent(in) :: self
+      type(dg_t), intent(in) :: e1, e2, e3       !! invariants of E
+      type(dg_t) :: v, y
+
+      associate (unused => self)
+      end associate
+      y = volume_excess(e1, e2, e3)
+      v = y/(dg_sqrt(y + 1.0_wp) + 1.0_wp)
+   end function law_change
+
+   !> U(v), of a law that `divide` divides.
+   pure function law_volume(self, v) result(u)
+      class(law_t), intent(in) :: self
+      type(dg_t), intent(in) :: v                !! change of volume, `change` or its mean
+      type(dg_t) :: u                            !! [M/(L T^2)]
+
+      associate (unused => self, no => v)
+      end associate
+      u = dg_t()
+   end function law_volume
+
+   !> The change of volume of points in plane strain, with its gradients.
+   pure subroutine law_change_points(law, with_tangent, points)
+      class(law_t), intent(in) :: law
+      logical, intent(in) :: with_tangent        !! else the tangent stays as it is
+      type(change_points_t), intent(inout) :: points   !! all but the strains is set
+      type(dg_t) :: e1, e2, v
+      integer :: l
+
+      do l = 1, n_lane
+         call plane_invariants(points%law_points_t, l, e1, e2)
+         v = law%change(e1, e2, dg_variable(3, 0.0_wp, 0.0_wp))
+         points%start(l) = v%f0
+         points%by(l) = v%df
+         call plane_stress(v, l, points%law_points_t)
+         points%stress_33(l) = plane_normal(v, v%g(3), e1, e2)
+         points%at_end(l, :) = plane_slope(v, points%strain(l, :) + points%dstrain(l, :))
+         if (with_tangent) call plane_tangent(v, l, points%law_points_t)
+      end do
+   end subroutine law_change_points
 
    include "emcon_law_plane.inc"
 

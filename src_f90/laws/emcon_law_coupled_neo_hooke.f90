@@ -15,6 +15,8 @@ module emcon_law_coupled_neo_hooke
       procedure :: energy
       procedure :: respond
       procedure :: hold
+      procedure :: divide
+      procedure :: volume
    end type law_coupled_neo_hooke_t
 
    logical, parameter :: is_near = .true.
@@ -54,6 +56,29 @@ contains
       class(law_coupled_neo_hooke_t), intent(in) :: self
       include "emcon_law_held.inc"
    end subroutine hold
+
+   !> As `law_t` has it.
+   subroutine divide(self, rest)
+      class(law_coupled_neo_hooke_t), intent(in) :: self
+      class(law_t), allocatable, intent(out) :: rest
+      type(law_coupled_neo_hooke_t) :: other
+
+      other = self
+      other%lam = 0.0_wp
+      allocate(rest, source=other)
+   end subroutine divide
+
+   !> lam/2 ln^2 J by the mean of J; what stays has no stress at rest and little more stiffness
+   !> against a change of volume than mu.
+   pure function volume(self, v) result(u)
+      use emcon_dgrad3, only : dg_log1p, dg_t, operator(*)
+      class(law_coupled_neo_hooke_t), intent(in) :: self
+      type(dg_t), intent(in) :: v                !! J - 1 or its mean
+      type(dg_t) :: u, logarithm                 !! [M/(L T^2)]
+
+      logarithm = dg_log1p(v)
+      u = (0.5_wp*self%lam)*(logarithm*logarithm)
+   end function volume
 
    include "../dgrad/emcon_dgrad_rules.inc"
    include "../dgrad/emcon_dgrad_near.inc"

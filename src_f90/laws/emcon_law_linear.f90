@@ -15,6 +15,9 @@ module emcon_law_linear
       procedure :: energy
       procedure :: respond
       procedure :: hold
+      procedure :: divide
+      procedure :: change
+      procedure :: volume
    end type law_linear_t
 
    logical, parameter :: is_near = .true.
@@ -54,6 +57,39 @@ contains
       class(law_linear_t), intent(in) :: self
       include "emcon_law_held.inc"
    end subroutine hold
+
+   !> As `law_t` has it.
+   subroutine divide(self, rest)
+      class(law_linear_t), intent(in) :: self
+      class(law_t), allocatable, intent(out) :: rest
+      type(law_linear_t) :: other
+
+      other = self
+      other%lam = -2.0_wp/3.0_wp*self%mu
+      allocate(rest, source=other)
+   end subroutine divide
+
+   !> tr E, small or not: W is of E.
+   pure function change(self, e1, e2, e3) result(v)
+      use emcon_dgrad3, only : dg_t, operator(*), operator(+)
+      class(law_linear_t), intent(in) :: self
+      type(dg_t), intent(in) :: e1, e2, e3       !! invariants of E
+      type(dg_t) :: v
+
+      associate (unused => self)
+      end associate
+      v = e1 + 0.0_wp*e2 + 0.0_wp*e3
+   end function change
+
+   !> K/2 v^2.
+   pure function volume(self, v) result(u)
+      use emcon_dgrad3, only : dg_t, operator(*)
+      class(law_linear_t), intent(in) :: self
+      type(dg_t), intent(in) :: v                !! tr E or its mean
+      type(dg_t) :: u                            !! [M/(L T^2)]
+
+      u = (0.5_wp*self%lam + self%mu/3.0_wp)*(v*v)
+   end function volume
 
    include "../dgrad/emcon_dgrad_rules.inc"
    include "../dgrad/emcon_dgrad_near.inc"

@@ -2,7 +2,8 @@
 module emcon_law_neo_hooke
    use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, law_points_t, law_hold_one, law_respond_one, law_t, n_lane
+   use emcon_law, only : claim, law_points_t, law_hold_one, law_respond_one, law_t, n_lane, &
+      no_volume
    implicit none
    private
    public :: law_neo_hooke_t
@@ -15,6 +16,8 @@ module emcon_law_neo_hooke
       procedure :: energy
       procedure :: respond
       procedure :: hold
+      procedure :: divide
+      procedure :: volume
    end type law_neo_hooke_t
 
    logical, parameter :: is_near = .true.
@@ -57,6 +60,28 @@ contains
       class(law_neo_hooke_t), intent(in) :: self
       include "emcon_law_held.inc"
    end subroutine hold
+
+   !> As `law_t` has it.
+   subroutine divide(self, rest)
+      class(law_neo_hooke_t), intent(in) :: self
+      class(law_t), allocatable, intent(out) :: rest
+      type(law_neo_hooke_t) :: other
+
+      other = self
+      other%d1 = scale(self%d1, no_volume)
+      allocate(rest, source=other)
+   end subroutine divide
+
+   !> By the mean of J - 1.
+   pure function volume(self, v) result(u)
+      use emcon_dgrad3, only : dg_t, operator(*), operator(+)
+      use emcon_invariants, only : volume_energy
+      class(law_neo_hooke_t), intent(in) :: self
+      type(dg_t), intent(in) :: v                !! change of volume
+      type(dg_t) :: u                            !! [M/(L T^2)]
+
+      u = volume_energy([self%d1], v*(v + 2.0_wp))
+   end function volume
 
    include "../dgrad/emcon_dgrad_rules.inc"
    include "../dgrad/emcon_dgrad_near.inc"

@@ -8,7 +8,7 @@ module emcon_law_ogden
       operator(-), operator(+), operator(/)
    use emcon_dgrad_series, only : cosh_chord, cosh_excess, expm1_of, log1p_of
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, law_t, volume_energy, volume_excess
+   use emcon_law, only : claim, law_t, no_volume, volume_energy, volume_excess
    implicit none
    private
    public :: law_ogden_t
@@ -21,6 +21,8 @@ module emcon_law_ogden
    contains
       procedure :: take => ogden_take
       procedure :: energy => ogden_energy
+      procedure :: divide
+      procedure :: volume
    end type law_ogden_t
 
 contains
@@ -115,5 +117,25 @@ contains
       end do
       w%g(3) = (s33 - dot_product(w%g, [1.0_wp, e1%f1, 0.0_wp]))/e2%f1
    end subroutine set_normal_slope
+
+   !> As `law_t` has it.
+   subroutine divide(self, rest)
+      class(law_ogden_t), intent(in) :: self
+      class(law_t), allocatable, intent(out) :: rest
+      type(law_ogden_t) :: other
+
+      other = self
+      other%d = scale(self%d, no_volume)
+      allocate(rest, source=other)
+   end subroutine divide
+
+   !> By the mean of J - 1.
+   pure function volume(self, v) result(u)
+      class(law_ogden_t), intent(in) :: self
+      type(dg_t), intent(in) :: v                !! change of volume
+      type(dg_t) :: u                            !! [M/(L T^2)]
+
+      u = volume_energy(self%d(:self%order), v*(v + 2.0_wp))
+   end function volume
 
 end module emcon_law_ogden

@@ -5,6 +5,7 @@
 module emcon_verdict
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
+   use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
    use emcon_look_plane, only : overlap_text
    use emcon_march, only : increment_t, march_t
@@ -89,7 +90,20 @@ contains
       self%message = ""
       call small_range_init(self%small, terms_solid(march%system%term))
       allocate(self%largest_force(size(march%state%pairs%total)), source=0.0_wp)
+      call warn_of_locking(self, terms_solid(march%system%term))
    end subroutine verdict_start
+
+   !> Elements that are too stiff, the one with the largest ratio of Poisson named.
+   subroutine warn_of_locking(self, solid)
+      type(verdict_t), intent(inout) :: self
+      type(solid_t), intent(in) :: solid
+      real(wp) :: ratio
+      integer :: e
+
+      call locking_element(solid, e, ratio)
+      if (e > 0) call add_warning(self, "element " // to_text(solid%label(e)) // " at nu = " &
+         // to_text(ratio) // " locks: " // locking_advice)
+   end subroutine warn_of_locking
 
    !> The state was set from outside, which turned `before` into `after`: what came in or went out
    !> by that is no error of the balance.

@@ -14,6 +14,7 @@ module emcon_initial_contact
    use emcon_sort, only : find_sorted
    use emcon_start_gaps, only : start_gaps_init, start_gaps_measure, start_gaps_nearest, &
       start_gaps_t, start_gaps_way
+   use emcon_surface_edges, only : faces_of_edges
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none
    private
@@ -129,10 +130,14 @@ contains
       type(chain_t), intent(in) :: chain
       integer, intent(in) :: e
       character(len=:), allocatable, intent(out) :: text
+      integer, allocatable :: face(:)
 
       text = "the edge"
-      if (.not. allocated(surface%edge)) text = "face S" // to_text(surface%face(e)) // &
-         " of element " // to_text(scene%element_label(surface%element(e)))
+      if (.not. allocated(surface%edge)) then
+         call faces_of_edges(scene, surface, face)
+         text = "face S" // to_text(surface%face(face(e))) // " of element " &
+            // to_text(scene%element_label(surface%element(face(e))))
+      end if
       text = text // " (nodes " // to_text(scene%node_label(chain%edge(1, e))) // ", " // &
          to_text(scene%node_label(chain%edge(2, e))) // ")"
    end subroutine face_text

@@ -3,12 +3,13 @@
 !>
 !> Source: docs/theory.md, section 11.
 module emcon_ties
-   use emcon_chain, only : chain_init, chain_t, surface_edges
+   use emcon_chain, only : chain_init, chain_t
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
+   use emcon_surface_edges, only : faces_of_edges, surface_edges
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_tie, only : tie_measure
    use emcon_tie_balance, only : tie_balance, tie_balance_report_t, tie_is_balanced
@@ -56,17 +57,20 @@ contains
    !> Take the faces that ties cover out of all exterior.
    pure subroutine uncover_exterior(scene)
       type(scene_t), intent(inout) :: scene
-      logical, allocatable :: is_tied(:)
-      integer, allocatable :: edge(:, :)
+      logical, allocatable :: is_tied(:), is_left(:)
+      integer, allocatable :: edge(:, :), face(:)
       integer :: s
 
       do s = 1, size(scene%surface)
          if (.not. scene%surface(s)%is_exterior) cycle
          call surface_edges(scene, scene%surface(s), edge)
          call tied_edges_find(scene, edge, is_tied)
+         call faces_of_edges(scene, scene%surface(s), face)
          associate (surface => scene%surface(s))
-            surface%element = pack(surface%element, .not. is_tied)
-            surface%face = pack(surface%face, .not. is_tied)
+            is_left = spread(.false., 1, size(surface%face))
+            is_left(pack(face, .not. is_tied)) = .true.
+            surface%element = pack(surface%element, is_left)
+            surface%face = pack(surface%face, is_left)
          end associate
       end do
    end subroutine uncover_exterior

@@ -4,6 +4,7 @@ module emcon_report_bodies
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_law_registry, only : law_given, law_rows
+   use emcon_locking, only : poisson_ratio
    use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -27,7 +28,7 @@ module emcon_report_bodies
       real(wp), allocatable :: center(:)         !! (n_dim) of mass [L]
       real(wp) :: inertia = 0.0_wp               !! about the centre: sum of m r^2 [M L^2]
       real(wp) :: modulus = 0.0_wp               !! of pressure waves, the largest [M/(L T^2)]
-      real(wp) :: ratio = 0.0_wp                 !! Poisson's, the largest
+      real(wp) :: ratio = 0.0_wp                 !! Poisson's, the largest of what may lock
       real(wp) :: speed = 0.0_wp                 !! of pressure waves, the largest [L/T]
       real(wp) :: transit = huge(1.0_wp)         !! of a wave between two nodes, the shortest [T]
    end type body_t
@@ -80,10 +81,9 @@ contains
          associate (law => solid%law(solid%law_of(e))%law)
             call law_response_plane(law, rest, rest, response)
             modulus = 2.0_wp*response%tangent(1, 1)   ! by the end of a step of no size: a half
+            if (solid%may_lock(e)) body%ratio = max(body%ratio, poisson_ratio(law))
             if (.not. (modulus > 0.0_wp .and. material%density > 0.0_wp)) return
             body%modulus = max(body%modulus, modulus)
-            ! lambda/(2 lambda + 2 mu) of modulus = lambda + 2 mu
-            body%ratio = max(body%ratio, 0.5_wp*(modulus - 2.0_wp*law%shear)/(modulus - law%shear))
          end associate
          speed = sqrt(modulus/material%density)
       end associate

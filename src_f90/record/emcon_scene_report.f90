@@ -5,6 +5,7 @@ module emcon_scene_report
    use emcon_gaps, only : gaps_forget, gaps_search
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
+   use emcon_locking, only : locking_advice, locking_limit
    use emcon_motion, only : at_rest, motion_of
    use emcon_options, only : option_text
    use emcon_pose, only : pose_at_end
@@ -21,8 +22,6 @@ module emcon_scene_report
 
    !> A body so many times stiffer than the softest one hardly deforms.
    real(wp), parameter :: much_stiffer = 100.0_wp
-   !> Elements of linear shape lock above this ratio of Poisson.
-   real(wp), parameter :: nearly_incompressible = 0.45_wp
    !> Waves are not resolved by increments of so many transits.
    real(wp), parameter :: many_transits = 10.0_wp
 
@@ -263,12 +262,11 @@ contains
       integer :: i
 
       do i = 1, size(body)
-         if (.not. body(i)%ratio > nearly_incompressible .or. &
+         if (.not. body(i)%ratio > locking_limit .or. &
             body(i)%n_rigid == body(i)%n_element) cycle
          call row_begin(row, "advice", "body")
          call row_put(row, "body", i, " #")
-         call row_put(row, "poisson", body(i)%ratio, " at nu = # locks: it is too stiff " // &
-            "in bending and contact; take nu <= " // to_text(nearly_incompressible))
+         call row_put(row, "poisson", body(i)%ratio, " at nu = # locks: " // locking_advice)
          call rows_add(rows, row)
       end do
    end subroutine advise_locking

@@ -6,7 +6,7 @@ module emcon_corotated_pack_plane
    use emcon_corotated_plane, only : corotated_t
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
-   use emcon_shape, only : max_node => max_element_nodes
+   use emcon_shape, only : max_node => max_plane_nodes
    implicit none
    private
    public :: corotated_pack_t, corotated_pack_motion_t

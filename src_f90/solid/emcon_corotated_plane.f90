@@ -8,7 +8,7 @@
 module emcon_corotated_plane
    use emcon_element, only : element_geometry_t
    use emcon_kinds, only : wp
-   use emcon_shape, only : max_element_nodes
+   use emcon_shape, only : max_plane_nodes
    implicit none
    private
    public :: corotated_t, corotated_motion_t, corotated_init, corotated_move, corotated_energy, &
@@ -17,25 +17,25 @@ module emcon_corotated_plane
    !> An element at rest, its positions from those of its first node.
    type :: corotated_t
       integer :: n_node = 0
-      real(wp) :: x(2, max_element_nodes) = 0.0_wp       !! positions [L]
-      real(wp) :: slope(2, max_element_nodes) = 0.0_wp   !! mean gradients of shape functions [1/L]
+      real(wp) :: x(2, max_plane_nodes) = 0.0_wp       !! positions [L]
+      real(wp) :: slope(2, max_plane_nodes) = 0.0_wp   !! mean gradients of shape functions [1/L]
       real(wp), allocatable :: stiffness(:, :)   !! (2*n_node, 2*n_node) K [M/T^2]
    end type corotated_t
 
    !> At one end of a motion.
    type :: end_t
-      real(wp) :: y(2, max_element_nodes) = 0.0_wp       !! positions [L]
+      real(wp) :: y(2, max_plane_nodes) = 0.0_wp       !! positions [L]
       real(wp) :: g(2) = 0.0_wp                          !! (F11 + F22, F21 - F12)
       real(wp) :: rho = 0.0_wp                           !! |g|
-      real(wp) :: d(2, max_element_nodes) = 0.0_wp       !! displacement in the frame [L]
+      real(wp) :: d(2, max_plane_nodes) = 0.0_wp       !! displacement in the frame [L]
    end type end_t
 
    !> From one end to the other.
    type :: corotated_motion_t
       type(end_t) :: first, last
-      real(wp) :: y(2, max_element_nodes) = 0.0_wp       !! means of the ends
+      real(wp) :: y(2, max_plane_nodes) = 0.0_wp       !! means of the ends
       real(wp) :: g(2) = 0.0_wp
-      real(wp) :: k(2, max_element_nodes) = 0.0_wp       !! K at the mean d [M L/T^2]
+      real(wp) :: k(2, max_plane_nodes) = 0.0_wp       !! K at the mean d [M L/T^2]
       real(wp) :: alpha = 0.0_wp                         !! mean of 1/rho
       real(wp) :: beta = 0.0_wp                          !! weight of g in the force
    end type corotated_motion_t
@@ -160,7 +160,7 @@ contains
       type(corotated_t), intent(in) :: self
       real(wp), intent(in) :: from(:, :), by(:, :)       !! (2, n_node) from the first node's [L]
       type(corotated_motion_t), intent(out) :: motion
-      real(wp) :: mean(2, max_element_nodes), product
+      real(wp) :: mean(2, max_plane_nodes), product
       integer :: i, n
 
       n = self%n_node
@@ -238,8 +238,8 @@ contains
       type(corotated_motion_t), intent(in) :: motion
       real(wp), intent(in) :: way(:, :)                  !! (2, n_node) [L]
       real(wp), intent(out) :: image(:, :)               !! (2, n_node) [M L/T^2]
-      real(wp) :: dg(2), drho, dd(2, max_element_nodes), dk(2, max_element_nodes)
-      real(wp) :: dalpha, dbeta, q(2), more(2, max_element_nodes), product
+      real(wp) :: dg(2), drho, dd(2, max_plane_nodes), dk(2, max_plane_nodes)
+      real(wp) :: dalpha, dbeta, q(2), more(2, max_plane_nodes), product
       integer :: i, n
 
       n = self%n_node

@@ -4,7 +4,7 @@
 !> of the scene costs no digits. Forces and tangents: emcon_element_pack_plane.
 module emcon_element
    use emcon_kinds, only : wp
-   use emcon_shape, only : max_node => max_element_nodes
+   use emcon_shape, only : max_node => max_plane_nodes
    implicit none
    private
    public :: element_geometry_t, element_motion_t, element_response_t, point_motion_t

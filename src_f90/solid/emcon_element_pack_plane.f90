@@ -9,7 +9,7 @@ module emcon_element_pack_plane
    use emcon_element, only : element_geometry_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, n_lane
-   use emcon_shape, only : max_node => max_element_nodes
+   use emcon_shape, only : max_node => max_plane_nodes
    implicit none
    private
    public :: element_pack_t, pack_motion_t, pack_point_t, pack_response_t

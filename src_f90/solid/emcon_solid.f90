@@ -10,6 +10,7 @@ module emcon_solid
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t, n_lane
    use emcon_law_registry, only : law_create, law_given, law_linearise
+   use emcon_mean_volume_plane, only : mean_volume_respond
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_point_function, only : point_gradient, point_ok
    use emcon_scene, only : scene_t, where_text
@@ -44,6 +45,9 @@ module emcon_solid
       type(element_pack_t), allocatable :: pack(:)         !! all but small and rigid ones
       !> One per material; behind them, if there are linear elements, those for these
       type(law_box_t), allocatable :: law(:)
+      logical, allocatable :: may_lock(:)                !! (n_element) at small changes of volume
+      logical, allocatable :: has_mean(:)                !! (n_element) volume resists in the mean
+      type(law_box_t), allocatable :: rest(:)            !! like `law`, without U, for these
       type(host_law_t), allocatable :: given(:)         !! like `law`, or one in its place
       logical :: has_given = .false.                     !! some law is a given one
       integer, allocatable :: n_point(:)                 !! quadrature points, of each given law
@@ -80,20 +84,11 @@ contains
       self%kind = scene%element_kind
       self%node = scene%element_node
       allocate(self%law_of(n), self%geometry(n), self%thickness(n))
-      allocate(self%is_rigid(n), source=.false.)
-      do k = 1, size(scene%rigid)
-         self%is_rigid(scene%rigid(k)%element) = .true.
-      end do
       n_most = size(self%node, 1)
       allocate(self%mass(n_most, n_most, n), source=0.0_wp)
       allocate(self%volume_mass(n_most, n), self%stiffness(n_most, n), source=0.0_wp)
       self%section = scene%element_section
-      self%has_inertia = .not. scene%section(scene%element_section)%is_massless
-      self%is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear &
-         .and. .not. self%is_rigid
-      self%is_corotated = scene%section(scene%element_section)%kinematics == kinematics_corotated &
-         .and. .not. self%is_rigid
-      self%is_small = self%is_linear .or. self%is_corotated
+      call tell_apart(self, scene)
       if (any(self%is_corotated)) allocate(self%x, source=scene%x)
       call init_laws(self, scene, at_rest, error, given)
       if (allocated(error)) return
@@ -112,9 +107,55 @@ contains
             return
          end if
       end do
+      call divide_laws(self, error)
+      if (allocated(error)) return
       call number_points(self)
       call make_packs(self)
    end subroutine solid_init
+
+   !> What laws are without their resistance to a change of volume, where elements ask for it.
+   subroutine divide_laws(self, error)
+      type(solid_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      integer :: e, k
+
+      allocate(self%rest(size(self%law)))
+      do e = 1, self%n_element
+         k = self%law_of(e)
+         if (.not. self%has_mean(e) .or. self%is_rigid(e) .or. allocated(self%rest(k)%law)) cycle
+         if (allocated(self%law(k)%law)) call self%law(k)%law%divide(self%rest(k)%law)
+         if (allocated(self%rest(k)%law)) cycle
+         call raise(error, err_input, "element " // to_text(self%label(e)) // " takes the mean " &
+            // "change of volume, which the law given for material " // self%material(k)%text // &
+            " does not tell apart; take CPE4 or CPE8")
+         return
+      end do
+   end subroutine divide_laws
+
+   !> What elements are by their kinds, sections and bodies.
+   pure subroutine tell_apart(self, scene)
+      type(solid_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer :: e, k
+
+      allocate(self%is_rigid(self%n_element), source=.false.)
+      do k = 1, size(scene%rigid)
+         self%is_rigid(scene%rigid(k)%element) = .true.
+      end do
+      allocate(self%has_mean(self%n_element), self%may_lock(self%n_element))
+      do e = 1, self%n_element
+         associate (kind => scene%kind(scene%element_kind(e)))
+            self%has_mean(e) = kind%has_mean_volume
+            self%may_lock(e) = kind%may_lock()
+         end associate
+      end do
+      associate (section => scene%section(scene%element_section))
+         self%has_inertia = .not. section%is_massless
+         self%is_linear = section%kinematics == kinematics_linear .and. .not. self%is_rigid
+         self%is_corotated = section%kinematics == kinematics_corotated .and. .not. self%is_rigid
+      end associate
+      self%is_small = self%is_linear .or. self%is_corotated
+   end subroutine tell_apart
 
    !> Pack the elements of each kind and law, as they come in the scene.
    pure subroutine make_packs(self)
@@ -315,6 +356,11 @@ contains
       type(pack_response_t), intent(inout) :: part
       integer :: k
 
+      if (self%has_mean(pack%element(1))) then
+         call mean_volume_respond(pack, self%law(pack%law)%law, self%rest(pack%law)%law, motion, &
+            with_tangent, part)
+         return
+      end if
       call pack_clear(pack%n_node, part, with_tangent)
       do k = 1, pack%n_gp
          call pack_point(pack, k, motion, point)

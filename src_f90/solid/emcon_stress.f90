@@ -12,6 +12,7 @@ module emcon_stress
    use emcon_host_law, only : host_response_t, host_state
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, law_response_t, n_lane
+   use emcon_mean_volume_plane, only : mean_volume_hold
    use emcon_push_forward_plane, only : push_forward
    use emcon_solid, only : solid_evaluate_given, solid_t
    implicit none
@@ -128,7 +129,10 @@ contains
             strain(:3, before + l) = point%strain
             f(:, :, l) = point%f_end
          end do
-         if (solid%first_point(e) == 0) then
+         if (solid%has_mean(e)) then
+            call mean_volume_hold(solid%law(solid%law_of(e))%law, solid%rest(solid%law_of(e))%law, &
+               solid%geometry(e)%weight, points)
+         else if (solid%first_point(e) == 0) then
             call solid%law(solid%law_of(e))%law%hold(points)
          else
             call hold_given(given, solid%law_of(e), solid%first_point(e) + before, n, points)

@@ -2,7 +2,6 @@
 module emcon_loads
    use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_t
-   use emcon_element_kind, only : max_face_nodes
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : instant_t
@@ -25,6 +24,7 @@ module emcon_loads
       type(amplitude_t), allocatable, private :: amplitude(:)   !! of the scene
       integer, allocatable, private :: frame(:, :)  !! (n_dim + 1, bodies) of rigid bodies
       integer, allocatable, private :: face(:, :)   !! (n, n_load) nodes of a loaded face, else 0
+      integer, allocatable, private :: n_on(:)      !! (n_load) how many these are
       !> (n_dim*n, n_dim*n, n_load) places of the stiffness of pressure on it
       integer, allocatable, private :: slot(:, :, :)
       logical, private :: is_ramped = .false.    !! static: without amplitude, linear over the step
@@ -42,6 +42,9 @@ module emcon_loads
       procedure :: respond
       procedure :: is_symmetric
    end type loads_t
+
+   !> Nodes that one load may act on: an edge with one in its middle.
+   integer, parameter :: most_face_nodes = 3, moment_nodes = 2
 
 contains
 
@@ -88,7 +91,7 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not needed: they are found again
       integer, allocatable :: number(:)
-      integer :: dof(scene%n_dim, max_face_nodes), i, e, j, k, a
+      integer :: dof(scene%n_dim, most_face_nodes), i, e, j, k, a
 
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
@@ -99,26 +102,29 @@ contains
          end do
          self%duration = step%duration
       end associate
-      if (allocated(self%face)) deallocate(self%face, self%slot)
-      allocate(self%face(max_face_nodes, size(self%load)), source=0)
+      if (allocated(self%face)) deallocate(self%face, self%n_on, self%slot)
+      allocate(self%face(most_face_nodes, size(self%load)), self%n_on(size(self%load)), source=0)
       allocate(self%slot(size(dof), size(dof), size(self%load)), source=0)
       allocate(number, source=freedom_numbers(space%numbering))
       do i = 1, size(self%load)
          select case (self%load(i)%kind)
          case (load_pressure)
             e = self%load(i)%target
-            self%face(:, i) = scene%element_node( &
-               scene%kind(scene%element_kind(e))%face_node(:, self%load(i)%place), e)
+            associate (kind => scene%kind(scene%element_kind(e)))
+               self%n_on(i) = kind%n_face_node
+               self%face(:self%n_on(i), i) = scene%element_node(kind%face(self%load(i)%place), e)
+            end associate
          case (load_moment)
-            self%face(:, i) = self%frame(:max_face_nodes, &
+            self%n_on(i) = moment_nodes
+            self%face(:moment_nodes, i) = self%frame(:moment_nodes, &
                findloc(self%frame(1, :), self%load(i)%target, 1))
          case default
             cycle
          end select
          do a = 1, scene%n_dim
-            dof(a, :) = number(scene%n_dim*(self%face(:, i) - 1) + a)
+            dof(a, :self%n_on(i)) = number(scene%n_dim*(self%face(:self%n_on(i), i) - 1) + a)
          end do
-         associate (all => reshape(dof, [size(dof)]))
+         associate (all => reshape(dof(:, :self%n_on(i)), [scene%n_dim*self%n_on(i)]))
             do k = 1, size(all)
                do j = 1, size(all)
                   self%slot(j, k, i) = reduction_slot(space%reduction, matrix, all(j), all(k))
@@ -183,16 +189,18 @@ contains
                end do
             case (load_pressure)
                p = p*self%thickness(load%target)
-               call add_pressure(self%face(:, i), p, motion%x, motion%at, self%follows(i), &
-                  self%force)
-               if (present(value) .and. self%follows(i)) then
-                  call add_pressure_stiffness(p*motion%load_weight, self%slot(:, :, i), value, side)
-               end if
+               associate (face => self%face(:self%n_on(i), i), &
+                     m => size(self%force, 1)*self%n_on(i))
+                  call add_pressure(face, p, motion%x, motion%at, self%follows(i), self%force)
+                  if (present(value) .and. self%follows(i)) call add_pressure_stiffness( &
+                     p*motion%load_weight, self%slot(:m, :m, i), value, side)
+               end associate
             case (load_moment)
-               call add_moment(self%face(:, i), p, motion%x, motion%at, self%force)
-               if (present(value)) call add_moment_stiffness(motion%x(:, self%face(:, i)) &
-                  + motion%at(:, self%face(:, i)), p*motion%load_weight, self%slot(:, :, i), &
-                  value, side)
+               associate (frame => self%face(:moment_nodes, i))
+                  call add_moment(frame, p, motion%x, motion%at, self%force)
+                  if (present(value)) call add_moment_stiffness(motion%x(:, frame) &
+                     + motion%at(:, frame), p*motion%load_weight, self%slot(:, :, i), value, side)
+               end associate
             end select
          end associate
       end do

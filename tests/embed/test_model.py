@@ -425,7 +425,8 @@ def test_model_goes_to_other_processes() -> None:
     (SQUARE, [[0.0, 1.0, 2.0]], "whole numbers"),
     (SQUARE, [[0, 1, 4]], "no node 4; rows of nodes are 0 to 3"),
     (SQUARE, [[0, 1, -1]], "no node -1"),
-    (SQUARE, {"CPE8": [[0, 1, 2]]}, "no kind"),
+    (SQUARE, {"CPE9": [[0, 1, 2]]}, "no kind"),
+    (SQUARE, {"CPE8": [[0, 1, 2]]}, "have 8 nodes"),
     (SQUARE, {"CPE4": [[0, 1, 2]]}, "have 4 nodes"),
 ])
 def test_arrays_that_are_no_mesh_are_refused(nodes: Any, elements: Any, message: str) -> None:

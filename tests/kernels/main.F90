@@ -28,6 +28,7 @@ program main
    use test_dgrad_series, only : collect_dgrad_series
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
+   use test_element_kinds, only : collect_element_kinds
    use test_gauss, only : collect_gauss
    use test_host_check, only : collect_host_check
    use test_host_deck, only : collect_host_deck
@@ -136,6 +137,7 @@ program main
    call run("law", collect_law)
    call run("law_points", collect_law_points)
    call run("element", collect_element)
+   call run("element_kinds", collect_element_kinds)
    call run("corotated", collect_corotated)
    call run("soft_law", collect_soft_law)
    call run("solid", collect_solid)

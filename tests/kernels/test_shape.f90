@@ -111,7 +111,7 @@ contains
       end do
    end subroutine test_nodes
 
-   !> Along a coordinate the functions are linear: a central difference is exact.
+   !> Along a coordinate the functions are no more than quadratic: a central difference is exact.
    subroutine test_slopes(error)
       type(error_t), allocatable, intent(out) :: error
       type(element_kind_t), allocatable :: kind(:)
@@ -135,12 +135,16 @@ contains
       end do
    end subroutine test_slopes
 
-   !> Triangle: 1 point to degree 1, 3 points to degree 2; square: 2 x 2 points to x^3 y^3.
+   !> Triangle: 1 point to degree 1, 3 points to degree 2, 6 to 4; square: 2 x 2 points to x^3 y^3,
+   !> 3 x 3 to x^5 y^5.
    subroutine test_quadrature(error)
       type(error_t), allocatable, intent(out) :: error
 
       call check_kind(error, "CPE3", 1, 2)
       call check_kind(error, "CPE4", 3, 3)
+      call check_kind(error, "CPE6", 2, 4)
+      call check_kind(error, "CPE8", 5, 5)
+      call check_kind(error, "CPE8R", 3, 5)
    end subroutine test_quadrature
 
    subroutine check_kind(error, name, degree, mass_degree)
@@ -170,7 +174,7 @@ contains
 
       do p = 0, degree
          do q = 0, degree
-            if (rule%n_node == 3) then
+            if (any(rule%n_node == [3, 6])) then
                if (p + q > degree) cycle
                expected = gamma(real(p + 1, wp))*gamma(real(q + 1, wp))/gamma(real(p + q + 3, wp))
             else

@@ -1,0 +1,192 @@
+!> The sides of elements in the plane that have nodes between their corners.
+module emcon_deck_sides_plane
+   use emcon_deck_adjacency, only : adjacency_init, adjacency_t
+   use emcon_deck_reader, only : reader_t
+   use emcon_diagnostics, only : add_error, add_warning, label_list
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t
+   use emcon_shape, only : shape_table_t, shape_tabulate
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: check_sides
+
+   !> A node between two corners beyond a quarter of its side folds the element there; at a quarter
+   !> strains at the corner are infinite. Where it is further off the middle, that is told.
+   real(wp), parameter :: quarter = 0.25_wp, off_middle = 0.15_wp
+   !> Coordinates in decks are rounded.
+   real(wp), parameter :: rounded = 1.0e-3_wp
+
+contains
+
+   !> Refuse nodes outside the middle half of their side, elements that their sides fold, and
+   !> straight sides beside those with a node.
+   subroutine check_sides(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      logical, dimension(size(scene%element_label)) :: is_bent, is_off, is_folded
+      real(wp) :: furthest
+      integer :: e
+
+      if (.not. has_middles(scene)) return
+      if (reader%doubt_positions) return
+      is_folded = .false.
+      is_bent = .false.
+      is_off = .false.
+      do e = 1, size(is_bent)
+         if (scene%kind(scene%element_kind(e))%n_face_node < 3) cycle
+         if (scene%element_node(1, e) == 0) cycle
+         furthest = furthest_from_middle(scene, e)
+         is_bent(e) = furthest > 0.5_wp - quarter + rounded
+         is_off(e) = .not. is_bent(e) .and. furthest > off_middle
+         is_folded(e) = .not. is_bent(e) .and. folds(scene, e)
+      end do
+      if (any(is_bent)) call tell(is_bent, " has a node outside the middle half of its side, " &
+         // "where the element folds; put it into the middle")
+      if (any(is_folded)) call tell(is_folded, " is folded by the nodes of its sides: " &
+         // "its area is not positive everywhere")
+      if (any(is_off)) call add_warning(reader%log, scene%element_origin(findloc(is_off, .true., &
+         1)), "element " // label_list(pack(scene%element_label, is_off)) // " has a node " &
+         // "far off the middle of its side: strains are less exact, and infinite at a corner " &
+         // "if it stands at a quarter")
+      if (.not. (reader%doubt_elements .or. reader%doubt_shapes)) call check_neighbours(reader, &
+         scene)
+
+   contains
+
+      subroutine tell(is_wrong, text)
+         logical, intent(in) :: is_wrong(:)
+         character(len=*), intent(in) :: text
+
+         reader%doubt_shapes = .true.
+         call add_error(reader%log, scene%element_origin(findloc(is_wrong, .true., 1)), &
+            "element " // label_list(pack(scene%element_label, is_wrong)) // text)
+      end subroutine tell
+
+   end subroutine check_sides
+
+   !> Has an element of the scene nodes between its corners?
+   pure logical function has_middles(scene)
+      type(scene_t), intent(in) :: scene
+      integer :: e
+
+      has_middles = .true.
+      do e = 1, size(scene%element_kind)
+         if (scene%kind(scene%element_kind(e))%n_face_node > 2) return
+      end do
+      has_middles = .false.
+   end function has_middles
+
+   !> The largest distance of such a node from the middle of its side, along it, per length.
+   pure real(wp) function furthest_from_middle(scene, e) result(furthest)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: e
+      real(wp) :: way(2), arm(2)
+      integer :: f
+
+      furthest = 0.0_wp
+      associate (kind => scene%kind(scene%element_kind(e)))
+         do f = 1, kind%n_face
+            associate (node => scene%element_node(kind%face(f), e))
+               way = scene%x(:, node(2)) - scene%x(:, node(1))
+               arm = scene%x(:, node(3)) - scene%x(:, node(1))
+            end associate
+            arm = arm/maxval(abs(way))
+            way = way/maxval(abs(way))
+            furthest = max(furthest, abs(dot_product(arm, way)/dot_product(way, way) - 0.5_wp))
+         end do
+      end associate
+   end function furthest_from_middle
+
+   !> Is the area negative at a node or not positive at a point of the quadrature?
+   logical function folds(scene, e)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: e
+      type(shape_table_t) :: table
+      real(wp), allocatable :: place(:, :)
+      real(wp) :: x(2, scene%kind(scene%element_kind(e))%n_node), value(size(x, 2))
+      real(wp) :: slope(2, size(x, 2)), least, most
+      integer :: i
+
+      associate (kind => scene%kind(scene%element_kind(e)))
+         x = scene%x(:, scene%element_node(:kind%n_node, e))
+         x = x - spread(x(:, 1), 2, size(x, 2))
+         x = x/maxval(abs(x))
+         call shape_tabulate(kind%shape, .true., table)
+         folds = .true.
+         most = 0.0_wp
+         do i = 1, table%n_gp
+            most = max(most, area_at(table%slope(:, :, i)))
+            if (.not. area_at(table%slope(:, :, i)) > 0.0_wp) return
+         end do
+         call kind%shape%places(place)
+         least = most
+         do i = 1, size(place, 2)
+            call kind%shape%values(place(:, i), value, slope)
+            least = min(least, area_at(slope))
+         end do
+         folds = least < -4.0_wp*rounded*most
+      end associate
+
+   contains
+
+      !> det dx/dxi.
+      pure real(wp) function area_at(slope)
+         real(wp), intent(in) :: slope(:, :)
+         real(wp) :: jacobian(2, 2)
+
+         jacobian = matmul(x, transpose(slope))
+         area_at = jacobian(1, 1)*jacobian(2, 2) - jacobian(1, 2)*jacobian(2, 1)
+      end function area_at
+
+   end function folds
+
+   !> A side without a node between its corners beside one that has one: they would come apart.
+   subroutine check_neighbours(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t) :: adjacency
+      integer :: e, f, g, i, other
+
+      call adjacency_init(adjacency, scene)
+      do e = 1, size(scene%element_kind)
+         associate (kind => scene%kind(scene%element_kind(e)))
+            if (kind%n_face_node /= 2) cycle
+            do f = 1, kind%n_face
+               associate (side => scene%element_node(kind%face(f), e))
+                  do i = adjacency%first(side(1)), adjacency%first(side(1) + 1) - 1
+                     other = adjacency%element(i)
+                     g = bent_side(scene, other, side)
+                     if (g == 0) cycle
+                     call add_error(reader%log, scene%element_origin(e), "element " // &
+                        to_text(scene%element_label(e)) // " has a straight side where " // &
+                        "element " // to_text(scene%element_label(other)) // " has node " // &
+                        to_text(scene%node_label(g)) // " between the corners: they come " // &
+                        "apart there; take one order of elements, or nodes of their own and *TIE")
+                     return
+                  end do
+               end associate
+            end do
+         end associate
+      end do
+   end subroutine check_neighbours
+
+   !> The node between the corners `side` of element `e`, 0 if it has no such side.
+   pure integer function bent_side(scene, e, side)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: e
+      integer, intent(in) :: side(:)             !! (2)
+      integer :: f
+
+      bent_side = 0
+      associate (kind => scene%kind(scene%element_kind(e)))
+         if (kind%n_face_node < 3) return
+         do f = 1, kind%n_face
+            associate (own => scene%element_node(kind%face(f), e))
+               if (all(own(:2) == side) .or. all(own(2:1:-1) == side)) bent_side = own(3)
+            end associate
+         end do
+      end associate
+   end function bent_side
+
+end module emcon_deck_sides_plane
