@@ -1,0 +1,544 @@
+!> Elements in three dimensions, distorted, with each law: what a step and a mesh ask of them.
+module test_element_space
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_element_space, only : space_element_init, space_element_mass, space_element_respond, &
+      space_element_t, space_motion_t, space_part_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_law, only : law_response_plane, law_response_t, law_t
+   use emcon_law_registry, only : law_coupled_neo_hooke, law_create, law_linear, &
+      law_mooney_rivlin, law_neo_hooke, law_yeoh
+   use emcon_law_space, only : law_response_space, space_response_t
+   use emcon_shape, only : m => max_element_nodes, shape_fault, shape_t
+   use emcon_shape_hexahedron_space, only : shape_hexahedron_t
+   use emcon_shape_quadratic_tetrahedron_space, only : shape_quadratic_tetrahedron_t
+   use emcon_shape_serendipity_space, only : shape_serendipity_space_t
+   use emcon_shape_tetrahedron_space, only : shape_tetrahedron_t
+   use emcon_text, only : to_text
+   use small_scenes, only : shake, young
+   implicit none
+   private
+   public :: collect_element_space
+
+   real(wp), parameter :: eps = epsilon(1.0_wp)
+   !> Sums over up to 27 points and 20 nodes, each term of some dozen roundings.
+   real(wp), parameter :: tol = 1024.0_wp*eps
+   integer, parameter :: n_law = 5, n_kind = 5
+   character(len=6), parameter :: name(n_kind) = [character(len=6) :: "C3D4", "C3D8", "C3D10", &
+      "C3D20", "C3D20R"]
+
+   type :: sample_t
+      character(len=:), allocatable :: what
+      integer :: n = 0                           !! nodes
+      logical :: nlgeom = .true.
+      real(wp) :: x(3, m) = 0.0_wp
+      type(space_element_t) :: element
+      class(shape_t), allocatable :: shape
+      class(law_t), allocatable :: law
+   end type sample_t
+
+contains
+
+   subroutine collect_element_space(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("shape functions", test_shapes), &
+         test_case_t("laws: a strain of the plane", test_plane), &
+         test_case_t("identity, force and moments of a step", test_step), &
+         test_case_t("tangent against differences", test_tangent), &
+         test_case_t("a turned element responds turned", test_turned), &
+         test_case_t("patch: energy and work of a uniform strain", test_patch), &
+         test_case_t("rank", test_rank), &
+         test_case_t("mass, centre and inertia", test_mass), &
+         test_case_t("free flight of one element", test_flight)]
+   end subroutine collect_element_space
+
+   !> Kind 1..n_kind, its corners moved by up to a tenth of its size, other nodes in the middle of
+   !> their sides and moved by up to `bend`.
+   subroutine make_sample(kind, law, nlgeom, bend, sample, error)
+      integer, intent(in) :: kind, law
+      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: bend
+      type(sample_t), intent(out) :: sample
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: codes(n_law) = [law_linear, law_coupled_neo_hooke, law_neo_hooke, &
+         law_mooney_rivlin, law_yeoh]
+      integer, parameter :: side(2, 6) = reshape([1, 2, 2, 3, 3, 1, 1, 4, 2, 4, 3, 4], [2, 6])
+      real(wp), parameter :: c = 0.2_wp*young, d = 1.0_wp/young
+      real(wp), allocatable :: constant(:), place(:, :)
+      real(wp) :: move(3, m)
+      integer :: i, n_corner
+
+      call make_shape(kind, sample%shape)
+      call sample%shape%places(place)
+      n_corner = merge(4, 8, kind == 1 .or. kind == 3)
+      sample%n = size(place, 2)
+      if (n_corner == 8) place = 0.5_wp*place
+      call shake(move, 0.1_wp)
+      do i = n_corner + 1, sample%n              ! in the middle of its side
+         if (n_corner == 4) then
+            move(:, i) = 0.5_wp*sum(move(:, side(:, i - 4)), 2)
+         else
+            move(:, i) = 0.5_wp*sum(move(:, :8), 2, spread(sum(abs(place(:, :8) &
+               - spread(place(:, i), 2, 8)), 1) < 0.51_wp, 1, 3))
+         end if
+      end do
+      place = place + move(:, :sample%n)
+      call shake(move, bend)
+      place(:, n_corner + 1:) = place(:, n_corner + 1:) + move(:, n_corner + 1:sample%n)
+      sample%x(:, :sample%n) = place
+      sample%nlgeom = nlgeom
+      sample%what = trim(name(kind)) // ", law " // to_text(law) // ", nlgeom " &
+         // to_text(merge(1, 0, nlgeom))
+      select case (law)
+      case (3)
+         constant = [c, d]
+      case (4)
+         constant = [c, 0.5_wp*c, d]
+      case (5)
+         constant = [c, 0.1_wp*c, 0.1_wp*c, d, d, d]
+      case default
+         constant = [young, 0.3_wp]
+      end select
+      call law_create(codes(law), constant, sample%law, error)
+      call space_element_init(sample%element, sample%shape, place)
+      call check_true(error, all(sample%element%weight > 0.0_wp), sample%what // ": volume")
+   end subroutine make_sample
+
+   subroutine make_shape(kind, shape)
+      integer, intent(in) :: kind
+      class(shape_t), allocatable, intent(out) :: shape
+
+      select case (kind)
+      case (1)
+         allocate(shape_tetrahedron_t :: shape)
+      case (2)
+         allocate(shape_hexahedron_t :: shape)
+      case (3)
+         allocate(shape_quadratic_tetrahedron_t :: shape)
+      case default
+         allocate(shape, source=shape_serendipity_space_t(merge(3, 2, kind == 4)))
+      end select
+   end subroutine make_shape
+
+   subroutine respond(sample, u0, du, with_tangent, part)
+      type(sample_t), intent(in) :: sample
+      real(wp), intent(in) :: u0(3, m), du(3, m)
+      logical, intent(in) :: with_tangent
+      type(space_part_t), intent(inout) :: part
+      type(space_motion_t) :: motion
+
+      motion%nlgeom = sample%nlgeom
+      motion%from = u0
+      motion%by = du
+      part = space_part_t()
+      call space_element_respond(sample%element, sample%law, motion, with_tangent, part)
+   end subroutine respond
+
+   !> A start up to 2 % off, and a motion of up to 3 % plus, with nlgeom, a turn of 0.7 rad.
+   subroutine draw(sample, u0, du)
+      type(sample_t), intent(in) :: sample
+      real(wp), intent(out) :: u0(3, m), du(3, m)
+
+      call shake(u0, 0.02_wp)
+      call shake(du, 0.03_wp)
+      if (sample%nlgeom) du = du + matmul(rotation(0.7_wp), sample%x + u0) - (sample%x + u0)
+      u0(:, sample%n + 1:) = 0.0_wp
+      du(:, sample%n + 1:) = 0.0_wp
+   end subroutine draw
+
+   !> About the axis (1, 2, 2)/3.
+   pure function rotation(angle) result(r)
+      real(wp), intent(in) :: angle
+      real(wp) :: r(3, 3), k(3, 3)
+      integer :: a
+
+      k = reshape([0.0_wp, 2.0_wp, -2.0_wp, -2.0_wp, 0.0_wp, 1.0_wp, 2.0_wp, -1.0_wp, 0.0_wp], &
+         [3, 3])/3.0_wp
+      r = sin(angle)*k + (1.0_wp - cos(angle))*matmul(k, k)
+      do a = 1, 3
+         r(a, a) = r(a, a) + 1.0_wp
+      end do
+   end function rotation
+
+   !> Sum of x cross f.
+   pure function moment(x, f) result(t)
+      real(wp), intent(in) :: x(:, :), f(:, :)
+      real(wp) :: t(3)
+
+      t = [sum(x(2, :)*f(3, :) - x(3, :)*f(2, :)), sum(x(3, :)*f(1, :) - x(1, :)*f(3, :)), &
+         sum(x(1, :)*f(2, :) - x(2, :)*f(1, :))]
+   end function moment
+
+   !> One at their own node, zero at others; sum 1; positions reproduced; slopes by differences,
+   !> exact for quadratic functions.
+   subroutine test_shapes(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(shape_t), allocatable :: shape
+      character(len=:), allocatable :: fault
+      real(wp), allocatable :: place(:, :), value(:), up(:), down(:), slope(:, :), other(:, :)
+      real(wp) :: point(3), way(3)
+      integer :: a, i, k
+
+      do k = 1, n_kind
+         call make_shape(k, shape)
+         call shape%places(place)
+         call shape_fault(shape, size(place, 2), fault)
+         call check_equal(error, fault, "", name(k))
+         if (allocated(value)) deallocate(value, up, down, slope, other)
+         allocate(value(size(place, 2)), up(size(place, 2)), down(size(place, 2)))
+         allocate(slope(3, size(place, 2)), other(3, size(place, 2)))
+         do i = 1, size(place, 2)
+            call shape%values(place(:, i), value, slope)
+            up = 0.0_wp
+            up(i) = 1.0_wp
+            call check_near(error, value, up, 0.0_wp, 1.0_wp, name(k) // ", node " // to_text(i))
+         end do
+         point = [0.2_wp, 0.15_wp, 0.4_wp]
+         call shape%values(point, value, slope)
+         call check_near(error, matmul(place, value), point, tol, 1.0_wp, name(k) // ": place")
+         do a = 1, 3
+            way = 0.0_wp
+            way(a) = 0.5_wp
+            call shape%values(point + way, up, other)
+            call shape%values(point - way, down, other)
+            call check_near(error, slope(a, :), up - down, tol, 1.0_wp, name(k) // ": slope")
+         end do
+      end do
+   end subroutine test_shapes
+
+   !> A strain without components along z gives what the law gives in plane strain.
+   subroutine test_plane(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_response_t) :: space
+      type(law_response_t) :: plane
+      real(wp), parameter :: e(3) = [0.1_wp, -0.2_wp, 0.15_wp], d(3) = [0.2_wp, 0.1_wp, -0.3_wp]
+      real(wp), parameter :: zero = 0.0_wp
+      integer, parameter :: own(3) = [1, 2, 4]
+      integer :: law
+
+      do law = 1, n_law
+         call make_sample(1, law, .true., 0.0_wp, sample, error)
+         if (allocated(error)) return
+         call law_response_plane(sample%law, e, d, plane)
+         call law_response_space(sample%law, [e(:2), zero, e(3:), zero, zero], &
+            [d(:2), zero, d(3:), zero, zero], space)
+         call check_near(error, space%energy, plane%energy, tol, young, "energy")
+         call check_near(error, space%stress(own), plane%stress, tol, young, "stress")
+         call check_near(error, space%tangent(own, own), plane%tangent, tol, young, "tangent")
+         call law_response_plane(sample%law, e, 0.0_wp*d, plane)
+         call law_response_space(sample%law, [e(:2), zero, e(3:), zero, zero], &
+            spread(zero, 1, 6), space)
+         call check_near(error, space%stress(3), plane%stress_33, tol, young, "normal")
+      end do
+   end subroutine test_plane
+
+   !> f.du = W1 - W0; no net force; no moment on the mid-configuration.
+   subroutine test_step(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: start, step
+      real(wp) :: u0(3, m), du(3, m), zero(3, m), place(3, m)
+      integer :: i, k
+
+      zero = 0.0_wp
+      do i = 0, 2*n_law*n_kind - 1
+         call make_sample(1 + mod(i/n_law, n_kind), 1 + mod(i, n_law), i >= n_law*n_kind, 0.03_wp, &
+            sample, error)
+         if (allocated(error)) return
+         do k = 1, 4
+            call draw(sample, u0, du)
+            if (k == 4) du = scale(du, -20)
+            call respond(sample, u0, zero, .false., start)
+            call respond(sample, u0, du, .false., step)
+            call check_true(error, .not. step%is_inverted, sample%what // ": is not inverted")
+            call check_near(error, sum(step%force*du), step%energy - start%energy, tol, &
+               sum(step%magnitude*abs(du)) + merge(start%energy, 0.0_wp, k == 4), sample%what)
+            call check_near(error, sum(step%force, dim=2), [0.0_wp, 0.0_wp, 0.0_wp], tol, &
+               sum(step%magnitude), sample%what // ": force")
+            place = sample%x
+            if (sample%nlgeom) place = place + (u0 + 0.5_wp*du)
+            call check_near(error, moment(place, step%force), [0.0_wp, 0.0_wp, 0.0_wp], tol, &
+               sum(step%magnitude)*maxval(abs(place)), sample%what // ": moment")
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_step
+
+   !> Central differences of step eps^(1/3): error a multiple of eps^(2/3).
+   subroutine test_tangent(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step, up, down
+      real(wp) :: u0(3, m), du(3, m), way(3, m), h
+      integer :: a, i, j
+
+      h = eps**(1.0_wp/3.0_wp)
+      do i = 0, n_law*n_kind - 1
+         call make_sample(1 + i/n_law, 1 + mod(i, n_law), mod(i, 3) > 0, 0.03_wp, sample, error)
+         if (allocated(error)) return
+         call draw(sample, u0, du)
+         call respond(sample, u0, du, .true., step)
+         do j = 1, sample%n
+            do a = 1, 3
+               way = 0.0_wp
+               way(a, j) = h
+               call respond(sample, u0, du + way, .false., up)
+               call respond(sample, u0, du - way, .false., down)
+               call check_near(error, step%tangent(:, :, a, j), (up%force - down%force) &
+                  /(2.0_wp*h), 3000.0_wp*h**2, young, sample%what)
+            end do
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_tangent
+
+   !> The same motion of the turned element: the same energy, forces turned.
+   subroutine test_turned(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample, other
+      type(space_part_t) :: step, turned
+      real(wp) :: u0(3, m), du(3, m), r(3, 3)
+      integer :: i
+
+      r = rotation(1.1_wp)
+      do i = 0, n_law*n_kind - 1
+         call make_sample(1 + i/n_law, 1 + mod(i, n_law), .true., 0.03_wp, sample, error)
+         if (allocated(error)) return
+         call draw(sample, u0, du)
+         call respond(sample, u0, du, .false., step)
+         other = sample
+         other%x = matmul(r, sample%x)
+         call space_element_init(other%element, other%shape, other%x(:, :other%n))
+         call respond(other, matmul(r, u0), matmul(r, du), .false., turned)
+         call check_near(error, turned%energy, step%energy, tol, young, sample%what // ": energy")
+         call check_near(error, turned%force, matmul(r, step%force), tol, young, &
+            sample%what // ": forces")
+         if (allocated(error)) return
+      end do
+   end subroutine test_turned
+
+   !> Uniform grad u on a distorted element: W times the volume, and the work of the forces on every
+   !> uniform field is stress times its gradient times the volume.
+   subroutine test_patch(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step
+      type(space_response_t) :: state
+      real(wp), parameter :: grad(3, 3) = reshape([0.1_wp, -0.2_wp, 0.05_wp, 0.3_wp, 0.15_wp, &
+         0.1_wp, -0.1_wp, 0.05_wp, -0.08_wp], [3, 3])
+      real(wp) :: u0(3, m), zero(3, m), f(3, 3), c(3, 3), s(3, 3), volume
+      integer :: a, i
+
+      zero = 0.0_wp
+      do i = 0, 2*n_law*n_kind - 1
+         call make_sample(1 + mod(i/n_law, n_kind), 1 + mod(i, n_law), i >= n_law*n_kind, 0.03_wp, &
+            sample, error)
+         if (allocated(error)) return
+         u0 = matmul(grad, sample%x)
+         f = 0.0_wp
+         do a = 1, 3
+            f(a, a) = 1.0_wp
+         end do
+         c = grad + transpose(grad)
+         if (sample%nlgeom) then
+            c = c + matmul(transpose(grad), grad)
+            f = f + grad
+         end if
+         call law_response_space(sample%law, [0.5_wp*c(1, 1), 0.5_wp*c(2, 2), 0.5_wp*c(3, 3), &
+            c(1, 2), c(2, 3), c(1, 3)], spread(0.0_wp, 1, 6), state)
+         s = reshape([state%stress([1, 4, 6]), state%stress([4, 2, 5]), state%stress([6, 5, 3])], &
+            [3, 3])
+         volume = sum(sample%element%weight)
+         call respond(sample, u0, zero, .false., step)
+         call check_near(error, step%energy, volume*state%energy, tol, young, &
+            sample%what // ": energy")
+         call check_near(error, matmul(step%force, transpose(sample%x)), volume*matmul(f, s), tol, &
+            young, sample%what // ": stress")
+         if (allocated(error)) return
+      end do
+   end subroutine test_patch
+
+   !> Of the tangent at rest: all but six rigid motions; with 2 x 2 x 2 points no more than these
+   !> have strains.
+   subroutine test_rank(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step
+      real(wp) :: zero(3, m)
+      integer :: k, n
+
+      zero = 0.0_wp
+      do k = 1, n_kind
+         call make_sample(k, 1 + mod(k, n_law), .true., 0.03_wp, sample, error)
+         if (allocated(error)) return
+         n = sample%n
+         call respond(sample, zero, zero, .true., step)
+         call check_equal(error, rank_of(reshape(step%tangent(:, :n, :, :n), [3*n, 3*n])), &
+            min(3*n - 6, 6*sample%element%n_gp), sample%what)
+      end do
+   end subroutine test_rank
+
+   !> By elimination with the largest pivot; what is left below the root of epsilon is round-off.
+   pure integer function rank_of(matrix)
+      real(wp), intent(in) :: matrix(:, :)
+      real(wp) :: a(size(matrix, 1), size(matrix, 2)), row(size(matrix, 2))
+      integer :: at(2), j
+
+      a = matrix
+      rank_of = 0
+      do j = 1, size(a, 1)
+         at = maxloc(abs(a))
+         if (abs(a(at(1), at(2))) <= sqrt(eps)*maxval(abs(matrix))) return
+         rank_of = rank_of + 1
+         row = a(at(1), :)/a(at(1), at(2))
+         a = a - spread(a(:, at(2)), 2, size(row))*spread(row, 1, size(a, 1))
+      end do
+   end function rank_of
+
+   !> Of an affine image y = A x + b of the plain element: volume det A V, and with second moments M
+   !> of the plain one those A M A^T of its image, in closed form for cube and tetrahedron.
+   subroutine test_mass(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(shape_t), allocatable :: shape
+      real(wp), allocatable :: place(:, :), mass(:, :)
+      real(wp), parameter :: a(3, 3) = reshape([1.0_wp, 0.2_wp, -0.1_wp, 0.3_wp, 1.5_wp, 0.2_wp, &
+         0.1_wp, -0.4_wp, 0.8_wp], [3, 3])
+      real(wp) :: det, volume, centre(3), second(3, 3)
+      integer :: k
+
+      det = a(1, 1)*(a(2, 2)*a(3, 3) - a(2, 3)*a(3, 2)) - a(1, 2)*(a(2, 1)*a(3, 3) &
+         - a(2, 3)*a(3, 1)) + a(1, 3)*(a(2, 1)*a(3, 2) - a(2, 2)*a(3, 1))
+      do k = 1, n_kind
+         call make_shape(k, shape)
+         call shape%places(place)
+         second = 0.0_wp
+         if (k == 1 .or. k == 3) then            ! int x = 1/24, int x^2 = 1/60, int x y = 1/120
+            volume = 1.0_wp/6.0_wp
+            centre = 1.0_wp/24.0_wp
+            second = 1.0_wp/120.0_wp
+            second(1, 1) = 1.0_wp/60.0_wp
+            second(2, 2) = second(1, 1)
+            second(3, 3) = second(1, 1)
+         else
+            volume = 8.0_wp
+            centre = 0.0_wp
+            second(1, 1) = 8.0_wp/3.0_wp
+            second(2, 2) = second(1, 1)
+            second(3, 3) = second(1, 1)
+         end if
+         if (allocated(mass)) deallocate(mass)
+         allocate(mass(size(place, 2), size(place, 2)))
+         place = matmul(a, place)
+         call space_element_mass(shape, place, 3.0_wp, mass)
+         call check_near(error, sum(mass), 3.0_wp*det*volume, tol, 1.0_wp, name(k) // ": mass")
+         call check_near(error, matmul(place, sum(mass, 2)), 3.0_wp*det*matmul(a, centre), tol, &
+            1.0_wp, name(k) // ": centre")
+         call check_near(error, matmul(matmul(place, mass), transpose(place)), &
+            3.0_wp*det*matmul(matmul(a, second), transpose(a)), tol, 1.0_wp, name(k) // ": inertia")
+      end do
+   end subroutine test_mass
+
+   !> Energy-momentum steps of one free element that spins and vibrates: energy, momentum and
+   !> angular momentum stay, to the round-off of as many steps.
+   subroutine test_flight(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: part
+      real(wp) :: u(3, m), v(3, m), du(3, m), mass(m, m), start(7), now(7)
+      real(wp), parameter :: h = 0.02_wp
+      integer, parameter :: n_step = 100
+      integer :: i, k
+
+      do k = 1, n_kind
+         call make_sample(k, 2 + mod(k, 4), .true., 0.0_wp, sample, error)
+         if (allocated(error)) return
+         mass = 0.0_wp
+         call space_element_mass(sample%shape, sample%x(:, :sample%n), 1.0_wp, &
+            mass(:sample%n, :sample%n))
+         u = 0.0_wp
+         call shake(v, 0.3_wp)
+         v = v + matmul(rotation(1.5_wp), sample%x)
+         v(:, sample%n + 1:) = 0.0_wp
+         call respond(sample, u, 0.0_wp*u, .false., part)
+         start = invariants(sample%x + u, v, mass, part%energy)
+         do i = 1, n_step
+            du = h*v
+            call solve_step(sample, mass, h, u, v, du, part, error)
+            if (allocated(error)) return
+            u = u + du
+            v = 2.0_wp/h*du - v
+         end do
+         now = invariants(sample%x + u, v, mass, part%energy)
+         call check_near(error, now, start, 100.0_wp*tol, maxval(abs(start)), sample%what)
+      end do
+   end subroutine test_flight
+
+   !> Energy, momentum, angular momentum.
+   pure function invariants(place, v, mass, energy) result(all)
+      real(wp), intent(in) :: place(3, m), v(3, m), mass(m, m), energy
+      real(wp) :: all(7), momentum(3, m)
+
+      momentum = matmul(v, mass)
+      all(1) = energy + 0.5_wp*sum(momentum*v)
+      all(2:4) = sum(momentum, 2)
+      all(5:7) = moment(place, momentum)
+   end function invariants
+
+   !> Newton's method for M (2/h^2 du - 2/h v) + f = 0.
+   subroutine solve_step(sample, mass, h, u, v, du, part, error)
+      type(sample_t), intent(in) :: sample
+      real(wp), intent(in) :: mass(m, m), h, u(3, m), v(3, m)
+      real(wp), intent(inout) :: du(3, m)
+      type(space_part_t), intent(inout) :: part
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: r(3, m), matrix(3*sample%n, 3*sample%n), way(3*sample%n)
+      integer :: a, i, j, k, n
+
+      n = sample%n
+      do k = 1, 30
+         call respond(sample, u, du, .true., part)
+         call check_true(error, .not. part%is_inverted, sample%what // ": is not inverted")
+         r = matmul(2.0_wp/h**2*du - 2.0_wp/h*v, mass) + part%force
+         if (k > 5 .and. maxval(abs(r)) <= 16.0_wp*eps*maxval(abs(part%magnitude) &
+            + 2.0_wp/h*abs(matmul(v, mass)))) return
+         if (k > 12) return
+         matrix = reshape(part%tangent(:, :n, :, :n), [3*n, 3*n])
+         do j = 1, n
+            do i = 1, n
+               do a = 1, 3
+                  matrix(3*i - 3 + a, 3*j - 3 + a) = matrix(3*i - 3 + a, 3*j - 3 + a) &
+                     + 2.0_wp/h**2*mass(i, j)
+               end do
+            end do
+         end do
+         call solve(matrix, reshape(r(:, :n), [3*n]), way)
+         du(:, :n) = du(:, :n) - reshape(way, [3, n])
+      end do
+   end subroutine solve_step
+
+   !> Gauss's elimination; the matrix is nearly that of the mass, so that its diagonal serves.
+   pure subroutine solve(matrix, right, x)
+      real(wp), intent(inout) :: matrix(:, :)
+      real(wp), intent(in) :: right(:)
+      real(wp), intent(out) :: x(:)
+      real(wp) :: factor
+      integer :: i, j, n
+
+      n = size(x)
+      x = right
+      do j = 1, n
+         do i = j + 1, n
+            factor = matrix(i, j)/matrix(j, j)
+            matrix(i, j:) = matrix(i, j:) - factor*matrix(j, j:)
+            x(i) = x(i) - factor*x(j)
+         end do
+      end do
+      do i = n, 1, -1
+         x(i) = (x(i) - dot_product(matrix(i, i + 1:), x(i + 1:)))/matrix(i, i)
+      end do
+   end subroutine solve
+
+end module test_element_space
