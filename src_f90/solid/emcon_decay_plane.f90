@@ -27,7 +27,9 @@ module emcon_decay_plane
       logical, allocatable, private :: deforms(:)        !! (n_element) and has moduli
       real(wp), allocatable, private :: alpha(:)         !! (n_element) of its material [1/T]
       real(wp), allocatable, private :: beta(:)          !! (n_element) of its material [T]
-      real(wp), allocatable, private :: moduli(:, :, :)  !! (3, 3, n_law) at rest [M/(L T^2)]
+      !> (3, 3, 2 n_law) of laws at rest, then of what `rest` leaves of them [M/(L T^2)]
+      real(wp), allocatable, private :: moduli(:, :, :)
+      integer, allocatable, private :: moduli_of(:)      !! (n_element) which of these
       logical, private :: nlgeom = .true.
       integer, allocatable, private :: slot(:)           !! element matrices by columns
       ! Of the last motion's forces [M L^2/T^2]:
@@ -53,14 +55,18 @@ contains
 
       self%role = role_internal
       self%solid = solid
-      allocate(self%moduli(n_strain, n_strain, size(solid%law)), source=0.0_wp)
+      allocate(self%moduli(n_strain, n_strain, 2*size(solid%law)), source=0.0_wp)
       allocate(self%deforms(solid%n_element), source=.false.)
+      self%moduli_of = solid%law_of + merge(size(solid%law), 0, solid%has_mean)
       do k = 1, size(solid%law)
          if (.not. allocated(solid%law(k)%law)) cycle
          call law_response_plane(solid%law(k)%law, rest, rest, state)
          ! By the end of a step of no size.
          self%moduli(:, :, k) = 2.0_wp*state%tangent
          self%deforms = self%deforms .or. (solid%law_of == k .and. .not. solid%is_rigid)
+         if (.not. allocated(solid%rest(k)%law)) cycle
+         call law_response_plane(solid%rest(k)%law, rest, rest, state)
+         self%moduli(:, :, size(solid%law) + k) = 2.0_wp*state%tangent
       end do
       associate (material => scene%section(scene%element_section)%material)
          self%alpha = scene%material(material)%alpha
@@ -157,9 +163,9 @@ contains
             call element_point(geometry, g, now, point)
             call element_point(geometry, g, before, last)
             c = 0.5_wp*motion%pose%dissipation*geometry%weight(g) &
-               *self%moduli(:, :, self%solid%law_of(e))
+               *self%moduli(:, :, self%moduli_of(e))
             viscous = (self%beta(e)*motion%pose%mass_scale)*geometry%weight(g) &
-               *self%moduli(:, :, self%solid%law_of(e))
+               *self%moduli(:, :, self%moduli_of(e))
             s = matmul(c, point%dstrain - motion%pose%recalled*last%dstrain)
             rate = matmul(viscous, point%dstrain)
             self%work = self%work + dot_product(s, point%dstrain)
