@@ -219,11 +219,12 @@ contains
       type(point_t), intent(in) :: point
       type(space_response_t), intent(in) :: response
       type(space_part_t), intent(inout) :: part
-      real(wp) :: nominal(n_dim, n_dim), f(n_dim)
+      real(wp) :: s(n_dim, n_dim), nominal(n_dim, n_dim), f(n_dim)
       integer :: i
 
       part%energy = part%energy + self%weight(k)*response%energy
-      nominal = matmul(point%f_mid, self%weight(k)*tensor_of(response%stress))
+      s = tensor_of(response%stress)
+      nominal = self%weight(k)*matmul(point%f_mid, s)
       do i = 1, self%n_node
          f = matmul(nominal, self%gradient(:, i, k))
          part%force(:, i) = part%force(:, i) + f

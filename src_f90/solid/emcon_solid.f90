@@ -142,18 +142,20 @@ contains
       do k = 1, size(scene%rigid)
          self%is_rigid(scene%rigid(k)%element) = .true.
       end do
-      allocate(self%has_mean(self%n_element), self%may_lock(self%n_element))
+      allocate(self%has_mean(self%n_element), self%may_lock(self%n_element), &
+         self%has_inertia(self%n_element), self%is_linear(self%n_element), &
+         self%is_corotated(self%n_element))
       do e = 1, self%n_element
-         associate (kind => scene%kind(scene%element_kind(e)))
+         associate (kind => scene%kind(scene%element_kind(e)), &
+               section => scene%section(scene%element_section(e)), &
+               is_free => .not. self%is_rigid(e))
             self%has_mean(e) = kind%has_mean_volume
             self%may_lock(e) = kind%may_lock()
+            self%has_inertia(e) = .not. section%is_massless
+            self%is_linear(e) = section%kinematics == kinematics_linear .and. is_free
+            self%is_corotated(e) = section%kinematics == kinematics_corotated .and. is_free
          end associate
       end do
-      associate (section => scene%section(scene%element_section))
-         self%has_inertia = .not. section%is_massless
-         self%is_linear = section%kinematics == kinematics_linear .and. .not. self%is_rigid
-         self%is_corotated = section%kinematics == kinematics_corotated .and. .not. self%is_rigid
-      end associate
       self%is_small = self%is_linear .or. self%is_corotated
    end subroutine tell_apart
 
