@@ -5,7 +5,8 @@ module emcon_blas
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
    implicit none
    private
-   public :: blas_single_thread, blas_name, blas_enter, blas_leave, ieee_status_type
+   public :: blas_single_thread, blas_is_shareable, blas_name, blas_enter, blas_leave
+   public :: ieee_status_type
 
    interface
       function emcon_blas_set_threads(n) result(done) bind(c)
@@ -43,6 +44,15 @@ contains
       call emcon_blas_name(len(buffer), buffer)
       name = buffer(:index(buffer, c_null_char) - 1)
    end subroutine blas_name
+
+   !> May threads call the library at a time? An OpenBLAS without threads and without locks hands
+   !> the same work space to both.
+   logical function blas_is_shareable()
+      character(len=:), allocatable :: name
+
+      call blas_name(name)
+      blas_is_shareable = index(name, "SINGLE_THREADED") == 0 .or. index(name, "USE_LOCKING") > 0
+   end function blas_is_shareable
 
    !> Before a call: no halting. Vector kernels of OpenBLAS raise exceptions in unused lanes, which
    !> under `-ffpe-trap` would end the program although all results are right.

@@ -1,6 +1,7 @@
 !> The stepper: open a deck, step, query, save, go on. All state is in the object; any number of
 !> steppers live side by side.
 module emcon_stepper
+   use emcon_blas, only : blas_is_shareable
    use emcon_deck, only : deck_read
    use emcon_deck_further, only : further_until
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
@@ -14,7 +15,7 @@ module emcon_stepper
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_set_threads, march_t
    use emcon_scene, only : scene_t
-   use emcon_text, only : notes_append, notes_t, string_t
+   use emcon_text, only : notes_append, notes_t, string_t, to_text
    use emcon_threads, only : threads_check, threads_default
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_ties, only : ties_prepare
@@ -144,7 +145,7 @@ contains
       if (allocated(error)) return
       call march_init(self%march, self%scene, error, self%given)
       if (allocated(error)) return
-      call march_set_threads(self%march, threads_default())
+      call march_set_threads(self%march, merge(threads_default(), 1, blas_is_shareable()))
       call march_begin_step(self%march, self%scene, 1, error)
       if (allocated(error)) return
       call notes_append(self%notes, self%march%system%notes)
@@ -159,6 +160,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call threads_check(n, error)
+      if (n > 1 .and. .not. (allocated(error) .or. blas_is_shareable())) call raise(error, &
+         err_input, to_text(n) // " threads: the OpenBLAS in use is one that threads must not " // &
+         "share; take that of libopenblas0-openmp or libopenblas0-pthread")
       if (.not. allocated(error)) call march_set_threads(self%march, n)
    end subroutine stepper_set_threads
 

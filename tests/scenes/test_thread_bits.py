@@ -51,6 +51,15 @@ def test_bits_do_not_depend_on_threads(scene, tmp_path):
             assert same, f"{n} threads: {name}"
 
 
+def test_bits_of_large_bodies_do_not_depend_on_threads(tmp_path):
+    """Both bodies have factors of dense blocks, made at a time."""
+    subprocess.run([sys.executable, DECKS/"make_ring.py", "--ring", "128x8", "--block", "120x10",
+                    "--output", tmp_path/"large.inp"], check=True)
+    found = [run_deck(tmp_path/"large.inp", tmp_path/f"{k}", options=["--threads", f"{n}"],
+                      h=0.01, t_end=0.14, frame=1).digits() for k, n in enumerate((1, 2, 2, 3))]
+    assert all(other == found[0] for other in found[1:])
+
+
 def script_of(code):
     """Take a step of the ring after `code`, and print how many threads the process has then."""
     return f"""
