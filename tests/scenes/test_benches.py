@@ -126,7 +126,9 @@ def test_goal_of_the_bar(tmp_path, monkeypatch):
     told = " ".join(line for line in words.splitlines() if line.startswith("goal scatter"))
     assert re.search(r"the cheapest setting is .*initiation=MASSLESS.*h=0.005", told)
     assert "with h alone the deck's own does not meet the goal down to h=0.005" in told
-    assert "initiation=MASSLESS alone: " in told
+    # Which precision is cheaper is the clock's to say; with the deck's own the knob is alone.
+    chosen = told.split("the cheapest setting is ")[1].split(";")[0]
+    assert ("initiation=MASSLESS alone: " in told) == ("precision=single" in chosen)
     assert command.startswith("python -m emcon study bar.inp --vary deck=bar.inp")
 
 
