@@ -79,7 +79,7 @@ KNOBS = (
     ("`POLISH=NO`, 1e-8", {"polish": "NO", "tolerance": "1e-8"}),
     ("`SADDLE POINT`", {"method": "SADDLE POINT"}),
     ("`PENALTY`", {"method": "PENALTY"}),
-    ("`PENALTY, FACTOR=10`", {"method": "PENALTY, FACTOR=10"}),
+    ("`PENALTY, FACTOR=10`", {"method": "'PENALTY, FACTOR=10'"}),
     ("`AUGMENTED LAGRANGE`", {"method": "AUGMENTED LAGRANGE"}),
     ("`PRECISION=single`", {"program": SINGLE}),
 )
@@ -98,6 +98,11 @@ def run_of(deck, folder, parameters, change):
     done = usage([program, path, "--quiet", "--output", folder, *options])
     run = Run(folder / "deck", done.errors)
     return (run if run.file(".vtkhdf").exists() and done.code in (0, 3) else None), done
+
+
+def last_words(errors, folder):
+    """What a program said last, without the folder it ran in."""
+    return errors.strip().splitlines()[-1].replace(str(folder), "")[:80]
 
 
 def figures_of(run, reference):
@@ -134,7 +139,7 @@ def lines_of(name, make, parameters, rounds):
                 cost.setdefault(knob, []).append(done.cpu)
                 if k == 0:
                     kept[knob] = figures_of(run, reference) if run else (
-                        "stops: " + done.errors.strip().splitlines()[-1][:80], "", "", "", "")
+                        "stops: " + last_words(done.errors, folder), "", "", "", "")
     first = min(cost["default"])
     return [(name, knob, f"{min(cost[knob])/first:.2f}", *found) for knob, found in kept.items()]
 
