@@ -22,7 +22,7 @@ module emcon_active_set_solve
       newton_solve, newton_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
-   use emcon_softness, only : most_augmentations, softness_augment
+   use emcon_softness, only : most_augmentations, softness_augment, softness_pulls
    use emcon_system, only : system_t
    implicit none
    private
@@ -92,7 +92,7 @@ contains
    end subroutine active_set_solve
 
    !> Solve with the present set. Contacts that give way and are pushed back are solved again with
-   !> the multipliers that came out, until nothing is left of their gaps.
+   !> the multipliers that came out, until nothing is left of their gaps, or until one pulls.
    subroutine solve(self, system, newton, motion, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -100,9 +100,10 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_done
+      logical :: is_done, may_leave
       integer :: i
 
+      may_leave = newton%looks_early
       do i = 1, most_augmentations
          call newton_solve(newton, system, self%set, motion, status, error)
          if (allocated(error)) return
@@ -111,6 +112,10 @@ contains
          newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
          call softness_augment(self%softness, self%set, is_done)
          if (is_done) return
+         if (may_leave .and. softness_pulls(self%softness, self%set)) then
+            status = newton_early
+            return
+         end if
       end do
       status = step_loose
    end subroutine solve

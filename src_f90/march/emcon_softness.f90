@@ -14,12 +14,14 @@ module emcon_softness
    implicit none
    private
    public :: softness_state_t, softness_begin_step, softness_select, softness_augment, &
-      softness_stored, softness_depth
+      softness_stored, softness_depth, softness_pulls
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
    !> By default an augmented Lagrangian is so much stiffer than what it pushes at.
    real(wp), parameter :: augmented_factor = 3.0_wp
+   !> A pull of this part of the largest multiplier tells that the set will change.
+   real(wp), parameter :: pull = 1.0e-2_wp
 
    type :: softness_state_t
       logical :: is_on = .false.                 !! contact gives way in this step
@@ -168,6 +170,18 @@ contains
          set%soft(k)%base = set%lam(k)
       end do
    end subroutine softness_augment
+
+   !> Does a contact of `set` that is pushed back pull by more than may turn while gaps still close?
+   !> Rows that say nearly the same never close all of their gaps: the multiplier of one falls on.
+   pure logical function softness_pulls(self, set) result(pulls)
+      type(softness_state_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer :: first
+
+      first = set%n_held + 1
+      pulls = self%augments .and. set%n >= first
+      if (pulls) pulls = minval(set%lam(first:set%n)) < -pull*maxval(abs(set%lam(first:set%n)))
+   end function softness_pulls
 
    !> What the contacts of `set` store at the end of the step [M L^2/T^2].
    pure real(wp) function softness_stored(self, set) result(energy)

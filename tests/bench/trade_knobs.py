@@ -97,7 +97,8 @@ def run_of(deck, folder, parameters, change):
     options = [f"--set={name}={value}" for name, value in merged.items()]
     done = usage([program, path, "--quiet", "--output", folder, *options])
     run = Run(folder / "deck", done.errors)
-    return (run if run.file(".vtkhdf").exists() and done.code in (0, 3) else None), done
+    is_whole = done.code in (0, 3) and "the analysis stops" not in done.errors
+    return (run if is_whole else None), done
 
 
 def last_words(errors, folder):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from plain_scenes import BOTH, ONE, UNGUARDED, Scene
+from plain_scenes import BOTH, ONE, UNGUARDED, Scene, below
 from scene_tools import DECKS, attempt, run_deck
 from test_contact_output import data_sets, restart
 from test_statics import E, FORCE, FORMULATIONS, NU, ROUNDED, displacement, tower
@@ -139,6 +139,20 @@ def test_an_augmented_lagrangian_is_what_the_null_space_is(initiation, tmp_path)
         assert 0 < run.verdict["give"] <= tolerance
         assert run.verdict["augmentations"] >= 2
     assert runs[2].verdict["augmentations"] > runs[1].verdict["augmentations"]
+
+
+def test_nodes_of_both_sides_that_meet_are_pushed_back_too(tmp_path):
+    """A node on a node, each held by the other's surface: one of the two pulls and is let go."""
+    scene = Scene(0.01, 0.1)
+    scene.disc("BALL", (0.0, 0.52), 0.5, (8, 4), velocity=(0.3, -1.0))
+    scene.block("BLOCK", (-1.5, -0.8), (3.0, 0.8), (30, 8)).hold("BLOCK", below(-0.8))
+    scene.pairs = [("BALL", "BLOCK")]
+    hard, soft = (run_deck(scene.deck(BOTH), tmp_path/method.split()[0], method=method,
+                           formulation="NODE TO SURFACE") for method in ("NULL SPACE", AUGMENTED))
+    assert soft.history["time"][-1] == hard.history["time"][-1]
+    assert hard.history["active"].max() > 1 and soft.history["cuts"].sum() == 0
+    hard, soft = (run.fields()["displacement"][-1] for run in (hard, soft))
+    assert np.abs(soft - hard).max() < 1e-7*np.abs(hard).max()
 
 
 @pytest.mark.parametrize("scheme", ["MIDPOINT", "TRAPEZOIDAL", "GENERALIZED ALPHA", "BDF2",
