@@ -33,7 +33,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize docs install status clean \
+.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize docs install uninstall status clean \
 	precisions help kernel_objects FORCE
 
 # ---- set-up -------------------------------------------------------------------------------------
@@ -175,9 +175,22 @@ $(BUILD)/libemcon.a: $(LIB_OBJ)
 	@echo "  AR    $@"
 	$(Q)rm -f $@ && ar rcs $@ $^
 
-$(BUILD)/$(SHARED): $(LIB_OBJ)
+# The library shows what the headers declare and the modules hold, and nothing else; that with the
+# sanitizers in it also what they call each other by. MODULES=--no-modules: for C and Python alone.
+COMMA := ,
+MODULES ?=
+SYMBOLS := $(BUILD)/made/symbols$(MODULES).map
+ifneq ($(MADE),)
+SHOWN := $(if $(filter-out sanitize,$(MODE)),-Wl$(COMMA)--version-script=$(SYMBOLS))
+endif
+$(SYMBOLS): src_f90/make_symbols.py src_f90/c_header.py $(BORDER)/emcon.h
+	@mkdir -p $(@D)
+	$(Q)$(PYTHON) $< $(BORDER)/emcon.h $(MODULES) > $@
+
+$(BUILD)/$(SHARED): $(LIB_OBJ) $(if $(MADE),$(SYMBOLS))
 	@echo "  LINK  $@"
-	$(Q)$(FC) $(LDFLAGS_$(MODE)) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $^ $(LIBS) $(THREAD_LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -shared -Wl,-soname,$(@F) -Wl,--no-undefined -o $@ $(LIB_OBJ) \
+		$(SHOWN) $(LIBS) $(THREAD_LIBS)
 	$(Q)ln -sf $(@F) $(BUILD)/libemcon.so
 
 $(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
@@ -340,20 +353,41 @@ docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
 	.venv/bin/python -m ford --quiet .ci/ford.md
 	@echo "build/docs/index.html"
 
+# Prefixes may have blanks in their names; what is installed finds its parts from where it stands.
 TO = $(DESTDIR)$(PREFIX)
-install: app lib  ## program, library, modules, header and emcon.pc below PREFIX= (/usr/local)
-	install -d $(TO)/bin $(TO)/lib/pkgconfig $(TO)/include/emcon
-	install -m 755 $(BUILD)/emcon $(TO)/bin
-	install -m 755 $(BUILD)/$(SHARED) $(TO)/lib
-	ln -sf $(SHARED) $(TO)/lib/libemcon.so
-	install -m 644 $(BUILD)/libemcon.a $(TO)/lib
-	install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(basename $(notdir $(LIB_SRC)))) \
-		$(wildcard src_f90/border/*.h) $(TO)/include/emcon
-	printf '%s\n' 'prefix=$(abspath $(PREFIX))' 'Name: emcon' 'Version: $(VERSION)' \
-		'Description: energy-momentum conserving contact dynamics' \
-		'Cflags: -I$${prefix}/include/emcon' \
-		'$(strip Libs: -L$${prefix}/lib -lemcon $(LDFLAGS_$(MODE)))' \
-		'Libs.private: $(LIBS) $(THREAD_LIBS) -lgfortran -lm' > $(TO)/lib/pkgconfig/emcon.pc
+BLANK := $() $()
+COMPANIONS := emcon.pc emcon-static.pc emconConfig.cmake emconConfigVersion.cmake
+UP := ../../..
+LIB := lib
+INCLUDE := include/emcon
+ALL_LIBS = $(strip $(LIBS) $(THREAD_LIBS))
+# fill FILE FOLDER: FILE.in of the border with what it is to hold, into FOLDER.
+fill = sed -e 's|@VERSION@|$(VERSION)|' -e 's|@SHARED@|$(SHARED)|' -e 's|@UP@|$(UP)|' \
+	-e 's|@LIB@|$(LIB)|' -e 's|@INCLUDE@|$(INCLUDE)|' -e 's|@LDFLAGS@|$(LDFLAGS_$(MODE))|' \
+	-e 's|@LIBS@|$(ALL_LIBS)|' -e 's|@LIST@|$(subst $(BLANK),;,$(ALL_LIBS))|' \
+	$(BORDER)/$(1).in > $(2)/$(1)
+install: app lib  ## program, library, headers, modules, man page, for CMake and pkg-config, below PREFIX=
+	$(Q)install -d '$(TO)/bin' '$(TO)/lib/pkgconfig' '$(TO)/lib/cmake/emcon' '$(TO)/include/emcon' \
+		'$(TO)/share/man/man1' '$(TO)/share/doc/emcon'
+	$(Q)install -m 755 $(BUILD)/emcon '$(TO)/bin'
+	$(Q)install -m 755 $(BUILD)/$(SHARED) '$(TO)/lib'
+	$(Q)ln -sf $(SHARED) '$(TO)/lib/libemcon.so'
+	$(Q)install -m 644 $(BUILD)/libemcon.a '$(TO)/lib'
+	$(Q)install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(basename $(notdir $(LIB_SRC)))) \
+		$(BORDER)/emcon.h $(BORDER)/emcon.hpp '$(TO)/include/emcon'
+	$(Q)$(foreach file,$(filter %.pc,$(COMPANIONS)),$(call fill,$(file),'$(TO)/lib/pkgconfig') &&) :
+	$(Q)$(foreach file,$(filter %.cmake,$(COMPANIONS)),$(call fill,$(file),'$(TO)/lib/cmake/emcon') &&) :
+	$(Q)install -m 644 docs/emcon.1 '$(TO)/share/man/man1'
+	$(Q)install -m 644 LICENSE '$(TO)/share/doc/emcon'
+
+uninstall:  ## take away what `make install` has put below PREFIX=
+	$(Q)rm -f '$(TO)/bin/emcon' '$(TO)'/lib/libemcon.so* '$(TO)/lib/libemcon.a' \
+		'$(TO)'/include/emcon/emcon*.mod '$(TO)/include/emcon/emcon.h' '$(TO)/include/emcon/emcon.hpp' \
+		'$(TO)/lib/pkgconfig/emcon.pc' '$(TO)/lib/pkgconfig/emcon-static.pc' \
+		'$(TO)'/lib/cmake/emcon/emconConfig*.cmake '$(TO)/share/man/man1/emcon.1' \
+		'$(TO)/share/doc/emcon/LICENSE'
+	$(Q)for folder in include/emcon lib/cmake/emcon share/doc/emcon; do \
+		[ ! -d '$(TO)'/$$folder ] || rmdir --ignore-fail-on-non-empty '$(TO)'/$$folder; done
 
 status:  ## compiler, libraries and Python packages that were found
 	@$(SETUP) status

@@ -9,7 +9,7 @@ and turns back. `emcon_find_load` stands for `model_find_load`, `stepper_find_lo
 Arguments are matched by name, and turned by what both sides declare them as: flags and logicals,
 numbers from 0 and from 1 (COUNTED), arrays by rows and by columns, matrices, texts. Counts are held
 against the model where one of their arrays is given. What fits no rule is BY_HAND, in
-emcon_c_by_hand.f90.
+emcon_c_by_hand.f90 and emcon_status.c.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from c_header import Argument, Function, Header
 NAMES = {"evaluate_contact": "query_contact", "follow": "query_follow_links",
          "gather": "query_gather_links", "restore_snapshot": "stepper_restore",
          "resume": "model_load", "take_snapshot": "stepper_snapshot"}
-BY_HAND = {"version", "close", "message", "is_done", "run", "free_snapshot", "null_space"}
+BY_HAND = {"version", "close", "message", "is_done", "run", "free_snapshot", "null_space",
+           "status_text"}
 #: What can be called before the model is built.
 EARLY = re.compile(r"give_|add_|hold$|set_contact$|build$|resume$|get_(sizes|labels|positions)$"
                    r"|find_nodes$")

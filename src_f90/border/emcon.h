@@ -39,6 +39,10 @@ enum {
    EMCON_ERROR_INTERRUPT = 130 /* a callback asked to stop; the model stays usable */
 };
 
+/* What a code means, in a few words that stay where they are; what was wrong this time is told by
+ * emcon_message. */
+const char *emcon_status_text(int status);
+
 /* Kinds of loads. */
 enum {
    EMCON_LOAD_POINT = 1,       /* force on a degree of freedom of a node */

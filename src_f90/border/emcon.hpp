@@ -1,0 +1,438 @@
+// EMCON for C++ (C++11 and later): models that close themselves, failures as exceptions, arrays as
+// vectors. All of it stands in this header, over emcon.h, which says what each function does; what
+// has no name here is called by Model::call:
+//
+//    emcon::Model ring = emcon::Model::open("ring.inp", "h=0.05");
+//    ring.run(1.0);
+//    ring.call(emcon_set_threads, 2);
+#ifndef EMCON_HPP
+#define EMCON_HPP
+
+#include <emcon.h>
+
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace emcon {
+
+// What failed, by its code; its text is that of emcon_message.
+class Error : public std::runtime_error {
+public:
+   Error(int code, const std::string &text) : std::runtime_error(text), code_(code) {}
+   int code() const noexcept { return code_; }
+
+private:
+   int code_;
+};
+
+struct InputError : Error { using Error::Error; };
+struct AnalysisError : Error { using Error::Error; };
+struct FileError : Error { using Error::Error; };
+struct InternalError : Error { using Error::Error; };
+struct Interrupted : Error { using Error::Error; };
+
+// To be thrown by what a model was given, at a state where there is no energy: the step is tried
+// again in smaller parts.
+struct Outside : std::exception {
+   const char *what() const noexcept override { return "there is no energy at this state"; }
+};
+
+[[noreturn]] inline void fail(int code, const std::string &text)
+{
+   switch (code) {
+   case EMCON_ERROR_INPUT: throw InputError(code, text);
+   case EMCON_ERROR_ANALYSIS: throw AnalysisError(code, text);
+   case EMCON_ERROR_FILE: throw FileError(code, text);
+   case EMCON_ERROR_INTERRUPT: throw Interrupted(code, text);
+   default: throw InternalError(code, text);
+   }
+}
+
+// Called after each increment with it and the fraction that is done; false stops the run.
+using Progress = std::function<bool(const emcon_increment &, double)>;
+// Called with each line of the log.
+using Log = std::function<void(const std::string &)>;
+// An energy at points, as emcon_point_function: n_point, n_variable, z, value, gradient, and
+// hessian, which is NULL where it is not wanted.
+using PointFunction = std::function<void(int, int, const double *, double *, double *, double *)>;
+// Forces of a step, as emcon_force_function: n_node, u0, du, force, magnitude, energy, and tangent,
+// which is NULL where it is not wanted.
+using ForceFunction = std::function<void(int, const double *, const double *, double *, double *,
+                                         double *, double *)>;
+
+// A state that was kept; it outlives its model.
+class Snapshot {
+public:
+   explicit Snapshot(emcon_snapshot *kept) : kept_(kept) {}
+   const emcon_snapshot *get() const noexcept { return kept_.get(); }
+
+private:
+   struct Free {
+      void operator()(emcon_snapshot *kept) const noexcept { emcon_free_snapshot(kept); }
+   };
+   std::unique_ptr<emcon_snapshot, Free> kept_;
+};
+
+struct Verdict {
+   bool is_good;
+   std::string json;
+};
+
+// Of each possible contact; NaN is the gap where no surface is near.
+struct Contact {
+   std::vector<double> lam, pressure, gap;
+   std::vector<int> is_active, label, pair;
+};
+
+// A model: moved, not copied; closed at its end.
+class Model {
+public:
+   // ---- reading and building ----
+
+   static Model open(const std::string &deck, const std::string &parameters = "",
+                     bool is_lenient = false)
+   {
+      Model model;
+      model.check(emcon_open(deck.c_str(), parameters.c_str(), is_lenient, model.address()));
+      return model;
+   }
+
+   // Read without building: give the model what a deck cannot say, then `build`.
+   static Model read(const std::string &deck, const std::string &parameters = "",
+                     bool is_lenient = false)
+   {
+      Model model;
+      model.check(emcon_read(deck.c_str(), parameters.c_str(), is_lenient, model.address()));
+      return model;
+   }
+
+   static Model read_text(const std::string &text, const std::string &name = "deck",
+                          const std::string &parameters = "", bool is_lenient = false)
+   {
+      Model model;
+      model.check(emcon_read_text(text.c_str(), name.c_str(), parameters.c_str(), is_lenient,
+                                  model.address()));
+      return model;
+   }
+
+   static Model load(const std::string &path)
+   {
+      Model model;
+      model.check(emcon_load(path.c_str(), model.address()));
+      return model;
+   }
+
+   // A model of a host: nodes at the positions x0, y0, x1, y1, ...
+   static Model of_nodes(const std::vector<double> &x)
+   {
+      Model model;
+      model.check(emcon_new(static_cast<int>(x.size()/2), x.data(), model.address()));
+      return model;
+   }
+
+   void build() { call(emcon_build); }
+   void resume(const std::string &path) { call(emcon_resume, path.c_str()); }
+   void save(const std::string &path) const { call(emcon_save, path.c_str()); }
+
+   // ---- any function of emcon.h with a model and a status ----
+
+   emcon_model *get() const noexcept { return owned_->model; }
+
+   template <class Function, class... Arguments>
+   void call(Function function, Arguments &&...arguments) const
+   {
+      check(function(get(), std::forward<Arguments>(arguments)...));
+   }
+
+   // ---- the run of the deck, and steps ----
+
+   emcon_increment advance()
+   {
+      emcon_increment made;
+      call(emcon_advance, &made);
+      return made;
+   }
+
+   emcon_increment step(double h)
+   {
+      emcon_increment made;
+      call(emcon_step, h, &made);
+      return made;
+   }
+
+   // Increments until `time` is reached, or the end of the deck.
+   void run(double time, Progress progress = Progress(), Log log = Log())
+   {
+      Callbacks callbacks{owned_.get(), std::move(progress), std::move(log)};
+      check(emcon_run(get(), time, tell, callbacks.log ? write_line : nullptr, &callbacks));
+      rethrow();   // what the log threw after the last increment
+   }
+
+   void next_step() { call(emcon_next_step); }
+   bool is_done() const { return emcon_is_done(get()) != 0; }
+
+   Snapshot take_snapshot() const
+   {
+      emcon_snapshot *kept = nullptr;
+      const int status = emcon_take_snapshot(get(), &kept);
+      Snapshot snapshot(kept);
+      check(status);
+      return snapshot;
+   }
+
+   void restore(const Snapshot &snapshot) { call(emcon_restore_snapshot, snapshot.get()); }
+
+   // ---- what a model holds ----
+
+   emcon_sizes sizes() const
+   {
+      emcon_sizes found;
+      call(emcon_get_sizes, &found);
+      return found;
+   }
+
+   double time() const
+   {
+      double found = 0;
+      call(emcon_get_time, &found);
+      return found;
+   }
+
+   emcon_ledger ledger() const
+   {
+      emcon_ledger found;
+      call(emcon_get_ledger, &found);
+      return found;
+   }
+
+   Verdict verdict() const
+   {
+      int is_good = 0;
+      const char *json = nullptr;
+      call(emcon_get_verdict, &is_good, &json);
+      return {is_good != 0, json};
+   }
+
+   std::string notes() const { return text_of(emcon_get_notes); }
+   std::string report() const { return text_of(emcon_get_report); }
+
+   std::vector<int> labels() const
+   {
+      std::vector<int> label(static_cast<std::size_t>(sizes().n_node));
+      call(emcon_get_labels, static_cast<int>(label.size()), label.data());
+      return label;
+   }
+
+   // x and y of each node, side by side.
+   std::vector<double> positions() const
+   {
+      std::vector<double> x(n_freedom());
+      call(emcon_get_positions, static_cast<int>(x.size()/2), x.data());
+      return x;
+   }
+
+   std::vector<double> displacements() const
+   {
+      std::vector<double> u(n_freedom());
+      call(emcon_get_state, static_cast<int>(u.size()/2), u.data(), nullptr);
+      return u;
+   }
+
+   std::vector<double> velocities() const
+   {
+      std::vector<double> v(n_freedom());
+      call(emcon_get_state, static_cast<int>(v.size()/2), nullptr, v.data());
+      return v;
+   }
+
+   // Displacements and velocities; an empty one is left as it is.
+   void set_state(const std::vector<double> &u, const std::vector<double> &v)
+   {
+      if (!u.empty() && !v.empty() && u.size() != v.size())
+         throw InputError(EMCON_ERROR_INPUT, "displacements and velocities differ in length");
+      const std::size_t n = u.empty() ? v.size() : u.size();
+      call(emcon_set_state, static_cast<int>(n/2), u.empty() ? nullptr : u.data(),
+           v.empty() ? nullptr : v.data(), 0, nullptr, nullptr, nullptr);
+   }
+
+   Contact contact() const
+   {
+      const int n = sizes().n_contact;
+      const std::size_t size = static_cast<std::size_t>(n);
+      Contact found;
+      for (std::vector<double> *array : {&found.lam, &found.pressure, &found.gap})
+         array->resize(size);
+      for (std::vector<int> *array : {&found.is_active, &found.label, &found.pair})
+         array->resize(size);
+      call(emcon_get_contact, n, found.lam.data(), found.is_active.data(), found.label.data(),
+           found.pair.data());
+      call(emcon_get_pressures, n, found.pressure.data(), found.gap.data());
+      return found;
+   }
+
+   // ---- loads and boundary values ----
+
+   int find_load(int kind, int label, int place = 0) const
+   {
+      int load = 0;
+      call(emcon_find_load, kind, label, place, &load);
+      return load;
+   }
+
+   void set_load(int load, double value) { call(emcon_set_load, load, value); }
+   void prescribe(int label, int dof, double value) { call(emcon_prescribe, label, dof, value); }
+   void set_free(int label, int dof) { call(emcon_remove_prescribed, label, dof); }
+
+   // ---- what is given, between reading and building ----
+
+   // What is thrown by a function that was given ends the call that reached it, and is thrown on.
+
+   void give_law(const std::string &name, PointFunction law)
+   {
+      call(emcon_give_law, name.c_str(), point, keep(owned_->points, std::move(law)));
+   }
+
+   void give_potential(const std::string &name, const std::vector<int> &node,
+                       PointFunction potential)
+   {
+      call(emcon_give_potential, name.c_str(), static_cast<int>(node.size()), node.data(), point,
+           keep(owned_->points, std::move(potential)));
+   }
+
+   void give_force(const std::string &name, const emcon_csr &pattern, ForceFunction force)
+   {
+      call(emcon_give_force, name.c_str(), &pattern, forces,
+           keep(owned_->forces, std::move(force)));
+   }
+
+   void give_mass(const emcon_csr &mass) { call(emcon_give_mass, &mass); }
+
+private:
+   struct Owned;
+
+   // A function that was given, and the model whose call it may end.
+   template <class Function>
+   struct Given {
+      Owned *owner;
+      Function function;
+   };
+
+   // Stays where it is when a Model is moved.
+   struct Owned {
+      emcon_model *model = nullptr;
+      std::exception_ptr thrown;
+      std::vector<std::unique_ptr<Given<PointFunction>>> points;
+      std::vector<std::unique_ptr<Given<ForceFunction>>> forces;
+      Owned() = default;
+      Owned(const Owned &) = delete;
+      Owned &operator=(const Owned &) = delete;
+      ~Owned() { emcon_close(model); }
+   };
+
+   struct Callbacks {
+      Owned *owner;
+      Progress progress;
+      Log log;
+   };
+
+   Model() : owned_(new Owned) {}
+   emcon_model **address() noexcept { return &owned_->model; }
+   std::size_t n_freedom() const { return 2*static_cast<std::size_t>(sizes().n_node); }
+
+   void rethrow() const
+   {
+      if (!owned_->thrown) return;
+      std::exception_ptr thrown;
+      std::swap(thrown, owned_->thrown);
+      std::rethrow_exception(thrown);
+   }
+
+   void check(int status) const
+   {
+      if (status == EMCON_OK) return;
+      rethrow();
+      const char *text = emcon_message(get());
+      fail(status, text && *text ? text : emcon_status_text(status));
+   }
+
+   std::string text_of(int (*function)(emcon_model *, const char **)) const
+   {
+      const char *text = nullptr;
+      call(function, &text);
+      return text ? text : "";
+   }
+
+   template <class Function>
+   void *keep(std::vector<std::unique_ptr<Given<Function>>> &kept, Function function)
+   {
+      kept.emplace_back(new Given<Function>{owned_.get(), std::move(function)});
+      return kept.back().get();
+   }
+
+   // No exception passes through the library: 1 stands for Outside, 2 for one that is kept.
+   template <class Body>
+   static int guarded(Owned *owner, Body body) noexcept
+   {
+      try {
+         return body();
+      } catch (const Outside &) {
+         return 1;
+      } catch (...) {
+         if (!owner->thrown) owner->thrown = std::current_exception();
+         return 2;
+      }
+   }
+
+   static int point(void *user, int n_point, int n_variable, const double *z, int wants_hessian,
+                    double *value, double *gradient, double *hessian)
+   {
+      auto *given = static_cast<Given<PointFunction> *>(user);
+      return guarded(given->owner, [&] {
+         given->function(n_point, n_variable, z, value, gradient,
+                         wants_hessian ? hessian : nullptr);
+         return 0;
+      });
+   }
+
+   static int forces(void *user, int n_node, const double *u0, const double *du,
+                     int wants_tangent, double *force, double *magnitude, double *energy,
+                     double *tangent)
+   {
+      auto *given = static_cast<Given<ForceFunction> *>(user);
+      return guarded(given->owner, [&] {
+         given->function(n_node, u0, du, force, magnitude, energy,
+                         wants_tangent ? tangent : nullptr);
+         return 0;
+      });
+   }
+
+   static int tell(void *user, const emcon_increment *increment, double fraction_done)
+   {
+      auto *callbacks = static_cast<Callbacks *>(user);
+      if (callbacks->owner->thrown) return 1;   // by the log
+      if (!callbacks->progress) return 0;
+      return guarded(callbacks->owner,
+                     [&] { return callbacks->progress(*increment, fraction_done) ? 0 : 1; });
+   }
+
+   static void write_line(void *user, const char *line)
+   {
+      auto *callbacks = static_cast<Callbacks *>(user);
+      guarded(callbacks->owner, [&] {
+         callbacks->log(line);
+         return 0;
+      });
+   }
+
+   std::unique_ptr<Owned> owned_;
+};
+
+}  // namespace emcon
+
+#endif

@@ -1,0 +1,162 @@
+// The ring impact by emcon.hpp: run, states kept, conditions changed, functions given, failures.
+//
+// usage: host DECK
+#include <emcon.hpp>
+
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace {
+
+const char *const two_nodes = R"(*NODE
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+*ELEMENT, TYPE=CPE4, ELSET=ALL
+1, 1, 2, 3, 4
+*MATERIAL, NAME=M
+*DENSITY
+1.
+*ELASTIC
+100., 0.3
+*SOLID SECTION, ELSET=ALL, MATERIAL=M
+*STEP, NLGEOM
+*DYNAMIC, DIRECT
+0.1, 1.
+*END STEP
+)";
+
+struct Mishap : std::runtime_error {
+   using std::runtime_error::runtime_error;
+};
+
+void require(bool holds, const char *what)
+{
+   if (!holds) throw std::logic_error(what);
+}
+
+// 1/2 k x^2 in the first direction; `n_outside` points of the iteration have no energy.
+emcon::PointFunction spring(int &n_outside)
+{
+   return [&n_outside](int n_point, int n_variable, const double *z, double *value,
+                       double *gradient, double *hessian) {
+      if (n_outside > 0) {
+         n_outside -= 1;
+         throw emcon::Outside();
+      }
+      const double k = 5.0;
+      for (int p = 0; p < n_point; ++p) {
+         const double x = z[n_variable*p];
+         value[p] = 0.5*k*x*x;
+         for (int i = 0; i < n_variable; ++i) gradient[n_variable*p + i] = i == 0 ? k*x : 0.0;
+         if (!hessian) continue;
+         for (int i = 0; i < n_variable*n_variable; ++i)
+            hessian[n_variable*n_variable*p + i] = i == 0 ? k : 0.0;
+      }
+   };
+}
+
+void run_the_ring(const std::string &deck)
+{
+   emcon::Model ring = emcon::Model::open(deck, "h=0.05\nt_end=1.5");
+   const emcon::Snapshot start = ring.take_snapshot();
+   int n = 0;
+   std::size_t n_character = 0;
+   ring.run(1e30, [&n](const emcon_increment &, double) { return ++n > 0; },
+            [&n_character](const std::string &line) { n_character += line.size(); });
+   require(ring.is_done() && n == 30 && n_character > 0, "the run of the deck");
+   require(ring.verdict().is_good, "its verdict");
+   const emcon::Contact contact = ring.contact();
+   require(contact.lam.size() == contact.gap.size() && !contact.lam.empty(), "contacts");
+   const std::vector<double> u = ring.displacements();
+   emcon::Model moved = std::move(ring);   // what is inside stays where it is
+   moved.restore(start);
+   moved.run(1e30);
+   require(moved.displacements() == u, "the same bits");
+   std::printf("%.17g %.17g\n", moved.ledger().total, u[1]);
+}
+
+void stop_by_exceptions(const std::string &deck)
+{
+   emcon::Model ring = emcon::Model::open(deck, "h=0.05\nt_end=1");
+   try {
+      ring.run(1e30, [](const emcon_increment &, double) { return false; });
+      require(false, "a run that is stopped");
+   } catch (const emcon::Interrupted &error) {
+      require(error.code() == EMCON_ERROR_INTERRUPT, "its code");
+   }
+   try {
+      ring.run(1e30, [](const emcon_increment &, double) -> bool { throw Mishap("progress"); });
+      require(false, "an exception in a run");
+   } catch (const Mishap &) {
+   }
+   emcon::Model logged = emcon::Model::open(deck, "h=0.05\nt_end=1");
+   try {
+      logged.run(1e30, nullptr, [](const std::string &) { throw Mishap("log"); });
+      require(false, "an exception in the log");
+   } catch (const Mishap &) {
+      require(logged.time() < 0.06, "the end of its run");
+   }
+   try {
+      emcon::Model::open("no_such_deck.inp");
+      require(false, "a deck that is not there");
+   } catch (const emcon::Error &error) {
+      require(std::string(error.what()).find("no_such_deck.inp") != std::string::npos, "its text");
+   }
+   int label = 0;
+   try {
+      ring.call(emcon_get_labels, 1, &label);
+      require(false, "a count that does not fit");
+   } catch (const emcon::InputError &) {
+   }
+}
+
+void give_a_spring()
+{
+   int n_outside = 0;
+   emcon::Model block = emcon::Model::read_text(two_nodes);
+   block.give_potential("spring", {0, 1, 2, 3}, spring(n_outside));
+   block.build();
+   const double before = block.ledger().total;
+   n_outside = 1;                          // tried again, then through
+   block.advance();
+   require(n_outside == 0 && block.time() > 0, "a step that is tried again");
+   require(std::abs(block.ledger().total - before) <= 1e-12*before && before > 0, "energy");
+   bool throws = false;
+   emcon::Model other = emcon::Model::read_text(two_nodes);
+   other.give_potential("mishap", {0}, [&throws](int n_point, int n_variable, const double *,
+                                                 double *value, double *gradient, double *hessian) {
+      if (throws) throw Mishap("potential");
+      for (int p = 0; p < n_point; ++p) value[p] = 0.0;
+      for (int i = 0; i < n_point*n_variable; ++i) gradient[i] = 0.0;
+      for (int i = 0; hessian && i < n_point*n_variable*n_variable; ++i) hessian[i] = 0.0;
+   });
+   other.build();
+   throws = true;
+   try {
+      other.advance();
+      require(false, "an exception in a potential");
+   } catch (const Mishap &error) {
+      require(std::string(error.what()) == "potential", "that exception");
+   }
+   throws = false;
+   other.advance();                        // the model can go on
+}
+
+}  // namespace
+
+int main(int argc, char **argv)
+{
+   static_assert(!std::is_copy_constructible<emcon::Model>::value, "a model is not copied");
+   if (argc < 2) return 2;
+   require(std::string(emcon_status_text(EMCON_OK)) == "done", "text of a code");
+   run_the_ring(argv[1]);
+   stop_by_exceptions(argv[1]);
+   give_a_spring();
+   return 0;
+}
