@@ -7,7 +7,7 @@
 !> section 6.
 module emcon_layer
    use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done, &
-      step_singular
+      step_singular, step_too_far, touch_tol
    use emcon_active_set_solve, only : active_set_solve
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_correction, only : correction_free, correction_reset
@@ -247,6 +247,9 @@ contains
       call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
          status, error)
       if (allocated(error)) return
+      if (status == step_done .and. any(self%active%is_dropped .and. .not. stays)) then
+         if (any(have_closed(self) .and. .not. stays)) status = step_too_far
+      end if
       if (status /= step_done) then
          call mark_trouble(self, has_changed)
          return
@@ -275,6 +278,26 @@ contains
       status = step_singular
       call mark_trouble(self, has_changed)
    end subroutine layer_settle
+
+   !> The contacts that were left out as they seemed to follow from others, and close all the same:
+   !> of two corners that pass each other z may take the wrong side.
+   pure function have_closed(self)
+      type(layer_t), intent(in) :: self
+      logical :: have_closed(size(self%acts))    !! (contacts)
+      integer :: i
+
+      have_closed = self%active%is_dropped
+      do i = 1, size(self%system%contact)
+         associate (contact => self%system%contact(i)%contact, &
+               first => self%system%first_constraint(i))
+            associate (have => have_closed(first + 1:first + contact%n_constraint), &
+                  gap => contact%state)
+               have = have .and. gap%is_near .and. gap%is_over .and. &
+                  gap%gap1 < min(gap%gap0, 0.0_wp) - touch_tol*gap%size
+            end associate
+         end associate
+      end do
+   end function have_closed
 
    !> The massless slave nodes of the contacts that have opened or closed, or of all.
    pure subroutine mark_trouble(self, has_changed)

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 import scipy.linalg
+from overlap import worst
 from plain_scenes import AUTO, SCENES, Scene
 from scene_tools import DECKS, ROOT, Deck, run_deck
 
@@ -18,6 +19,8 @@ MASSLESS = {"initiation": "MASSLESS"}
 NTS = {"formulation": "NODE TO SURFACE", "sides": "AUTO"}
 MORTAR = {"formulation": "MORTAR", "sides": "ONE"}
 EPS = np.finfo(float).eps
+#: Coordinates of plain scenes are below 4, edges above 0.1: rounding of what is seen, by the edge.
+ROUNDING = 64*EPS*4/0.1
 
 
 def balances(history):
@@ -197,6 +200,16 @@ def test_soft_bodies_on_corners(name, choice, tmp_path):
                    tmp_path, **MASSLESS, **choice)
     assert BACK in run.log
     assert run.history["time"][-1] == pytest.approx(scene.t_end)
+    assert balances(run.history) < 1e-12
+
+
+@pytest.mark.parametrize("h", [0.02, 0.01, 0.005])
+def test_corners_that_pass_each_other_stay_outside(h, tmp_path):
+    """Two that meet without mass follow from each other: neither may be left out as it closes."""
+    scene = SCENES["slide off"]()
+    run = run_deck(scene.deck(AUTO), tmp_path, h=h, **MASSLESS, formulation="NODE TO SURFACE")
+    assert BACK not in run.log
+    assert worst(run.fields(), scene.alone).by_edge <= ROUNDING
     assert balances(run.history) < 1e-12
 
 
