@@ -1,8 +1,9 @@
 !> The judge: after each step, is a body inside another, whatever the constraints say?
 !>
 !> All pieces that contact pairs name are looked at both ways, at the end of the step and, where
-!> they move by much, on the straight way there. While boxes are apart nothing is done. Source:
-!> docs/theory.md, section 4.11.
+!> they move by much, on the straight way there. Of those that no pair brings together it is told
+!> where they come to overlap. While boxes are apart nothing is done. Source: docs/theory.md,
+!> section 4.11.
 module emcon_judge
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp
@@ -11,7 +12,7 @@ module emcon_judge
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: judge_t, overlap_t, judge_init, judge_step
+   public :: judge_t, overlap_t, judge_init, judge_excuse, judge_step
 
    !> Between two looks pieces move against each other by less than this part of the thinnest
    !> element: one look at what goes through it is then at least half as deep.
@@ -21,6 +22,11 @@ module emcon_judge
    !> Looks at one step at most.
    integer, parameter :: most_looks = 64
 
+   !> Two pieces, the first one not after the other.
+   type :: meeting_t
+      integer :: first = 0, second = 0
+   end type meeting_t
+
    type :: judge_t
       type(look_t) :: look
       ! Where each piece is in a step:
@@ -29,6 +35,8 @@ module emcon_judge
       real(wp), allocatable :: thinnest(:)       !! (n_piece) element at the outline [L]
       real(wp), allocatable :: longest(:)        !! (n_piece) edge [L]
       integer, allocatable :: other(:)           !! (n_piece) work space
+      type(meeting_t), allocatable :: excused(:) !! of pieces without a pair that may overlap
+      type(overlap_t) :: stray                   !! the deepest of others without a pair
       !> As long as no node has moved farther since the start of the step that was last looked at,
       !> there is no overlap [L].
       real(wp) :: clearance = 0.0_wp
@@ -45,9 +53,34 @@ contains
       associate (n => self%look%outline%n_piece)
          allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), &
             self%least(scene%n_dim, n), self%most(scene%n_dim, n))
-         allocate(self%thinnest(n), self%longest(n), self%other(n))
+         allocate(self%thinnest(n), self%longest(n), self%other(n), self%excused(0))
       end associate
    end subroutine judge_init
+
+   !> What overlaps at `u`, and no pair brings together, is meant to.
+   subroutine judge_excuse(self, x, u)
+      type(judge_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      type(overlap_t) :: overlap
+      type(meeting_t), allocatable :: meant(:)
+      real(wp) :: rest(size(u, 1), size(u, 2))
+      type(box_tree_t) :: tree
+      integer :: p, i, n
+
+      allocate(meant(0))
+      rest = 0.0_wp
+      call place(self, x, u, rest, tree)
+      do p = 1, self%look%outline%n_piece
+         call find_later(self, tree, p, n)
+         do i = 1, n
+            if (outline_meets(self%look%outline, p, self%other(i))) cycle
+            overlap = overlap_t()
+            call judge_pieces(self, p, self%other(i), x, u, rest, overlap)
+            if (overlap%depth > 0.0_wp) meant = [meant, meeting_t(p, self%other(i))]
+         end do
+      end do
+      self%excused = meant
+   end subroutine judge_excuse
 
    !> The deepest overlap in the step from `u0` by `du`.
    subroutine judge_step(self, x, u0, du, overlap)
@@ -58,19 +91,20 @@ contains
       integer :: p, i, n
       logical :: is_apart
 
+      self%stray = overlap_t()
       if (self%look%outline%n_piece == 0) return
       is_apart = .true.
+      call place(self, x, u0, du, tree)
       do p = 1, self%look%outline%n_piece
-         call measure(self, p, x, u0, du)
-      end do
-      call box_tree_init(tree, self%low, self%high)
-      do p = 1, self%look%outline%n_piece
-         n = 0
-         call box_tree_find(tree, self%low(:, p), self%high(:, p), 0.0_wp, self%other, n)
+         call find_later(self, tree, p, n)
          do i = 1, n
-            if (self%other(i) < p) cycle
-            if (.not. outline_meets(self%look%outline, p, self%other(i))) cycle
-            call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
+            if (outline_meets(self%look%outline, p, self%other(i))) then
+               call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
+            else if (is_excused(self, p, self%other(i))) then
+               cycle
+            else
+               call judge_pieces(self, p, self%other(i), x, u0, du, self%stray)
+            end if
             is_apart = .false.
          end do
       end do
@@ -78,7 +112,47 @@ contains
       if (is_apart) self%clearance = half_way*least_distance(self)
    end subroutine judge_step
 
-   !> Smallest distance of the boxes of two pieces that may meet, by the axis where it is largest.
+   !> Measure all pieces over the step, and put their boxes into a tree.
+   pure subroutine place(self, x, u0, du, tree)
+      type(judge_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(box_tree_t), intent(out) :: tree
+      integer :: p
+
+      do p = 1, self%look%outline%n_piece
+         call measure(self, p, x, u0, du)
+      end do
+      call box_tree_init(tree, self%low, self%high)
+   end subroutine place
+
+   !> The pieces from `p` on whose boxes meet that of `p`: the first `n` of `self%other`.
+   pure subroutine find_later(self, tree, p, n)
+      type(judge_t), intent(inout) :: self
+      type(box_tree_t), intent(in) :: tree
+      integer, intent(in) :: p
+      integer, intent(out) :: n
+      integer :: n_found, i
+
+      n_found = 0
+      call box_tree_find(tree, self%low(:, p), self%high(:, p), 0.0_wp, self%other, n_found)
+      n = 0
+      do i = 1, n_found
+         if (self%other(i) < p) cycle
+         n = n + 1
+         self%other(n) = self%other(i)
+      end do
+   end subroutine find_later
+
+   !> May pieces `p` and `q` overlap, as they did at first, or is it one piece with itself?
+   pure logical function is_excused(self, p, q)
+      type(judge_t), intent(in) :: self
+      integer, intent(in) :: p, q                !! p <= q
+
+      is_excused = p == q .or. any(self%excused%first == p .and. self%excused%second == q)
+   end function is_excused
+
+   !> Smallest distance of the boxes of two pieces that are looked at, by the axis where it is
+   !> largest.
    pure real(wp) function least_distance(self)
       type(judge_t), intent(in) :: self
       integer :: p, q
@@ -86,7 +160,7 @@ contains
       least_distance = huge(least_distance)
       do p = 1, self%look%outline%n_piece
          do q = p + 1, self%look%outline%n_piece
-            if (.not. outline_meets(self%look%outline, p, q)) cycle
+            if (is_excused(self, p, q)) cycle
             least_distance = min(least_distance, maxval(max(self%low(:, p) - self%high(:, q), &
                self%low(:, q) - self%high(:, p))))
          end do

@@ -239,17 +239,8 @@ contains
       call find_apart(self, stays)
       has_changed = has_changed .and. .not. stays
       if (.not. any(has_changed)) return
-      self%state%is_active = self%acts .and. .not. stays
-      self%state%lam = self%lam
-      call active_set_begin(self%active, self%system, self%motion, self%state)
-      self%active%is_dropped = stays
-      self%newton%driven = 0.0_wp
-      call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
-         status, error)
+      call balance(self, stays, status, error)
       if (allocated(error)) return
-      if (status == step_done .and. any(self%active%is_dropped .and. .not. stays)) then
-         if (any(have_closed(self) .and. .not. stays)) status = step_too_far
-      end if
       if (status /= step_done) then
          call mark_trouble(self, has_changed)
          return
@@ -278,6 +269,25 @@ contains
       status = step_singular
       call mark_trouble(self, has_changed)
    end subroutine layer_settle
+
+   !> Solve for z and its contacts; those that stay do not act.
+   subroutine balance(self, stays, status, error)
+      type(layer_t), intent(inout) :: self
+      logical, intent(in) :: stays(:)            !! (contacts)
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+
+      self%state%is_active = self%acts .and. .not. stays
+      self%state%lam = self%lam
+      call active_set_begin(self%active, self%system, self%motion, self%state)
+      self%active%is_dropped = stays
+      self%newton%driven = 0.0_wp
+      call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
+         status, error)
+      if (status /= step_done .or. allocated(error)) return
+      if (.not. any(self%active%is_dropped .and. .not. stays)) return
+      if (any(have_closed(self) .and. .not. stays)) status = step_too_far
+   end subroutine balance
 
    !> The contacts that were left out as they seemed to follow from others, and close all the same:
    !> of two corners that pass each other z may take the wrong side.

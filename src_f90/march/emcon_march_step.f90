@@ -245,6 +245,7 @@ contains
       if (self%active%travel%total + largest_motion(self%ending%du) >= self%clear_until) then
          call judge_step(self%judge, scene%x, self%state%u, self%ending%du, overlap)
          self%clear_until = self%active%travel%total + self%judge%clearance
+         if (self%judge%stray%depth > increment%stray%depth) increment%stray = self%judge%stray
       end if
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
       if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then

@@ -33,6 +33,7 @@ module emcon_march_types
       logical :: is_guarded = .false.            !! guards act in it
       integer :: n_held = 0                      !! contacts held closed that come and go
       type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge
+      type(overlap_t) :: stray                   !! of bodies that no pair brings together
       type(stand_off_t) :: stand_off             !! air across which contact forces act
       real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
       !> Largest relative residual above Newton's tolerance that was accepted; 0: there is none.

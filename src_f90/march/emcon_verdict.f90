@@ -36,6 +36,7 @@ module emcon_verdict
    real(wp), parameter :: touching = 1.0e-3_wp, far_behind = 0.1_wp
    !> What contact gives way by is told; so many times that is deeper, whichever edge counts.
    real(wp), parameter :: most_give = 2.0_wp
+   character(len=*), parameter :: stray_words = ", which no contact pair brings together, overlap"
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
 
@@ -132,12 +133,6 @@ contains
       if (increment%n_held > 0) self%n_held = self%n_held + 1
       self%most_held = max(self%most_held, increment%n_held)
       associate (state => march%state)
-         if (increment%overlap%depth > self%deepest) then
-            self%deepest = increment%overlap%depth
-            self%deepest_time = state%time
-            call overlap_text(increment%overlap, scene%node_label, march%system%space%body, &
-               self%place)
-         end if
          self%stabilization = march%ledger%stabilization
          if (increment%give > self%give) then
             self%give = increment%give
@@ -159,9 +154,39 @@ contains
       do i = 1, increment%warnings%n
          call add_warning(self, increment%warnings%item(i)%text)
       end do
+      call follow_overlaps(self, scene, march, increment)
       if (size(self%small%section) > 0) call follow_linear(self, scene, march)
       call follow_energy(self, march)
    end subroutine verdict_update
+
+   !> Bodies in each other: the deepest overlap. Of those that no pair brings together a warning
+   !> tells, for the first time of two of them.
+   subroutine follow_overlaps(self, scene, march, increment)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(increment_t), intent(in) :: increment
+      character(len=:), allocatable :: text, place
+      integer :: i
+
+      associate (body => march%system%space%body, overlap => increment%overlap, &
+            stray => increment%stray, time => march%state%time)
+         if (overlap%depth > self%deepest) then
+            self%deepest = overlap%depth
+            self%deepest_time = time
+            call overlap_text(overlap, scene%node_label, body, self%place)
+         end if
+         if (.not. stray%depth > touching) return
+         text = "bodies " // to_text(min(body(stray%node), body(stray%edge(1)))) // " and " // &
+            to_text(max(body(stray%node), body(stray%edge(1)))) // stray_words
+         do i = 1, self%warnings%n
+            if (index(self%warnings%item(i)%text, text) == 1) return
+         end do
+         call overlap_text(stray, scene%node_label, body, place)
+         call add_warning(self, text // " at time " // to_text(time, 9) // ", " // place // &
+            ": name them in a *CONTACT PAIR, or all by *CONTACT")
+      end associate
+   end subroutine follow_overlaps
 
    !> Linear sections: a warning where one leaves the range of small kinematics.
    subroutine follow_linear(self, scene, march)
@@ -315,7 +340,8 @@ contains
                line = line // "contact gives way by up to " // to_text(self%give, 3) // &
                   " of an edge and no more penetrates, "
             else if (size(self%largest_force) > 0) then
-               line = line // "nothing penetrates, "
+               line = line // "nothing penetrates" // trim(merge(" where contact pairs are", &
+                  repeat(" ", 24), has_stray(self))) // ", "
             end if
          end if
          line = line // "all residuals are within the tolerance"
@@ -325,6 +351,17 @@ contains
       end do
       if (self%n_warning > 0) line = line // "; warnings: " // to_text(self%n_warning)
    end subroutine verdict_line
+
+   !> Was there an overlap of bodies that no pair brings together?
+   pure logical function has_stray(self)
+      type(verdict_t), intent(in) :: self
+      integer :: i
+
+      has_stray = .false.
+      do i = 1, self%warnings%n
+         has_stray = has_stray .or. index(self%warnings%item(i)%text, stray_words) > 0
+      end do
+   end function has_stray
 
    !> The closing balance, the warnings and the verdict.
    subroutine verdict_balance_lines(self, scene, march, lines)

@@ -78,6 +78,23 @@ def test_an_overlap_is_found(tmp_path):
     assert done.overlap.by_edge > 1e-5
 
 
+@pytest.mark.parametrize(("gap", "is_paired", "warns"), [
+    (0.05, False, True), (0.05, True, False), (-0.05, False, False)])
+def test_bodies_without_a_pair_that_go_through_each_other_are_told(tmp_path, gap, is_paired, warns):
+    """Of two that fly at each other only pairs with a third are named; at first they may overlap."""
+    scene = Scene(0.02, 0.2)
+    scene.block("FLOOR", (-1.0, -0.5), (3.0, 0.4), (3, 1)).hold("FLOOR", lambda *_: True)
+    scene.block("LEFT", (-0.5, 0.0), (0.5, 0.5), (2, 2), velocity=(1.0, 0.0))
+    scene.block("RIGHT", (gap, 0.0), (0.5, 0.5), (2, 2))
+    scene.pairs = [("LEFT", "FLOOR"), ("RIGHT", "FLOOR"), *[("LEFT", "RIGHT")]*is_paired]
+    run = run_deck(scene.deck(AUTO), tmp_path, formulation=NODES)
+    assert (max(overlap.frames(run.fields())).by_edge > 0.1) is not is_paired
+    told = [text for text in run.verdict["warnings"] if "no contact pair brings together" in text]
+    assert [text.startswith("bodies 2 and 3, which") for text in told] == [True]*warns
+    assert run.verdict["verdict"] == "good" and run.verdict["penetration"] < 1e-12
+    assert ("nothing penetrates where contact pairs are" in run.log) is warns
+
+
 def test_decks_made_anew():
     given = Deck("*CONTACT PAIR, INTERACTION=I, TYPE=<formulation>\nA, B\n*STEP\n*STATIC\n"
                  "*NODE FILE, FREQUENCY=5\nU, V\n*CONTACT PRINT\nCF\n*END STEP", "made")
