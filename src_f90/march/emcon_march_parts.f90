@@ -131,7 +131,7 @@ contains
 
       may_return = any(self%layer%is_massless .and. .not. self%is_bare) &
          .and. self%scheme%row%masses_resist .and. any(status == [step_refused, step_diverged, &
-         step_singular, step_cycling, step_unbalanced]) .and. &
+         step_singular, step_cycling, step_too_far, step_unbalanced]) .and. &
          level >= min(return_level, self%n_level)
    end function may_return
 
@@ -147,7 +147,7 @@ contains
       logical :: is_back(size(scene%x, 2))
       integer :: i, n
 
-      call mass_find_troubled(self, scene, status /= step_refused, is_back)
+      call mass_find_troubled(self, scene, all(status /= [step_refused, step_too_far]), is_back)
       n = 0
       do i = 1, size(is_back)
          if (.not. is_back(i)) cycle

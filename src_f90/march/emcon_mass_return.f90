@@ -42,7 +42,7 @@ contains
    subroutine mass_find_troubled(self, scene, has_residual, is_troubled)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
-      logical, intent(in) :: has_residual        !! of the last iterate
+      logical, intent(in) :: has_residual        !! of an iterate that is no solution
       logical, intent(out) :: is_troubled(:)     !! (n_node)
       real(wp) :: left(size(is_troubled))
       logical :: may_have_mass(size(is_troubled))

@@ -192,7 +192,8 @@ BACK = "contact nodes take their mass back"
 @pytest.mark.parametrize(("name", "choice"), [
     ("tower", {"formulation": "NODE TO SURFACE"}), ("corners", {"formulation": "NODE TO SURFACE"}),
     ("crossing", {"formulation": "SEGMENT"}), ("crossing", {"formulation": "MORTAR"}),
-    ("slide off", {"formulation": "MORTAR"})], ids=lambda x: x if isinstance(x, str) else "")
+    ("slide off", {"formulation": "MORTAR"}), ("slide off", {"formulation": "MORTAR", "h": 0.01}),
+    ("slide off", {"formulation": "MORTAR", "h": 0.006})], ids=lambda x: x if isinstance(x, str) else "")
 def test_soft_bodies_on_corners(name, choice, tmp_path):
     """A massless node slips off a corner at once; with its mass back it takes its time."""
     scene = SCENES[name]()
