@@ -46,7 +46,8 @@ _FRICTIONLESS = "FRICTIONLESS CONTACT"
 
 
 #: Nodes of an element, by kind.
-KINDS = {"CPE3": 3, "CPE4": 4, "CPE4H": 4, "CPE6": 6, "CPE8": 8, "CPE8R": 8}
+KINDS = {"CPE3": 3, "CPE4": 4, "CPE4H": 4, "CPE6": 6, "CPE8": 8, "CPE8R": 8, "CPS3": 3, "CPS4": 4,
+         "CPS6": 6, "CPS8": 8, "CPS8R": 8}
 
 
 class Model(Cards):
@@ -105,7 +106,7 @@ class Model(Cards):
 
         nodes            (n, 2) positions [L]
         elements         (m, 3) or (m, 4) rows of `nodes`, counter-clockwise; or by kind, CPE3,
-                         CPE4, CPE4H, CPE6, CPE8, CPE8R; None where `given_forces` stand for
+                         CPE4, CPE4H, CPE6, CPE8, CPE8R, or CPS for CPE in plane stress; None where `given_forces` stand for
                          elements
         node_labels      (n,) whole numbers from 1 on, each once; default 1..n
         element_labels   (m,), or by kind; default 1.. in the order of `elements`
@@ -206,7 +207,7 @@ class Model(Cards):
         corners   nodes, counter-clockwise; of CPE6 and CPE8 with those between them behind
         labels    (m,), as with `add_nodes`
         name      of the element set that they are in
-        kind      CPE3, CPE4, CPE4H, CPE6, CPE8 or CPE8R
+        kind      CPE3, CPE4, CPE4H, CPE6, CPE8 or CPE8R; CPS for CPE in plane stress, without H
 
         Returns the rows (m,) of the elements.
         """

@@ -20,23 +20,15 @@ module emcon_deck_mesh
    !> Element types of Abaqus and CalculiX that are not read.
    character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
       "CPE4R", "CPE4RH", "CPE4I", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
-      "CPS4R", "CPS4I", "CPS8R", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
+      "CPS4R", "CPS4I", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
       "CAX8R", "C3D4", "C3D4H", "C3D6", "C3D8", "C3D8R", "C3D8I", "C3D8H", "C3D10", "C3D10M", &
       "C3D15", "C3D20", "C3D20R", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
       "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
       "DASHPTA", "GAPUNI", "DCOUP3D"]
 
-   !> Elements that stand for something else, as mesh generators write them.
-   type :: substitute_t
-      character(len=4) :: name
-      character(len=4) :: kind                     !! of the registry; empty: a line
-   end type substitute_t
-
-   type(substitute_t), parameter :: substitutes(*) = [ &
-      substitute_t("CPS3", "CPE3"), substitute_t("CPS4", "CPE4"), &
-      substitute_t("CPS6", "CPE6"), substitute_t("CPS8", "CPE8"), &
-      substitute_t("T2D2", ""), substitute_t("T3D2", "")]
+   !> Elements of lines, as mesh generators write them.
+   character(len=4), parameter :: line_types(*) = ["T2D2", "T3D2"]
    !> A line is no element of the scene: an edge between two nodes that surfaces may name.
    integer, parameter :: kind_line = -1
 
@@ -268,34 +260,18 @@ contains
             if (reader%card(i)%name == "ELEMENT") is_first = is_first .and. &
                option_name(reader%card(i), "TYPE") /= type_name
          end do
-         do i = 1, size(substitutes)
-            if (substitutes(i)%name /= type_name) cycle
+         if (any(line_types == type_name)) then
             kind = kind_line
-            if (substitutes(i)%kind /= "") kind = find_element_kind(kinds, substitutes(i)%kind)
-            if (is_first) call tell_substitute(reader, card, substitutes(i))
+            if (is_first) call card_warning(reader, card, "elements of type " // type_name &
+               // " are lines that surfaces may name; they have no stiffness (told once)")
             return
-         end do
+         end if
          if (has_user_card(reader, type_name)) is_first = .false.
          if (type_name /= "" .and. is_first) call refuse_type(reader, card, kinds, type_name)
       end associate
       reader%doubt_elements = .true.
       reader%doubt_names = .true.
    end subroutine find_type
-
-   subroutine tell_substitute(reader, card, substitute)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(substitute_t), intent(in) :: substitute
-
-      if (substitute%kind == "") then
-         call card_warning(reader, card, "elements of type " // trim(substitute%name) &
-            // " are lines that surfaces may name; they have no stiffness (told once)")
-      else
-         call card_warning(reader, card, "element type " // trim(substitute%name) &
-            // " is read as " // substitute%kind // ": the model is plane strain, not plane " &
-            // "stress (told once)")
-      end if
-   end subroutine tell_substitute
 
    subroutine refuse_type(reader, card, kinds, type_name)
       type(reader_t), intent(inout) :: reader

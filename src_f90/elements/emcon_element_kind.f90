@@ -24,6 +24,7 @@ module emcon_element_kind
       integer :: vtk_type = 0                    !! cell number of VTK files
       integer :: n_vtk = 0                       !! nodes of that cell, the first
       logical :: has_mean_volume = .false.       !! volume resists in the mean over the element
+      logical :: is_thin = .false.               !! plane stress, not plane strain
    contains
       procedure :: face
       procedure :: may_lock

@@ -21,7 +21,19 @@ module emcon_element_registry
       element_row_t("CPE8", 2, 8, 4, 4, 3, &
          reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8), &
       element_row_t("CPE8R", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8)]
+         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8), &
+      element_row_t("CPS3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3, &
+         is_thin=.true.), &
+      element_row_t("CPS4", 2, 4, 4, 4, 2, &
+         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_thin=.true.), &
+      element_row_t("CPS6", 2, 6, 3, 3, 3, &
+         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6, is_thin=.true.), &
+      element_row_t("CPS8", 2, 8, 4, 4, 3, &
+         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
+         is_thin=.true.), &
+      element_row_t("CPS8R", 2, 8, 4, 4, 3, &
+         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
+         is_thin=.true.)]
 
 contains
 
@@ -34,15 +46,15 @@ contains
       do k = 1, size(kind)
          kind(k)%element_row_t = element_rows(k)
          select case (element_rows(k)%name)
-         case ("CPE3")
+         case ("CPE3", "CPS3")
             allocate(shape_triangle_t :: kind(k)%shape)
-         case ("CPE4", "CPE4H")
+         case ("CPE4", "CPE4H", "CPS4")
             allocate(shape_quadrilateral_t :: kind(k)%shape)
-         case ("CPE6")
+         case ("CPE6", "CPS6")
             allocate(shape_quadratic_triangle_t :: kind(k)%shape)
-         case ("CPE8")
+         case ("CPE8", "CPS8")
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=3))
-         case ("CPE8R")
+         case ("CPE8R", "CPS8R")
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=2))
          end select
       end do

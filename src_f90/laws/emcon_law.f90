@@ -75,6 +75,7 @@ module emcon_law
       real(wp) :: energy(n_lane) = 0.0_wp
       real(wp) :: stress(n_lane, 3) = 0.0_wp
       real(wp) :: stress_33(n_lane) = 0.0_wp     !! set by `hold`
+      real(wp) :: stretch_33(n_lane) = 1.0_wp    !! normal to the plane, set by `hold` of sheets
       real(wp) :: tangent(n_lane, 3, 3) = 0.0_wp
    end type law_points_t
 

@@ -10,11 +10,15 @@ module emcon_law_linear
    type, extends(law_t) :: law_linear_t
       real(wp) :: lam = 0.0_wp                   !! [M/(L T^2)]
       real(wp) :: mu = 0.0_wp
+      !> In plane stress E33 = -contraction e1, and W has the same form with another `lam`.
+      logical :: is_thin = .false.
+      real(wp) :: contraction = 0.0_wp
    contains
       procedure :: take => linear_take
       procedure :: energy
       procedure :: respond
-      procedure :: hold
+      procedure :: hold => linear_hold
+      procedure :: make_thin
       procedure :: divide
       procedure :: change
       procedure :: volume
@@ -57,6 +61,28 @@ contains
       class(law_linear_t), intent(in) :: self
       include "emcon_law_held.inc"
    end subroutine hold
+
+   !> In plane stress no stress is normal to the plane, and there is a stretch.
+   pure subroutine linear_hold(self, points)
+      class(law_linear_t), intent(in) :: self
+      type(law_points_t), intent(inout) :: points    !! `dstrain` is 0
+
+      call hold(self, points)
+      if (.not. self%is_thin) return
+      points%stress_33 = 0.0_wp
+      ! tr E without the shear. Where it would leave no thickness there is a stress all the same.
+      points%stretch_33 = sqrt(max(epsilon(1.0_wp), &
+         1.0_wp - 2.0_wp*self%contraction*sum(points%strain(:, :size(points%strain, 2) - 1), 2)))
+   end subroutine linear_hold
+
+   !> Take the form of plane stress: docs/theory.md, behind eq. (10b).
+   pure subroutine make_thin(self)
+      class(law_linear_t), intent(inout) :: self
+
+      self%contraction = self%lam/(self%lam + 2.0_wp*self%mu)
+      self%lam = 2.0_wp*self%mu*self%contraction
+      self%is_thin = .true.
+   end subroutine make_thin
 
    !> As `law_t` has it.
    subroutine divide(self, rest)

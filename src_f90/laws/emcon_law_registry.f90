@@ -9,12 +9,13 @@ module emcon_law_registry
    use emcon_law_mooney_rivlin, only : law_mooney_rivlin_t
    use emcon_law_neo_hooke, only : law_neo_hooke_t
    use emcon_law_ogden, only : law_ogden_t
+   use emcon_law_thin_plane, only : thin_law
    use emcon_law_yeoh, only : law_yeoh_t
    use emcon_text, only : to_text, to_upper
    implicit none
    private
    public :: law_row_t, law_rows, law_titles, law_variants, find_law_row, n_constant, law_create, &
-      law_linearise
+      law_linearise, law_make_thin
    public :: law_linear, law_neo_hooke, law_coupled_neo_hooke, law_given, law_mooney_rivlin, &
       law_yeoh, law_ogden
 
@@ -156,6 +157,25 @@ contains
       end select
       allocate(linear, source=plain)
    end subroutine law_linearise
+
+   !> The law of a thin sheet, in plane stress.
+   subroutine law_make_thin(law, thin)
+      class(law_t), intent(in) :: law
+      class(law_t), allocatable, intent(out) :: thin   !! not allocated: of plane strain alone
+
+      type(law_linear_t) :: plain
+
+      select type (law)
+      type is (law_linear_t)
+         plain = law
+         call plain%make_thin()
+         allocate(thin, source=plain)
+      type is (law_ogden_t)                      ! its stretches are those of E33 = 0
+         return
+      class default
+         call thin_law(law, thin)
+      end select
+   end subroutine law_make_thin
 
    !> Number of constants of each row.
    pure function count_constants() result(n)

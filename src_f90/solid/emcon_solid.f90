@@ -8,8 +8,8 @@ module emcon_solid
    use emcon_host_law, only : host_answer, host_law_t, host_law_take, host_points_make_room, &
       host_response_t, host_rest_stiffness
    use emcon_kinds, only : dp, wp
-   use emcon_law, only : law_box_t, law_response_plane, law_response_t, n_lane
-   use emcon_law_registry, only : law_create, law_given, law_linearise
+   use emcon_law, only : law_box_t, law_response_plane, law_response_t, law_t, n_lane
+   use emcon_law_registry, only : law_create, law_given, law_linearise, law_make_thin
    use emcon_mean_volume_plane, only : mean_volume_respond
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_point_function, only : point_gradient, point_ok
@@ -41,9 +41,11 @@ module emcon_solid
       logical, allocatable :: is_small(:)                !! (n_element) one of these two
       real(wp), allocatable :: x(:, :)                   !! (n_dim, n_node) [L], for corotated ones
       logical, allocatable :: is_rigid(:)                !! (n_element) mass alone, no forces
+      logical, allocatable :: is_thin(:)                 !! (n_element) plane stress
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
       type(element_pack_t), allocatable :: pack(:)         !! all but small and rigid ones
-      !> One per material; behind them, if there are linear elements, those for these
+      !> One per material; behind them, if there are linear elements, those for these; behind all
+      !> these, if there are thin ones, the same in plane stress
       type(law_box_t), allocatable :: law(:)
       logical, allocatable :: may_lock(:)                !! (n_element) at small changes of volume
       logical, allocatable :: has_mean(:)                !! (n_element) volume resists in the mean
@@ -69,7 +71,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
       type(shape_table_t) :: stiffness(size(scene%kind)), mass(size(scene%kind))
-      real(wp) :: at_rest(size(scene%material))
+      real(wp), allocatable :: at_rest(:)
       integer :: e, k, n, n_most
 
       n = size(scene%element_kind)
@@ -95,12 +97,15 @@ contains
       call init_kinds(self, scene, stiffness, mass, error)
       if (allocated(error)) return
       do e = 1, n
-         self%law_of(e) = scene%section(scene%element_section(e))%material
+         k = scene%section(scene%element_section(e))%material
+         self%law_of(e) = k + merge(size(self%law)/2, 0, self%is_thin(e))
          self%thickness(e) = scene%section(scene%element_section(e))%thickness
-         call init_element(self, scene%x, scene%material(self%law_of(e))%density, e, &
+         call init_element(self, scene%x, scene%material(k)%density, e, &
             stiffness(self%kind(e)), mass(self%kind(e)))
          if (.not. self%is_rigid(e)) call estimate_stiffness(self, at_rest(self%law_of(e)), e)
          if (self%is_small(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
+         call check_law(self, scene, e, error)
+         if (allocated(error)) return
          if (any(self%geometry(e)%weight <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
                " is inverted or has no area; check the order of its nodes")
@@ -112,6 +117,23 @@ contains
       call number_points(self)
       call make_packs(self)
    end subroutine solid_init
+
+   !> A thin element asks for a law that is known in plane stress.
+   subroutine check_law(self, scene, e, error)
+      type(solid_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: e
+      type(error_t), allocatable, intent(out) :: error
+
+      if (.not. self%is_thin(e) .or. self%is_rigid(e)) return
+      if (allocated(self%law(self%law_of(e))%law)) return
+      call raise(error, err_input, where_text(scene, scene%element_origin(e)) // ": error: " &
+         // "element " // to_text(self%label(e)) // " is of type " &
+         // trim(scene%kind(self%kind(e))%name) // ", plane stress, in which the law of material " &
+         // self%material(scene%section(scene%element_section(e))%material)%text &
+         // " is not known: it gives no stress normal to the plane; take ELASTIC, NEO HOOKE, " &
+         // "MOONEY-RIVLIN or YEOH, or plane strain, CPE")
+   end subroutine check_law
 
    !> What laws are without their resistance to a change of volume, where elements ask for it.
    subroutine divide_laws(self, error)
@@ -142,13 +164,15 @@ contains
       do k = 1, size(scene%rigid)
          self%is_rigid(scene%rigid(k)%element) = .true.
       end do
-      allocate(self%has_mean(self%n_element), self%may_lock(self%n_element), &
+      allocate(self%is_thin(self%n_element), self%has_mean(self%n_element), &
+         self%may_lock(self%n_element), &
          self%has_inertia(self%n_element), self%is_linear(self%n_element), &
          self%is_corotated(self%n_element))
       do e = 1, self%n_element
          associate (kind => scene%kind(scene%element_kind(e)), &
                section => scene%section(scene%element_section(e)), &
                is_free => .not. self%is_rigid(e))
+            self%is_thin(e) = kind%is_thin
             self%has_mean(e) = kind%has_mean_volume
             self%may_lock(e) = kind%may_lock()
             self%has_inertia(e) = .not. section%is_massless
@@ -217,16 +241,17 @@ contains
    subroutine init_laws(self, scene, at_rest, error, given)
       type(solid_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      real(wp), intent(out) :: at_rest(:)                !! (n_material) [M/(L T^2)]
+      real(wp), allocatable, intent(out) :: at_rest(:)   !! as `law` [M/(L T^2)]
       type(error_t), allocatable, intent(out) :: error
       type(host_law_t), intent(in), optional :: given(:)
-      real(wp), parameter :: rest(3) = 0.0_wp
-      type(law_response_t) :: state
-      integer :: k, n
+      integer :: k, n, n_law
 
-      n = size(scene%material)*merge(2, 1, any(self%is_small))
+      n_law = size(scene%material)
+      if (any(self%is_small)) n_law = n_law + size(scene%material)
+      n = n_law
+      if (any(self%is_thin)) n = n + n_law
       allocate(self%law(n), self%given(n))
-      at_rest = 0.0_wp
+      allocate(at_rest(n), source=0.0_wp)
       do k = 1, size(scene%material)
          select case (scene%material(k)%law)
          case (0)
@@ -248,12 +273,28 @@ contains
          end select
          if (allocated(error)) return
          if (.not. allocated(self%law(k)%law)) cycle
-         call law_response_plane(self%law(k)%law, rest, rest, state)
-         at_rest(k) = maxval(abs(state%tangent))
-         n = size(scene%material) + k
-         if (n <= size(self%law)) call law_linearise(self%law(k)%law, self%law(n)%law)
+         at_rest(k) = rest_stiffness(self%law(k)%law)
+         if (any(self%is_small)) call law_linearise(self%law(k)%law, &
+            self%law(size(scene%material) + k)%law)
+      end do
+      if (.not. any(self%is_thin)) return
+      do k = 1, n_law
+         if (.not. allocated(self%law(k)%law)) cycle
+         call law_make_thin(self%law(k)%law, self%law(n_law + k)%law)
+         if (.not. allocated(self%law(n_law + k)%law)) cycle
+         at_rest(n_law + k) = rest_stiffness(self%law(n_law + k)%law)
       end do
    end subroutine init_laws
+
+   !> The largest entry of the tangent of a law at rest.
+   pure real(wp) function rest_stiffness(law)
+      class(law_t), intent(in) :: law
+      real(wp), parameter :: rest(3) = 0.0_wp
+      type(law_response_t) :: state
+
+      call law_response_plane(law, rest, rest, state)
+      rest_stiffness = maxval(abs(state%tangent))
+   end function rest_stiffness
 
    !> Number the quadrature points of each given law through all its elements.
    pure subroutine number_points(self)

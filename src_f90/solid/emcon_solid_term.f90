@@ -59,7 +59,8 @@ contains
       is_here = .true.
       if (any(self%solid%is_small)) then
          is_here = .false.
-         is_here(pack(self%solid%law_of, .not. self%solid%is_small)) = .true.
+         is_here(pack(1 + mod(self%solid%law_of - 1, size(is_here)), .not. self%solid%is_small)) &
+            = .true.
       end if
       self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear &
          .or. .not. is_here)

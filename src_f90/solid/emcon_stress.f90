@@ -140,6 +140,8 @@ contains
          do l = 1, n
             call push_forward(f(:, :, l), points%stress(l, :), points%stress_33(l), &
                stress(:, before + l))
+            if (motion%nlgeom .and. solid%is_thin(e)) stress(:, before + l) &
+               = stress(:, before + l)/points%stretch_33(l)
          end do
       end do
    end subroutine element_state

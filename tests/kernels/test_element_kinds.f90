@@ -90,7 +90,8 @@ contains
       scene%x = place
       scene%u0 = 0.0_wp*place
       scene%v0 = 0.0_wp*place
-      call set_law(law, scene)
+      ! Ogden's law is not known in plane stress: another one in its place.
+      call set_law(merge(n_law - 1, law, element_rows(kind)%is_thin .and. law == n_law), scene)
       sample%kind = kind
       sample%n = n
       sample%nlgeom = nlgeom
@@ -271,7 +272,8 @@ contains
          else
             f = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
          end if
-         call law_response_plane(sample%solid%law(1)%law, e, [0.0_wp, 0.0_wp, 0.0_wp], state)
+         call law_response_plane(sample%solid%law(sample%solid%law_of(1))%law, e, &
+            [0.0_wp, 0.0_wp, 0.0_wp], state)
          s = reshape([state%stress(1), state%stress(3), state%stress(3), state%stress(2)], [2, 2])
          p = matmul(f, s)
          area = sum(sample%solid%geometry(1)%weight)
@@ -314,7 +316,7 @@ contains
    end subroutine test_rigid
 
    !> Of the tangent at rest: all but the three rigid motions. With fewer points there is one motion
-   !> more without strain at any of them, as is known of CPE8R; neighbours stop it.
+   !> more without strain at any of them, as is known of CPE8R and CPS8R; neighbours stop it.
    subroutine test_rank(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
@@ -329,7 +331,7 @@ contains
             if (allocated(error)) return
             call respond(sample, zero, zero, .true., step)
             call check_equal(error, rank_of(step%tangent(:2*sample%n, :2*sample%n)), &
-               2*sample%n - merge(4, 3, element_rows(k)%name == "CPE8R"), sample%what)
+               2*sample%n - merge(4, 3, index(element_rows(k)%name, "8R") > 0), sample%what)
          end do
       end do
    end subroutine test_rank

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from scene_tools import run_deck
+from scene_tools import emcon, run_deck
 
 KINDS = ["CPE3", "CPE4", "CPE4H", "CPE6", "CPE8", "CPE8R"]
-QUADRATIC = {"CPE6", "CPE8", "CPE8R"}
+#: In plane stress.
+THIN = ["CPS3", "CPS4", "CPS6", "CPS8", "CPS8R"]
+QUADRATIC = {"CPE6", "CPE8", "CPE8R", "CPS6", "CPS8", "CPS8R"}
 ELASTIC = "*ELASTIC\n100., 0.3\n"
 RUBBER = "*HYPERELASTIC, NEO HOOKE\n20., 0.01\n"
 
@@ -21,7 +23,7 @@ class Mesh:
         corners = np.array(corners, float)
         for j in range(self.last[1] + 1):
             for i in range(self.last[0] + 1):
-                if kind in ("CPE8", "CPE8R") and i % 2 and j % 2:
+                if "8" in kind and i % 2 and j % 2:
                     continue
                 s, t = i/self.last[0], j/self.last[1]
                 self.label[i, j] = len(self.x) + 1
@@ -70,7 +72,7 @@ def run(text, folder):
 
 
 @pytest.mark.parametrize("nlgeom", [False, True])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", KINDS + THIN)
 def test_patch(kind, nlgeom, tmp_path):
     """Linear displacements on the outline of a distorted mesh are linear inside, to round-off."""
     mesh = Mesh(kind, 3, 3, [(0, 0), (3, 0.5), (3.5, 3), (-0.5, 2.5)], shake=0.08)
@@ -86,6 +88,39 @@ def test_patch(kind, nlgeom, tmp_path):
     assert np.abs(found - wanted).max() <= 1e-12*np.abs(wanted).max()
     stress = frame["cauchy_stress"][-1]
     assert np.abs(stress - stress[0]).max() <= 1e-12*100
+    assert (np.abs(stress[:, 2]).max() == 0) == (kind in THIN)
+
+
+@pytest.mark.parametrize("kind", THIN)
+def test_a_sheet_that_is_pulled(kind, tmp_path):
+    """Stretched by half along x, free along y and z: the stress of a bar in closed form."""
+    mesh = Mesh(kind, 2, 2, [(0, 0), (2, 0), (2, 1), (0, 1)])
+    young, nu = 100.0, 0.3
+    mu, lam = young/(2 + 2*nu), young*nu/((1 + nu)*(1 - 2*nu))
+    right = "".join(f"{k}, 1, 1, 1.\n" for k in mesh.side("right"))
+    left = "".join(f"{k}, 1\n" for k in mesh.side("left"))
+    frame = run(mesh.deck(f"*HYPERELASTIC, COUPLED NEO HOOKE\n{young}, {nu}\n",
+                          f"*BOUNDARY\n{left}{mesh.at((0, 0))[0]}, 2\n*STEP, NLGEOM\n*STATIC\n"
+                          f"0.5, 1.\n*BOUNDARY\n{right}*NODE FILE\nU\n*EL FILE\nS\n*END STEP\n"),
+                tmp_path).fields()
+    c = 1.0                                # of mu (c - 1) + lam ln J = 0, J = 1.5 c, c the square
+    for _ in range(60):                    # of the stretch across, by Newton's method
+        c -= (mu*(c - 1) + lam*np.log(1.5*c))/(mu + lam/c)
+    stress = frame["cauchy_stress"][-1]
+    pull = (mu*(1.5**2 - 1) + lam*np.log(1.5*c))/(1.5*c)
+    assert np.abs(stress - np.array([pull, 0, 0, 0, 0, 0])).max() <= 1e-10*pull
+    top = frame["displacement"][-1][mesh.side("top")[0] - 1, 1]
+    assert abs(top - (np.sqrt(c) - 1)) <= 1e-12
+
+
+def test_a_law_not_known_in_plane_stress(tmp_path):
+    mesh = Mesh("CPS4", 1, 1, [(0, 0), (1, 0), (1, 1), (0, 1)])
+    text = mesh.deck("*HYPERELASTIC, OGDEN, N=1\n20., 1.5, 0.01\n", "*STEP, NLGEOM\n*STATIC\n"
+                     "*NODE FILE\nU\n*END STEP\n")
+    (tmp_path/"deck.inp").write_text(text)
+    done = emcon("check", tmp_path/"deck.inp")
+    assert done.returncode == 2
+    assert "deck.inp:7: error: element 1 is of type CPS4, plane stress" in done.stderr
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -111,7 +146,7 @@ def test_pressure_all_around(kind, tmp_path):
     assert np.abs(stress[:, 3]).max() <= 1e-11
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", KINDS + THIN)
 def test_free_flight(kind, tmp_path):
     """A block that spins, flies and vibrates, 1000 increments."""
     mesh = Mesh(kind, 2, 1, [(0, 0), (2, 0), (2, 1), (0, 1)])
