@@ -165,7 +165,7 @@ def agrees(value, text):
 
 
 def test_table_has_all_cells():
-    assert len(list(energy_table())) == 6
+    assert len(list(energy_table())) == 8
 
 
 @pytest.mark.parametrize("treatment, h, text", list(energy_table()))
