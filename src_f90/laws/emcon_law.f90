@@ -21,7 +21,7 @@ module emcon_law
    integer, parameter :: n_lane = 8
    !> A law leaves out what resists a change of volume by making it so many powers of two smaller,
    !> below all round-off: loops over points would divide by a D of 0 before they look.
-   integer, parameter :: no_volume = 60
+   integer, parameter :: no_volume = digits(1.0_wp) + 7
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
