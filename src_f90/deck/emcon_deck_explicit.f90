@@ -6,7 +6,7 @@ module emcon_deck_explicit
    use emcon_kinds, only : wp
    use emcon_solver_registry, only : solver_default
    use emcon_steps, only : initiation_admissible, initiation_massless, method_null_space, &
-      newton_kept, step_t
+      method_penalty, newton_kept, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -25,7 +25,11 @@ contains
          associate (card => reader%card(i))
             if (card%name == "STEP") exit
             select case (card%name)
-            case ("NEWTON", "CONSTRAINTMETHOD")
+            case ("CONSTRAINTMETHOD")
+               if (step%constraint_method /= method_penalty) call card_error(reader, card, "an " &
+                  // "explicit step has no system to solve: leave the card to other steps, " // &
+                  "but for TYPE=PENALTY")
+            case ("NEWTON")
                call card_error(reader, card, "an explicit step has no system to solve: leave " // &
                   "the card to other steps")
             case ("CONTACTINITIATION")
@@ -66,7 +70,8 @@ contains
             cycle
          end if
          step(k)%initiation = initiation_admissible
-         step(k)%constraint_method = method_null_space
+         if (step(k)%constraint_method /= method_penalty) step(k)%constraint_method = &
+            method_null_space
          step(k)%newton = newton_kept
          step(k)%solver = solver_default
       end do

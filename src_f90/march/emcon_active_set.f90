@@ -225,7 +225,7 @@ contains
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            if (self%outlook(pair)%passes) then
+            if (self%outlook(pair)%passes .or. self%softness%is_at_ends) then
                self%is_active(first:last) = .false.
                cycle
             end if

@@ -78,7 +78,8 @@ contains
             call active_set_leave(self, system, motion)
             cycle
          end if
-         if (status /= newton_converged .or. size(system%contact) == 0) return
+         if (status /= newton_converged .or. size(system%contact) == 0 &
+            .or. self%softness%is_at_ends) return
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_advance(self, system, motion, is_done, status)
          if (is_done .and. status == step_done .and. self%holding%is_needed) then

@@ -13,7 +13,7 @@ module emcon_critical_step
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    use emcon_system, only : system_t, system_tangent_times
    use emcon_term, only : fastest_t
-   use emcon_term_registry, only : terms_mass_values
+   use emcon_term_registry, only : terms_mass_rows, terms_mass_values
    implicit none
    private
    public :: critical_bound, critical_sharp, tridiagonal_largest
@@ -27,13 +27,15 @@ contains
 
    !> A step below the critical one, by the fastest element; `is_bounded`: there is no other
    !> stiffness.
-   subroutine critical_bound(system, place, h, element, is_bounded)
+   subroutine critical_bound(system, place, stiffness, h, element, is_bounded)
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: place        !! that rests, placed at its end
+      real(wp), intent(in) :: stiffness(:)       !! (n_node) of what pushes single nodes [M/T^2]
       real(wp), intent(out) :: h                 !! huge: nothing vibrates [T]
       integer, intent(out) :: element            !! 0: none
       logical, intent(out) :: is_bounded         !! no other stiffness
       type(fastest_t) :: fastest
+      real(wp) :: square
       integer :: k
 
       is_bounded = .true.
@@ -42,13 +44,39 @@ contains
       end do
       element = fastest%element
       h = huge(h)
-      if (fastest%square > 0.0_wp) h = 2.0_wp/sqrt(fastest%square)
+      call add_nodes(system, stiffness, fastest%square, square, is_bounded)
+      if (square > 0.0_wp) h = 2.0_wp/sqrt(square)
    end subroutine critical_bound
 
+   !> No frequency of two stiffnesses is higher than those of each together, in squares.
+   pure subroutine add_nodes(system, stiffness, of_elements, square, is_bounded)
+      type(system_t), intent(in) :: system
+      real(wp), intent(in) :: stiffness(:)       !! (n_node) [M/T^2]
+      real(wp), intent(in) :: of_elements        !! square of the fastest's frequency [1/T^2]
+      real(wp), intent(out) :: square            !! of all [1/T^2]
+      logical, intent(inout) :: is_bounded
+      real(wp), allocatable :: mass(:)
+      real(wp) :: largest
+      integer :: i
+
+      square = of_elements
+      if (.not. any(stiffness > 0.0_wp)) return
+      allocate(mass(size(stiffness)))
+      call terms_mass_rows(system%term, mass)
+      is_bounded = is_bounded .and. system%space%numbering%n_dependent == 0
+      largest = 0.0_wp
+      do i = 1, size(mass)
+         if (.not. any(system%space%numbering%unknown(:, i) > 0)) cycle
+         if (mass(i) > 0.0_wp) largest = max(largest, stiffness(i)/mass(i))
+      end do
+      square = square + largest
+   end subroutine add_nodes
+
    !> The critical step of the unknowns of the step; the mass between them is definite.
-   subroutine critical_sharp(system, place, h, error)
+   subroutine critical_sharp(system, place, stiffness, h, error)
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: place        !! that rests, placed at its end
+      real(wp), intent(in) :: stiffness(:)       !! (n_node) of what pushes single nodes [M/T^2]
       real(wp), intent(out) :: h                 !! huge: nothing vibrates [T]
       type(error_t), allocatable, intent(out) :: error
       class(sparse_solver_t), allocatable :: mass
@@ -72,7 +100,7 @@ contains
       beta(0) = 0.0_wp
       last = 0.0_wp
       do i = 1, min(n, most_vectors)
-         call stiffness_times(system, place, q, image)
+         call stiffness_times(system, place, stiffness, q, image)
          alpha(i) = dot_product(q, image)
          call mass%solve(image, solved, error)
          if (allocated(error)) exit
@@ -94,16 +122,21 @@ contains
    end subroutine critical_sharp
 
    !> K q over the unknowns.
-   subroutine stiffness_times(system, place, q, image)
+   subroutine stiffness_times(system, place, stiffness, q, image)
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: place
+      real(wp), intent(in) :: stiffness(:)       !! (n_node) [M/T^2]
       real(wp), intent(in) :: q(:)               !! (n_unknown)
       real(wp), intent(out), contiguous :: image(:)      !! (n_unknown)
       real(wp), dimension(size(place%x, 1), size(place%x, 2)) :: way, force
+      integer :: i
 
       way = 0.0_wp
       call add_to_dofs(system%space%numbering, q, 1.0_wp, way)
       call system_tangent_times(system, place, way, force)
+      do i = 1, size(stiffness)
+         force(:, i) = force(:, i) + stiffness(i)*way(:, i)
+      end do
       call pick_unknowns(system%space%numbering, force, image)
    end subroutine stiffness_times
 

@@ -12,6 +12,7 @@ module emcon_explicit
    use emcon_csr, only : csr_find
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit_push, only : explicit_push
+   use emcon_explicit_soft, only : explicit_soft_force, explicit_soft_limit, explicit_soft_push
    use emcon_frozen, only : frozen_take
    use emcon_kinds, only : dp, wp
    use emcon_march_guess, only : follow_links
@@ -49,8 +50,10 @@ contains
       logical :: is_known, is_bounded
 
       self%newton%correction%kept%most_products = most_products
+      self%system%frozen%is_known = .false.
       call check_mass(self, scene, error)
       if (allocated(error)) return
+      call explicit_soft_limit(self, scene)
       associate (place => self%explicit%place, step => scene%step(self%state%i_step), &
             limit => self%state%critical_h)
          call motion_init(place, scene%x)
@@ -58,9 +61,10 @@ contains
          is_known = limit > 0.0_wp
          if (.not. is_known) then
             self%state%budget = 0.0_wp
-            call critical_bound(self%system, place, limit, self%state%critical_element, is_bounded)
+            call critical_bound(self%system, place, self%explicit%stiffness, limit, &
+               self%state%critical_element, is_bounded)
             if (step%h > limit .or. .not. is_bounded) call critical_sharp(self%system, place, &
-               limit, error)
+               self%explicit%stiffness, limit, error)
             if (allocated(error)) return
          end if
          if (.not. limit < huge(limit)) return
@@ -82,6 +86,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
 
       text = "the critical step " // to_text(self%state%critical_h)
+      if (self%active%softness%is_at_ends) text = text // " with closed contacts"
       if (self%state%critical_element > 0) text = text // " (the fastest element is " // &
          to_text(scene%element_label(self%state%critical_element)) // ")"
    end subroutine limit_text
@@ -144,6 +149,7 @@ contains
             call system_respond(system, explicit%place, .false.)
             call system_check_response(system, "at the start of the increment", error)
             if (allocated(error)) return
+            call explicit_soft_push(self, is_end=.false.)
             call frozen_take(system%frozen, system%response)
          end if
          if (mod(self%state%increment, look_every) == 0 .and. self%state%increment &
@@ -178,9 +184,11 @@ contains
       logical :: is_bounded
 
       associate (explicit => self%explicit)
-         call critical_bound(self%system, explicit%place, bound, element, is_bounded)
+         call critical_bound(self%system, explicit%place, explicit%stiffness, bound, element, &
+            is_bounded)
          if (part%h <= bound .and. is_bounded) return
-         call critical_sharp(self%system, explicit%place, self%state%critical_h, error)
+         call critical_sharp(self%system, explicit%place, explicit%stiffness, &
+            self%state%critical_h, error)
          self%state%critical_element = element
       end associate
    end subroutine find_limit
@@ -207,7 +215,7 @@ contains
          if (any(active%is_active)) return
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_select(active, system, motion)
-         is_done = size(system%contact) == 0
+         is_done = size(system%contact) == 0 .or. active%softness%is_at_ends
          status = step_done
          if (.not. is_done) call active_set_advance(active, system, motion, is_done, status)
          call phase_leave(system%phases, left)
@@ -253,6 +261,7 @@ contains
          ending%energy = system%response%energy
          ending%potential = system%response%potential
          explicit%load = system%response%part(role_external)%force
+         call explicit_soft_push(self, is_end=.true.)
          call frozen_take(system%frozen, system%response)
          call explicit_push(self, part%h, error)
          if (allocated(error)) return
@@ -289,6 +298,8 @@ contains
          where (self%system%space%numbering%unknown > 0) explicit%residual = 0.0_wp
          state%reaction = 0.5_wp*(state%reaction + explicit%residual)
          self%newton%contact = 0.5_wp*(self%newton%contact + explicit%contact)
+         if (self%active%softness%is_at_ends) call explicit_soft_force(explicit%soft(3 &
+            - explicit%i_start), self%newton%contact)
          contact = 0.0_wp
          do k = 1, set%n
             contact = contact + 0.25_wp*(set%lam(k)*(h*way_of(set, k, state%v) &

@@ -21,6 +21,11 @@ module emcon_explicit_type
       type(constraint_set_t) :: set              !! that holds velocities there
       integer, allocatable :: row(:)             !! (set%n) and their places in the set of the step
       real(wp), allocatable :: mu(:)             !! (constraints of the step) multipliers there
+      !> Contacts that give way at the start and the end of the step, at whichever of its two places
+      !> that is.
+      type(constraint_set_t) :: soft(2)
+      integer :: i_start = 1                     !! that of the start
+      real(wp), allocatable :: stiffness(:)      !! (n_node) of closed contacts, at most [M/T^2]
    end type explicit_t
 
 end module emcon_explicit_type

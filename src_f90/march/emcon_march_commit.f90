@@ -67,10 +67,15 @@ contains
          end if
          state%v = self%v1
          state%contact = self%newton%contact
-         call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
-            merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
-            .not. self%motion%pose%pushes_at_end))
-         call pair_sums_add(state%sums, system, set, self%motion, h, self%scheme%row%masses_resist)
+         if (self%active%softness%is_at_ends) then
+            call record_soft(self, scene, h, increment)
+         else
+            call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
+               merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
+               .not. self%motion%pose%pushes_at_end))
+            call pair_sums_add(state%sums, system, set, self%motion, h, &
+               self%scheme%row%masses_resist)
+         end if
          state%internal = self%ending%force
          state%energy = self%ending%energy
          state%potential = self%ending%potential
@@ -94,6 +99,29 @@ contains
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
+
+   !> What contacts that push at both ends of the step transmit: half of it at each.
+   subroutine record_soft(self, scene, h, increment)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      type(increment_t), intent(inout) :: increment
+      integer :: i
+
+      associate (state => self%state, explicit => self%explicit)
+         do i = 1, 2
+            call pair_sums_add(state%sums, self%system, explicit%soft(merge(explicit%i_start, 3 &
+               - explicit%i_start, i == 1)), self%motion, 0.5_wp*h, .true.)
+         end do
+         explicit%i_start = 3 - explicit%i_start
+         associate (soft => explicit%soft(explicit%i_start))
+            call pair_record_measure(state%pairs, self%system, soft, scene%x, state%u, &
+               self%motion%du, 0.0_wp)
+            increment%give = max(increment%give, softness_depth(soft))
+            self%ledger%contact_energy = softness_stored(self%active%softness, soft)
+         end associate
+      end associate
+   end subroutine record_soft
 
    !> What contacts stand off and give way by, and how often they were pushed again.
    pure subroutine tell_gaps(self, h, increment)
@@ -153,9 +181,14 @@ contains
       type(march_t), intent(inout) :: self
       integer :: k
 
-      associate (state => self%state, set => self%active%set, layer => self%layer)
+      associate (state => self%state, set => self%active%set, layer => self%layer, &
+            soft => self%explicit%soft(self%explicit%i_start))
          state%is_active = .false.
          state%lam = 0.0_wp
+         if (self%active%softness%is_at_ends) then
+            state%is_active(soft%id) = .true.
+            state%lam(soft%id) = soft%lam
+         end if
          do k = 1, set%n
             state%is_active(set%id(k)) = .true.
             state%lam(set%id(k)) = set%lam(k)

@@ -2,14 +2,13 @@
 !> the surfaces. Source: docs/theory.md, eqs. (20a) to (20e).
 module emcon_softness
    use emcon_constraints, only : constraint_place, constraint_set_t
-   use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
    use emcon_soft_law, only : soft_energy
    use emcon_steps, only : method_augmented_lagrange, method_penalty, step_t
    use emcon_system, only : system_t
-   use emcon_term_registry, only : terms_mass
+   use emcon_term_registry, only : terms_mass_rows
    use emcon_text, only : note_add, to_text
    implicit none
    private
@@ -26,6 +25,7 @@ module emcon_softness
    type :: softness_state_t
       logical :: is_on = .false.                 !! contact gives way in this step
       logical :: augments = .false.              !! and is pushed back: AUGMENTED LAGRANGE
+      logical :: is_at_ends = .false.            !! and pushes where steps begin and end: explicit
       real(wp) :: tolerance = 0.0_wp             !! of that, by the edge
       integer :: n_augmentation = 0              !! in the last increment
       real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
@@ -46,6 +46,7 @@ contains
       self%augments = step%constraint_method == method_augmented_lagrange
       self%is_on = (self%augments .or. step%constraint_method == method_penalty) .and. &
          size(system%contact) > 0
+      self%is_at_ends = self%is_on .and. step%scheme%is_explicit
       do k = 1, size(system%contact)
          system%contact(k)%contact%gives_way = .false.
       end do
@@ -57,27 +58,14 @@ contains
          call system%term(k)%term%add_stiffness(inner)
       end do
       mass = 0.0_wp
-      if (self%augments .and. step%scheme%masses_resist) call find_mass(system, mass)
+      if (self%augments .and. step%scheme%masses_resist) call terms_mass_rows(system%term, &
+         mass)
       inner = inner + 2.0_wp*mass/step%h**2
       do k = 1, size(system%contact)
          call set_contact(self, system, scene, step, k, inner, error)
          if (allocated(error)) return
       end do
    end subroutine softness_begin_step
-
-   !> Mass at each node: the sums of rows.
-   subroutine find_mass(system, mass)
-      type(system_t), intent(in) :: system
-      real(wp), intent(out) :: mass(:)           !! (n_node) [M]
-      type(csr_t) :: between
-      integer :: i
-
-      call terms_mass(system%term, between)
-      mass = 0.0_wp
-      do i = 1, between%n_row
-         mass(i) = real(sum(between%value(between%row_start(i) + 1:between%row_start(i + 1))), wp)
-      end do
-   end subroutine find_mass
 
    !> The stiffness of contact `k`: one pressure by penetration for all of its nodes, that of the
    !> deck, or the mean of `inner` at its slave nodes by their area, or else at the master's. Where

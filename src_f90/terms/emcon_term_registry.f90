@@ -19,7 +19,7 @@ module emcon_term_registry
    use emcon_term, only : term_box_t
    implicit none
    private
-   public :: terms_create, terms_solid, terms_mass, terms_mass_times, terms_mass_values, &
+   public :: terms_create, terms_solid, terms_mass, terms_mass_rows, terms_mass_times, terms_mass_values, &
       terms_massless, terms_return_mass, terms_decay
 
    !> Where the terms that every model has stand; what is given comes after them.
@@ -160,6 +160,20 @@ contains
          mass = part%mass
       end select
    end subroutine terms_mass
+
+   !> Mass at each node: the sums of rows.
+   pure subroutine terms_mass_rows(term, mass)
+      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+      real(wp), intent(out) :: mass(:)           !! (n_node) [M]
+      type(csr_t) :: between
+      integer :: i
+
+      call terms_mass(term, between)
+      mass = 0.0_wp
+      do i = 1, between%n_row
+         mass(i) = real(sum(between%value(between%row_start(i) + 1:between%row_start(i + 1))), wp)
+      end do
+   end subroutine terms_mass_rows
 
    !> The nodes that contact finds without mass: those that have given theirs to their neighbours,
    !> and of sections without inertia.
