@@ -4,6 +4,8 @@
 !> by the fastest element. The value itself comes from Lanczos' method, in the inner product of the
 !> mass. Source: docs/theory.md, section 14.
 module emcon_critical_step
+   use emcon_constraint, only : condition_rate
+   use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -73,12 +75,13 @@ contains
    end subroutine add_nodes
 
    !> The critical step of the unknowns of the step; the mass between them is definite.
-   subroutine critical_sharp(system, place, stiffness, h, error)
+   subroutine critical_sharp(system, place, stiffness, h, error, closed)
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: place        !! that rests, placed at its end
       real(wp), intent(in) :: stiffness(:)       !! (n_node) of what pushes single nodes [M/T^2]
       real(wp), intent(out) :: h                 !! huge: nothing vibrates [T]
       type(error_t), allocatable, intent(out) :: error
+      type(constraint_set_t), intent(in), optional :: closed   !! contacts that give way there
       class(sparse_solver_t), allocatable :: mass
       real(dp), allocatable :: value(:)
       real(wp), allocatable, dimension(:) :: q, before, image, solved
@@ -100,7 +103,7 @@ contains
       beta(0) = 0.0_wp
       last = 0.0_wp
       do i = 1, min(n, most_vectors)
-         call stiffness_times(system, place, stiffness, q, image)
+         call stiffness_times(system, place, stiffness, q, image, closed)
          alpha(i) = dot_product(q, image)
          call mass%solve(image, solved, error)
          if (allocated(error)) exit
@@ -122,14 +125,16 @@ contains
    end subroutine critical_sharp
 
    !> K q over the unknowns.
-   subroutine stiffness_times(system, place, stiffness, q, image)
+   subroutine stiffness_times(system, place, stiffness, q, image, closed)
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: place
       real(wp), intent(in) :: stiffness(:)       !! (n_node) [M/T^2]
       real(wp), intent(in) :: q(:)               !! (n_unknown)
       real(wp), intent(out), contiguous :: image(:)      !! (n_unknown)
+      type(constraint_set_t), intent(in), optional :: closed
       real(wp), dimension(size(place%x, 1), size(place%x, 2)) :: way, force
-      integer :: i
+      real(wp) :: push
+      integer :: i, k
 
       way = 0.0_wp
       call add_to_dofs(system%space%numbering, q, 1.0_wp, way)
@@ -137,6 +142,16 @@ contains
       do i = 1, size(stiffness)
          force(:, i) = force(:, i) + stiffness(i)*way(:, i)
       end do
+      if (present(closed)) then
+         do k = 1, closed%n
+            associate (item => closed%item(k))
+               push = closed%soft(k)%stiffness*condition_rate(item, way)
+               do i = 1, item%n_node
+                  force(:, item%node(i)) = force(:, item%node(i)) + push*item%c(:, i)
+               end do
+            end associate
+         end do
+      end if
       call pick_unknowns(system%space%numbering, force, image)
    end subroutine stiffness_times
 

@@ -12,7 +12,8 @@ module emcon_explicit
    use emcon_csr, only : csr_find
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit_push, only : explicit_push
-   use emcon_explicit_soft, only : explicit_soft_force, explicit_soft_limit, explicit_soft_push
+   use emcon_explicit_soft, only : explicit_soft_force, explicit_soft_limit, explicit_soft_push, &
+      explicit_soft_widen
    use emcon_frozen, only : frozen_take
    use emcon_kinds, only : dp, wp
    use emcon_march_guess, only : follow_links
@@ -138,7 +139,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_known
+      logical :: is_known, has_grown
 
       associate (system => self%system, explicit => self%explicit)
          system%frozen%is_on = .false.
@@ -152,8 +153,12 @@ contains
             call explicit_soft_push(self, is_end=.false.)
             call frozen_take(system%frozen, system%response)
          end if
+         call explicit_soft_widen(self, has_grown)
          if (mod(self%state%increment, look_every) == 0 .and. self%state%increment &
             > self%state%n_before) call find_limit(self, part, error)
+         if (has_grown .and. .not. allocated(error)) call critical_sharp(system, explicit%place, &
+            0.0_wp*explicit%stiffness, self%state%critical_h, error, &
+            explicit%soft(explicit%i_start))
          if (.not. allocated(error)) call check_limit(self, scene, part, error)
          system%frozen%is_on = .not. allocated(error)
       end associate
@@ -298,7 +303,7 @@ contains
          where (self%system%space%numbering%unknown > 0) explicit%residual = 0.0_wp
          state%reaction = 0.5_wp*(state%reaction + explicit%residual)
          self%newton%contact = 0.5_wp*(self%newton%contact + explicit%contact)
-         if (self%active%softness%is_at_ends) call explicit_soft_force(explicit%soft(3 &
+         if (self%active%softness%is_at_ends) call explicit_soft_force(explicit%soft(1 &
             - explicit%i_start), self%newton%contact)
          contact = 0.0_wp
          do k = 1, set%n

@@ -14,9 +14,10 @@ module emcon_explicit_soft
    use emcon_softness, only : softness_select
    use emcon_surface_edges, only : surface_edges
    use emcon_term, only : role_internal
+   use emcon_travel, only : largest_motion
    implicit none
    private
-   public :: explicit_soft_push, explicit_soft_force, explicit_soft_limit
+   public :: explicit_soft_push, explicit_soft_force, explicit_soft_limit, explicit_soft_widen
 
 contains
 
@@ -31,7 +32,7 @@ contains
       if (.not. self%active%softness%is_at_ends) return
       call phase_enter(self%system%phases, phase_gaps, left)
       associate (explicit => self%explicit, response => self%system%response)
-         associate (soft => explicit%soft(merge(3 - explicit%i_start, explicit%i_start, is_end)))
+         associate (soft => explicit%soft(merge(1 - explicit%i_start, explicit%i_start, is_end)))
             call find_closed(self, soft, is_end)
             if (soft%n > 0) then
                call constraints_evaluate(soft, self%system, explicit%place, leaves_second=.true.)
@@ -44,16 +45,19 @@ contains
       call phase_leave(self%system%phases, left)
    end subroutine explicit_soft_push
 
-   !> Hand the contacts that are closed at the place to `soft`. One that was open at the start may
-   !> be closed so deep only that it has not passed a thin body.
+   !> Hand the contacts that are closed at the place to `soft`. One that was open at the start is
+   !> closed no deeper than both sides have moved: else the other side of a thin body is meant.
    subroutine find_closed(self, soft, is_end)
       type(march_t), intent(inout) :: self
       type(constraint_set_t), intent(inout) :: soft
       logical, intent(in) :: is_end
       logical :: is_closed(self%system%n_constraint)
       integer :: pair, i, k, id
+      real(wp) :: way
 
       is_closed = .false.
+      way = 0.0_wp
+      if (is_end) way = 2.0_wp*largest_motion(self%ending%du)
       associate (system => self%system, active => self%active, place => self%explicit%place)
          if (is_end) then
             call active_set_pass(active, system, self%motion)
@@ -69,7 +73,7 @@ contains
                   associate (gap => contact%state(i))
                      if (.not. (gap%is_near .and. gap%is_over)) cycle
                      is_closed(id) = gap%gap1 < gap%closed .and. (self%state%is_active(id) &
-                        .or. gap%gap1 - gap%closed > -contact%deepest_start*gap%size)
+                        .or. gap%gap1 - gap%closed > -contact%deepest_start*gap%size - way)
                   end associate
                end do
             end associate
@@ -91,8 +95,9 @@ contains
       call constraints_force(soft, 1, force)
    end subroutine explicit_soft_force
 
-   !> What contacts stiffen each node by when all of them are closed, at most: their matrix is below
-   !> this diagonal in all directions, twice where both sides move. Source: docs/theory.md, eq. (42).
+   !> What pairs stiffen each node by when all of them are closed: the matrix of contacts is below
+   !> this diagonal where the nodes of both surfaces stand as close to each other, twice where both
+   !> move. Source: docs/theory.md, eq. (42).
    subroutine explicit_soft_limit(self, scene)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -102,23 +107,27 @@ contains
 
       if (allocated(self%explicit%stiffness)) deallocate(self%explicit%stiffness)
       allocate(self%explicit%stiffness(size(scene%x, 2)), source=0.0_wp)
+      self%explicit%met = self%explicit%stiffness
       if (.not. self%active%softness%is_at_ends) return
       associate (bound => self%explicit%stiffness, system => self%system)
          do k = 1, size(system%contact)
-            associate (contact => system%contact(k)%contact, own => self%active%softness%stiffness( &
-                  system%first_constraint(k) + 1:system%first_constraint(k + 1)), &
+            associate (contact => system%contact(k)%contact, stiffness => &
+                  self%active%softness%stiffness, first => system%first_constraint(k) + 1, &
+                  last => system%first_constraint(k + 1), &
                   pair => scene%pair(abs(system%contact(k)%of_pair)))
+               if (contact%slack > 0.0_wp) cycle
                call surface_edges(scene, scene%surface(pair%slave), slave)
                call surface_edges(scene, scene%surface(pair%master), master)
                if (system%contact(k)%of_pair < 0) call exchange(slave, master)
                twice = 1.0_wp
                if (moves(self, contact%node) .and. moves(self, [master])) twice = 2.0_wp
-               bound(contact%node) = bound(contact%node) + twice*own
-               call add_opposite(bound, scene%x, master, twice*sum(own)/length_of(scene%x, slave), &
-                  twice*maxval(own))
+               bound(contact%node) = bound(contact%node) + twice*stiffness(first:last)
+               call add_opposite(bound, scene%x, master, twice*sum(stiffness(first:last)) &
+                  /length_of(scene%x, slave))
             end associate
          end do
       end associate
+      self%explicit%met = self%explicit%stiffness
    end subroutine explicit_soft_limit
 
    pure subroutine exchange(one, other)
@@ -149,24 +158,50 @@ contains
       moves = .false.
    end function moves
 
-   !> Add what master nodes are stiffened by: a pressure by depth over half of their edges, and one
-   !> slave node more, as slave nodes need not stand evenly over these.
-   pure subroutine add_opposite(bound, x, edge, by_length, one)
+   !> Add what master nodes are stiffened by: a pressure by depth over half of their edges.
+   pure subroutine add_opposite(bound, x, edge, by_length)
       real(wp), intent(inout) :: bound(:)        !! (n_node) [M/T^2]
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
       integer, intent(in) :: edge(:, :)          !! (2, n_edge)
       real(wp), intent(in) :: by_length          !! [M/(L T^2)]
-      real(wp), intent(in) :: one                !! [M/T^2]
-      logical :: is_met(size(bound))
       integer :: e
 
-      is_met = .false.
       do e = 1, size(edge, 2)
-         is_met(edge(:, e)) = .true.
          bound(edge(:, e)) = bound(edge(:, e)) + 0.5_wp*by_length*length_of(x, edge(:, e:e))
       end do
-      where (is_met) bound = bound + one
    end subroutine add_opposite
+
+   !> Do the contacts that are closed at the start of the step stiffen a node by more than any have
+   !> done before? Of one it is at most its stiffness times the node's gradient times those of all
+   !> that move.
+   subroutine explicit_soft_widen(self, has_grown)
+      type(march_t), intent(inout) :: self
+      logical, intent(out) :: has_grown          !! the critical step is to be found with them
+      real(wp) :: total(size(self%v1, 2)), slope(size(self%explicit%stiffness))
+      logical :: is_free(size(self%v1, 2))
+      integer :: k, i
+
+      has_grown = .false.
+      associate (soft => self%explicit%soft(self%explicit%i_start), &
+            bound => self%explicit%met)
+         if (.not. self%active%softness%is_at_ends .or. soft%n == 0) return
+         is_free = [(moves(self, [i]), i = 1, size(is_free))]
+         total = 0.0_wp
+         do k = 1, soft%n
+            associate (item => soft%item(k))
+               do i = 1, item%n_node
+                  slope(i) = merge(sqrt(sum(item%c(:, i)**2)), 0.0_wp, is_free(item%node(i)))
+               end do
+               do i = 1, item%n_node
+                  total(item%node(i)) = total(item%node(i)) &
+                     + soft%soft(k)%stiffness*slope(i)*sum(slope(:item%n_node))
+               end do
+            end associate
+         end do
+         has_grown = any(total > (1.0_wp + sqrt(epsilon(1.0_wp)))*bound)
+         if (has_grown) bound = max(bound, total)
+      end associate
+   end subroutine explicit_soft_widen
 
    pure real(wp) function length_of(x, edge) result(length)
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
@@ -175,7 +210,7 @@ contains
 
       length = 0.0_wp
       do e = 1, size(edge, 2)
-         associate (side => x(:, edge(2, e)) - x(:, edge(1, e)))
+         associate (side => x(:, edge(size(edge, 1), e)) - x(:, edge(1, e)))
             length = length + sqrt(dot_product(side, side))      ! norm2 knows the units
          end associate
       end do

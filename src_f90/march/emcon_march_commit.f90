@@ -67,15 +67,7 @@ contains
          end if
          state%v = self%v1
          state%contact = self%newton%contact
-         if (self%active%softness%is_at_ends) then
-            call record_soft(self, scene, h, increment)
-         else
-            call pair_record_measure(state%pairs, system, set, scene%x, state%u, self%motion%du, &
-               merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
-               .not. self%motion%pose%pushes_at_end))
-            call pair_sums_add(state%sums, system, set, self%motion, h, &
-               self%scheme%row%masses_resist)
-         end if
+         call record_pairs(self, scene, h)
          state%internal = self%ending%force
          state%energy = self%ending%energy
          state%potential = self%ending%potential
@@ -100,28 +92,35 @@ contains
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
 
-   !> What contacts that push at both ends of the step transmit: half of it at each.
-   subroutine record_soft(self, scene, h, increment)
+   !> What the pairs have transmitted; where contacts push at both ends of the step, half of it at
+   !> each.
+   subroutine record_pairs(self, scene, h)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(increment_t), intent(inout) :: increment
-      integer :: i
+      real(wp) :: lag
 
-      associate (state => self%state, explicit => self%explicit)
-         do i = 1, 2
-            call pair_sums_add(state%sums, self%system, explicit%soft(merge(explicit%i_start, 3 &
-               - explicit%i_start, i == 1)), self%motion, 0.5_wp*h, .true.)
-         end do
-         explicit%i_start = 3 - explicit%i_start
+      associate (state => self%state, system => self%system, explicit => self%explicit)
+         if (.not. self%active%softness%is_at_ends) then
+            lag = merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
+               .not. self%motion%pose%pushes_at_end)
+            call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u, &
+               self%motion%du, lag)
+            call pair_sums_add(state%sums, system, self%active%set, self%motion, h, &
+               self%scheme%row%masses_resist)
+            return
+         end if
+         call pair_sums_add(state%sums, system, explicit%soft(explicit%i_start), self%motion, &
+            0.5_wp*h, .true.)
+         explicit%i_start = 1 - explicit%i_start
          associate (soft => explicit%soft(explicit%i_start))
-            call pair_record_measure(state%pairs, self%system, soft, scene%x, state%u, &
-               self%motion%du, 0.0_wp)
-            increment%give = max(increment%give, softness_depth(soft))
+            call pair_sums_add(state%sums, system, soft, self%motion, 0.5_wp*h, .true.)
+            call pair_record_measure(state%pairs, system, soft, scene%x, state%u, self%motion%du, &
+               0.0_wp)
             self%ledger%contact_energy = softness_stored(self%active%softness, soft)
          end associate
       end associate
-   end subroutine record_soft
+   end subroutine record_pairs
 
    !> What contacts stand off and give way by, and how often they were pushed again.
    pure subroutine tell_gaps(self, h, increment)
@@ -131,6 +130,8 @@ contains
 
       call stand_off_add(increment%stand_off, self%system, self%active%set, h)
       increment%give = max(increment%give, softness_depth(self%active%set))
+      if (self%active%softness%is_at_ends) increment%give = max(increment%give, &
+         softness_depth(self%explicit%soft(self%explicit%i_start)))
       increment%n_augmentation = max(increment%n_augmentation, &
          self%active%softness%n_augmentation)
    end subroutine tell_gaps

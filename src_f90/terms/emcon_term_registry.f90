@@ -19,8 +19,8 @@ module emcon_term_registry
    use emcon_term, only : term_box_t
    implicit none
    private
-   public :: terms_create, terms_solid, terms_mass, terms_mass_rows, terms_mass_times, terms_mass_values, &
-      terms_massless, terms_return_mass, terms_decay
+   public :: terms_create, terms_solid, terms_mass, terms_mass_rows, terms_mass_times, &
+      terms_mass_values, terms_massless, terms_return_mass, terms_decay
 
    !> Where the terms that every model has stand; what is given comes after them.
    integer, parameter :: of_inertia = 1, of_solid = 2, of_loads = 3, n_own = 3

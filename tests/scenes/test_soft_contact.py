@@ -1,12 +1,14 @@
 """`*CONSTRAINT METHOD, TYPE=PENALTY` and `AUGMENTED LAGRANGE`: contact that gives way."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from plain_scenes import BOTH, ONE, UNGUARDED, Scene, below
 from scene_tools import DECKS, attempt, run_deck
 from test_contact_output import data_sets, restart
+from test_explicit import bar, critical_step, stiffness_and_mass
 from test_statics import E, FORCE, FORMULATIONS, NU, ROUNDED, displacement, tower
 
 METHOD = "*CONSTRAINT METHOD, TYPE=<method>"
@@ -170,6 +172,87 @@ def test_other_schemes_push_by_a_penalty_too(scheme, tmp_path):
     assert made < 0.2
 
 
+# ---- explicit steps -----------------------------------------------------------------------------
+
+
+def explicit(deck):
+    """`deck` by central differences."""
+    deck.replace("*DYNAMIC, DIRECT", "*DYNAMIC, DIRECT, EXPLICIT")
+    for card in ("*NEWTON", "*CONTACT INITIATION"):
+        deck.remove(card)
+    return deck
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_a_mass_on_the_spring_by_central_differences(formulation, share, tmp_path):
+    """Each place and velocity is that of the same formulas in Python, and so is what is stored."""
+    h = share*2/OMEGA
+    deck = explicit(falling(h, math.ceil((REBOUND + 0.1)/h)*h))
+    run = run_deck(deck, tmp_path, method=PENALTY, formulation=formulation)
+    history = run.history
+    assert critical_step(run) == pytest.approx(2/OMEGA, rel=1e-5), "of six printed digits"
+
+    def push(gap):
+        return -STIFFNESS*min(gap, 0.0)
+
+    gap, v, impulse = GAP, -SPEED, 0.0
+    for row in history[1:]:
+        way = h*v + 0.5*h*h/MASS*push(gap)
+        both = 0.5*h*(push(gap) + push(gap + way))
+        gap, v, impulse = gap + way, v + both/MASS, impulse + both
+        assert row["py"] == pytest.approx(MASS*v, abs=1e-12*MASS*SPEED)
+        assert row["contact_energy"] == pytest.approx(0.5*STIFFNESS*min(gap, 0.0)**2,
+                                                      abs=1e-12*MASS*SPEED**2)
+        assert row["pair1_impulse_y"] == pytest.approx(impulse, abs=1e-12*MASS*SPEED)
+    assert impulse > MASS*SPEED, "it has turned back"
+    assert run.verdict["verdict"] == "good"
+
+
+def test_the_critical_step_with_a_penalty_is_that_of_the_closed_contact(tmp_path):
+    """The highest frequency of bar and springs by numpy; above it the deck is refused."""
+    cells, size = (2, 6), (0.1, 1.0)
+    stiffness, mass = stiffness_and_mass(cells, size, 0.0)
+    for by_area in (1e3, 1e4, 1e6):
+        closed = stiffness.copy()
+        for node, area in enumerate((0.025, 0.05, 0.025)):
+            for freedom in (2*node, 2*node + 1):
+                closed[freedom, freedom] += by_area*area
+        root = np.sqrt(mass)
+        limit = 2/math.sqrt(np.linalg.eigvalsh(closed/np.outer(root, root)).max())
+        deck = bar(cells, kind="NODE TO SURFACE, SIDES=ONE")
+        deck.insert(f"*CONSTRAINT METHOD, TYPE=PENALTY, STIFFNESS={by_area}", before="*NODE PRINT")
+        done, _ = attempt(deck, tmp_path/f"{by_area}above", (), {"h": 1.001*limit, "t_end": 1.0})
+        assert done.returncode == 2
+        told = re.search(r"is larger than the critical step (\S+) with closed contacts", done.stderr)
+        assert float(told[1]) == pytest.approx(limit, rel=2e-5)
+        run = run_deck(deck, tmp_path/f"{by_area}below", h=0.999*limit, t_end=0.6)
+        history = run.history
+        # The contact shakes the fastest vibration, whose energy may seem 1/(1 - 0.999^2) larger.
+        assert (history["kinetic"] + history["strain"]).max() < 1e3*history["kinetic"][0]
+        assert history["contact_energy"].max() > 0
+
+
+@pytest.mark.parametrize(("formulation", "sides"), [
+    ("NODE TO SURFACE", ONE), ("NODE TO SURFACE", BOTH), ("SEGMENT", ONE)])
+def test_explicit_penalties_keep_momenta(formulation, sides, tmp_path):
+    """Momenta to round-off, energy but for what central differences are off by: of order 2."""
+    off = []
+    for h in (0.001, 0.00025):
+        run = run_deck(explicit(discs(sides)), tmp_path/str(h), method=PENALTY,
+                       formulation=formulation, h=h)
+        history = run.history
+        assert history["active"].max() > 1 and history["active"][-1] == 0
+        assert history["contact_energy"].max() > 1e-3*history["kinetic"][0]
+        assert history["contact_energy"][-1] == 0 and np.all(history["contact_work"] == 0)
+        scale = np.abs(history["lz"]).max() + np.abs(history["px"]).max()
+        for name in ("px", "py", "lz"):
+            assert np.abs(history[name] - history[name][0]).max() < 1e-12*scale, name
+        assert run.verdict["verdict"] == "good" and 0 < run.verdict["give"] < 0.1
+        off.append(np.ptp(history["total"])/history["kinetic"][0])
+    assert off[0] < 2e-3 and off[1] < off[0]/2
+
+
 # ---- statics ------------------------------------------------------------------------------------
 
 
@@ -210,9 +293,10 @@ def test_a_penalty_tends_to_the_exact_contact(tmp_path):
 # ---- bits ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", [PENALTY, AUGMENTED])
-def test_restart_in_contact_gives_the_same_bits(tmp_path, method):
-    deck = discs(ONE)
+@pytest.mark.parametrize(("method", "is_explicit"), [(PENALTY, False), (AUGMENTED, False),
+                                                     (PENALTY, True)])
+def test_restart_in_contact_gives_the_same_bits(tmp_path, method, is_explicit):
+    deck = explicit(discs(BOTH)) if is_explicit else discs(ONE)
     deck.replace("*NODE FILE", "*RESTART, WRITE, FREQUENCY=8\n*NODE FILE")
     k = deck.find("*STEP")
     second = [(head, list(data)) for head, data in deck.card[k:]]
@@ -220,7 +304,8 @@ def test_restart_in_contact_gives_the_same_bits(tmp_path, method):
     second[second.index(("*RESTART, WRITE, FREQUENCY=8", []))] = (
         "*RESTART, WRITE, FREQUENCY=0", [])
     deck.card += second
-    run = run_deck(deck, tmp_path/"whole", method=method, formulation="NODE TO SURFACE")
+    run = run_deck(deck, tmp_path/"whole", method=method, formulation="NODE TO SURFACE",
+                   **({"h": 0.001, "t_end": 0.1} if is_explicit else {}))
     history = run.history
     n = int(np.searchsorted(history["time"], 0.32 - 1e-9))
     assert history["active"][n] > 0
