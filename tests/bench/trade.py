@@ -5,15 +5,14 @@
 
 Five scenes, each with one body as it is, corotated, linear, quasi-static and rigid, and with massive and
 massless surfaces of contact, one run at a time. Times are those of whole processes, as ratios to
-the first run of the scene in the same round; of three rounds the medians. Needs the program
-(`make app`).
+the first run of the scene in the same round; of three rounds the medians. Runs are kept in
+build/trade/PROGRAM: what was interrupted goes on. Needs the program (`make app`).
 """
 
 import argparse
 import dataclasses
 import pathlib
 import sys
-import tempfile
 
 import numpy as np
 
@@ -21,9 +20,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "scenes")]
 
 from book.common import COLOURS, axes, save, size, table  # noqa: E402
+from kept_runs import folder_of, name_of, run_once  # noqa: E402
 from plain_scenes import AUTO, Scene, below, bowl, gears  # noqa: E402
-from scene_tools import DECKS, PROGRAM, Deck, Run  # noqa: E402
-from timing import usage  # noqa: E402
+from scene_tools import DECKS, PROGRAM, Deck  # noqa: E402
 from verification import update  # noqa: E402
 
 PAGE = ROOT / "docs" / "trade.md"
@@ -138,12 +137,9 @@ CASES = (
 
 def measured(deck, folder, parameters):
     """The run of a deck, its processor time [s] and its largest memory [MiB]."""
-    folder.mkdir(parents=True)
-    path = deck.write(folder / "deck.inp")
-    options = [f"--set={name}={value}" for name, value in parameters.items()]
-    done = usage([PROGRAM, path, "--quiet", "--output", folder, *options])
+    run, done = run_once(folder, deck, parameters)
     assert done.code == 0 or "bodies overlap" in done.errors, done.errors
-    return Run(folder / "deck"), done.cpu, done.memory
+    return run, done.cpu, done.memory
 
 
 def force_of(history, n=5):
@@ -171,12 +167,12 @@ class Result:
 
 
 def results(case, folder, rounds):
-    """Results by kind of body and of surface."""
+    """Results by kind of body and of surface; runs are kept in `folder`."""
     found = {}
     for k in range(rounds):
         for kind in case.kinds:
             for surfaces in SURFACES:
-                where = folder / f"{len(list(folder.iterdir()))}"
+                where = folder / name_of(case.name, kind, surfaces, k)
                 run, cpu, memory = measured(case.deck(kind), where,
                                             {**case.parameters, "initiation": surfaces})
                 key = kind, surfaces
@@ -245,8 +241,7 @@ def main():
     for case in CASES:
         if options.only and not any(word in case.name for word in options.only):
             continue
-        with tempfile.TemporaryDirectory() as folder:
-            found = results(case, pathlib.Path(folder), options.rounds)
+        found = results(case, folder_of("simplified"), options.rounds)
         lines += rows_of(case, found)
         if options.update and case.deck is ring:
             draw(found, PAGE.parent / "trade_ring.png")

@@ -3,20 +3,21 @@
     .venv/bin/python tests/bench/trade_knobs.py [--update] [words of the names of scenes]
 
 Writes a table between the marks `knobs` of docs/trade.md. Errors are those against the same mesh with
-increments sixteen times as small and massless surfaces.
+increments sixteen times as small and massless surfaces. Runs are kept in build/trade/PROGRAM: what was
+interrupted goes on.
 """
 
 import argparse
 import pathlib
-import tempfile
+import re
 
 import numpy as np
 from trade import NTS, PAGE, PROGRAM, ball, bowl, drift, drawn, force_of, impulse_of, percent
 
 from book.common import size, table  # isort: skip, `trade` says where
 from book.forces import switches
-from scene_tools import DECKS, Deck, Run
-from timing import usage
+from kept_runs import folder_of, name_of, run_once
+from scene_tools import DECKS, Deck
 from verification import update
 
 SINGLE = PROGRAM.parent.parent / "release-single" / "emcon"
@@ -59,6 +60,25 @@ SCENES = (
     ("disc in a bowl", plain(bowl, "BOWL"), {**NTS, "h": 0.01}),
 )
 MORTAR = {"formulation": "MORTAR"}
+
+
+def explicit(method):
+    """A deck by central differences, contact closed exactly or by `method`."""
+
+    def change(deck):
+        text = deck.text().replace("*DYNAMIC, DIRECT", "*DYNAMIC, DIRECT, EXPLICIT")
+        for card in ("NEWTON", "CONTACT INITIATION", "TIME INTEGRATION", "CONSTRAINT METHOD"):
+            text = re.sub(rf"\*{card}[^\n]*\n", "", text)
+        return Deck(text.replace("*NODE FILE", method + "*NODE FILE"))
+
+    return change
+
+
+#: Steps that are told to be so much of the critical one; impacts make elements faster.
+SHARE = 0.9
+EXPLICIT = {"deck": explicit(""), "share": SHARE}
+EXPLICIT_PENALTY = {"deck": explicit("*CONSTRAINT METHOD, TYPE=PENALTY\n"), "share": SHARE}
+
 #: Text, what changes: parameters (h as a factor), or the program.
 KNOBS = (
     ("default", {}),
@@ -81,22 +101,23 @@ KNOBS = (
     ("`PENALTY`", {"method": "PENALTY"}),
     ("`PENALTY, FACTOR=10`", {"method": "'PENALTY, FACTOR=10'"}),
     ("`AUGMENTED LAGRANGE`", {"method": "AUGMENTED LAGRANGE"}),
+    ("`EXPLICIT`", EXPLICIT), ("`EXPLICIT`, `PENALTY`", EXPLICIT_PENALTY),
     ("`PRECISION=single`", {"program": SINGLE}),
 )
 
 
 def run_of(deck, folder, parameters, change):
-    """The run, its processor time [s]; None: the program stopped, with its message."""
+    """The run, or None if the program stopped, and what it took."""
     change = dict(change)
     program = change.pop("program", PROGRAM)
+    deck = change.pop("deck", lambda own: own)(deck)
+    share = change.pop("share", None)
     merged = {**parameters, **change}
     if "h" in change:
         merged["h"] = parameters["h"]*change["h"]
-    folder.mkdir()
-    path = deck.write(folder / "deck.inp")
-    options = [f"--set={name}={value}" for name, value in merged.items()]
-    done = usage([program, path, "--quiet", "--output", folder, *options])
-    run = Run(folder / "deck", done.errors)
+    if share:
+        merged["h"] = share*critical_step(deck, folder.with_name(folder.name + "-limit"), merged)
+    run, done = run_once(folder, deck, merged, program)
     is_whole = done.code in (0, 3) and "the analysis stops" not in done.errors
     return (run if is_whole else None), done
 
@@ -104,6 +125,13 @@ def run_of(deck, folder, parameters, change):
 def last_words(errors, folder):
     """What a program said last, without the folder it ran in."""
     return errors.strip().splitlines()[-1].replace(str(folder), "")[:80]
+
+
+def critical_step(deck, folder, parameters):
+    """What the program says of an increment as long as the run."""
+    t_end = parameters.get("t_end") or re.search(r"^t_end = (\S+)", deck.text(), re.MULTILINE)[1]
+    _, done = run_once(folder, deck, {**parameters, "h": t_end})
+    return float(re.search(r"the critical step ([-+.0-9E]+)", done.errors)[1])
 
 
 def figures_of(run, reference):
@@ -126,21 +154,19 @@ def figures_of(run, reference):
 def lines_of(name, make, parameters, rounds):
     """Rows of a scene; the processor time is the least of the rounds, over that of the default."""
     deck, cost, kept = make(), {}, {}
-    with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        reference, done = run_of(deck, folder / "reference", parameters,
-                                 {"h": 1/16, "initiation": "MASSLESS"})
-        assert reference, done.errors
-        for k in range(rounds):
-            for knob, change in KNOBS:
-                if not pathlib.Path(change.get("program", PROGRAM)).exists():
-                    continue
-                place = folder / f"{len(list(folder.iterdir()))}"
-                run, done = run_of(deck, place, parameters, change)
-                cost.setdefault(knob, []).append(done.cpu)
-                if k == 0:
-                    kept[knob] = figures_of(run, reference) if run else (
-                        "stops: " + last_words(done.errors, folder), "", "", "", "")
+    folder = folder_of("knobs")
+    reference, done = run_of(deck, folder / name_of(name, "reference"), parameters,
+                             {"h": 1/16, "initiation": "MASSLESS"})
+    assert reference, done.errors
+    for k in range(rounds):
+        for knob, change in KNOBS:
+            if not pathlib.Path(change.get("program", PROGRAM)).exists():
+                continue
+            run, done = run_of(deck, folder / name_of(name, knob, k), parameters, change)
+            cost.setdefault(knob, []).append(done.cpu)
+            if k == 0:
+                kept[knob] = figures_of(run, reference) if run else (
+                    "stops: " + last_words(done.errors, folder), "", "", "", "")
     first = min(cost["default"])
     return [(name, knob, f"{min(cost[knob])/first:.2f}", *found) for knob, found in kept.items()]
 

@@ -5,13 +5,15 @@ import subprocess
 import sys
 
 import pytest
-from scene_tools import CRASH, DECKS, ROOT, emcon
+from scene_tools import CRASH, DECKS, ROOT, Deck, emcon
 
 BENCH = ROOT / "tests" / "bench"
 sys.path.insert(0, str(BENCH))
 
 import bench_targets  # noqa: E402
+import kept_runs  # noqa: E402
 import trade_first  # noqa: E402
+import trade_knobs  # noqa: E402
 import trade_studies  # noqa: E402
 from bench_counts import rises  # noqa: E402
 from floors import factor_columns  # noqa: E402
@@ -41,6 +43,27 @@ def test_counts_that_rise_are_told():
     assert rises(stored, found) == (["ring: newton 100 -> 104"], [])
     assert rises(found, stored) == ([], ["ring: newton 104 -> 100"])
     assert rises(stored, {"ring": {"cuts": 1}})[0]
+
+
+def test_runs_of_trade_go_on_where_they_were(tmp_path):
+    """A run that is there is taken as it is; not one of another deck, or that did not end."""
+    deck = Deck.read(DECKS / "bouncing_bar.inp")
+    asked = {"t_end": 0.1, "frame": 0.1}
+    _, first = kept_runs.run_once(tmp_path/"run", deck, asked)
+    assert kept_runs.run_once(tmp_path/"run", deck, asked)[1] == first
+    run, other = kept_runs.run_once(tmp_path/"run", deck, {**asked, "t_end": 0.05})
+    assert other != first and run.history["time"][-1] == pytest.approx(0.05)
+    (tmp_path/"run"/"took.json").rename(tmp_path/"run"/"took.part")
+    assert kept_runs.run_once(tmp_path/"run", deck, {**asked, "t_end": 0.05})[1] != other
+
+
+def test_explicit_knobs_run_below_their_critical_step(tmp_path):
+    name, make, parameters = trade_knobs.SCENES[1]
+    for knob in (trade_knobs.EXPLICIT, trade_knobs.EXPLICIT_PENALTY):
+        run, done = trade_knobs.run_of(make(), tmp_path/str(len(list(tmp_path.iterdir()))),
+                                       {**parameters, "t_end": 1.2, "frame": 1.2}, knob)
+        assert run, f"{name}: {done.errors}"
+        assert "h is 0.9 of it" in run.log and run.history["active"].max() > 0
 
 
 def test_table_of_phases():
