@@ -25,6 +25,8 @@ from scene_tools import PROGRAM  # noqa: E402
 
 ROWS = [*bodies.ROWS, *impacts.ROWS, *long.ROWS]
 PAGE = ROOT / "docs" / "stability.md"
+#: The row whose values are pairs: a table of its own.
+GRID = "grid"
 
 
 def text_of(value):
@@ -55,6 +57,16 @@ def line_of(row, outcomes):
             said.replace("|", "\\|") or "", row.why)
 
 
+def grid_lines(row, outcomes):
+    """The rows of the table of a row whose values are pairs."""
+    firsts, seconds = (list(dict.fromkeys(value[k] for value in row.values)) for k in (0, 1))
+    of = dict(zip(row.values, outcomes, strict=True))
+    cells = [[of[a, b] for b in seconds] for a in firsts]
+    return table(("", *(f"{b:g}" for b in seconds)),
+                 [(f"{a:g}", *(f"{o.figure:.1e}" if o.kind == HOLDS else f"{o.kind}: {o.figure:.1e}"
+                               for o in line)) for a, line in zip(firsts, cells, strict=True)])
+
+
 HEAD = ("what", "tried", "holds", "largest figure", "else the program says", "limit")
 ILL_HEAD = ("what", "(6)", "(6), multipliers scaled", "(7)", "residual, at most")
 
@@ -78,24 +90,30 @@ def main():
     options = parser.parse_args()
     rows = [row for row in ROWS if not options.rows or row.name in options.rows]
     folder = folder_of_program()
-    lines, ill_lines, n_silent = [], [], 0
+    lines, ill_lines, grid, n_silent = [], [], None, 0
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         futures = [[pool.submit(run_case, row, value, folder, True) for value in row.values] for row in rows]
         for row, future in zip(rows, futures, strict=True):
             start = time.monotonic()
             outcomes = [f.result() for f in future]
             n_silent += sum(o.kind == SILENT for o in outcomes)
-            lines.append(line_of(row, outcomes))
-            ill_lines += [line for line in [ill_line_of(row, outcomes)] if line]
+            if row.name == GRID:
+                grid = grid_lines(row, outcomes)
+            else:
+                lines.append(line_of(row, outcomes))
+                ill_lines += [line for line in [ill_line_of(row, outcomes)] if line]
             print(f"{row.name} ({time.monotonic() - start:.0f} s)", flush=True)
             for value, o in zip(row.values, outcomes, strict=True):
                 print(f"   {text_of(value):>14}  {o.kind:6}  {o.figure:.1e}  {o.text}"
                       f"  {o.residual:.0e}  {' '.join(f'{c:.0e}' for c in o.ill or ())}", flush=True)
     if options.update:
         text = PAGE.read_text()
-        for name, head, rows in (("extremes", HEAD, lines), ("conditions", ILL_HEAD, ill_lines)):
+        for name, made in (("extremes", table(HEAD, lines)), ("grid", grid),
+                           ("conditions", table(ILL_HEAD, ill_lines))):
+            if made is None:
+                continue
             mark = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-            made = "\n".join(table(head, rows))
+            made = "\n".join(made)
             text = mark.sub(lambda match, made=made: match[1] + made + "\n" + match[2], text)
         PAGE.write_text(text)
     return n_silent

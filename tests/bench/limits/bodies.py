@@ -34,7 +34,7 @@ def strain_error(run, excess):
 # ---- ratio of Poisson ---------------------------------------------------------------------------
 
 
-def bent(ratio):
+def bent(ratio, kind="CPE4"):
     """A cantilever, 60 by 6 elements, under a small load at its end."""
     scene = Scene(1, 1)
     scene.block("BEAM", (0, 0), (10, 1), (60, 6)).hold("BEAM", lambda x, y: x < 1e-9)
@@ -42,6 +42,7 @@ def bent(ratio):
     deck.replace("100.0, 0.3", f"100.0, {ratio!r}")
     deck.replace("*HYPERELASTIC, COUPLED NEO HOOKE", "*ELASTIC")
     deck.replace("*DYNAMIC, DIRECT\n<h>, <t_end>", "*STATIC\n1., 1.")
+    deck.replace("TYPE=CPE4", f"TYPE={kind}")
     tip = [label for label, p in scene.part["BEAM"].node.items() if p[0] > 10 - 1e-9]
     deck.replace("*NODE FILE", "*CLOAD\n" + "\n".join(f"{n}, 2, -1e-7" for n in tip) + "\n*NODE FILE")
     return deck
@@ -73,9 +74,10 @@ def flat_elements(ratio):
 def falling(value):
     """One element in free fall: rho L^2/(E h^2), and offset by size."""
     scale, offset = value
-    h = (1/(100*scale))**0.5
+    size = 0.7
+    h = (size**2/(100*scale))**0.5
     gravity = 0.1/h**2
-    return one_element(at=(offset, -offset), step=(
+    return one_element(size, at=(offset, -offset), step=(
         f"*DYNAMIC, DIRECT\n{h!r}, {10*h!r}\n*DLOAD\nONE, GRAV, {gravity!r}, 0., -1.\n"
         "*NODE FILE\nU, V\n"))
 
@@ -84,6 +86,10 @@ def fall_error(run, _):
     """g t^2/2 of ten increments of 0.1/h^2, 5, which mid-point inertia gives exactly."""
     u = run.fields()["displacement"][-1]
     return max(np.abs(u[:, 1]/-5.0 - 1).max(), np.abs(u[:, 0]/5).max())
+
+
+SCALES = tuple(10.0**k for k in (-20, -16, -12, -8, -4, 0, 4, 8, 12, 16, 20))
+OFFSETS = (0.0, 1e3, 1e6, 1e9, 1e12)
 
 
 # ---- rotation -----------------------------------------------------------------------------------
@@ -145,6 +151,10 @@ ROWS = [
         (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.4999999), bent, deflection_error,
         "deflection by beam theory", bar=0.1, warns="body .* locks.*", reach=2,
         why="plain four-node elements lock: volume is held at four points of each"),
+    Row("poisson_mean", "the same of `CPE4H`",
+        (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.4999999),
+        functools.partial(bent, kind="CPE4H"), deflection_error, "deflection by beam theory", bar=0.1,
+        reach=7, short=(0, -1)),
     Row("aspect", "length by height of elements that a disc falls on",
         (1, 1e2, 1e3, 1e4, 1e5), flat_elements, energy_error, "energy", reach=5),
     Row("scale", "rho L^2/(E h^2) of an element in free fall",
@@ -155,6 +165,10 @@ ROWS = [
         tuple((1.0, 10.0**k) for k in (0, 3, 6, 9, 12)), falling, fall_error,
         "place after ten increments", bar=1e-8, reach=5,
         why="the places of the nodes themselves are rounded to eps times the offset"),
+    Row("grid", "both: rho L^2/(E h^2), and offset by size",
+        tuple((scale, offset) for scale in SCALES for offset in OFFSETS), falling, fall_error,
+        "place after ten increments", bar=1e-8, reach=0, short=(3*len(OFFSETS) - 1, 4*len(OFFSETS) - 1, -1),
+        why="that of the one or of the other: below"),
     Row("rotation", "radians that a block turns by in an increment",
         (0.1, 0.5, 1.0, 2.0, 3.0, 6.0), spinning, spin_error, "energy, angular momentum", reach=6),
     Row("units", "units of length, mass and time", tuple(
