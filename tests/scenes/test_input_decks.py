@@ -238,6 +238,24 @@ def test_bar_on_wall(initiation, tmp_path):
         assert rebound > 99
 
 
+@pytest.mark.parametrize("initiation", ["MASSLESS", "PERSISTENT", "VELOCITY UPDATE"])
+def test_thrown_bar(initiation, tmp_path):
+    """Doyen, Ern and Piperno's first benchmark: contact for 2 L/c with rho c v, and it comes back."""
+    h = 0.005
+    history = run_deck(impacts.thrown(), tmp_path, initiation=initiation, h=h, t_end=2.0).history
+    assert np.abs(history["total"]/history["total"][0] - 1).max() < 1e-12
+    force = np.abs(history["pair1_force_y"])
+    on = np.flatnonzero(force)
+    start, end = history["time"][on[0] - 1], history["time"][on[-1]]
+    slack = 2*h + 2*0.2/30                       # an increment at both ends, and the wave front
+    assert start == pytest.approx(0.5, abs=h) and end - start == pytest.approx(2/3, abs=slack)
+    impulse = np.sum(force[1:])*h
+    assert impulse == pytest.approx(10*(10 + history["py"][-1]/10), rel=1e-10)
+    assert impulse/(end - start) == pytest.approx(300, rel=slack/(2/3))
+    # What it lacks is vibration: a wave front is some two elements of fifty wide.
+    assert 10*(1 - 2/50) < history["py"][-1]/10 < 10
+
+
 @pytest.mark.parametrize("restitution", [1, 0.5, 0])
 def test_rigid_bar(restitution, tmp_path):
     deck = DECKS / "rigid_bar.inp"
