@@ -15,7 +15,7 @@ import pathlib
 import re
 import tempfile
 
-from book import (bar, contact_patch, contact_sides, forces, free_bodies, gain, hertz, impacts,
+from book import (bar, contact_patch, contact_sides, elements, forces, free_bodies, gain, hertz, impacts,
                   ironing, numerics, plain, press_fit, ring, slave_floor, spin, statics, ties, ties_condition)
 from book.common import Runs
 
@@ -24,7 +24,7 @@ DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
 #: In the order of the book.
 CHAPTERS = [
     chapter
-    for module in (ring, spin, bar, forces, free_bodies, statics, ties, ties_condition, contact_patch,
+    for module in (ring, spin, bar, forces, free_bodies, statics, elements, ties, ties_condition, contact_patch,
                    hertz, press_fit, ironing, plain, contact_sides, slave_floor, numerics, impacts,
                    gain)
     for chapter in module.CHAPTERS
