@@ -50,7 +50,7 @@ endif
 include build/config.mk
 endif
 
-.venv/%.stamp: pywrap/pyproject.toml build/config.mk
+.venv/%.stamp: pyproject.toml build/config.mk
 	@$(SETUP) python $*
 
 PY := .venv/bin/python
@@ -167,7 +167,7 @@ $(O)/%.c.o: %.c $(BUILD)/flags.txt
 	@echo "  CC    $<"
 	$(Q)$(CCOMPILE) -MMD -MP -c $< -o $@
 
-VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pywrap/pyproject.toml)
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
 # Programs run with libraries of their own major version, as long as that is 0 of their minor one.
 SHARED := libemcon.so.$(shell echo $(VERSION) | sed 's/^\(0\.[0-9]*\|[1-9][0-9]*\)\..*/\1/')
 
@@ -176,16 +176,15 @@ $(BUILD)/libemcon.a: $(LIB_OBJ)
 	$(Q)rm -f $@ && ar rcs $@ $^
 
 # The library shows what the headers declare and the modules hold, and nothing else; that with the
-# sanitizers in it also what they call each other by. MODULES=--no-modules: for C and Python alone.
+# sanitizers in it also what they call each other by.
 COMMA := ,
-MODULES ?=
-SYMBOLS := $(BUILD)/made/symbols$(MODULES).map
+SYMBOLS := $(BUILD)/made/symbols.map
 ifneq ($(MADE),)
 SHOWN := $(if $(filter-out sanitize,$(MODE)),-Wl$(COMMA)--version-script=$(SYMBOLS))
 endif
 $(SYMBOLS): src_f90/make_symbols.py src_f90/c_header.py $(BORDER)/emcon.h
 	@mkdir -p $(@D)
-	$(Q)$(PYTHON) $< $(BORDER)/emcon.h $(MODULES) > $@
+	$(Q)$(PYTHON) $< $(BORDER)/emcon.h > $@
 
 $(BUILD)/$(SHARED): $(LIB_OBJ) $(if $(MADE),$(SYMBOLS))
 	@echo "  LINK  $@"
@@ -253,6 +252,20 @@ $(BENCHES): $(BUILD)/%: tests/bench/%.f90 $(BUILD)/libemcon.a
 benches: $(BENCHES)  ## the programs of tests/bench
 kernels: $(BUILD)/kernels  ## the program of the kernel tests, build/release/kernels [SUITE [TEST]]
 
+# ---- what others find the library by ------------------------------------------------------------
+
+BLANK := $() $()
+COMPANIONS := emcon.pc emcon-static.pc emconConfig.cmake emconConfigVersion.cmake
+UP := ../../..
+LIB := lib
+INCLUDE := include/emcon
+ALL_LIBS = $(strip $(LIBS) $(THREAD_LIBS))
+# fill FILE FOLDER: FILE.in of the border with what it is to hold, into FOLDER.
+fill = sed -e 's|@VERSION@|$(VERSION)|' -e 's|@SHARED@|$(SHARED)|' -e 's|@UP@|$(UP)|' \
+	-e 's|@LIB@|$(LIB)|' -e 's|@INCLUDE@|$(INCLUDE)|' -e 's|@LDFLAGS@|$(LDFLAGS_$(MODE))|' \
+	-e 's|@LIBS@|$(ALL_LIBS)|' -e 's|@LIST@|$(subst $(BLANK),;,$(ALL_LIBS))|' \
+	$(BORDER)/$(1).in > $(2)/$(1)
+
 # ---- Python extension ---------------------------------------------------------------------------
 
 # f2py writes the wrapper, the rules below compile it: the same way for every version of Python.
@@ -294,10 +307,22 @@ ifneq ($(filter pywrap run,$(MAKECMDGOALS)),)
 $(error Python and C see double: pywrap is for PRECISION=double; app, lib and kernels are for all)
 endif
 endif
-pywrap: $(P)/_core$(EXT_SUFFIX)  ## the Python package, used as .venv/bin/python -m emcon
+# The program of the package, with its library beside it.
+$(P)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/$(SHARED)
+	@echo "  LINK  $@"
+	$(Q)mkdir -p $(P) && $(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(THREAD_LIBS) -Wl,-rpath,'$$ORIGIN/..'
+
+pywrap: $(P)/_core$(EXT_SUFFIX) $(P)/emcon  ## the Python package, used as .venv/bin/python -m emcon
 	$(Q)find '$(PACKAGE)' -name 'libemcon.so.*' ! -name $(SHARED) -delete
+	$(Q)install -d '$(PACKAGE)/bin' '$(PACKAGE)/include' '$(PACKAGE)/cmake'
 	$(Q)for f in $< $(BUILD)/$(SHARED); do \
 		cmp -s $$f '$(PACKAGE)'/$${f##*/} || install -m 755 $$f '$(PACKAGE)'; done
+	$(Q)cmp -s $(P)/emcon '$(PACKAGE)/bin/emcon' || install -m 755 $(P)/emcon '$(PACKAGE)/bin'
+	$(Q)install -m 644 $(BORDER)/emcon.h $(BORDER)/emcon.hpp '$(PACKAGE)/include'
+	$(Q)$(foreach file,$(filter %.cmake,$(COMPANIONS)),$(call fill,$(file),'$(PACKAGE)/cmake') &&) :
+pywrap: UP := ..
+pywrap: LIB := .
+pywrap: INCLUDE := include
 
 # ---- use ----------------------------------------------------------------------------------------
 
@@ -355,17 +380,6 @@ docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
 
 # Prefixes may have blanks in their names; what is installed finds its parts from where it stands.
 TO = $(DESTDIR)$(PREFIX)
-BLANK := $() $()
-COMPANIONS := emcon.pc emcon-static.pc emconConfig.cmake emconConfigVersion.cmake
-UP := ../../..
-LIB := lib
-INCLUDE := include/emcon
-ALL_LIBS = $(strip $(LIBS) $(THREAD_LIBS))
-# fill FILE FOLDER: FILE.in of the border with what it is to hold, into FOLDER.
-fill = sed -e 's|@VERSION@|$(VERSION)|' -e 's|@SHARED@|$(SHARED)|' -e 's|@UP@|$(UP)|' \
-	-e 's|@LIB@|$(LIB)|' -e 's|@INCLUDE@|$(INCLUDE)|' -e 's|@LDFLAGS@|$(LDFLAGS_$(MODE))|' \
-	-e 's|@LIBS@|$(ALL_LIBS)|' -e 's|@LIST@|$(subst $(BLANK),;,$(ALL_LIBS))|' \
-	$(BORDER)/$(1).in > $(2)/$(1)
 install: app lib  ## program, library, headers, modules, man page, for CMake and pkg-config, below PREFIX=
 	$(Q)install -d '$(TO)/bin' '$(TO)/lib/pkgconfig' '$(TO)/lib/cmake/emcon' '$(TO)/include/emcon' \
 		'$(TO)/share/man/man1' '$(TO)/share/doc/emcon'
@@ -393,7 +407,7 @@ status:  ## compiler, libraries and Python packages that were found
 	@$(SETUP) status
 
 clean:  ## remove build/ and the compiled extension (.venv stays)
-	rm -rf build pywrap/emcon/_core*.so pywrap/emcon/libemcon.so.*
+	rm -rf build pywrap/emcon/_core*.so pywrap/emcon/libemcon.so.* $(addprefix pywrap/emcon/,bin include cmake)
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while IFS='	' read -r name text; do \

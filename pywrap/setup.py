@@ -1,6 +1,7 @@
-"""Compile the extension for the interpreter that pip runs in, by the rules of the Makefile.
+"""Compile library, program and extension for the interpreter that pip runs in.
 
-The Fortran sources stand beside this folder: wheels are made in the whole tree.
+By the rules of the Makefile, whose sources stand beside this folder: wheels and source archives are
+made of the whole tree.
 """
 
 from __future__ import annotations
@@ -19,12 +20,15 @@ from pathlib import Path
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.command.egg_info import FileList
 from setuptools.command.sdist import sdist
 
 ROOT = Path(__file__).resolve().parents[1]
-#: The library, by whatever series its version is of.
-LIBRARY = "libemcon.so.*"
-
+#: What is compiled, and what stands beside it for programs in other languages.
+MADE = ("libemcon.so.*", "bin/*", "include/*", "cmake/*")
+#: What a source archive holds.
+SOURCES = ("CHANGELOG.md", "CITATION.cff", "LICENSE", "Makefile", "README.md", "pyproject.toml",
+           ".ci", "docs", "input_decks", "pywrap", "src_f90")
 
 def demand(condition: bool, text: str) -> None:
     """End with `text`, the last line that pip shows, unless `condition` holds."""
@@ -69,7 +73,7 @@ def make(objects: Path, package: Path) -> None:
         done = subprocess.run(["make", "--no-print-directory", f"-j{os.cpu_count() or 1}", "pywrap",
                                *(f"{name}={value}" for name, value in variables.items())],
                               cwd=ROOT, env=env, stdin=subprocess.DEVNULL, check=False)
-    made = (package/f"_core{variables['EXT_SUFFIX']}").is_file() and any(package.glob(LIBRARY))
+    made = (package/f"_core{variables['EXT_SUFFIX']}").is_file() and all(any(package.glob(names)) for names in MADE)
     demand(done.returncode == 0 and made,
            "EMCON could not be compiled; the reason stands above")
 
@@ -85,20 +89,36 @@ class BuildExtension(build_ext):
     def get_output_mapping(self) -> dict[str, str]:
         mapping = super().get_output_mapping()
         if self.inplace:  # a strict editable installation links what stands here, nothing else
-            for library in (ROOT/"pywrap"/"emcon").glob(LIBRARY):
-                mapping[str(Path(self.build_lib)/"emcon"/library.name)] = f"emcon/{library.name}"
+            package = ROOT/"pywrap"/"emcon"
+            for file in (file for names in MADE for file in package.glob(names)):
+                name = f"emcon/{file.relative_to(package)}"
+                mapping[str(Path(self.build_lib)/name)] = f"pywrap/{name}"
         return mapping
 
 
-class NoSourceArchive(sdist):
+def source_files() -> list[str]:
+    """What a source archive holds: sources, without what was made of them."""
+    made = {file for names in MADE for file in (ROOT/"pywrap"/"emcon").glob(names)}
+    found = [file for name in SOURCES for file in (ROOT/name, *(ROOT/name).rglob("*"))
+             if file.is_file() and file not in made and file.suffix not in {".so", ".pyc"}
+             and not any(part in {"build", "dist"} or part.endswith(".egg-info")
+                         for part in file.relative_to(ROOT).parts)]
+    return sorted(str(file.relative_to(ROOT)) for file in found)
+
+
+class SourceArchive(sdist):
+    """All that wheels are made of; nothing that was made, nothing of tests."""
+
     def run(self) -> None:
-        sys.exit("error: there is no source archive of pywrap/, since the Fortran sources stand "
-                 "beside it: make a wheel (pip wheel ./pywrap, python -m build --wheel pywrap)")
+        self.filelist = FileList()
+        self.filelist.files = source_files()
+        self.make_distribution()
 
 
 demand((ROOT/"Makefile").is_file() and (ROOT/"src_f90").is_dir(),
        f"EMCON is compiled from its whole tree, but {ROOT} holds no Makefile and src_f90: "
-       "point pip to the folder pywrap of a clone")
+       "point pip to a clone, or to a source archive")
+demand(Path.cwd() == ROOT, f"point pip to {ROOT}, where pyproject.toml is")
 
 # Nothing of an earlier build, perhaps of another interpreter, gets into this one.
 (ROOT/"build").mkdir(exist_ok=True)
@@ -107,6 +127,6 @@ atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
 
 setup(
     ext_modules=[Extension("emcon._core", sources=[])],
-    cmdclass={"build_ext": BuildExtension, "sdist": NoSourceArchive},
+    cmdclass={"build_ext": BuildExtension, "sdist": SourceArchive},
     options={"build": {"build_base": str(SCRATCH)}, "egg_info": {"egg_base": str(SCRATCH)}},
 )

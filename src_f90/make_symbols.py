@@ -1,10 +1,8 @@
 """Write which symbols the shared library shows: the functions of emcon.h, and the modules.
 
     python make_symbols.py HEADER > SCRIPT_OF_THE_LINKER
-    python make_symbols.py HEADER --no-modules > SCRIPT_OF_THE_LINKER
 
-Helpers in C, and whatever a static library brings along, stay inside; so do Fortran's modules where
-no program of Fortran can see their `.mod` files.
+Helpers in C, and whatever a static library brings along, stay inside.
 """
 
 from __future__ import annotations
@@ -18,7 +16,7 @@ from c_header import Header
 def main() -> None:
     header = Header(Path(sys.argv[1]).read_text(encoding="utf-8"))
     names = [function.name for function in header.functions]
-    names += [] if "--no-modules" in sys.argv[2:] else ["__emcon_*"]
+    names.append("__emcon_*")
     print("{\n  global:\n" + "".join(f"    {name};\n" for name in names) + "  local: *;\n};")
 
 

@@ -268,7 +268,7 @@ def test_counts_only_fall():
 def test_one_version():
     """The library, the package, the citation bear one version, the newest of CHANGELOG.md."""
     library = (ROOT / "src_f90/base/emcon_version.f90").read_text()
-    package = (ROOT / "pywrap/pyproject.toml").read_text()
+    package = (ROOT / "pyproject.toml").read_text()
     (number,) = re.findall(r'version = "([\d.]+)"', library)
     assert number in re.findall(r'^version = "(.*)"', package, re.M)
     changes = re.findall(r"^## \[(\d\S*)\] - (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.M)

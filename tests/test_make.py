@@ -47,7 +47,7 @@ class Tree:
 
     def __init__(self, folder):
         self.folder = folder
-        for name in ("Makefile", ".ci/setup", "src_f90/module_order.py", "pywrap/pyproject.toml"):
+        for name in ("Makefile", ".ci/setup", "src_f90/module_order.py", "pyproject.toml"):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)
         # What was found on this machine: nothing has to be looked for again.

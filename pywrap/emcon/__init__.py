@@ -53,8 +53,8 @@ if TYPE_CHECKING:
 __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries",
            "HistoryFile", "InputError", "Interface", "Model", "Outside", "Pairs", "ResultError",
            "ResultPaths", "Results", "Series", "Stepper", "__version__", "animate",
-           "check_derivatives", "compare", "energy_drift", "locate", "plot", "read_bodies",
-           "read_history", "read_pairs"]
+           "check_derivatives", "compare", "energy_drift", "get_cmake_dir", "get_include",
+           "get_library", "locate", "plot", "read_bodies", "read_history", "read_pairs"]
 
 #: The names of the package by module, imported when first used: matplotlib and HDF5 take long to
 #: load, and results are read without the compiled extension.
@@ -84,18 +84,38 @@ def __getattr__(name: str) -> Any:
             found = getattr(importlib.import_module(f".{_LATE[name]}", __name__), name)
         except AttributeError as error:
             raise ImportError(f"{error}: the compiled extension is not of this version of the "
-                              "package; make pywrap, or pip install ./pywrap, makes it anew"
+                              "package; make pywrap, or pip install of its source, makes it anew"
                               ) from error
     globals()[name] = found
     return found
 
 
+def get_include() -> str:
+    """The folder of `emcon.h` and `emcon.hpp`, for programs that embed the library."""
+    return str(Path(__file__).parent/"include")
+
+
+def get_library() -> str:
+    """The shared library, to be linked with by this path and found by it when the program runs."""
+    (library,) = Path(__file__).parent.glob("libemcon.so.*")
+    return str(library)
+
+
+def get_cmake_dir() -> str:
+    """What CMake is to be told as `emcon_DIR`, so that find_package(emcon) finds the library."""
+    return str(Path(__file__).parent/"cmake")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
 def _version() -> str:
-    """The version in `pyproject.toml`: beside the package in the source tree, else as installed."""
+    """The version in `pyproject.toml`: above the package in the source tree, else as installed."""
     import importlib.metadata
     import tomllib
-    project = Path(__file__).parents[1]/"pyproject.toml"
-    if project.is_file():
+    project = Path(__file__).parents[2]/"pyproject.toml"
+    if Path(__file__).parents[1].name == "pywrap" and project.is_file():
         return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
     return importlib.metadata.version("emcon")
 

@@ -1,22 +1,33 @@
-"""`python -m emcon`: a picture, an animation or a short table of a run; two runs compared; studies.
+"""`emcon`, or `python -m emcon`: run decks, look at results, turn meshes into decks, make studies.
 
-Exit codes as in docs/deck.md: 0 done, 2 wrong or missing input, 4 cannot write; `compare` with a
-tolerance: 1 if a difference is above it; `study`: 1 if a goal is not met, 3 if no member is done,
-130 if interrupted.
+What a deck needs (run, check, restart) is done by the program that is compiled, in place of this
+one; the rest here. Exit codes as in docs/deck.md: 0 done, 2 wrong or missing input, 4 cannot write;
+`compare` with a tolerance: 1 if a difference is above it; `study`: 1 if a goal is not met, 3 if no
+member is done, 130 if interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
+import difflib
 import math
+import os
+import subprocess
 import sys
+import warnings
 from pathlib import Path
 
-from . import __version__
 from .comparison import compare
+from .program import find_program
 from .results import ResultError, locate
 from .summary import summary
 
+#: Commands of this file; anything else is for the compiled program.
+_COMMANDS = {"plot": "write a picture of a run", "animate": "write an animation of a run",
+             "compare": "print the largest differences of two runs",
+             "summary": "print a short table of a run",
+             "mesh": "turn a mesh of Gmsh or another program into cards of a deck",
+             "study": "run a deck with many settings, weigh errors and cost"}
 _RESULT = "a result: its base name (NAME) or NAME.vtkhdf, NAME.h5, NAME.csv"
 
 
@@ -45,16 +56,16 @@ def _tolerance(text: str) -> float:
 
 
 def _parser(arguments: list[str]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m emcon", description="Look at EMCON results; run studies.")
-    parser.add_argument("--version", action="version", version=f"emcon {__version__}")
+    name = "emcon" if Path(sys.argv[0]).name == "emcon" else "python -m emcon"
+    parser = argparse.ArgumentParser(prog=name, description="Look at EMCON results; run studies.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    plot = commands.add_parser("plot", help="write a picture of a run")
+    plot = commands.add_parser("plot", help=_COMMANDS["plot"])
     plot.add_argument("result", metavar="RESULT", help=_RESULT)
     plot.add_argument("--output", metavar="FILE", type=Path,
                       help="picture to write, by suffix png, pdf, svg, ... (default NAME.png)")
     plot.add_argument("--times", metavar="T", type=_time, nargs="+",
                       help="times of the upper row (default: six, evenly spaced)")
-    movie = commands.add_parser("animate", help="write an animation of a run")
+    movie = commands.add_parser("animate", help=_COMMANDS["animate"])
     movie.add_argument("result", metavar="RESULT", help=_RESULT)
     movie.add_argument("--output", metavar="FILE", type=Path,
                        help="animation to write, gif or mp4 by its suffix (default NAME.gif)")
@@ -62,16 +73,25 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
                        help="frames per second (default 20)")
     movie.add_argument("--field", metavar="NAME", default="von_mises",
                        help="point or cell field that gives the colours (default von_mises)")
-    two = commands.add_parser("compare", help="print the largest differences of two runs")
+    two = commands.add_parser("compare", help=_COMMANDS["compare"])
     two.add_argument("one", metavar="A", help=_RESULT)
     two.add_argument("other", metavar="B", help="another result of the same model")
     two.add_argument("--tolerance", metavar="TOL", type=_tolerance,
                      help="exit with 1 if a relative difference is above TOL")
     two.add_argument("--only", metavar="NAME", nargs="+", default=[],
                      help="compare these fields, columns and series only")
-    table = commands.add_parser("summary", help="print a short table of a run")
+    table = commands.add_parser("summary", help=_COMMANDS["summary"])
     table.add_argument("result", metavar="RESULT", help=_RESULT)
-    many = commands.add_parser("study", help="run a deck with many settings, weigh errors and cost")
+    mesh = commands.add_parser("mesh", help=_COMMANDS["mesh"])
+    mesh.add_argument("source", metavar="IN", type=Path,
+                      help="mesh of Gmsh (.msh), Abaqus (.inp) or another format of meshio")
+    mesh.add_argument("target", metavar="OUT", type=Path,
+                      help="file to write, for *INCLUDE, INPUT=OUT in a deck")
+    mesh.add_argument("--scale", metavar="F", type=_positive, default=1.0,
+                      help="multiply lengths by F")
+    mesh.add_argument("--refine", metavar="N", type=int, choices=range(7), default=0,
+                      help="cut each element in four, N times")
+    many = commands.add_parser("study", help=_COMMANDS["study"])
     if "study" in arguments[:1]:
         # h5py and matplotlib take long to load; other commands do not need all of it
         from .study import add_arguments
@@ -120,9 +140,59 @@ def _compare(options: argparse.Namespace) -> int:
     return int(options.tolerance is not None and bool(found.exceeding(options.tolerance)))
 
 
+def _mesh(options: argparse.Namespace) -> None:
+    """Write the cards, say what sets and surfaces there are."""
+    from .mesh import MeshError, read, refine
+
+    if options.target.suffix.lower() != ".inp":
+        raise ResultError(f"{options.target}: cards of a deck are written, so name it NAME.inp")
+    with warnings.catch_warnings(record=True) as notes:
+        warnings.simplefilter("always")
+        try:
+            found = refine(read(options.source), options.refine).scale(options.scale)
+        except FileNotFoundError:
+            raise ResultError(f"there is no file {options.source}") from None
+        except (MeshError, ImportError) as problem:
+            raise ResultError(str(problem)) from None
+    for note in notes:
+        print(f"note: {note.message}", file=sys.stderr)
+    print(f"{found.write(options.target)}: {len(found.node_labels)} nodes")
+    for kind, labels in found.element_labels.items():
+        print(f"  {kind:<12} {len(labels)} elements")
+    for what, sets in (("node set", found.node_sets), ("element set", found.element_sets),
+                       ("surface", found.surfaces)):
+        for name, members in sets.items():
+            print(f"  {what:<12} {name}, {len(members)}")
+
+
+def _hand_over(arguments: list[str]) -> int:
+    """What is not for this file: the compiled program takes the place of this one."""
+    first = arguments[0] if arguments else "--help"
+    near = difflib.get_close_matches(first, _COMMANDS, 1)
+    if near and not Path(first).exists():
+        print(f"error: there is no command {first}; did you mean {near[0]}?", file=sys.stderr)
+        return 2
+    program = find_program()
+    if not program:
+        print("error: this installation has no compiled program: make pywrap in a clone, or pip "
+              "install of its source, makes it", file=sys.stderr)
+        return 4
+    if first in {"--help", "-h"}:
+        text = subprocess.run([program, "--help"], capture_output=True, text=True, check=True).stdout
+        print(text.rstrip() + "\n\nalso, each with --help:")
+        for name, what in _COMMANDS.items():
+            print(f"  emcon {name:<10} {what}")
+        return 0
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os.execv(program, ["emcon", *arguments])
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    if not arguments or arguments[0] not in _COMMANDS:
+        return _hand_over(arguments)
     options = _parser(arguments).parse_args(arguments)
     try:
         if options.command == "plot":
@@ -131,6 +201,8 @@ def main(arguments: list[str] | None = None) -> int:
             _animate(options)
         elif options.command == "compare":
             return _compare(options)
+        elif options.command == "mesh":
+            _mesh(options)
         elif options.command == "study":
             return _study(options)
         else:

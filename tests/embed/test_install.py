@@ -1,13 +1,15 @@
-"""`pip install ./pywrap`: a wheel is complete, made for one interpreter, and runs on its own."""
+"""`pip install .`: a wheel is complete, made for one interpreter, and runs on its own."""
 
 from __future__ import annotations
 
 import json
 import os
 import shutil
+import stat
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import tomllib
 import zipfile
 from pathlib import Path
@@ -18,14 +20,17 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT/"pywrap"
 sys.path.insert(0, str(PACKAGE))
 
+from embed_tools import need, run  # noqa: E402
 from emcon.stepper import Stepper  # noqa: E402
 
 RING = ROOT/"input_decks"/"ring.inp"
-PROJECT = tomllib.loads((PACKAGE/"pyproject.toml").read_text(encoding="utf-8"))["project"]
+PROJECT = tomllib.loads((ROOT/"pyproject.toml").read_text(encoding="utf-8"))["project"]
 VERSION = PROJECT["version"]
-BESIDE = {"emcon/py.typed", "emcon/_core.pyi"}
+BESIDE = {"emcon/py.typed", "emcon/_core.pyi", "emcon/include/emcon.h", "emcon/include/emcon.hpp",
+          "emcon/cmake/emconConfig.cmake", "emcon/cmake/emconConfigVersion.cmake"}
 LIBRARY = f"libemcon.so.{'.'.join(VERSION.split('.')[:2 if VERSION.startswith('0.') else 1])}"
-COMPILED = {f"emcon/_core{sysconfig.get_config_var('EXT_SUFFIX')}", f"emcon/{LIBRARY}"}
+COMPILED = {f"emcon/_core{sysconfig.get_config_var('EXT_SUFFIX')}", f"emcon/{LIBRARY}",
+            "emcon/bin/emcon"}
 NO_PATH = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 ONE_INCREMENT = """
 import importlib.metadata, json, sys
@@ -47,8 +52,10 @@ pywrap:
 	test -z "$(PY_READY)$(THEIRS)"
 	$(PY) -c 'import numpy'
 	echo made > $(PACKAGE)/_core$(EXT_SUFFIX)
-	echo made > $(PACKAGE)/LIBRARY
-""".replace("LIBRARY", LIBRARY)
+	mkdir -p $(PACKAGE)/bin $(PACKAGE)/include $(PACKAGE)/cmake
+	for name in LIBRARY bin/emcon BESIDE; do echo made > $(PACKAGE)/$$name; done
+""".replace("LIBRARY", LIBRARY).replace("BESIDE", " ".join(
+    sorted(name.removeprefix("emcon/") for name in BESIDE if name.count("/") > 1)))
 
 
 def pip_wheel(package: Path, into: Path, **env: str) -> subprocess.CompletedProcess[str]:
@@ -58,9 +65,9 @@ def pip_wheel(package: Path, into: Path, **env: str) -> subprocess.CompletedProc
                           env=os.environ | env, capture_output=True, text=True)
 
 
-def setup(package: Path, command: str, **env: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "setup.py", command], cwd=package, env=os.environ | env,
-                          capture_output=True, text=True)
+def setup(tree: Path, command: str, **env: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "pywrap/setup.py", command], cwd=tree,
+                          env=os.environ | env, capture_output=True, text=True)
 
 
 def files(folder: Path, pattern: str = "*") -> set[str]:
@@ -74,7 +81,7 @@ def python_files(package: Path) -> set[str]:
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wheel")
-    done = pip_wheel(PACKAGE, folder)
+    done = pip_wheel(ROOT, folder)
     assert done.returncode == 0, done.stdout + done.stderr
     (file,) = folder.iterdir()
     return file
@@ -85,12 +92,15 @@ def tree(tmp_path: Path) -> Path:
     """A source tree with products of another interpreter in it, and a Makefile that is quick."""
     shutil.copytree(PACKAGE, tmp_path/"tree"/"pywrap",
                     ignore=shutil.ignore_patterns("_core*.so", "libemcon*", "__pycache__", "build",
-                                                  "dist", "*.egg-info"))
+                                                  "bin", "include", "cmake", "dist", "*.egg-info"))
     package = tmp_path/"tree"/"pywrap"
     (tmp_path/"tree"/"src_f90").mkdir()
+    (tmp_path/"tree"/"src_f90"/"source.f90").write_text("")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT/name, tmp_path/"tree")
     (tmp_path/"tree"/"Makefile").write_text(MAKEFILE)
     (package/"emcon.egg-info").mkdir()
-    listed = ["pyproject.toml", "setup.py", *python_files(package)]
+    listed = ["setup.py", *python_files(package)]
     stale = ["emcon/_core.cpython-36m-x86_64-linux-gnu.so", "emcon/libemcon.so.0", *COMPILED]
     for name in {*stale, "build/lib/emcon/gone.py", "emcon/_core.so"}:
         (package/name).parent.mkdir(parents=True, exist_ok=True)
@@ -105,6 +115,9 @@ def test_wheel_is_complete_and_for_this_interpreter(wheel: Path) -> None:
     assert within == python_files(PACKAGE) | COMPILED | BESIDE
     assert {name.split("/")[0] for name in names} == {"emcon", f"emcon-{VERSION}.dist-info"}
     tag = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    (program,) = (entry for entry in zipfile.ZipFile(wheel).infolist()
+                  if entry.filename == "emcon/bin/emcon")
+    assert program.external_attr >> 16 & stat.S_IXUSR
     platform = sysconfig.get_platform().replace("-", "_")
     assert wheel.name == f"emcon-{VERSION}-{tag}-{tag}{sys.abiflags}-{platform}.whl"
 
@@ -125,7 +138,7 @@ def test_unpacked_wheel_gives_the_bits_of_the_tree(wheel: Path, tmp_path: Path) 
 
 def test_nothing_slips_in_or_is_left(tree: Path, tmp_path: Path) -> None:
     before = files(tree)
-    done = pip_wheel(tree/"pywrap", tmp_path, MAKEFLAGS="n -- THEIRS=theirs")
+    done = pip_wheel(tree, tmp_path, MAKEFLAGS="n -- THEIRS=theirs")
     assert done.returncode == 0, done.stdout + done.stderr
     (file,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(file) as archive:
@@ -137,7 +150,7 @@ def test_nothing_slips_in_or_is_left(tree: Path, tmp_path: Path) -> None:
 
 def test_reason_of_a_failed_build_is_the_last_that_pip_shows(tree: Path, tmp_path: Path) -> None:
     (tree/"Makefile").write_text("$(error EMCON needs the packages gfortran)\npywrap:\n")
-    done = pip_wheel(tree/"pywrap", tmp_path)
+    done = pip_wheel(tree, tmp_path)
     text = done.stdout + done.stderr
     assert done.returncode != 0 and "Traceback" not in text
     assert text.index("EMCON needs the packages gfortran") < text.index(
@@ -147,7 +160,7 @@ def test_reason_of_a_failed_build_is_the_last_that_pip_shows(tree: Path, tmp_pat
 
 def test_wheel_without_an_extension_is_refused(tree: Path) -> None:
     (tree/"Makefile").write_text(".PHONY: pywrap\n")
-    done = setup(tree/"pywrap", "bdist_wheel")
+    done = setup(tree, "bdist_wheel")
     assert done.returncode != 0 and "error: EMCON could not be compiled" in done.stderr
     assert not list(tree.rglob("*.whl"))
 
@@ -155,21 +168,120 @@ def test_wheel_without_an_extension_is_refused(tree: Path) -> None:
 def test_old_numpy_is_refused(tree: Path, tmp_path: Path) -> None:
     (tmp_path/"numpy-1.26.4.dist-info").mkdir()
     (tmp_path/"numpy-1.26.4.dist-info"/"METADATA").write_text("Name: numpy\nVersion: 1.26.4\n")
-    done = setup(tree/"pywrap", "bdist_wheel", PYTHONPATH=str(tmp_path))
+    done = setup(tree, "bdist_wheel", PYTHONPATH=str(tmp_path))
     assert done.returncode != 0 and "Traceback" not in done.stderr
     assert f"{sys.executable} has 1.26.4: pip install 'numpy >=2.0, <3'" in done.stderr
 
 
 def test_package_folder_alone_is_refused(tree: Path) -> None:
     (tree/"Makefile").unlink()
-    done = setup(tree/"pywrap", "bdist_wheel")
+    done = setup(tree, "bdist_wheel")
     assert done.returncode != 0 and "Traceback" not in done.stderr
-    assert "holds no Makefile and src_f90: point pip to the folder pywrap of a clone" in done.stderr
+    assert "holds no Makefile and src_f90: point pip to a clone" in done.stderr
     assert not (tree/"build").exists()
 
 
-def test_source_archive_is_refused(tree: Path) -> None:
-    done = setup(tree/"pywrap", "sdist")
-    assert done.returncode != 0 and "Traceback" not in done.stderr
-    assert "pip wheel ./pywrap" in done.stderr
-    assert not list(tree.rglob("*.tar.gz"))
+def test_the_folder_of_the_package_is_no_place_for_pip(tree: Path) -> None:
+    done = subprocess.run([sys.executable, "setup.py", "bdist_wheel"], cwd=tree/"pywrap",
+                          capture_output=True, text=True)
+    assert done.returncode != 0 and f"point pip to {tree}" in done.stderr
+
+
+def test_source_archive_holds_sources_only(tree: Path, tmp_path: Path) -> None:
+    """All that a wheel is made of, none of what was made: a wheel of it is one of the tree."""
+    done = setup(tree, "sdist")
+    assert done.returncode == 0, done.stderr
+    (archive,) = (tree/"dist").glob("*.tar.gz")
+    with tarfile.open(archive) as packed:
+        packed.extractall(tmp_path/"unpacked", filter="data")
+    top = tmp_path/"unpacked"/f"emcon-{VERSION}"
+    expected = {"LICENSE", "Makefile", "README.md", "pyproject.toml", "src_f90/source.f90",
+                "pywrap/setup.py", "pywrap/build_backend.py",
+                *(f"pywrap/{name}" for name in python_files(PACKAGE) | BESIDE
+                  if name.count("/") == 1 or name.endswith(".py"))}
+    assert files(top) == expected | {"PKG-INFO", "setup.cfg", "pywrap/make_pyf.py"}
+    done = pip_wheel(top, tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_source_archive_of_the_project(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", "import build_backend, sys; "
+                           "build_backend.build_sdist(sys.argv[1])", tmp_path], cwd=ROOT,
+                          env=os.environ | {"PYTHONPATH": str(PACKAGE)}, capture_output=True,
+                          text=True)
+    assert done.returncode == 0, done.stderr
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as packed:
+        names = {name.split("/", 1)[1] for name in packed.getnames() if "/" in name}
+        metadata = packed.extractfile(f"emcon-{VERSION}/PKG-INFO").read().decode()
+    listed = subprocess.run(["git", "ls-files", "src_f90", "pywrap", "Makefile", ".ci"], cwd=ROOT,
+                            capture_output=True, text=True).stdout.split()
+    assert set(listed) <= names
+    assert not [name for name in names if name.endswith((".so", ".o", ".mod", ".pyc"))]
+    assert "License-Expression: BSD-3-Clause" in metadata and archive.stat().st_size < 10e6
+
+
+def test_the_program_of_an_unpacked_wheel(wheel: Path, tmp_path: Path) -> None:
+    """The command `emcon` of a wheel runs, checks, draws and tells of what there is not."""
+    folder = tmp_path/"unpacked"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)
+    (folder/"emcon"/"bin"/"emcon").chmod(0o755)             # as pip does
+    env = NO_PATH | {"PYTHONPATH": str(folder), "PATH": "/usr/bin:/bin"}
+
+    def emcon(*arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-m", "emcon", *arguments], cwd=tmp_path, env=env,
+                              capture_output=True, text=True)
+
+    assert emcon("--version").stdout.startswith(f"emcon {VERSION}")
+    help_text = emcon().stdout
+    assert "--output DIR" in help_text and "emcon mesh " in help_text
+    assert "unknowns" in emcon("check", RING).stdout
+    done = emcon(RING, "--set", "t_end=0.1", "--output", tmp_path)
+    assert done.returncode == 0 and "verdict: good" in done.stdout
+    assert emcon("restart", "ring.rst.h5", "--output", tmp_path/"on", "--until", "0.2").returncode == 0
+    assert "ring:" in emcon("summary", "ring").stdout
+    assert emcon("plot", "ring").returncode == 0 and (tmp_path/"ring.png").is_file()
+    done = emcon("plto", "ring")
+    assert done.returncode == 2 and "did you mean plot?" in done.stderr
+    assert emcon("run", "none.inp").returncode == 2
+    (folder/"emcon"/"bin"/"emcon").unlink()
+    done = emcon("check", RING)
+    assert done.returncode == 4 and "no compiled program" in done.stderr
+
+
+def test_a_host_in_cpp_by_the_files_of_a_wheel(wheel: Path, tmp_path: Path) -> None:
+    need("cmake")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path/"a folder")
+    told = subprocess.run([sys.executable, "-c", "import emcon; print(emcon.get_cmake_dir(), "
+                           "emcon.get_include(), emcon.get_library(), sep='\\n')"],
+                          env=NO_PATH | {"PYTHONPATH": str(tmp_path/"a folder")},
+                          capture_output=True, text=True, check=True).stdout.splitlines()
+    run("cmake", "-S", ROOT/"tests"/"embed"/"cmake", "-B", tmp_path/"host", f"-Demcon_DIR={told[0]}")
+    run("cmake", "--build", tmp_path/"host")
+    assert len(run(tmp_path/"host"/"host", RING).split()) == 2
+    run("cc", ROOT/"tests"/"embed"/"impact.c", f"-I{told[1]}", told[2], "-o", tmp_path/"impact",
+        f"-Wl,-rpath,{Path(told[2]).parent}")
+    assert run(tmp_path/"impact", RING, "h=0.05\nt_end=0.1").startswith("1 ")
+
+
+def test_meshes_become_cards(tmp_path: Path) -> None:
+    """`emcon mesh IN OUT`: what is read is what is written, scaled and refined."""
+    from emcon.mesh import block, read
+
+    block((0.0, 0.0), (2.0, 1.0), (4, 2)).write(tmp_path/"in.inp")
+
+    def mesh(*arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-m", "emcon", "mesh", *arguments], cwd=tmp_path,
+                              env=NO_PATH | {"PYTHONPATH": str(PACKAGE)}, capture_output=True,
+                              text=True)
+
+    done = mesh("in.inp", "out.inp", "--scale", "0.5", "--refine", "1")
+    assert done.returncode == 0 and "BLOCK_TOP" in done.stdout
+    found = read(tmp_path/"out.inp")
+    assert len(found.elements["CPE4"]) == 32 and found.nodes.max(axis=0).tolist() == [1.0, 0.5]
+    for arguments, reason in ((("none.msh", "out.inp"), "there is no file none.msh"),
+                              (("in.inp", "out.vtk"), "name it NAME.inp")):
+        done = mesh(*arguments)
+        assert done.returncode == 2 and reason in done.stderr and "Traceback" not in done.stderr

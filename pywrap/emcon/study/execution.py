@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
+from ..program import find_program as packed_program
 from ..results import ResultError, ResultPaths
 from .deck import DeckFile, refined_deck, times_of
 from .errors import StudyError
@@ -267,11 +268,13 @@ def bar_text(done: int, failed: int, total: int, seconds: float, width: int = 30
 
 
 def find_program(named: str | None, precision: str = "double") -> str:
-    """The program of a precision: as named, in the source tree, or, of double, on the path."""
+    """The program of a precision: as named, in the source tree, or, of double, that of the package
+    or on the path."""
     folder = PRECISIONS[precision]
     built = Path(__file__).resolve().parents[3]/"build"/folder/"emcon"
     on_path = shutil.which("emcon") if precision == "double" else None
-    choices: Iterable[str | None] = [named] if named else [str(built), on_path]
+    packed = packed_program() if precision == "double" else None
+    choices: Iterable[str | None] = [named] if named else [str(built), packed, on_path]
     for choice in choices:
         found = shutil.which(choice) if choice else None
         if found:

