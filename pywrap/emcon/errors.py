@@ -11,6 +11,10 @@ class InputError(ValueError):
     """A deck or an argument is wrong; the text says what, where and what to do."""
 
 
+class MissingFile(InputError, FileNotFoundError):
+    """A deck that is not there."""
+
+
 class AnalysisError(ArithmeticError):
     """The analysis failed; the state is that of the last part that succeeded."""
 

@@ -92,6 +92,33 @@ class FieldFile:
                               f"{', '.join((*self.point_fields, *self.cell_fields)) or 'none'}")
         return self._series("PointData", name)
 
+    def keys(self) -> tuple[str, ...]:
+        """The names of all fields, each once."""
+        return tuple(dict.fromkeys((*self.point_fields, *self.cell_fields)))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.keys())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.keys()
+
+    def __len__(self) -> int:
+        return len(self.keys())
+
+    def items(self) -> Iterator[tuple[str, FieldSeries]]:
+        """Names and fields; nothing is read yet."""
+        return ((name, self[name]) for name in self)
+
+    def values(self) -> Iterator[FieldSeries]:
+        """All fields; nothing is read yet."""
+        return (self[name] for name in self)
+
+    def __repr__(self) -> str:
+        if not self._file:
+            return f"FieldFile({str(self.path)!r}), closed"
+        return (f"FieldFile({str(self.path)!r}): {len(self.times)} frames, t = {self.times[0]:g} "
+                f"to {self.times[-1]:g}, {', '.join(self)}")
+
     def _series(self, group: str, name: str) -> FieldSeries:
         names = self.point_fields if group == "PointData" else self.cell_fields
         if name not in names:

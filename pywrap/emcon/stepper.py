@@ -5,7 +5,9 @@ from __future__ import annotations
 import html
 import json
 import os
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, NoReturn
@@ -17,9 +19,10 @@ from . import _core
 from .arguments import labels, number, path_bytes, positive, real_array
 from .conditions import Conditions
 from .csr import Csr
-from .errors import AnalysisError, InputError
+from .errors import AnalysisError, InputError, MissingFile
 from .handle import Handle
 from .memory import structure, text
+from .meshes import Meshes
 from .model import Model
 from .queries import ConstraintReport, Evaluation, Queries, contact_arguments, of_all
 
@@ -66,6 +69,9 @@ class Snapshot:
     def __init__(self, address: int) -> None:
         self._address = address
 
+    def __repr__(self) -> str:
+        return "a state of Stepper.save, for Stepper.restore"
+
     def __reduce__(self) -> NoReturn:
         raise TypeError("a saved state cannot be copied or sent to another process; use "
                         "write_restart")
@@ -75,7 +81,7 @@ class Snapshot:
             _core.emcon_free_snapshot(self._address)
 
 
-class Stepper(Queries, Conditions):
+class Stepper(Queries, Conditions, Meshes):
     """A model at some point of its analysis; `model` is one, or the path of a deck.
 
     Parameters of the deck are given as keywords: ``Stepper("ring.inp", h=0.005)``. Arrays are
@@ -90,12 +96,18 @@ class Stepper(Queries, Conditions):
 
     def __init__(self, model: str | os.PathLike[str] | Model, *, lenient: bool = False,
                  **parameters: object) -> None:
-        if not isinstance(model, Model):
-            model = Model.from_deck(model, lenient=lenient, **parameters)
-        elif lenient or parameters:
-            raise InputError("parameters are given to Model.from_deck, not to the Stepper of a "
-                             "Model")
-        self._begin(model.build)
+        if isinstance(model, Model):
+            if lenient or parameters:
+                raise InputError("parameters are given to Model.from_deck, not to the Stepper of "
+                                 "a Model")
+            self._begin(model.build)
+            return
+        try:
+            self._begin(Model.from_deck(model, lenient=lenient, **parameters).build)
+        except InputError as problem:
+            if os.path.exists(model):
+                raise
+            raise MissingFile(str(problem)) from None
 
     def _begin(self, build: Callable[[Handle], None]) -> None:
         """A library model, made by `build` in its handle."""
@@ -179,17 +191,26 @@ class Stepper(Queries, Conditions):
         self._handle.change(_core.emcon_next_step)
 
     def run(self, until: float | None = None,
-            callback: Callable[[Stepper, Increment], bool | None] | None = None) -> int:
+            callback: Callable[[Stepper, Increment], bool | None] | None = None, *,
+            output: str | os.PathLike[str] | None = None, progress: bool = False) -> int:
         """Advance by increments of the deck to its end, or to the first that reaches time `until`.
 
         ``callback(stepper, increment)`` is called after each; where it returns True the run stops
-        there, None and False go on. What it raises ends the run as well. Returns the number of
-        increments made; the stepper can go on in any case.
+        there, None and False go on. What it raises ends the run as well. With `output` the run
+        leaves files as one of the program does (docs/deck.md), from its first state on, for
+        `Results`: those of a name FOLDER/NAME, or of FOLDER/run where there is such a folder. With
+        `progress` a line on standard error tells how far it is. Returns the number of increments
+        made; the stepper can go on in any case.
         """
         if until is not None:
             until = number(until, "until")
         if callback is not None and not callable(callback):
             raise InputError(f"the callback is to be a function, not {callback!r}")
+        with self._recording(output):
+            return self._run(until, callback, progress)
+
+    def _run(self, until: float | None,
+             callback: Callable[[Stepper, Increment], bool | None] | None, progress: bool) -> int:
         n = 0
         while not self.is_done:
             if until is not None:
@@ -198,6 +219,9 @@ class Stepper(Queries, Conditions):
                     break
             increment = self.step()
             n += 1
+            if progress:
+                print(f"\r{self.fraction:4.0%}  time {increment.time:g}  increments {n}  "
+                      f"contacts {increment.active} ", end="", file=sys.stderr, flush=True)
             if callback is None:
                 continue
             answer = callback(self, increment)
@@ -206,7 +230,37 @@ class Stepper(Queries, Conditions):
                                  "False go on")
             if answer:
                 break
+        if progress:
+            print(file=sys.stderr)
         return n
+
+    @contextmanager
+    def _recording(self, output: str | os.PathLike[str] | None) -> Iterator[None]:
+        """Files for what is done within."""
+        if output is None:
+            yield
+            return
+        base = os.fsdecode(path_bytes(output))
+        if os.path.isdir(base):
+            base = os.path.join(base, "run")
+        elif not os.path.isdir(os.path.dirname(base) or "."):
+            raise FileNotFoundError(2, "no such folder", os.path.dirname(base))
+        self._handle.call(_core.emcon_record, os.fsencode(base))
+        try:
+            yield
+        finally:
+            if self._handle.address:             # a callback may have closed the stepper
+                self._handle.call(_core.emcon_end_record)
+
+    @property
+    def fraction(self) -> float:
+        """How much of the run of the deck is done, 0 to 1."""
+        return float(self._handle.call(_core.emcon_get_progress)[0])
+
+    @property
+    def t_end(self) -> float:
+        """The time at which the last step of the deck ends [T]."""
+        return float(self._handle.call(_core.emcon_get_progress)[1])
 
     @property
     def is_done(self) -> bool:
@@ -247,6 +301,9 @@ class Stepper(Queries, Conditions):
             self._handle.call(_text, _core.emcon_get_report))
         return report
 
+    def __copy__(self) -> NoReturn:
+        self._handle.__reduce__()
+
     def __repr__(self) -> str:
         lines = [row["text"] for rows in self.report().values() for row in rows]
         return "\n".join([f"Stepper at time {self.time:g}", *lines])
@@ -257,12 +314,6 @@ class Stepper(Queries, Conditions):
             cells = "".join(f"<tr><td>{html.escape(row['text'])}</td></tr>" for row in rows)
             parts.append(f"<table><tr><th>{kind}</th></tr>{cells}</table>")
         return "".join(parts)
-
-    def node_set(self, name: str) -> NDArray[np.intp]:
-        """The rows of a node set in arrays of nodes, (k,). Raises `InputError` if there is none."""
-        if not isinstance(name, str) or not name.strip() or "\0" in name:
-            raise InputError(f"a node set has a name, not {name!r}")
-        return np.flatnonzero(self._handle.call(_core.emcon_find_nodes, name.encode(), self.n_node))
 
     # ---- state ------------------------------------------------------------------------------
 

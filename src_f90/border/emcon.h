@@ -305,6 +305,13 @@ int emcon_is_done(emcon_model *model);
 /* Increments until `time` is reached, or the end of the deck. Callbacks may be NULL. */
 int emcon_run(emcon_model *model, double time, emcon_progress progress, emcon_log log, void *user);
 
+/* Write results as a run of the program does, from the present state on: `base`.vtkhdf, .h5, .csv,
+ * a row and what the deck asks for after each increment of whichever function; until it is ended,
+ * which adds `base`.json, or the model is closed. Where they cannot be written any more, the record
+ * ends and the increment tells so. */
+int emcon_record(emcon_model *model, const char *base);
+int emcon_end_record(emcon_model *model);
+
 /* ---- steps of any size ----------------------------------------------------------------------- */
 
 /* One step of the size h > 0 under the conditions of the present step of the deck, cut into parts
@@ -350,6 +357,10 @@ int emcon_resume(emcon_model *model, const char *path);
 int emcon_get_sizes(emcon_model *model, emcon_sizes *sizes);
 
 int emcon_get_time(emcon_model *model, double *time);
+
+/* How much of the run of the deck is done, 0 to 1, and the time at which its last step ends. */
+int emcon_get_progress(emcon_model *model, double *fraction, double *t_end);
+
 int emcon_get_ledger(emcon_model *model, emcon_ledger *ledger);
 
 /* The verdict on the increments that led to this state, of whichever function: is the balance
@@ -368,6 +379,25 @@ int emcon_get_report(emcon_model *model, const char **json);
 
 /* Which nodes are in the node set `name`: 1, else 0. */
 int emcon_find_nodes(emcon_model *model, const char *name, int n_node, int *is_in /* n_node */);
+
+/* The names that sets and surfaces have in the deck, a line each: `node set RING`, `element set
+ * RING`, `surface RING_OUTER`. `*text` as that of emcon_get_verdict. */
+int emcon_get_names(emcon_model *model, const char **text);
+
+/* Which elements are in the element set `name`: 1, else 0; which of their faces in the surface
+ * `name`, as the deck counts them: face 1 is the first. */
+int emcon_find_elements(emcon_model *model, const char *name, int n_element,
+                        int *is_in /* n_element */);
+int emcon_find_faces(emcon_model *model, const char *name, int n_element,
+                     int *is_in /* n_element x 6 */);
+
+/* Elements: labels, what VTK calls their kind (5 and 9: CPE3 and CPE4), and their nodes in VTK's
+ * order, which is that of the deck; -1 behind the last. */
+int emcon_get_elements(emcon_model *model, int n_element, int *label /* n_element */,
+                       int *kind /* n_element */, int *node /* n_element x 20 */);
+
+/* The body that each node is part of, one of n_body; -1: of none. */
+int emcon_get_bodies(emcon_model *model, int n_node, int *body /* n_node */);
 
 /* Labels of the nodes, n_node. */
 int emcon_get_labels(emcon_model *model, int n_node, int *label /* n_node */);
@@ -397,6 +427,13 @@ int emcon_get_pressures(emcon_model *model, int n_contact, double *pressure /* n
  * same on the master side, length in contact; and the number of active contacts. */
 int emcon_get_pairs(emcon_model *model, int n_pair, double *total /* n_pair x 7 */,
                     int *n_active /* n_pair */);
+
+/* The field that the field file has of a variable of decks, as U, V, RF, S, E, ENER, CDIS, CSTR,
+ * CF, in the present state: `*n_component` numbers for each of `*n_place` nodes, of E, ENER, ELKE
+ * and EVOL elements; S are six components of Cauchy's stress and von Mises' behind them. The array
+ * belongs to the model and is valid until this is asked again, or the model is closed. */
+int emcon_get_field(emcon_model *model, const char *name, int *n_place, int *n_component,
+                    const double **value);
 
 /* Of each body: px, py, and the angular momentum about the origin; 3*n_body. */
 int emcon_get_momenta(emcon_model *model, int n_body, double *momenta /* n_body x 3 */);

@@ -3,12 +3,13 @@
 module emcon_c_by_hand
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_double, c_f_pointer, &
       c_f_procpointer, c_funptr, c_int, c_loc, c_null_ptr, c_ptr
-   use emcon_c_border, only : c_string, put_address, put_matrix, put_number
+   use emcon_c_border, only : c_string, f_text, put_address, put_matrix, put_number
    use emcon_c_types, only : increment_c, log_c, progress_c
    use emcon_errors, only : err_analysis, err_input, err_interrupt, err_none, error_t, raise
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t
    use emcon_model, only : find_built, find_model, handle_fail, handle_pass, model_t
+   use emcon_model_record, only : model_end_record, model_field
    use emcon_model_run, only : model_go
    use emcon_run_log, only : model_lines
    use emcon_stepper, only : stepper_close, stepper_fraction, stepper_is_done
@@ -20,7 +21,7 @@ module emcon_c_by_hand
    implicit none
    private
    public :: emcon_version_c, emcon_close, emcon_message, emcon_is_done, emcon_run
-   public :: emcon_free_snapshot, emcon_null_space_c
+   public :: emcon_free_snapshot, emcon_get_field, emcon_null_space_c
 
 contains
 
@@ -42,10 +43,12 @@ contains
    subroutine emcon_close(handle) bind(c)
       type(c_ptr), value :: handle
       type(model_t), pointer :: model
+      type(error_t), allocatable :: error
       integer(c_int) :: ierr
 
       call find_model(handle, model, ierr)
       if (.not. associated(model)) return
+      call model_end_record(model, error)        ! nobody is left who could be told
       call query_free(model%query)
       call stepper_close(model%stepper)
       deallocate(model)
@@ -59,6 +62,28 @@ contains
       call c_f_pointer(kept, snapshot)
       deallocate(snapshot)
    end subroutine emcon_free_snapshot
+
+   integer(c_int) function emcon_get_field(handle, name, n_place, n_component, value) &
+      result(status) bind(c)
+      type(c_ptr), value :: handle, name, n_place, n_component, value
+      type(model_t), pointer :: model
+      type(error_t), allocatable :: error
+      real(dp), allocatable :: found(:, :)
+
+      call find_built(handle, model, status)
+      if (status /= err_none) return
+      call put_address(c_null_ptr, value)
+      call put_number(0, n_place)
+      call put_number(0, n_component)
+      call model_field(model, f_text(name), found, error)
+      if (.not. allocated(error)) then
+         model%c_field = real(found, c_double)
+         call put_number(size(found, 2), n_place)
+         call put_number(size(found, 1), n_component)
+         if (size(found) > 0) call put_address(c_loc(model%c_field), value)
+      end if
+      call handle_pass(model, error, status)
+   end function emcon_get_field
 
    type(c_ptr) function emcon_message(handle) bind(c)
       type(c_ptr), value :: handle

@@ -7,6 +7,7 @@ module emcon_model_run
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
    use emcon_model, only : model_t
+   use emcon_model_record, only : model_keep
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_check_solids, &
       stepper_is_done, stepper_read, stepper_read_text
@@ -128,6 +129,7 @@ contains
          call stepper_advance(model%stepper, made, error)
       end if
       increment = as_increment(model, made)
+      call model_keep(model, made, error)
    end subroutine model_go
 
    subroutine model_step(model, h, increment, error)
@@ -139,6 +141,7 @@ contains
 
       call stepper_step(model%stepper, h, made, error)
       increment = as_increment(model, made)
+      call model_keep(model, made, error)
    end subroutine model_step
 
    pure type(increment_c) function as_increment(model, made)

@@ -8,11 +8,12 @@ module emcon_model_state
    use emcon_quantities, only : contact_quantity
    use emcon_report_row, only : report_row_t, rows_json
    use emcon_scene_report, only : scene_report
+   use emcon_stepper, only : stepper_fraction, stepper_is_done
    use emcon_text, only : to_upper
    use emcon_verdict_file, only : verdict_so_far
    implicit none
    private
-   public :: model_time, model_ledger, model_verdict, model_notes, model_report
+   public :: model_time, model_progress, model_ledger, model_verdict, model_notes, model_report
    public :: model_find_nodes, model_labels, model_positions
    public :: model_state, model_get_multipliers, model_contact, model_pressures, model_pairs
 
@@ -24,6 +25,15 @@ contains
 
       time = model%stepper%march%state%time
    end subroutine model_time
+
+   subroutine model_progress(model, fraction, t_end)
+      type(model_t), intent(in) :: model
+      real(wp), intent(out) :: fraction, t_end
+
+      fraction = 1.0_wp
+      if (.not. stepper_is_done(model%stepper)) fraction = stepper_fraction(model%stepper)
+      t_end = sum(model%stepper%scene%step%duration)
+   end subroutine model_progress
 
    pure subroutine model_ledger(model, ledger)
       type(model_t), intent(in) :: model

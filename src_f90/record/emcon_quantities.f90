@@ -11,11 +11,13 @@ module emcon_quantities
    use emcon_stepper, only : stepper_t
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
    use emcon_term_registry, only : terms_solid
+   use emcon_text, only : string_t
    use emcon_turn_record, only : turn_record_spin
    use emcon_vtkhdf, only : field_t
    implicit none
    private
    public :: quantity_values, quantity_components, quantity_fields, quantity_of_field
+   public :: quantity_variables
    public :: node_quantity, element_quantity, contact_quantity, contact_field, pair_quantity
    public :: at_nodes, at_elements, at_contacts, at_pairs, pair_variables
 
@@ -92,6 +94,20 @@ contains
       if (n == of_vector) n = n_dim
       if (n == of_rotation) n = n_dim*(n_dim - 1)/2
    end function quantity_components
+
+   !> All variables that can stand in the field file.
+   pure function quantity_variables() result(names)
+      type(string_t), allocatable :: names(:)
+      integer :: k, n
+
+      allocate(names(count(rows%field /= "")))
+      n = 0
+      do k = 1, size(rows)
+         if (rows(k)%field == "") cycle
+         n = n + 1
+         names(n)%text = trim(rows(k)%variable)
+      end do
+   end function quantity_variables
 
    !> The fields of the field file that a variable stands for.
    pure function quantity_fields(variable, n_dim) result(fields)

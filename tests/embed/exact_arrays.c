@@ -103,6 +103,49 @@ static void ask(void)
    free(is_in);
 }
 
+/* Mesh, sets, bodies, fields: arrays of exactly their size, and what there is not. */
+static void look(void)
+{
+   const int n = sizes.n_element;
+   const size_t size = (size_t)n;
+   int *label = calloc(size, sizeof *label), *kind = calloc(size, sizeof *kind);
+   int *node = calloc(20*size, sizeof *node), *face = calloc(6*size, sizeof *face);
+   int *body = calloc((size_t)sizes.n_node, sizeof *body);
+   int n_place = -1, n_component = -1;
+   const double *value = NULL;
+   const char *text = NULL;
+   double fraction = -1, t_end = -1;
+   WORKS(emcon_get_elements(m, n, label, kind, node));
+   need(node[0] >= 0 && node[19] == -1 && kind[0] == 9, "an element");
+   WORKS(emcon_get_elements(m, n, NULL, NULL, node));
+   REFUSED(emcon_get_elements(m, n + 1, label, kind, node));
+   WORKS(emcon_get_bodies(m, sizes.n_node, body));
+   need(body[node[0]] >= 0 && body[node[0]] < sizes.n_body, "its body");
+   REFUSED(emcon_get_bodies(m, sizes.n_node - 1, body));
+   REFUSED(emcon_find_elements(m, "no such set", n, label));
+   REFUSED(emcon_find_faces(m, "no such surface", n, face));
+   REFUSED(emcon_find_faces(m, NULL, n, face));
+   WORKS(emcon_get_names(m, &text));
+   need(text && strstr(text, "node set ") && strstr(text, "surface "), "names");
+   WORKS(emcon_get_field(m, "s", &n_place, &n_component, &value));
+   need(n_place == sizes.n_node && n_component == 7 && value[7*n_place - 1] >= 0, "stress");
+   WORKS(emcon_get_field(m, "ENER", &n_place, &n_component, &value));
+   need(n_place == n && n_component == 1 && value[n - 1] >= 0, "strain energy");
+   WORKS(emcon_get_field(m, "U", NULL, NULL, NULL));
+   REFUSED(emcon_get_field(m, "SS", &n_place, &n_component, &value));
+   need(n_place == 0 && value == NULL, "nothing where there is none");
+   REFUSED(emcon_get_field(m, NULL, &n_place, &n_component, &value));
+   WORKS(emcon_get_progress(m, &fraction, &t_end));
+   need(fraction >= 0 && fraction <= 1 && t_end > 0, "progress");
+   need(emcon_record(m, "no/such/folder/run") == EMCON_ERROR_FILE, "a folder that is not there");
+   WORKS(emcon_end_record(m));                  /* of nothing */
+   free(label);
+   free(kind);
+   free(node);
+   free(face);
+   free(body);
+}
+
 /* Kernels: along a straight edge the gap is what the slave moves across it, and a linear law gives
  * half its stress times the strain; derivatives go along rows. */
 static void kernels(void)
@@ -151,6 +194,7 @@ int main(int argc, char **argv)
    WORKS(emcon_get_sizes(m, &sizes));
    evaluate();
    ask();
+   look();
    kernels();
    int *label = calloc((size_t)sizes.n_node, sizeof *label),
        *unknown = calloc(2*(size_t)sizes.n_node, sizeof *unknown);

@@ -164,7 +164,8 @@ def test_everything_of_a_closed_stepper_says_so(one: Path) -> None:
         "evaluate": (ZERO, 0.1), "residual": (ZERO, 0.1), "tangent": (ZERO, 0.1),
         "null_space": (ZERO, 0.1), "guess": (0.1,), "constraint": (ZERO, ZERO),
         "restore": (saved,), "write_restart": ("closed.rst.h5",), "prescribe": (1, 1, 0.0),
-        "release": (1, 1), "set_point_load": (1, 1, 0.0), "set_pressure": (1, 1, 0.0),
+        "element_set": ("ALL",), "surface": ("ALL",), "field": ("U",), "release": (1, 1),
+        "set_point_load": (1, 1, 0.0), "set_pressure": (1, 1, 0.0),
         "set_gravity": (1, 0.0), "set_threads": (1,), "node_set": ("ALL",)}
     free = {"close", "from_restart"}
     for name in dir(Stepper):
