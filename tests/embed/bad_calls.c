@@ -22,7 +22,8 @@ static void tell(const char *call, int status)
 static void without_model(void)
 {
    double x[2] = {0, 0};
-   int i[2] = {0, 0};
+   int i[2] = {0, 0}, faces[6], nodes[20];
+   const double *values;
    emcon_csr matrix;
    emcon_sizes sizes;
    const char *json;
@@ -60,6 +61,15 @@ static void without_model(void)
    TELL(emcon_get_notes(m, &json));
    TELL(emcon_get_report(m, &json));
    TELL(emcon_find_nodes(m, "ALL", 1, i));
+   TELL(emcon_find_elements(m, "ALL", 1, i));
+   TELL(emcon_find_faces(m, "TOP", 1, faces));
+   TELL(emcon_get_names(m, &json));
+   TELL(emcon_get_elements(m, 1, i, i, nodes));
+   TELL(emcon_get_bodies(m, 1, i));
+   TELL(emcon_get_field(m, "U", i, i, &values));
+   TELL(emcon_get_progress(m, x, x));
+   TELL(emcon_record(m, "none"));
+   TELL(emcon_end_record(m));
    TELL(emcon_get_labels(m, 1, i));
    TELL(emcon_get_positions(m, 1, x));
    TELL(emcon_get_state(m, 1, x, x));
