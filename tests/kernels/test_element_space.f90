@@ -267,15 +267,16 @@ contains
       end do
    end subroutine test_step
 
-   !> Central differences of step eps^(1/3): error a multiple of eps^(2/3).
+   !> Central differences over four points, of step h = eps^(0.3): an error of order h^4 = eps^(1.2)
+   !> and one of eps/h = eps^(0.7).
    subroutine test_tangent(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
-      type(space_part_t) :: step, up, down
+      type(space_part_t) :: step, near(2), far(2)
       real(wp) :: u0(3, m), du(3, m), way(3, m), h
       integer :: a, i, j
 
-      h = eps**(1.0_wp/3.0_wp)
+      h = eps**0.3_wp
       do i = 0, n_law*n_kind - 1
          call make_sample(1 + i/n_law, 1 + mod(i, n_law), mod(i, 3) > 0, 0.03_wp, sample, error)
          if (allocated(error)) return
@@ -285,10 +286,13 @@ contains
             do a = 1, 3
                way = 0.0_wp
                way(a, j) = h
-               call respond(sample, u0, du + way, .false., up)
-               call respond(sample, u0, du - way, .false., down)
-               call check_near(error, step%tangent(:, :, a, j), (up%force - down%force) &
-                  /(2.0_wp*h), 3000.0_wp*h**2, young, sample%what)
+               call respond(sample, u0, du + way, .false., near(1))
+               call respond(sample, u0, du - way, .false., near(2))
+               call respond(sample, u0, du + 2.0_wp*way, .false., far(1))
+               call respond(sample, u0, du - 2.0_wp*way, .false., far(2))
+               call check_near(error, step%tangent(:, :, a, j), &
+                  (8.0_wp*(near(1)%force - near(2)%force) - (far(1)%force - far(2)%force)) &
+                  /(12.0_wp*h), 800.0_wp*eps**0.7_wp, young, sample%what)
             end do
          end do
          if (allocated(error)) return
