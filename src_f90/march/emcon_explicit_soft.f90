@@ -19,6 +19,10 @@ module emcon_explicit_soft
    private
    public :: explicit_soft_push, explicit_soft_force, explicit_soft_limit, explicit_soft_widen
 
+   !> A critical step that was found with closed contacts counts until a node is stiffened by so
+   !> much more: places of contact move a little with each step.
+   real(wp), parameter :: room = 1.1_wp
+
 contains
 
    !> Find the contacts that are closed at `self%explicit%place`, as the end of the present step or
@@ -178,19 +182,18 @@ contains
       type(march_t), intent(inout) :: self
       logical, intent(out) :: has_grown          !! the critical step is to be found with them
       real(wp) :: total(size(self%v1, 2)), slope(size(self%explicit%stiffness))
-      logical :: is_free(size(self%v1, 2))
       integer :: k, i
 
       has_grown = .false.
       associate (soft => self%explicit%soft(self%explicit%i_start), &
             bound => self%explicit%met)
          if (.not. self%active%softness%is_at_ends .or. soft%n == 0) return
-         is_free = [(moves(self, [i]), i = 1, size(is_free))]
          total = 0.0_wp
          do k = 1, soft%n
             associate (item => soft%item(k))
                do i = 1, item%n_node
-                  slope(i) = merge(sqrt(sum(item%c(:, i)**2)), 0.0_wp, is_free(item%node(i)))
+                  slope(i) = 0.0_wp
+                  if (moves(self, item%node(i:i))) slope(i) = sqrt(sum(item%c(:, i)**2))
                end do
                do i = 1, item%n_node
                   total(item%node(i)) = total(item%node(i)) &
@@ -199,7 +202,7 @@ contains
             end associate
          end do
          has_grown = any(total > (1.0_wp + sqrt(epsilon(1.0_wp)))*bound)
-         if (has_grown) bound = max(bound, total)
+         if (has_grown) bound = max(bound, room*total)
       end associate
    end subroutine explicit_soft_widen
 

@@ -129,9 +129,10 @@ contains
       type(increment_t), intent(inout) :: increment
 
       call stand_off_add(increment%stand_off, self%system, self%active%set, h)
-      increment%give = max(increment%give, softness_depth(self%active%set))
+      increment%give = max(increment%give, softness_depth(self%active%softness, &
+         self%active%set))
       if (self%active%softness%is_at_ends) increment%give = max(increment%give, &
-         softness_depth(self%explicit%soft(self%explicit%i_start)))
+         softness_depth(self%active%softness, self%explicit%soft(self%explicit%i_start)))
       increment%n_augmentation = max(increment%n_augmentation, &
          self%active%softness%n_augmentation)
    end subroutine tell_gaps

@@ -29,6 +29,7 @@ module emcon_softness
       real(wp) :: tolerance = 0.0_wp             !! of that, by the edge
       integer :: n_augmentation = 0              !! in the last increment
       real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
+      real(wp), allocatable :: edge(:)           !! (n_constraint) of the slave surface [L]
    end type softness_state_t
 
 contains
@@ -52,7 +53,7 @@ contains
       end do
       if (.not. self%is_on) return
       self%tolerance = step%softness%tolerance
-      allocate(self%stiffness(system%n_constraint), source=0.0_wp)
+      allocate(self%stiffness(system%n_constraint), self%edge(system%n_constraint), source=0.0_wp)
       inner = 0.0_wp
       do k = 1, size(system%term)
          call system%term(k)%term%add_stiffness(inner)
@@ -103,6 +104,8 @@ contains
          contact%gives_way = .not. self%augments .and. step%scheme%masses_resist
          self%stiffness(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
             contact%both_sides)*by_area
+         ! Nodes at the ends of a surface have half of an edge.
+         self%edge(before + 1:before + size(area)) = maxval(area/contact%thickness)
          if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) // &
             " gives way by a stiffness of " // to_text(by_area, 9) // ", pressure by penetration")
       end associate
@@ -184,15 +187,21 @@ contains
       end do
    end function softness_stored
 
-   !> How deep the contacts of `set` have given way, by the edge: the largest.
-   pure real(wp) function softness_depth(set) result(depth)
+   !> How deep the contacts of `set` have given way: the largest, by the edge of the slave or of the
+   !> master, whichever is shorter; of an augmented Lagrangian by that of its tolerance.
+   pure real(wp) function softness_depth(self, set) result(depth)
+      type(softness_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
+      real(wp) :: edge
       integer :: k
 
       depth = 0.0_wp
       if (.not. allocated(set%soft)) return
       do k = set%n_held + 1, set%n
-         depth = max(depth, -set%soft(k)%left/set%item(k)%size)
+         edge = set%item(k)%size
+         if (self%edge(set%id(k)) > 0.0_wp .and. .not. self%augments) edge = min(edge, &
+            self%edge(set%id(k)))
+         depth = max(depth, -set%soft(k)%left/edge)
       end do
    end function softness_depth
 

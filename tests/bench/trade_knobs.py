@@ -162,6 +162,8 @@ def lines_of(name, make, parameters, rounds):
         for knob, change in KNOBS:
             if not pathlib.Path(change.get("program", PROGRAM)).exists():
                 continue
+            if "share" in change and k > 0:              # of thousands of increments once is enough
+                continue
             run, done = run_of(deck, folder / name_of(name, knob, k), parameters, change)
             cost.setdefault(knob, []).append(done.cpu)
             if k == 0:

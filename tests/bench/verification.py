@@ -16,7 +16,8 @@ import re
 import tempfile
 
 from book import (bar, contact_patch, contact_sides, elements, forces, free_bodies, gain, hertz, impacts,
-                  ironing, numerics, plain, press_fit, ring, slave_floor, spin, statics, ties, ties_condition)
+                  ironing, numerics, plain, press_fit, ring, slave_floor, soft, spin, statics, ties,
+                  ties_condition)
 from book.common import Runs
 
 DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
@@ -25,7 +26,7 @@ DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
 CHAPTERS = [
     chapter
     for module in (ring, spin, bar, forces, free_bodies, statics, elements, ties, ties_condition, contact_patch,
-                   hertz, press_fit, ironing, plain, contact_sides, slave_floor, numerics, impacts,
+                   hertz, press_fit, ironing, plain, contact_sides, slave_floor, soft, numerics, impacts,
                    gain)
     for chapter in module.CHAPTERS
 ]

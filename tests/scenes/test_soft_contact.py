@@ -172,6 +172,17 @@ def test_other_schemes_push_by_a_penalty_too(scheme, tmp_path):
     assert made < 0.2
 
 
+def test_what_gives_way_is_told_by_the_shorter_edge(tmp_path):
+    """The judge counts by the edges of the bar; those of the floor are longer."""
+    for factor, verdict in ((10, "good"), (0.1, "bad")):
+        _, run = attempt(DECKS/"bouncing_bar.inp", tmp_path/str(factor), (), {
+            "method": f"'PENALTY, FACTOR={factor}'", "t_end": 2.0, "frame": 2.0, "h": 0.0025,
+            "formulation": "NODE TO SURFACE"})
+        assert run.verdict["verdict"] == verdict, run.verdict["reasons"]
+        # The foot of the bar is a single edge, half of which is each node's.
+        assert 0.5 <= run.verdict["give"]/run.verdict["penetration"] <= 4
+
+
 # ---- explicit steps -----------------------------------------------------------------------------
 
 
