@@ -54,7 +54,7 @@ __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "
            "HistoryFile", "InputError", "Interface", "Model", "Outside", "Pairs", "ResultError",
            "ResultPaths", "Results", "Series", "Stepper", "__version__", "animate",
            "check_derivatives", "compare", "energy_drift", "get_cmake_dir", "get_include",
-           "get_library", "locate", "plot", "read_bodies", "read_history", "read_pairs"]
+           "get_library", "locate", "mesh", "plot", "read_bodies", "read_history", "read_pairs"]
 
 #: The names of the package by module, imported when first used: matplotlib and HDF5 take long to
 #: load, and results are read without the compiled extension.
@@ -77,6 +77,8 @@ _LATE = {name: module for module, names in _PLACES.items() for name in names.spl
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         found: Any = _version()
+    elif name == "mesh":
+        found = importlib.import_module(".mesh", __name__)
     elif name not in _LATE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     else:

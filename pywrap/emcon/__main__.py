@@ -182,7 +182,7 @@ def _hand_over(arguments: list[str]) -> int:
         print(text.rstrip() + "\n\nalso, each with --help:")
         for name, what in _COMMANDS.items():
             print(f"  emcon {name:<10} {what}")
-        return 0
+        return 0 if arguments else 2
     sys.stdout.flush()
     sys.stderr.flush()
     os.execv(program, ["emcon", *arguments])

@@ -92,6 +92,11 @@ def _draw_energies(axes: Axes, history: NDArray[np.void]) -> None:
             ("strain", "strain", ORANGE, "-"), ("external_work", "external work", GREY, "--")):
         axes.plot(history["time"], history[name], style, color=colour, label=label)
     axes.set_ylabel("energy")
+    _legend(axes)
+
+
+def _legend(axes: Axes) -> None:
+    """Above the axes, where no curve is."""
     axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=4, handlelength=1.3,
                 columnspacing=1.0, handletextpad=0.4, borderaxespad=0.1)
 
@@ -101,9 +106,8 @@ def _draw_drift(axes: Axes, history: NDArray[np.void]) -> None:
     at_start = abs(float(history["total"][0]))
     axes.semilogy(history["time"], np.maximum(drift, DRIFT_FLOOR), color=BLACK, linewidth=0.8)
     epsilon = float(np.finfo(np.float64).eps)
-    axes.axhline(epsilon, color=GREY, linewidth=0.6, linestyle="--")
-    axes.annotate("machine epsilon", (1.0, epsilon), xycoords=("axes fraction", "data"),
-                  xytext=(-2, 2), textcoords="offset points", ha="right", color=GREY, fontsize=8)
+    axes.axhline(epsilon, color=GREY, linewidth=0.6, linestyle="--", label="machine epsilon")
+    _legend(axes)
     top = float(np.nanmax(drift, initial=0.0))
     axes.set_ylim(DRIFT_FLOOR, max(1e-8, 30.0*top))
     axes.yaxis.set_major_locator(LogLocator(10.0, numticks=7))
