@@ -67,7 +67,7 @@ module emcon_api
    use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_quantities, only : at_contacts, at_elements, at_nodes, at_pairs, contact_field, &
       contact_quantity, element_quantity, node_quantity, pair_quantity, quantity_components, &
-      quantity_values
+      quantity_values, quantity_variables
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_scheme, only : scheme_t
    use emcon_shape, only : shape_t
