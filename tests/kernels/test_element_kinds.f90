@@ -222,7 +222,8 @@ contains
                call check_near(error, step%tangent(:2*n, 2*node - 2 + a), reshape( &
                   (8.0_wp*(near(1)%force(:, :n) - near(2)%force(:, :n)) &
                   - (far(1)%force(:, :n) - far(2)%force(:, :n)))/(12.0_wp*h), [2*n]), &
-                  800.0_wp*eps**0.7_wp, young, sample%what // ", column " // to_text(2*node - 2 + a))
+                  800.0_wp*eps**0.7_wp, young, &
+                  sample%what // ", column " // to_text(2*node - 2 + a))
             end do
          end do
          if (allocated(error)) return
