@@ -86,6 +86,8 @@ def compare(name, text, program, folder):
         ours = displacements(deck)
     except ArithmeticError as failure:
         return f"ends early: {str(failure).splitlines()[0]}"
+    except ValueError as refused:
+        return f"the stepper: {str(refused).splitlines()[0]}"
     theirs = calculix_suite.run(program, deck)
     if theirs is None:
         return "CalculiX prints no displacements"
