@@ -27,6 +27,9 @@ module emcon_keeping
    !> corrections more than short ones: about as many as a new one costs.
    integer, parameter :: most_increments = 20, most_excess = 6
 
+   !> Solves of a step that it may fail: of a set that is not the last one, more often than not.
+   integer, parameter :: most_failures = 2
+
    !> Looks at the second derivatives of constraints in a solve.
    integer, parameter :: most_looks = 2
 
@@ -36,6 +39,7 @@ module emcon_keeping
       type(factor_base_t) :: base                !! of the present factor
       logical, private :: is_tried = .false.     !! in the present step
       logical, private :: is_new = .false.       !! made in it
+      integer, private :: n_failure = 0          !! solves of the present step that it has failed
       logical, private :: knows_set = .false.    !! it has taken the solve's constraints
       integer, private :: n_look = 0             !! looks at their second derivatives since then
       type(instant_t), private :: start          !! of the present step
@@ -72,6 +76,7 @@ contains
       is_lost = .false.
       if (self%is_allowed) self%is_allowed = kept_factor_is_possible(correction%kept)
       self%is_tried = self%is_allowed
+      self%n_failure = 0
       if (.not. self%is_allowed) return
       if (.not. correction%kept%is_made) self%base = base
       self%is_new = self%base%is_set .and. abs(h - self%base%h) > 0.0_wp
@@ -192,8 +197,8 @@ contains
       self%n_correction = 0
    end subroutine keeping_break_off
 
-   !> The factor does not lead to an end: no more of it in this step, and back to the first guess.
-   !> One that is not fit for the step's constraints may be for those of the next.
+   !> The factor does not lead to an end: back to the first guess. Other sets of the step may do
+   !> with a new one. One that cannot take the set's constraints may take those of the next step.
    pure subroutine keeping_give_up(self, correction, is_fit, du)
       type(keeping_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
@@ -201,7 +206,8 @@ contains
       real(wp), intent(out) :: du(:, :)          !! (n_dim, n_node) [L]
 
       if (is_fit) call keeping_forget(self, correction)
-      self%is_allowed = .false.
+      self%n_failure = self%n_failure + 1
+      self%is_allowed = self%knows_set .and. self%n_failure < most_failures
       du = self%guess
    end subroutine keeping_give_up
 
