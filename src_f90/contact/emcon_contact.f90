@@ -28,7 +28,7 @@ module emcon_contact
       logical :: is_arriving = .false.                !! too little is covered at the start
       logical :: was_open = .true.                    !! arriving: the start is seen from the front
       logical :: is_leaving = .false.                 !! too little is covered at the end
-      logical :: is_covered = .true.                  !! the stencil still holds at the end
+      logical :: is_covered = .true.                  !! see `covers`
       real(wp) :: gap0 = 0.0_wp                       !! mean gap Phi/W [L]
       real(wp) :: gap1 = 0.0_wp
       real(wp) :: size = 0.0_wp
@@ -40,6 +40,7 @@ module emcon_contact
       logical :: may_sharpen = .false.                !! of polygons: convex corners are rounded
       logical :: is_sharp = .false.                   !! but not in this step
       logical :: meets_statics = .false.              !! a step of the deck is static
+      logical :: may_leave = .false.                  !! constraints lose their surface, in a step
       logical :: gives_way = .false.                  !! it stores what it takes: a penalty
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
@@ -67,6 +68,7 @@ module emcon_contact
       procedure :: own_area
       procedure :: share
       procedure :: mean_gap
+      procedure :: covers
       procedure(configure_interface), deferred :: configure
       procedure(begin_interface), deferred :: begin_step
       procedure(measure_interface), deferred :: measure
@@ -175,6 +177,15 @@ contains
 
       mean_gap = gap
    end function mean_gap
+
+   !> Does the stencil of constraint `i` still hold at the end of the motion that was last measured?
+   pure logical function covers(self, i, x, u0, du)
+      class(contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+
+      covers = self%state(i)%is_covered
+   end function covers
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push

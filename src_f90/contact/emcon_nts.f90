@@ -23,7 +23,8 @@ module emcon_nts
    use emcon_scene, only : scene_t
    use emcon_self_contact, only : self_contact_is_apart
    use emcon_stance, only : stance_holds, stance_t, stance_take
-   use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_sees, touch_rule_t
+   use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_may, &
+      touch_rule_sees, touch_rule_t
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
@@ -56,6 +57,7 @@ module emcon_nts
       type(polygon_stencil_t), allocatable :: polygon(:, :)   !! (2, n_constraint) over these
       type(near_list_t) :: near
       integer, allocatable :: near_item(:)            !! (n_constraint) its place in that list
+      integer :: n_sifted = 0                         !! the list that was last sifted
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
                                                       !! first node
       type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
@@ -70,6 +72,7 @@ module emcon_nts
       procedure :: configure => nts_configure
       procedure :: measure => nts_measure
       procedure :: evaluate => nts_evaluate
+      procedure :: covers => nts_covers
       procedure :: area => nts_area
    end type nts_t
 
@@ -162,6 +165,7 @@ contains
       real(wp) :: best
 
       call near_list_update(self%near, x, u0, du, self%reach)
+      if (self%is_self .and. self%n_sifted /= self%near%n_list) call sift(self)
       call self%has_looked(self%near%clearance)
       if (self%n_list == self%near%n_list .and. (self%were_sharp .eqv. self%is_sharp)) then
          if (stance_holds(self%stance, self%near%node, x, u0)) return
@@ -181,6 +185,29 @@ contains
          if (self%smoothing /= smoothing_hermite) self%start(i) = polygon_start(self, i, x, u0)
       end do
    end subroutine nts_begin_step
+
+   !> Leave out of a new list of candidates what a surface never touches of itself.
+   pure subroutine sift(self)
+      type(nts_t), intent(inout) :: self
+      integer :: item, k, from, n
+
+      n = 0
+      associate (near => self%near%candidates)
+         do item = 1, size(near%start) - 1
+            from = near%start(item)
+            near%start(item) = n + 1
+            do k = from, near%start(item + 1) - 1
+               if (.not. touch_rule_may(self%rule, self%slave, self%chain_node(item), &
+                  near%edge(k))) cycle
+               n = n + 1
+               near%edge(n) = near%edge(k)
+            end do
+         end do
+         near%start(size(near%start)) = n + 1
+      end associate
+      self%near%candidates%edge = self%near%candidates%edge(:n)
+      self%n_sifted = self%near%n_list
+   end subroutine sift
 
    !> Take edge `e` for constraint `i` if it is nearer than `best`.
    pure subroutine choose_nearer(self, i, e, x, u, best)
@@ -263,6 +290,7 @@ contains
    pure subroutine nts_measure(self, x, u0, du)
       class(nts_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      logical :: is_at_rest
       integer :: i
 
       if (.not. stance_holds(self%stance, self%near%node, x, u0)) then
@@ -271,13 +299,44 @@ contains
             if (self%smoothing /= smoothing_hermite) self%start(i) = polygon_start(self, i, x, u0)
          end do
       end if
+      is_at_rest = nothing_moves(self%near%node, du) .and. self%smoothing /= smoothing_hermite
       do i = 1, self%n_constraint
-         self%state(i) = gap_state(self, i, x, u0, du)
+         if (is_at_rest) then
+            self%state(i) = state_at_rest(self, i)
+         else
+            self%state(i) = gap_state(self, i, x, u0, du)
+         end if
       end do
       if (self%smoothing /= smoothing_hermite) return
       self%state%is_covered = self%state%is_covered .and. .not. self%is_lost
       self%is_lost = .false.
    end subroutine nts_measure
+
+   !> Do the nodes `node` stay where they are?
+   pure logical function nothing_moves(node, du)
+      integer, intent(in) :: node(:)             !! of the scene
+      real(wp), intent(in), contiguous :: du(:, :)   !! (n_dim, n_node) [L]
+      integer :: k
+
+      nothing_moves = .true.
+      do k = 1, size(node)
+         nothing_moves = .not. any(abs(du(:, node(k))) > 0.0_wp)
+         if (.not. nothing_moves) return
+      end do
+   end function nothing_moves
+
+   !> The gap over a polygon in a step without motion: it ends as it began.
+   pure function state_at_rest(self, i) result(state)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      type(gap_state_t) :: state
+
+      if (self%edge(i) == 0) return
+      state = self%start(i)%state
+      state%gap1 = state%gap0
+      state%is_over = is_over(state, self%start(i)%xi, self%start(i)%xi, &
+         [self%polygon(1, i)%before > 0, self%polygon(1, i)%after > 0])
+   end function state_at_rest
 
    !> What a gap over a polygon is as a step begins.
    pure function polygon_start(self, i, x, u0) result(start)
@@ -327,27 +386,50 @@ contains
       type(start_t), intent(in) :: start
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
-      real(wp) :: local(2, 5), dlocal(2, 5), xi1
-      integer :: k
+      real(wp) :: xi1
 
       state = start%state
-      associate (stencil => self%polygon(1, i), n => self%polygon(1, i)%n, &
-            before => self%polygon(1, i)%before, after => self%polygon(1, i)%after)
+      call polygon_end(self, i, x, u0, du, state%gap1, xi1)
+      associate (stencil => self%polygon(1, i))
+         state%is_over = is_over(state, start%xi, xi1, [stencil%before > 0, stencil%after > 0])
+      end associate
+      state%is_covered = .true.
+   end function polygon_state
+
+   !> Gap of constraint `i` over its polygon after the motion `du`, and the projection on its edge.
+   pure subroutine polygon_end(self, i, x, u0, du, gap, xi)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(out) :: gap, xi
+      real(wp) :: local(2, 5), dlocal(2, 5)
+      integer :: k
+
+      associate (stencil => self%polygon(1, i), n => self%polygon(1, i)%n)
          call stencil_gather(x, u0, du, n, stencil%node, local, dlocal)
          do k = 1, n
             local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
          end do
-         call nts_gap_value(local(:, :n), before, after, stencil%rounding, state%gap1, xi1, &
-            stencil%goes_around)
-         state%gap1 = state%gap1 - self%offset
-         state%is_over = is_over(state, start%xi, xi1, [before > 0, after > 0])
+         call nts_gap_value(local(:, :n), stencil%before, stencil%after, stencil%rounding, gap, &
+            xi, stencil%goes_around)
+         gap = gap - self%offset
       end associate
-      state%is_covered = .true.
-      if (xi1 < 0.0_wp .or. xi1 > 1.0_wp) state%is_covered = is_covered(self, i, self%edge(i), x, &
-         u0, du)
-      if (self%other(i) > 0 .and. state%is_covered) state%is_covered = is_covered(self, i, &
-         self%other(i), x, u0, du)
-   end function polygon_state
+   end subroutine polygon_end
+
+   !> Over polygons only those are asked for that act or begin to: the edges around are looked at
+   !> here, not for each gap that is measured.
+   pure logical function nts_covers(self, i, x, u0, du) result(covers)
+      class(nts_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      real(wp) :: gap, xi
+
+      covers = self%state(i)%is_covered
+      if (self%edge(i) == 0 .or. self%smoothing == smoothing_hermite) return
+      call polygon_end(self, i, x, u0, du, gap, xi)
+      if (xi < 0.0_wp .or. xi > 1.0_wp) covers = is_covered(self, i, self%edge(i), x, u0, du)
+      if (self%other(i) > 0 .and. covers) covers = is_covered(self, i, self%other(i), x, u0, du)
+   end function nts_covers
 
    !> Nodes over the polygon: slave node, edge, and what is there before and after that may keep the
    !> node out.
@@ -463,10 +545,13 @@ contains
          integer, intent(in) :: e
          real(wp) :: u(2, 3), local(2, 3)
 
+         if (.not. present(du)) then
+            distance_of = edge_distance(x, u0, self%node(i), self%master%edge(:, e))
+            return
+         end if
          associate (node => [self%node(i), self%master%edge(:, e)])
             local = x(:, node)
-            u = u0(:, node)
-            if (present(du)) u = u + du(:, node)
+            u = u0(:, node) + du(:, node)
          end associate
          distance_of = edge_distance(local, u, 1, [2, 3])
       end function distance_of

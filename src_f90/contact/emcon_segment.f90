@@ -15,7 +15,7 @@ module emcon_segment
       moment_gap_xi, n_moment
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : scene_t
-   use emcon_weighted, only : weighted_init, weighted_measure, weighted_t
+   use emcon_weighted, only : weighted_init, weighted_t
    implicit none
    private
    public :: segment_t, segment_init
@@ -27,7 +27,7 @@ module emcon_segment
    contains
       procedure :: configure => segment_configure
       procedure :: begin_step => segment_begin_step
-      procedure :: measure => segment_measure
+      procedure :: covers => segment_covers
       procedure :: measure_edges => segment_measure_edges
       procedure :: form_edge => segment_form_edge
    end type segment_t
@@ -110,22 +110,22 @@ contains
    end function is_over
 
    !> The stencils of all nodal gaps that a constraint is made of must hold at the end.
-   pure subroutine segment_measure(self, x, u0, du)
-      class(segment_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      integer :: i, k
+   pure logical function segment_covers(self, i, x, u0, du) result(covers)
+      class(segment_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      integer :: k, j
 
-      call weighted_measure(self, x, u0, du)
-      do i = 1, self%n_constraint
-         do k = 1, 2
-            associate (e => self%node_edge(k, i))
-               if (e == 0) cycle
-               self%state(i)%is_covered = self%state(i)%is_covered &
-                  .and. all(self%nts%state(self%end_node(:, e))%is_covered)
-            end associate
-         end do
+      covers = self%state(i)%is_covered
+      do k = 1, 2
+         associate (e => self%node_edge(k, i))
+            if (e == 0) cycle
+            do j = 1, size(self%end_node, 1)
+               if (covers) covers = self%nts%covers(self%end_node(j, e), x, u0, du)
+            end do
+         end associate
       end do
-   end subroutine segment_measure
+   end function segment_covers
 
    pure subroutine segment_measure_edges(self, x, u0, du)
       class(segment_t), intent(inout) :: self

@@ -7,7 +7,7 @@ module emcon_self_contact
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: self_contact_may_touch, self_contact_is_apart, chain_faces
+   public :: self_contact_is_meant, self_contact_may_touch, self_contact_is_apart, chain_faces
 
    !> Edges face each other if their normals have a cosine below minus this; one lies above the
    !> other if the way to it and the normal have a cosine above this.
@@ -18,39 +18,53 @@ module emcon_self_contact
 
 contains
 
-   !> May node `k` of the chain touch edge `e` at x + u? That must be no neighbour, come later along
-   !> the surface unless `both_sides` are held, and face the node; unless they touch, each must lie
-   !> above the other.
-   pure logical function self_contact_may_touch(chain, k, e, both_sides, x, u) result(may_touch)
+   !> Is edge `e` no neighbour of node `k` of the chain, and does it come later along the surface
+   !> unless `both_sides` are held?
+   pure logical function self_contact_is_meant(chain, k, e, both_sides) result(is_meant)
       type(chain_t), intent(in) :: chain
       integer, intent(in) :: k                   !! index into the nodes of `chain`
       integer, intent(in) :: e                   !! edge of `chain`
       logical, intent(in) :: both_sides          !! each holds the other
-      real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
-      real(wp) :: a(2), b(2), mean(2), length, distance
-      integer :: own, first, n, side
+      integer :: first, side
 
-      may_touch = self_contact_is_apart(chain, k, e)
-      if (.not. may_touch) return
+      is_meant = self_contact_is_apart(chain, k, e)
+      if (.not. is_meant .or. both_sides) return
       first = huge(first)
+      do side = 1, 2
+         associate (own => chain%node_edge(side, k))
+            if (own > 0) first = min(first, chain%place(own))
+         end associate
+      end do
+      is_meant = chain%place(e) > first
+   end function self_contact_is_meant
+
+   !> May node `k` of the chain touch edge `e`, which is meant, at x + u? That must face the node;
+   !> unless they touch, each must lie above the other.
+   pure logical function self_contact_may_touch(chain, k, e, x, u) result(may_touch)
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: k                   !! index into the nodes of `chain`
+      integer, intent(in) :: e                   !! edge of `chain`
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (n_dim, n_node of the scene)
+      real(wp) :: a(2), b(2), mean(2), length, distance
+      integer :: n, side
+
+      mean = mean_along(chain, k, x, u)
+      a = way(x, u, chain%edge(:, e))
+      may_touch = faces(mean, a)
+      if (.not. may_touch) return
       length = 0.0_wp
       n = 0
       do side = 1, 2
-         own = chain%node_edge(side, k)
-         if (own == 0) cycle
-         first = min(first, chain%place(own))
-         length = length + norm2(way(x, u, chain%edge(:, own)))
-         n = n + 1
+         associate (own => chain%node_edge(side, k))
+            if (own == 0) cycle
+            length = length + norm2(way(x, u, chain%edge(:, own)))
+            n = n + 1
+         end associate
       end do
-      may_touch = both_sides .or. chain%place(e) > first
-      if (may_touch) may_touch = chain_faces(chain, k, chain%edge(:, e), x, u)
-      if (.not. may_touch) return
-      a = way(x, u, chain%edge(:, e))
       b = way(x, u, [chain%edge(1, e), chain%node(k)])
       b = b - max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))*a
       distance = norm2(b)
       if (distance*real(n, wp) <= deepest*length) return
-      mean = mean_along(chain, k, x, u)
       may_touch = cross(b, a) > least_facing*distance*norm2(a) &
          .and. cross(mean, b) > least_facing*distance*norm2(mean)
    end function self_contact_may_touch
@@ -76,12 +90,16 @@ contains
       integer, intent(in) :: k                   !! index into the nodes of `chain`
       integer, intent(in) :: edge(2)             !! nodes of the scene
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene) [L]
-      real(wp) :: a(2), mean(2)
 
-      mean = mean_along(chain, k, x, u)
-      a = way(x, u, edge)
-      chain_faces = dot_product(mean, a) < -least_facing*norm2(mean)*norm2(a)
+      chain_faces = faces(mean_along(chain, k, x, u), way(x, u, edge))
    end function chain_faces
+
+   !> Does an edge along `a` face a node whose edges go along `mean`?
+   pure logical function faces(mean, a)
+      real(wp), intent(in) :: mean(:), a(:)      !! (n_dim)
+
+      faces = dot_product(mean, a) < -least_facing*norm2(mean)*norm2(a)
+   end function faces
 
    !> Sum of the unit tangents of the edges at node `k`.
    pure function mean_along(chain, k, x, u) result(mean)

@@ -10,11 +10,12 @@ module emcon_touch_rule
    use emcon_chain, only : chain_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_self_contact, only : self_contact_may_touch
+   use emcon_self_contact, only : self_contact_is_meant, self_contact_may_touch
    use emcon_tied_edges, only : tied_ends_find
    implicit none
    private
-   public :: touch_rule_t, touch_rule_init, touch_rule_sees, touch_rule_allows
+   public :: touch_rule_t, touch_rule_init, touch_rule_sees, touch_rule_may, &
+      touch_rule_allows
 
    !> Classes of bodies at most, and with them constraints of a node.
    integer, parameter :: most_classes = 4
@@ -59,28 +60,42 @@ contains
       if (self%n_class > 1) sees = 1 + mod(self%body(e) - 1, self%n_class) == class
    end function touch_rule_sees
 
-   !> May node `k` of the chain touch edge `e` at x + u? On another body any edge that is the
-   !> nearest one; on its own never that of another closed boundary: the body lies between them.
-   !> What a tie ends on an edge does not touch it, and what is under a tied piece nothing.
+   !> May node `k` of the chain ever touch edge `e`? What a tie ends on an edge does not touch it,
+   !> and what is under a tied piece nothing; of the own body never the edges that meet at the node
+   !> and those beside them, nor another closed boundary: the body lies between them.
+   pure logical function touch_rule_may(self, chain, k, e) result(may)
+      type(touch_rule_t), intent(in) :: self
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: k                   !! index into the nodes of `chain`
+      integer, intent(in) :: e                   !! edge of `chain`
+      integer :: own
+
+      may = .not. self%is_buried(k) .and. self%host(k) /= e
+      if (.not. may) return
+      if (self%both_sides) then
+         own = maxval(chain%node_edge(:, k))
+         if (self%body(own) /= self%body(e)) return
+         associate (p => chain%part(own), q => chain%part(e))
+            may = .not. (p /= q .and. chain%is_closed(p) .and. chain%is_closed(q))
+         end associate
+      end if
+      if (may) may = self_contact_is_meant(chain, k, e, self%both_sides)
+   end function touch_rule_may
+
+   !> And at x + u? On another body any edge that is the nearest one.
    pure logical function touch_rule_allows(self, chain, k, e, x, u) result(allows)
       type(touch_rule_t), intent(in) :: self
       type(chain_t), intent(in) :: chain
       integer, intent(in) :: k                   !! index into the nodes of `chain`
       integer, intent(in) :: e                   !! edge of `chain`
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
-      integer :: own
 
-      allows = .not. self%is_buried(k) .and. self%host(k) /= e
+      allows = touch_rule_may(self, chain, k, e)
       if (.not. allows) return
       if (self%both_sides) then
-         own = maxval(chain%node_edge(:, k))
-         allows = self%body(own) /= self%body(e)
-         if (allows) return
-         associate (p => chain%part(own), q => chain%part(e))
-            if (p /= q .and. chain%is_closed(p) .and. chain%is_closed(q)) return
-         end associate
+         if (self%body(maxval(chain%node_edge(:, k))) /= self%body(e)) return
       end if
-      allows = self_contact_may_touch(chain, k, e, self%both_sides, x, u)
+      allows = self_contact_may_touch(chain, k, e, x, u)
    end function touch_rule_allows
 
 end module emcon_touch_rule

@@ -16,7 +16,7 @@ module emcon_weighted
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: weighted_t, weighted_init, weighted_measure
+   public :: weighted_t, weighted_init
 
    !> A slave node is let go where less than this fraction of its surface is covered: a smaller part
    !> says hardly more than the constraint of its neighbour.
@@ -85,6 +85,7 @@ contains
       call chain_join(self%slave, scene)
       call chain_join(self%master, scene)
       self%is_self = pair%slave == pair%master
+      self%may_leave = .true.
       self%node = self%slave%node
       self%twin = self%slave%twin
       n = size(self%node)

@@ -167,16 +167,16 @@ contains
       self%is_let_go = .false.
    end subroutine active_set_restart
 
-   !> Choose the stencils of a contact for `motion`, and measure it over `du`.
+   !> Choose the stencils of a contact for `motion`, and measure it over `du` if that is given.
    subroutine active_set_look(self, system, pair, motion, du)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       integer, intent(in) :: pair                !! number of the contact
       type(motion_t), intent(in) :: motion
-      real(wp), intent(in), contiguous :: du(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(in), contiguous, optional :: du(:, :)   !! (n_dim, n_node) [L]
 
       call pair_search(system, pair, motion)
-      call pair_measure(system, pair, motion%x, motion%u0, du)
+      if (present(du)) call pair_measure(system, pair, motion%x, motion%u0, du)
       associate (contact => system%contact(pair)%contact)
          self%outlook(pair) = outlook_t(self%travel%total + contact%clearance, &
             contact%n_look)
@@ -225,14 +225,16 @@ contains
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            if (self%outlook(pair)%passes .or. self%softness%is_at_ends) then
-               self%is_active(first:last) = .false.
+            self%is_active(first:last) = .false.
+            if (self%outlook(pair)%passes .or. self%softness%is_at_ends) cycle
+            if (.not. any(self%was_active(first:last))) then
+               call active_set_look(self, system, pair, motion)
                cycle
             end if
             call active_set_look(self, system, pair, motion, at_rest(motion%u0))
             self%is_active(first:last) = self%was_active(first:last) &
                .and. contact%state%is_near .and. contact%state%is_over
-            if (.not. any(self%is_active(first:last))) cycle
+            if (.not. (contact%may_leave .and. any(self%is_active(first:last)))) cycle
             call pair_measure(system, pair, motion%x, motion%u0, motion%du)
             self%is_active(first:last) = self%is_active(first:last) &
                .and. .not. contact%state%is_leaving
@@ -241,19 +243,17 @@ contains
    end subroutine begin_contact
 
    !> Hand the present set to the constraints, with the gaps to hold; multipliers carry over.
-   subroutine active_set_select(self, system, motion)
+   subroutine active_set_select(self, system, motion, is_measured)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
+      logical, intent(in), optional :: is_measured   !! as the gaps were when last looked at
       integer :: k, pair, i
 
       call remember(self)
       if (self%set%n == 0 .and. .not. any(self%is_active)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
-      do pair = 1, size(system%contact)
-         if (is_empty(self, system, pair)) cycle
-         call pair_measure(system, pair, motion%x, motion%u0, motion%du)
-      end do
+      if (.not. knows_gaps()) call measure_all(self, system, motion)
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
          call constraint_place(system, self%set%id(k), pair, i)
@@ -275,7 +275,28 @@ contains
       end do
       call softness_select(self%softness, system, self%set, self%masses_resist .and. &
          .not. motion%pose%pushes_at_end)
+
+   contains
+
+      logical function knows_gaps()
+         knows_gaps = .false.
+         if (present(is_measured)) knows_gaps = is_measured
+      end function knows_gaps
+
    end subroutine active_set_select
+
+   !> Measure the gaps of all contacts that something is near.
+   subroutine measure_all(self, system, motion)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      integer :: pair
+
+      do pair = 1, size(system%contact)
+         if (is_empty(self, system, pair)) cycle
+         call pair_measure(system, pair, motion%x, motion%u0, motion%du)
+      end do
+   end subroutine measure_all
 
    !> Newton's method has not converged: let go of the contacts that pull in its last iterate, each
    !> once in a step, and start again with the multipliers and from where it started. `is_done` if

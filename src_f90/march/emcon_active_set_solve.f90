@@ -39,15 +39,18 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_done, is_held
-      integer :: left, k
+      logical :: is_done, is_held, is_measured
+      integer :: left
 
       self%first = motion%du
       self%driven = newton%driven
+      is_measured = .false.
       do
          call phase_enter(system%phases, phase_gaps, left)
          if (self%holding%is_needed) call hold(self, system, scene, newton%driven, motion)
-         call active_set_select(self, system, motion)
+         call active_set_select(self, system, motion, is_measured .and. .not. &
+            self%holding%is_needed)
+         is_measured = .false.
          call phase_leave(system%phases, left)
          status = step_not_held
          if (allocated(self%holding%text)) return
@@ -56,15 +59,9 @@ contains
             .and. self%n_early < most_early
          call solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
-         do k = 1, self%set%n
-            self%lam(self%set%id(k)) = self%set%lam(k)
-         end do
+         self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
          if (status == newton_redundant) then
-            associate (redundant => newton%correction%redundant, is_near => &
-                  newton%correction%is_near)
-               call active_set_put_off(self, pack(redundant, is_near))
-               call active_set_drop(self, pack(redundant, .not. is_near))
-            end associate
+            call leave_out(self, newton%correction%redundant, newton%correction%is_near)
             cycle
          end if
          if (status == newton_diverged) then
@@ -76,12 +73,14 @@ contains
          newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
          if (status == newton_early) then
             call active_set_leave(self, system, motion)
+            is_measured = .true.
             cycle
          end if
          if (status /= newton_converged .or. size(system%contact) == 0 &
             .or. self%softness%is_at_ends) return
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_advance(self, system, motion, is_done, status)
+         is_measured = status /= step_cycling
          if (is_done .and. status == step_done .and. self%holding%is_needed) then
             call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
             if (.not. is_held) status = step_not_held
@@ -91,6 +90,16 @@ contains
          if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> What follows from other constraints nearly waits, what does so clearly does not act.
+   pure subroutine leave_out(self, redundant, is_near)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(in) :: redundant(:)        !! (any) places in the set, from 1
+      logical, intent(in) :: is_near(:)          !! (of each) nearly
+
+      call active_set_put_off(self, pack(redundant, is_near))
+      call active_set_drop(self, pack(redundant, .not. is_near))
+   end subroutine leave_out
 
    !> Solve with the present set. Contacts that give way and are pushed back are solved again with
    !> the multipliers that came out, until nothing is left of their gaps, or until one pulls.

@@ -100,14 +100,14 @@ contains
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then
                   k = k + 1
-                  call look_at_active(self, contact, i, k, status)
+                  call look_at_active(self, contact, i, k, motion, status)
                   changes = is_let_go(self, system, contact, i, k)
                   if (changes .and. self%holding%is_needed) self%holding%has_pulled(id) = .true.
                else
                   call look_at_open(self, contact, i, id, changes, status)
                   ! What the pairs take in may hold the bodies away from their guards.
                   if (contact%slack > 0.0_wp .and. has_changed) changes = .false.
-                  if (changes .and. begins_unseen(self, contact, i)) status = step_too_far
+                  if (changes .and. begins_unseen(self, contact, i, motion)) status = step_too_far
                end if
                has_changed = has_changed .or. changes
                if (changes .and. self%one_by_one .and. .not. contact%state(i)%is_leaving) then
@@ -147,17 +147,18 @@ contains
 
    !> Can the step stand on constraint `k` of the set, the `i`-th of `contact`, which acts? If its
    !> stencil has moved on, the step is solved again with that for the motion that came out.
-   pure subroutine look_at_active(self, contact, i, k, status)
+   pure subroutine look_at_active(self, contact, i, k, motion, status)
       type(active_set_t), intent(inout) :: self
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i                   !! its number in `contact`
       integer, intent(in) :: k
+      type(motion_t), intent(in) :: motion       !! that was last measured
       integer, intent(inout) :: status
       real(wp) :: held
       logical :: is_new
 
       associate (gap => contact%state(i))
-         if (.not. gap%is_covered) status = step_too_far
+         if (.not. contact%covers(i, motion%x, motion%u0, motion%du)) status = step_too_far
          ! A new contact may not be held at a larger distance than the deck allows.
          is_new = self%set%is_kept(k) .and. .not. self%was_active(self%set%id(k))
          if (is_new .and. self%gap_tolerance > 0.0_wp &
@@ -227,13 +228,14 @@ contains
 
    !> Would the `i`-th constraint of `contact` begin to act with a stencil chosen for another
    !> motion?
-   pure logical function begins_unseen(self, contact, i)
+   pure logical function begins_unseen(self, contact, i, motion)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i
+      type(motion_t), intent(in) :: motion       !! that was last measured
 
       associate (gap => contact%state(i))
-         begins_unseen = .not. gap%is_covered .or. &
+         begins_unseen = .not. contact%covers(i, motion%x, motion%u0, motion%du) .or. &
             (self%masses_resist .and. gap%gap0 > contact%farthest_start)
       end associate
    end function begins_unseen
