@@ -168,7 +168,10 @@ class Run:
 
 
 class Fields:
-    """The field file, all of it: times, `x` (n_node, 2) and fields (n_frame, n, n_component)."""
+    """The field file, all of it: times, `x` (n_node, n_dim) and fields (n_frame, n, n_component)."""
+
+    #: Cells of three dimensions.
+    SPACE = (10, 12, 24, 25)
 
     def __init__(self, path):
         with h5py.File(path, "r") as file:
@@ -176,7 +179,8 @@ class Fields:
             steps = root["Steps"]
             n_frame = int(steps.attrs["NSteps"])
             self.time = steps["Values"][:n_frame]
-            self.x = root["Points"][:, :2]
+            self.n_dim = 3 if np.isin(root["Types"][:], self.SPACE).any() else 2
+            self.x = root["Points"][:, :self.n_dim]
             self.cells = np.split(root["Connectivity"][:], root["Offsets"][1:-1])
             self._data = {}
             for kind in ("PointData", "CellData"):
@@ -190,7 +194,8 @@ class Fields:
 
     def __getitem__(self, name):
         values = self._data[name]
-        return values[..., :2] if values.ndim == 3 and values.shape[2] == 3 else values
+        is_vector = values.ndim == 3 and values.shape[2] == 3
+        return values[..., :self.n_dim] if is_vector else values
 
 
 # ---- decks --------------------------------------------------------------------------------------

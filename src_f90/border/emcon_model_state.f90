@@ -48,7 +48,7 @@ contains
          ledger%total = real(from%total, c_double)
          ledger%px = real(from%momentum(1), c_double)
          ledger%py = real(from%momentum(2), c_double)
-         ledger%lz = real(from%angular, c_double)
+         ledger%lz = real(from%angular(size(from%angular)), c_double)
          ledger%stabilization = real(from%stabilization, c_double)
          ledger%restitution_loss = real(from%restitution, c_double)
          ledger%scheme_loss = real(from%decay, c_double)

@@ -12,6 +12,7 @@ module emcon_deck
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
+   use emcon_deck_dimension, only : check_dimension, find_dimension, n_plane, refuse_plane_cards
    use emcon_deck_equations, only : read_equations
    use emcon_deck_fields, only : data_open, data_t, next_line, refuse_lines
    use emcon_deck_general_contact, only : read_general_contact
@@ -26,6 +27,7 @@ module emcon_deck
    use emcon_deck_rigid, only : read_rigid_bodies
    use emcon_deck_sets, only : read_sets
    use emcon_deck_source, only : deck_open, deck_source_t
+   use emcon_deck_shapes_space, only : check_shapes_space
    use emcon_deck_sides_plane, only : check_sides
    use emcon_deck_step, only : read_steps
    use emcon_deck_surfaces, only : read_surfaces
@@ -64,8 +66,8 @@ contains
       reader%doubt_elements = .not. source%is_whole
       reader%doubt_names = .not. source%is_whole
       scene%file = source%file_name
-      scene%n_dim = 2
       call read_cards(reader, overrides)
+      scene%n_dim = find_dimension(reader)
       if (size(reader%card) > 0) call read_scene(reader, scene)
       diagnostics = reader%log
    end subroutine deck_read
@@ -75,6 +77,7 @@ contains
       type(scene_t), intent(inout) :: scene
 
       call check_data(reader)
+      if (scene%n_dim /= n_plane) call refuse_plane_cards(reader)
       call read_heading(reader, scene)
       call read_nodes(reader, scene)
       call read_element_kinds(reader, scene)
@@ -94,19 +97,32 @@ contains
       call read_general_contact(reader, scene)
       call read_equations(reader, scene)
       call read_steps(reader, scene)
-      call check_shapes(reader, scene)
-      call check_sides(reader, scene)
+      call check_geometry(reader, scene)
       call check_materials(reader, scene)
       call check_nodes(reader, scene)
       call check_linear(reader, scene)
       call check_massless_sections(reader, scene)
-      call check_surfaces(reader, scene)
+      if (scene%n_dim == n_plane) call check_surfaces(reader, scene)
       call choose_slaves(reader, scene)
       call check_pairs(reader, scene)
       call check_ties(reader, scene)
       call check_rigid(reader, scene)
       call guards_find(scene%pair, scene%surface, scene%guard)
    end subroutine read_scene
+
+   !> The shapes of elements, and what of the scene is of the plane alone.
+   subroutine check_geometry(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+
+      if (scene%n_dim == n_plane) then
+         call check_shapes(reader, scene)
+         call check_sides(reader, scene)
+      else
+         call check_shapes_space(reader, scene)
+         call check_dimension(reader, scene)
+      end if
+   end subroutine check_geometry
 
    !> Keywords without data lines are followed by none.
    subroutine check_data(reader)

@@ -25,7 +25,7 @@ contains
       type(scene_t), intent(inout) :: scene
       integer :: i
 
-      call element_kinds_create(scene%kind)
+      call element_kinds_create(scene%n_dim, scene%kind)
       do i = 1, size(reader%card)
          if (reader%card(i)%name == "USERELEMENT") call read_kind(reader, reader%card(i), &
             scene%n_dim, scene%kind)

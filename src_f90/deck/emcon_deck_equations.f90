@@ -1,6 +1,7 @@
 !> *EQUATION: sums of coefficient times displacement that are zero in all steps.
 module emcon_deck_equations
    use emcon_couplings, only : equation_t
+   use emcon_deck_dimension, only : freedoms_text, n_plane
    use emcon_deck_fields, only : data_error, data_open, data_t, get_integer, get_name, get_real, &
       is_blank, is_label, next_line
    use emcon_deck_named, only : get_nodes
@@ -183,11 +184,11 @@ contains
             // " is empty")
       end if
       call get_integer(reader, data, k + 1, "degree of freedom", term%dof)
-      if (term%dof == 3) then
+      if (term%dof == 3 .and. scene%n_dim == n_plane) then
          call data_error(reader, data, "the model is plane: degree of freedom 3 does not exist")
       else if (term%dof > scene%n_dim) then
          call data_error(reader, data, "degree of freedom " // to_text(term%dof) &
-            // " does not exist; known: 1, 2")
+            // " does not exist; known: " // freedoms_text(scene%n_dim))
       end if
       if (is_blank(data, k + 2)) call data_error(reader, data, "the coefficient is missing")
       call get_real(reader, data, k + 2, "coefficient", term%coefficient)

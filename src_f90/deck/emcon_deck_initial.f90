@@ -1,6 +1,7 @@
 !> *INITIAL CONDITIONS: displacements and velocities at the start; those of rigid bodies are given
 !> at their reference nodes.
 module emcon_deck_initial
+   use emcon_deck_dimension, only : freedoms_text, n_plane
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
       get_real, next_line
    use emcon_deck_named, only : get_nodes
@@ -8,6 +9,7 @@ module emcon_deck_initial
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
+   use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use emcon_turn_plane, only : turned_left
@@ -94,7 +96,8 @@ contains
          if (.not. data%ok) cycle
          call get_integer(reader, data, 2, "degree of freedom", dof)
          if (data%ok .and. dof > 3 .and. dof /= last_freedom) call data_error(reader, data, &
-            "degree of freedom " // to_text(dof) // " does not exist; known: 1, 2")
+            "degree of freedom " // to_text(dof) // " does not exist; known: " &
+            // freedoms_text(scene%n_dim))
          value = 0.0_wp
          call get_real(reader, data, 3, "value", value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
@@ -159,11 +162,11 @@ contains
          if (data%ok .and. any(abs(velocity(scene%n_dim + 1:)) > 0.0_wp)) call data_error(reader, &
             data, "the model is plane: the velocity along 3 must be 0")
          if (.not. data%ok) return
-         call read_axis(reader, data, axis)
+         call read_axis(reader, data, scene%n_dim, axis)
          if (.not. data%ok) return
          do i = 1, size(item)
             field%value(:, item(i)) = velocity(:scene%n_dim) &
-               + spin*turned_left(scene%x(:, item(i)) - axis(:scene%n_dim))
+               + spin*turned(scene%x(:, item(i)), axis)
          end do
          field%is_given(item) = .true.
          do i = 1, size(scene%rigid)
@@ -172,10 +175,26 @@ contains
       end do
    end subroutine read_rotating
 
-   !> The line behind: a point on the axis; a second one has to be above it, along 3.
-   subroutine read_axis(reader, data, axis)
+   !> How a point at `x` moves by a unit spin about an axis: two points of it, or one in the plane.
+   pure function turned(x, axis) result(velocity)
+      real(wp), intent(in) :: x(:)                 !! (n_dim) [L]
+      real(wp), intent(in) :: axis(:)              !! (n_axis) [L]
+      real(wp) :: velocity(size(x)), along(size(x))
+
+      if (size(x) == n_plane) then
+         velocity = turned_left(x - axis(:size(x)))
+      else
+         along = axis(size(x) + 1:) - axis(:size(x))
+         velocity = cross_product(along/norm2(along), x - axis(:size(x)))
+      end if
+   end function turned
+
+   !> The line behind: a point on the axis; in the plane a second one has to be above it, along 3,
+   !> in space there has to be one.
+   subroutine read_axis(reader, data, n_dim, axis)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
+      integer, intent(in) :: n_dim
       real(wp), intent(out) :: axis(:)             !! (n_axis) [L]
       logical :: is_there
       integer :: i
@@ -190,6 +209,11 @@ contains
       do i = 1, data%n
          if (data%ok) call get_real(reader, data, i, "coordinate", axis(i))
       end do
+      if (n_dim /= n_plane) then
+         if (data%ok .and. .not. any(abs(axis(n_dim + 1:) - axis(:n_dim)) > 0.0_wp)) &
+            call data_error(reader, data, "the axis needs two points: x, y, z and x, y, z")
+         return
+      end if
       if (.not. data%ok .or. data%n <= 3) return
       if (any(abs(axis(4:5) - axis(:2)) > 0.0_wp) .or. .not. axis(n_axis) > axis(3)) then
          call data_error(reader, data, "the model is plane: the axis goes along 3, from its " // &

@@ -2,6 +2,7 @@
 module emcon_deck_loads
    use emcon_deck_conditions, only : conditions_t, drop_loads, drop_prescribed, put_load, &
       put_prescribed
+   use emcon_deck_dimension, only : freedoms_text, n_plane
    use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, get_real, is_blank, next_line
@@ -90,7 +91,7 @@ contains
       new%is_frozen = has_option(card, "FIXED")
       call data_open(data, card)
       do while (next_line(reader, data))
-         call read_boundary_line(reader, data, is_held, new%value)
+         call read_boundary_line(reader, data, scene%n_dim, is_held, new%value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (data%ok) call check_rigid(reader, data, scene, is_held, item)
          if (data%ok) call check_value(reader, data, scene, is_held, item, new)
@@ -167,9 +168,10 @@ contains
    end subroutine check_boundary_options
 
    !> Which degrees of freedom a line prescribes, and the value.
-   subroutine read_boundary_line(reader, data, is_held, value)
+   subroutine read_boundary_line(reader, data, n_dim, is_held, value)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
+      integer, intent(in) :: n_dim
       logical, intent(out) :: is_held(last_freedom)
       real(wp), intent(out) :: value
       integer :: first, last
@@ -179,7 +181,7 @@ contains
       is_held = .false.
       call check_count(reader, data, 2, 4, "node or node set, first dof, last dof, value")
       if (.not. data%ok) return
-      call read_support(reader, data, is_held, is_named)
+      call read_support(reader, data, n_dim, is_held, is_named)
       if (is_named) return
       call get_integer(reader, data, 2, "degree of freedom", first)
       last = first
@@ -193,16 +195,17 @@ contains
             // ", is below the first, " // to_text(first))
       else if (last > last_freedom) then
          call data_error(reader, data, "degree of freedom " // to_text(last) &
-            // " does not exist; known: 1, 2")
+            // " does not exist; known: " // freedoms_text(n_dim))
       else
          is_held(first:last) = .true.
       end if
    end subroutine read_boundary_line
 
    !> The displacements that a support called by its name holds, if field 2 is a name.
-   subroutine read_support(reader, data, is_held, is_named)
+   subroutine read_support(reader, data, n_dim, is_held, is_named)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
+      integer, intent(in) :: n_dim
       logical, intent(inout) :: is_held(:)
       logical, intent(out) :: is_named
       character(len=:), allocatable :: name, known
@@ -212,7 +215,7 @@ contains
       if (is_named) is_named = scan(data%text(data%from(2):data%from(2)), "+-.0123456789<") == 0
       if (.not. is_named) return
       call get_name(reader, data, 2, "degree of freedom or support", name)
-      known = "1, 2"
+      known = freedoms_text(n_dim)
       do i = 1, size(supports)
          if (supports(i)%name == name) then
             is_held = supports(i)%is_held
@@ -238,8 +241,10 @@ contains
 
       if (new%value == 0.0_wp) return
       if (any(is_held(scene%n_dim + 1:last_freedom - 1))) then
-         call data_error(reader, data, "the model is plane: degrees of freedom 3 to 5 are 0, not " &
-            // to_text(new%value))
+         if (scene%n_dim == n_plane) call data_error(reader, data, "the model is plane: degrees " &
+            // "of freedom 3 to 5 are 0, not " // to_text(new%value))
+         if (scene%n_dim /= n_plane) call data_error(reader, data, "nodes do not turn: degrees " &
+            // "of freedom 4 and 5 are 0, not " // to_text(new%value))
       else if (is_held(last_freedom) .and. .not. reader%doubt_rigid) then
          do i = 1, size(item)
             if (any(scene%rigid%reference == item(i))) cycle
@@ -312,7 +317,7 @@ contains
          end do
       else if (new%place > scene%n_dim) then
          call data_error(reader, data, "degree of freedom " // to_text(new%place) &
-            // " does not exist; known: 1, 2")
+            // " does not exist; known: " // freedoms_text(scene%n_dim))
       end if
    end subroutine check_force
 
@@ -333,7 +338,7 @@ contains
       call data_open(data, card)
       do while (next_line(reader, data))
          call check_count(reader, data, 2, 6, "element or element set, load type, magnitude")
-         if (data%ok) call read_load_type(reader, data, maxval(scene%kind%n_face), new)
+         if (data%ok) call read_load_type(reader, data, scene, new)
          if (data%ok) call get_elements(reader, data, 1, scene, item)
          if (data%ok) call check_faces(reader, data, scene, item, new%place)
          if (.not. data%ok) cycle
@@ -359,15 +364,16 @@ contains
    end subroutine check_faces
 
    !> Kind, place, value and direction of a load on elements, of up to `n_face` faces.
-   subroutine read_load_type(reader, data, n_face, new)
+   subroutine read_load_type(reader, data, scene, new)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
-      integer, intent(in) :: n_face
+      type(scene_t), intent(in) :: scene
       type(load_t), intent(inout) :: new
       character(len=:), allocatable :: name
       real(wp) :: length
-      integer :: k
+      integer :: k, n_face
 
+      n_face = maxval(scene%kind%n_face)
       call get_name(reader, data, 2, "load type", name)
       new%value = 0.0_wp
       new%direction = 0.0_wp
@@ -388,7 +394,7 @@ contains
          length = norm2(new%direction)
          if (.not. data%ok) then
             return
-         else if (new%direction(3) /= 0.0_wp) then
+         else if (any(abs(new%direction(scene%n_dim + 1:)) > 0.0_wp)) then
             call data_error(reader, data, "the model is plane: gravity has no third component")
          else if (length <= 0.0_wp) then
             call data_error(reader, data, "gravity needs a direction: set, GRAV, g, nx, ny")

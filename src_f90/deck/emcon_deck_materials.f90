@@ -1,6 +1,7 @@
 !> *MATERIAL with its cards, and *SOLID SECTION.
 module emcon_deck_materials
    use emcon_deck_damping, only : read_damping
+   use emcon_deck_dimension, only : n_plane
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, is_blank, next_line
    use emcon_deck_named, only : find_set, hint_at_set, set_names
@@ -335,6 +336,11 @@ contains
             if (data%ok .and. section%thickness <= 0.0_wp) call data_error(reader, data, &
                "the thickness " // to_text(section%thickness) // " is not positive")
             call check_count(reader, data, 0, 1, "thickness")
+            if (scene%n_dim /= n_plane .and. abs(section%thickness - 1.0_wp) > 0.0_wp) then
+               call data_warning(reader, data, "solids of three dimensions have no thickness: " &
+                  // to_text(section%thickness) // " has no effect")
+               section%thickness = 1.0_wp
+            end if
             if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
          end if
       end associate

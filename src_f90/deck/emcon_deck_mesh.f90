@@ -1,13 +1,15 @@
 !> *NODE and *ELEMENT.
 module emcon_deck_mesh
+   use emcon_deck_dimension, only : n_space, other_dimension, type_dimension
    use emcon_deck_element_kinds, only : has_user_card, is_user_type
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
-      drop_zeros, get_integer, get_real, next_line
+      drop_zeros, get_integer, get_real, is_blank, next_line
    use emcon_deck_labels, only : find_label, label_map_init
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, need_name, &
       option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
    use emcon_element_kind, only : element_kind_t, find_element_kind
+   use emcon_element_registry, only : element_rows
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
@@ -21,8 +23,8 @@ module emcon_deck_mesh
    character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
       "CPE4R", "CPE4RH", "CPE4I", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
       "CPS4R", "CPS4I", "CAX3", "CAX4", "CAX4R", "CAX6", "CAX8", &
-      "CAX8R", "C3D4", "C3D4H", "C3D6", "C3D8", "C3D8R", "C3D8I", "C3D8H", "C3D10", "C3D10M", &
-      "C3D15", "C3D20", "C3D20R", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
+      "CAX8R", "C3D4H", "C3D6", "C3D8R", "C3D8I", "C3D8H", "C3D10M", &
+      "C3D15", "C3D20RH", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
       "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
       "DASHPTA", "GAPUNI", "DCOUP3D"]
@@ -101,16 +103,20 @@ contains
          end if
          call check_count(reader, data, 1, 4, "label, x, y, z")
          position = 0.0_wp
-         do k = 1, 3
+         do k = 1, size(axis)
             call get_real(reader, data, k + 1, axis(k), position(k))
          end do
+         if (data%ok .and. scene%n_dim == size(axis) .and. is_blank(data, 1 + scene%n_dim)) then
+            call data_error(reader, data, "node " // to_text(label) // " has no z: the elements " &
+               // "have three dimensions")
+         end if
          reader%doubt_positions = reader%doubt_positions .or. .not. data%ok
          ! A node with a bad coordinate stays, so that what names it is not an error too.
          n = n + 1
          scene%node_label(n) = label
          scene%node_origin(n) = line_origin(reader, data%i_line)
          scene%x(:, n) = position(:scene%n_dim)
-         if (position(3) /= 0.0_wp .and. .not. is_solid_told) then
+         if (any(abs(position(scene%n_dim + 1:)) > 0.0_wp) .and. .not. is_solid_told) then
             call data_warning(reader, data, "z of node " // to_text(label) &
                // " is not 0; the model is plane, z is left out (told once)")
             is_solid_told = .true.
@@ -209,7 +215,7 @@ contains
       integer :: kind, n_node, label, node(max_element_nodes), before(2)
 
       card = reader%card(i_card)
-      call find_type(reader, i_card, scene%kind, kind)
+      call find_type(reader, i_card, scene, n, kind)
       if (kind == 0) return
       n_node = 2
       if (kind > 0) n_node = scene%kind(kind)%n_node
@@ -241,26 +247,31 @@ contains
 
    !> What the type of a card stands for: an element kind, or lines; 0 if it is refused. Each type
    !> is told once.
-   subroutine find_type(reader, i_card, kinds, kind)
+   subroutine find_type(reader, i_card, scene, n, kind)
       type(reader_t), intent(inout) :: reader
       integer, intent(in) :: i_card
-      type(element_kind_t), intent(in) :: kinds(:)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: n                     !! elements so far
       integer, intent(out) :: kind
       character(len=:), allocatable :: type_name
       integer :: i
       logical :: is_first
 
       kind = 0
-      associate (card => reader%card(i_card))
+      associate (card => reader%card(i_card), kinds => scene%kind)
          call need_name(reader, card, "TYPE", type_name)
          if (type_name /= "") kind = find_element_kind(kinds, type_name)
          if (kind > 0) return
+         if (type_dimension(type_name) == other_dimension(scene%n_dim)) then
+            call tell_mixed(reader, card, scene, n, type_name)
+            return
+         end if
          is_first = .true.
          do i = 1, i_card - 1
             if (reader%card(i)%name == "ELEMENT") is_first = is_first .and. &
                option_name(reader%card(i), "TYPE") /= type_name
          end do
-         if (any(line_types == type_name)) then
+         if (any(line_types == type_name) .and. scene%n_dim /= n_space) then
             kind = kind_line
             if (is_first) call card_warning(reader, card, "elements of type " // type_name &
                // " are lines that surfaces may name; they have no stiffness (told once)")
@@ -273,6 +284,33 @@ contains
       reader%doubt_names = .true.
    end subroutine find_type
 
+   !> An element of the plane in a scene of three dimensions, or one of these in the plane.
+   subroutine tell_mixed(reader, card, scene, n, type_name)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: n                     !! elements so far
+      character(len=*), intent(in) :: type_name
+      character(len=:), allocatable :: first, own
+      type(data_t) :: data
+      integer :: label
+
+      reader%doubt_elements = .true.
+      reader%doubt_names = .true.
+      own = "elements"
+      call data_open(data, card)
+      if (next_line(reader, data)) then
+         call get_integer(reader, data, 1, "element label", label)
+         if (data%ok) own = "element " // to_text(label)
+      end if
+      first = "others"
+      if (n > 0) first = "element " // to_text(scene%element_label(1)) // ", " &
+         // trim(scene%kind(scene%element_kind(1))%name) // ","
+      call card_error(reader, card, "element type " // type_name // " of " // own // " beside " &
+         // first // " of " // to_text(scene%n_dim) // " dimensions: a deck has elements of the " &
+         // "plane or of space, not of both")
+   end subroutine tell_mixed
+
    subroutine refuse_type(reader, card, kinds, type_name)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -282,8 +320,11 @@ contains
       integer :: i
 
       list = ""
+      do i = 1, size(element_rows)
+         list = list // " " // trim(element_rows(i)%name)
+      end do
       do i = 1, size(kinds)
-         list = list // " " // trim(kinds(i)%name)
+         if (is_user_type(kinds(i)%name)) list = list // " " // trim(kinds(i)%name)
       end do
       if (is_user_type(type_name)) then
          call card_error(reader, card, "element type " // type_name // " is defined by no *USER " &

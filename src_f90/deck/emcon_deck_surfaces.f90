@@ -1,6 +1,7 @@
 !> *SURFACE, and the faces that elements share.
 module emcon_deck_surfaces
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, find_face, n_neighbours
+   use emcon_deck_dimension, only : n_plane
    use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_blank, next_line
@@ -74,6 +75,11 @@ contains
 
       n_before = reader%log%n_errors
       allocate(surface%element(0), surface%face(0), surface%node(0))
+      if (scene%n_dim /= n_plane .and. any(["EDGE    ", "SEGMENTS"] &
+         == option_name(card, "TYPE"))) then
+         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE", "the model has three dimensions")
+         return
+      end if
       select case (option_name(card, "TYPE"))
       case ("", "ELEMENT")
          call read_faces(reader, card, scene, adjacency, surface)

@@ -11,12 +11,13 @@ module emcon_element_kind
    !> Cells of the VTK file format.
    integer, parameter :: vtk_points = 2, vtk_polygon = 7
 
-   !> Topology of one element kind. In two dimensions corners and faces run counter-clockwise.
+   !> Topology of one element kind. In two dimensions corners and faces run counter-clockwise, in
+   !> three faces do seen from inside.
    type :: element_row_t
       character(len=8) :: name = ""
       integer :: n_dim = 0
       integer :: n_node = 0
-      integer :: n_corner = 0                    !! of a convex polygon, first nodes
+      integer :: n_corner = 0                    !! the first nodes
       integer :: n_face = 0
       integer :: n_face_node = 0
       !> local nodes of face S1, then S2, ...: corners in their order, then those between them

@@ -1,16 +1,22 @@
 !> The registry of elements: the only module that knows their kinds. A new kind is one file, one row
-!> of `element_rows` and one case of `element_kinds_create`.
+!> of `plane_rows` or `space_rows` and one case of `element_kinds_create`.
 module emcon_element_registry
    use emcon_element_kind, only : element_kind_t, element_row_t, face_room, find_element_kind
+   use emcon_shape, only : shape_t
+   use emcon_shape_hexahedron_space, only : shape_hexahedron_t
+   use emcon_shape_quadratic_tetrahedron_space, only : shape_quadratic_tetrahedron_t
    use emcon_shape_quadratic_triangle_plane, only : shape_quadratic_triangle_t
    use emcon_shape_quadrilateral_plane, only : shape_quadrilateral_t
    use emcon_shape_serendipity_plane, only : shape_serendipity_t
+   use emcon_shape_serendipity_space, only : shape_serendipity_space_t
+   use emcon_shape_tetrahedron_space, only : shape_tetrahedron_t
    use emcon_shape_triangle_plane, only : shape_triangle_t
    implicit none
    private
-   public :: element_rows, element_kinds_create, find_element_row
+   public :: element_rows, plane_rows, space_rows, element_kinds_create, find_element_row, &
+      face_shape_create
 
-   type(element_row_t), parameter :: element_rows(*) = [ &
+   type(element_row_t), parameter :: plane_rows(*) = [ &
       element_row_t("CPE3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3), &
       element_row_t("CPE4", 2, 4, 4, 4, 2, &
          reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4), &
@@ -35,17 +41,38 @@ module emcon_element_registry
          reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
          is_thin=.true.)]
 
+   !> Faces of hexahedra, seen from inside counter-clockwise: corners alone, and with the middles.
+   integer, parameter :: hexahedron_faces(face_room(1)) = reshape([1, 2, 3, 4, 5, 8, 7, 6, &
+      1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 8, 4, 4, 8, 5, 1], face_room, pad=[0])
+   integer, parameter :: round_faces(face_room(1)) = [ &
+      1, 2, 3, 4, 9, 10, 11, 12, 5, 8, 7, 6, 16, 15, 14, 13, 1, 5, 6, 2, 17, 13, 18, 9, &
+      2, 6, 7, 3, 18, 14, 19, 10, 3, 7, 8, 4, 19, 15, 20, 11, 4, 8, 5, 1, 20, 16, 17, 12]
+
+   type(element_row_t), parameter :: space_rows(*) = [ &
+      element_row_t("C3D4", 3, 4, 4, 4, 3, &
+         reshape([1, 2, 3, 1, 4, 2, 2, 4, 3, 3, 4, 1], face_room, pad=[0]), 10, 4), &
+      element_row_t("C3D8", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8), &
+      element_row_t("C3D10", 3, 10, 4, 4, 6, &
+         reshape([1, 2, 3, 5, 6, 7, 1, 4, 2, 8, 9, 5, 2, 4, 3, 9, 10, 6, 3, 4, 1, 10, 8, 7], &
+            face_room, pad=[0]), 24, 10), &
+      element_row_t("C3D20", 3, 20, 8, 6, 8, round_faces, 25, 20), &
+      element_row_t("C3D20R", 3, 20, 8, 6, 8, round_faces, 25, 20)]
+
+   type(element_row_t), parameter :: element_rows(*) = [plane_rows, space_rows]
+
 contains
 
-   !> All kinds, in the order of the rows, with their shapes.
-   pure subroutine element_kinds_create(kind)
+   !> All kinds of so many dimensions, in the order of the rows, with their shapes.
+   pure subroutine element_kinds_create(n_dim, kind)
+      integer, intent(in) :: n_dim               !! 2 or 3
       type(element_kind_t), allocatable, intent(out) :: kind(:)
-      integer :: k
+      integer :: first, k
 
-      allocate(kind(size(element_rows)))
+      first = merge(0, size(plane_rows), n_dim == plane_rows(1)%n_dim)
+      allocate(kind(merge(size(plane_rows), size(space_rows), first == 0)))
       do k = 1, size(kind)
-         kind(k)%element_row_t = element_rows(k)
-         select case (element_rows(k)%name)
+         kind(k)%element_row_t = element_rows(first + k)
+         select case (kind(k)%name)
          case ("CPE3", "CPS3")
             allocate(shape_triangle_t :: kind(k)%shape)
          case ("CPE4", "CPE4H", "CPS4")
@@ -56,11 +83,39 @@ contains
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=3))
          case ("CPE8R", "CPS8R")
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=2))
+         case ("C3D4")
+            allocate(shape_tetrahedron_t :: kind(k)%shape)
+         case ("C3D8")
+            allocate(shape_hexahedron_t :: kind(k)%shape)
+         case ("C3D10")
+            allocate(shape_quadratic_tetrahedron_t :: kind(k)%shape)
+         case ("C3D20")
+            allocate(kind(k)%shape, source=shape_serendipity_space_t(n_side=3))
+         case ("C3D20R")
+            allocate(kind(k)%shape, source=shape_serendipity_space_t(n_side=2))
          end select
       end do
    end subroutine element_kinds_create
 
-   !> Index of the row called `name` (upper case), 0 if there is none.
+   !> The shape of faces of so many nodes, corners in their order and then those between them; none
+   !> if there is no such face.
+   subroutine face_shape_create(n_node, shape)
+      integer, intent(in) :: n_node
+      class(shape_t), allocatable, intent(out) :: shape
+
+      select case (n_node)
+      case (3)
+         allocate(shape_triangle_t :: shape)
+      case (4)
+         allocate(shape_quadrilateral_t :: shape)
+      case (6)
+         allocate(shape_quadratic_triangle_t :: shape)
+      case (8)
+         allocate(shape, source=shape_serendipity_t(n_side=3))
+      end select
+   end subroutine face_shape_create
+
+   !> Index of the row of `element_rows` called `name` (upper case), 0 if there is none.
    pure integer function find_element_row(name)
       character(len=*), intent(in) :: name
 

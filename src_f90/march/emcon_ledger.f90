@@ -2,7 +2,7 @@
 module emcon_ledger
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
-   use emcon_moment_plane, only : moment_of
+   use emcon_rotation, only : moments_of, n_turn
    use emcon_state, only : state_t
    use emcon_system, only : mass_times, system_t
    use emcon_term_registry, only : terms_mass
@@ -30,7 +30,7 @@ module emcon_ledger
       real(wp) :: contact_energy = 0.0_wp        !! that contact by penalty stores
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]
-      real(wp) :: angular = 0.0_wp               !! about the origin [M L^2/T]
+      real(wp), allocatable :: angular(:)        !! (1 or 3) about the origin [M L^2/T]
       real(wp), allocatable, private :: work(:, :)   !! (n_dim, n_node) momentum of each node
    end type ledger_t
 
@@ -41,7 +41,7 @@ contains
       type(ledger_t), intent(out) :: self
       integer, intent(in) :: n_dim               !! > 0
 
-      allocate(self%momentum(n_dim), source=0.0_wp)
+      allocate(self%momentum(n_dim), self%angular(n_turn(n_dim)), source=0.0_wp)
    end subroutine ledger_init
 
    !> Energies and momenta of `state`; the works stand.
@@ -65,17 +65,18 @@ contains
       self%angular = 0.0_wp
       do i = 1, size(x, 2)
          place(:n_dim) = x(:, i) + state%u(:, i)
-         self%angular = self%angular + moment_of(place(:n_dim), self%work(:, i))
+         self%angular = self%angular + moments_of(place(:n_dim), self%work(:, i))
       end do
    end subroutine ledger_measure
 
-   !> Linear and angular momentum of each body, rows px, py, lz, in the state last measured.
+   !> Linear and angular momentum of each body, rows px, py, lz, in space px to pz and lx to lz, in
+   !> the state last measured.
    pure subroutine ledger_momenta(self, system, x, state, momenta)
       type(ledger_t), intent(in) :: self         !! of a measured state
       type(system_t), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state         !! the same
-      real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
+      real(wp), intent(out) :: momenta(:, :)     !! (3 or 6, n_body)
 
       call add_up(system%space%body, x, state%u, self%work, momenta)
    end subroutine ledger_momenta
@@ -85,7 +86,7 @@ contains
       type(system_t), intent(in) :: system
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(state_t), intent(in) :: state
-      real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
+      real(wp), intent(out) :: momenta(:, :)     !! (3 or 6, n_body)
       real(wp) :: momentum(size(x, 1), size(x, 2))
 
       call mass_times(system, state%v, momentum)
@@ -97,7 +98,7 @@ contains
       integer, intent(in) :: body(:)             !! (n_node) of each node; 0: none
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(in), contiguous :: momentum(:, :)     !! (n_dim, n_node) [M L/T]
-      real(wp), intent(out) :: momenta(:, :)     !! (3, n_body)
+      real(wp), intent(out) :: momenta(:, :)     !! (3 or 6, n_body)
       real(wp) :: place(most_dim)
       integer :: i, n
 
@@ -108,7 +109,7 @@ contains
          associate (to => momenta(:, body(i)))
             place(:n) = x(:, i) + u(:, i)
             to(:n) = to(:n) + momentum(:, i)
-            to(n + 1) = to(n + 1) + moment_of(place(:n), momentum(:, i))
+            to(n + 1:) = to(n + 1:) + moments_of(place(:n), momentum(:, i))
          end associate
       end do
    end subroutine add_up

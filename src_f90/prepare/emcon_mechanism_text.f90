@@ -38,6 +38,8 @@ contains
       logical :: contact_holds
       integer :: n_assembly, i, n, first, last
 
+      text = ""
+      if (scene%n_dim > 2) return
       contact_holds = .true.
       if (present(with_contact)) contact_holds = .not. with_contact
       call mechanism_rows_find(system, prescribed, rows)

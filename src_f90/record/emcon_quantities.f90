@@ -7,6 +7,7 @@ module emcon_quantities
    use emcon_motion, only : at_rest, motion_of
    use emcon_pose, only : pose_at_end
    use emcon_rigid_bodies, only : rigid_body_t
+   use emcon_rotation, only : n_turn
    use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_t
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
@@ -25,7 +26,8 @@ module emcon_quantities
    integer, parameter :: at_nodes = 1, at_elements = 2, at_contacts = 3, at_pairs = 4
 
    !> Components of a vector, in a row: one for each direction; of a rotation: for each plane.
-   integer, parameter :: of_vector = 0, of_rotation = -1
+   !> Of a strain: of its tensor, shears twice.
+   integer, parameter :: of_vector = 0, of_rotation = -1, of_strain = -2
 
    !> A variable of decks at one kind of places.
    type :: row_t
@@ -46,7 +48,7 @@ module emcon_quantities
       row_t("RM", at_nodes, of_rotation, "reaction_moment", is_sparse=.true.), &
       row_t("S", at_nodes, 7, "cauchy_stress", "von_mises"), &
       row_t("S", at_elements, 6), &
-      row_t("E", at_elements, 3, "strain"), &
+      row_t("E", at_elements, of_strain, "strain"), &
       row_t("ENER", at_elements, 1, "strain_energy"), &
       row_t("ELSE", at_elements, 1, "strain_energy"), &
       row_t("ELKE", at_elements, 1, "kinetic_energy"), &
@@ -92,7 +94,8 @@ contains
 
       n = rows(findloc(rows%variable == variable .and. rows%place == place, .true., 1))%n_component
       if (n == of_vector) n = n_dim
-      if (n == of_rotation) n = n_dim*(n_dim - 1)/2
+      if (n == of_rotation) n = n_turn(n_dim)
+      if (n == of_strain) n = n_dim + n_turn(n_dim)
    end function quantity_components
 
    !> All variables that can stand in the field file.
@@ -148,7 +151,7 @@ contains
       row = rows(findloc(rows%variable == variable .and. rows%field /= "", .true., 1))
    end function field_row
 
-   !> U, V, RF: (2, n_node); UR, VR, RM (1, n_node); S: Cauchy stress and von Mises stress (7,
+   !> U, V, RF: (n_dim, n_node); UR, VR, RM (1, n_node); S: Cauchy stress and von Mises stress (7,
    !> n_node).
    function node_quantity(stepper, variable) result(values)
       type(stepper_t), intent(in), target :: stepper
@@ -169,7 +172,7 @@ contains
             values = real(state%reaction, dp)
             call gather_frames(stepper%scene%rigid, values)
          case ("UR", "VR", "RM")
-            allocate(values(1, size(state%u, 2)), source=0.0_dp)
+            allocate(values(n_turn(size(state%u, 1)), size(state%u, 2)), source=0.0_dp)
             do i = 1, size(stepper%scene%rigid)
                values(1, stepper%scene%rigid(i)%reference) = turning(stepper, variable, i)
             end do
@@ -218,8 +221,8 @@ contains
       end do
    end subroutine gather_frames
 
-   !> Means and sums over elements: S (6), E (3), ENER and ELSE strain energy, ELKE kinetic energy,
-   !> EVOL reference volume (1); second index the element.
+   !> Means and sums over elements: S (6), E (3, in space 6), ENER and ELSE strain energy, ELKE
+   !> kinetic energy, EVOL reference volume (1); second index the element.
    function element_quantity(stepper, variable) result(values)
       type(stepper_t), intent(in), target :: stepper
       character(len=*), intent(in) :: variable
@@ -239,7 +242,8 @@ contains
             call element_energies(solid, state%v, energy)
             values = reshape(real(energy, dp), [1, n])
          case default
-            allocate(stress(6, n), strain(3, n), volume(n))
+            allocate(stress(6, n), volume(n), &
+               strain(quantity_components("E", at_elements, stepper%scene%n_dim), n))
             call element_means(solid, state%u, is_large(stepper), stress, strain, volume)
             if (variable == "S") then
                values = real(stress, dp)

@@ -13,6 +13,7 @@ module emcon_recorder
    use emcon_pair_columns, only : pair_columns, pair_values
    use emcon_quantities, only : quantity_fields, quantity_of_field
    use emcon_requests, only : output_contact_file
+   use emcon_rotation, only : n_turn
    use emcon_run_mark, only : run_mark
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
@@ -28,13 +29,16 @@ module emcon_recorder
    !> Frames of a deck that asks for no field output.
    integer, parameter :: default_frames = 100
 
-   type(column_t), parameter :: columns(22) = [column_t("increment", .true.), column_t("time"), &
+   !> Columns of all runs, but momenta: these stand between.
+   type(column_t), parameter :: energies(13) = [column_t("increment", .true.), column_t("time"), &
       column_t("h"), column_t("kinetic"), column_t("strain"), column_t("external_work"), &
       column_t("contact_work"), column_t("stabilization"), &
       column_t("restitution_loss"), column_t("scheme_loss"), column_t("damping_loss"), &
-      column_t("contact_energy"), column_t("total"), column_t("px"), column_t("py"), &
-      column_t("lz"), column_t("active", .true.), column_t("newton", .true.), &
-      column_t("cuts", .true.), column_t("penetration"), column_t("stand_off"), column_t("cpu")]
+      column_t("contact_energy"), column_t("total")]
+   type(column_t), parameter :: efforts(6) = [column_t("active", .true.), &
+      column_t("newton", .true.), column_t("cuts", .true.), column_t("penetration"), &
+      column_t("stand_off"), column_t("cpu")]
+   character(len=*), parameter :: axes = "xyz"
 
    !> What is written if no step asks for fields: of solids, and behind them of contact.
    character(len=*), parameter :: default_fields(8) = [character(len=4) :: "U", "V", "RF", "S", &
@@ -89,9 +93,14 @@ contains
       type(stepper_t), intent(in) :: stepper
       type(column_t), allocatable, intent(out) :: column(:)
       type(column_t), allocatable :: of_pairs(:)
+      integer :: a
 
       call pair_columns(stepper, of_pairs)
-      allocate(column, source=[columns, of_pairs])
+      associate (n_dim => stepper%scene%n_dim)
+         allocate(column, source=[energies, [(column_t("p" // axes(a:a)), a = 1, n_dim)], &
+            [(column_t("l" // axes(a:a)), a = len(axes) + 1 - n_turn(n_dim), len(axes))], &
+            efforts, of_pairs])
+      end associate
    end subroutine list_columns
 
    !> The elements as cells of the field file.
@@ -182,8 +191,16 @@ contains
 
       call print_series_define(self%series, self%history, stepper, error)
       if (.not. allocated(error)) call history_set_define(self%history, "BODIES", "MOMENTUM", &
-         [(k, k = 1, stepper%march%system%space%n_body)], 3, self%momentum_set, error)
+         [(k, k = 1, stepper%march%system%space%n_body)], n_momentum(stepper%scene), &
+         self%momentum_set, error)
    end subroutine define_sets
+
+   !> Momenta of a body: along each axis, and of each rotation.
+   pure integer function n_momentum(scene)
+      type(scene_t), intent(in) :: scene
+
+      n_momentum = scene%n_dim + n_turn(scene%n_dim)
+   end function n_momentum
 
    !> Record the present state after `increment`.
    subroutine recorder_write(self, stepper, increment, cpu, error)
@@ -192,7 +209,7 @@ contains
       type(increment_t), intent(in) :: increment
       real(dp), intent(in) :: cpu                !! seconds of CPU time so far
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: momenta(3, stepper%march%system%space%n_body)
+      real(wp) :: momenta(n_momentum(stepper%scene), stepper%march%system%space%n_body)
 
       associate (state => stepper%march%state, ledger => stepper%march%ledger)
          call history_append(self%history, [real(dp) :: real(state%increment, dp), &

@@ -6,6 +6,7 @@ module emcon_report_bodies
    use emcon_law_registry, only : law_given, law_rows
    use emcon_locking, only : poisson_ratio
    use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
+   use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_t
@@ -26,7 +27,8 @@ module emcon_report_bodies
       integer :: law = 0                         !! code of its law; < 0: several
       real(wp) :: mass = 0.0_wp                  !! [M]
       real(wp), allocatable :: center(:)         !! (n_dim) of mass [L]
-      real(wp) :: inertia = 0.0_wp               !! about the centre: sum of m r^2 [M L^2]
+      !> (1 or 3) about the axes through the centre: z in the plane, x, y and z [M L^2]
+      real(wp), allocatable :: inertia(:)
       real(wp) :: modulus = 0.0_wp               !! of pressure waves, the largest [M/(L T^2)]
       real(wp) :: ratio = 0.0_wp                 !! Poisson's, the largest of what may lock
       real(wp) :: speed = 0.0_wp                 !! of pressure waves, the largest [L/T]
@@ -122,11 +124,12 @@ contains
       type(body_t), intent(inout) :: body(:)
       type(csr_t) :: mass
       real(wp) :: m
-      integer :: i, k, b
+      integer :: i, k, b, n
 
       call terms_mass(stepper%march%system%term, mass)
       do b = 1, size(body)
-         allocate(body(b)%center(stepper%scene%n_dim), source=0.0_wp)
+         n = stepper%scene%n_dim
+         allocate(body(b)%center(n), body(b)%inertia(n_turn(n)), source=0.0_wp)
       end do
       associate (x => stepper%scene%x)
          do i = 1, mass%n_row
@@ -137,7 +140,7 @@ contains
                body(b)%mass = body(b)%mass + m
                body(b)%center = body(b)%center + m*x(:, i)
                body(b)%inertia = body(b)%inertia &
-                  + m*dot_product(x(:, i), x(:, mass%column(k) + 1))
+                  + m*about_axes(x(:, i), x(:, mass%column(k) + 1))
             end do
          end do
       end associate
@@ -145,9 +148,18 @@ contains
          if (.not. body(b)%mass > 0.0_wp) cycle
          body(b)%center = body(b)%center/body(b)%mass
          body(b)%inertia = max(0.0_wp, body(b)%inertia &
-            - body(b)%mass*dot_product(body(b)%center, body(b)%center))
+            - body(b)%mass*about_axes(body(b)%center, body(b)%center))
       end do
    end subroutine add_masses
+
+   !> a.b less what is along each axis of rotation.
+   pure function about_axes(a, b) result(square)
+      real(wp), intent(in) :: a(:), b(:)         !! (n_dim) [L]
+      real(wp) :: square(n_turn(size(a)))
+
+      square = dot_product(a, b)
+      if (size(square) == size(a)) square = square - a*b
+   end function about_axes
 
    !> A row for each body.
    subroutine bodies_rows(scene, body, rows)
@@ -189,7 +201,14 @@ contains
          call row_put(row, "center_" // axes(a:a), body%center(a), &
             trim(merge(", centre #", " #        ", a == 1)))
       end do
-      call row_put(row, "inertia", body%inertia, ", moment of inertia #")
+      if (size(body%inertia) == 1) then
+         call row_put(row, "inertia", body%inertia(1), ", moment of inertia #")
+         return
+      end if
+      do a = 1, size(body%inertia)
+         call row_put(row, "inertia_" // axes(a:a), body%inertia(a), &
+            trim(merge(", moments of inertia #", " #                    ", a == 1)))
+      end do
    end subroutine put_inertia
 
    subroutine name_kind(scene, body, name)

@@ -14,7 +14,7 @@ module emcon_element
    type :: element_geometry_t
       integer :: n_node = 0
       integer :: n_gp = 0
-      real(wp), allocatable :: gradient(:, :, :)           !! (2, n_node, n_gp) of the shape
+      real(wp), allocatable :: gradient(:, :, :)           !! (n_dim, n_node, n_gp) of the shape
                                                            !! functions by X [1/L]
       real(wp), allocatable :: weight(:)                   !! (n_gp) reference volume [L^3]
    end type element_geometry_t

@@ -3,26 +3,21 @@
 !> The force is a discrete gradient of the strain energy without net force and moment on the
 !> mid-configuration, as in the plane: docs/theory.md, eqs. (6), (10a) and (11).
 module emcon_element_space
+   use emcon_element, only : space_element_t => element_geometry_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
    use emcon_law_space, only : law_response_space, n_strain, space_response_t
+   use emcon_rotation, only : product_of => cross_product
    use emcon_shape, only : max_node => max_element_nodes, shape_t, shape_table_t, shape_tabulate
    implicit none
    private
-   public :: space_element_t, space_motion_t, space_part_t
-   public :: space_element_init, space_element_mass, space_element_respond
+   public :: n_space, space_element_t, space_motion_t, space_part_t
+   public :: space_element_init, space_element_place, space_element_mass, space_element_add_mass
+   public :: space_element_respond, space_element_hold
 
-   integer, parameter :: n_dim = 3
+   integer, parameter :: n_space = 3, n_dim = n_space
    !> Rows and columns of the components of a strain.
    integer, parameter :: row(n_strain) = [1, 2, 3, 1, 2, 1], column(n_strain) = [1, 2, 3, 2, 3, 3]
-
-   !> What the reference shape gives.
-   type :: space_element_t
-      integer :: n_node = 0
-      integer :: n_gp = 0
-      real(wp), allocatable :: gradient(:, :, :)   !! (3, n_node, n_gp) by X [1/L]
-      real(wp), allocatable :: weight(:)           !! (n_gp) reference volume [L^3]
-   end type space_element_t
 
    !> Motion of the nodes, from `from` by `by`.
    type :: space_motion_t
@@ -57,9 +52,18 @@ contains
       class(shape_t), intent(in) :: shape
       real(wp), intent(in) :: x(:, :)            !! (3, n_node) [L]
       type(shape_table_t) :: table
-      integer :: k
 
       call shape_tabulate(shape, .false., table)
+      call space_element_place(self, table, x)
+   end subroutine space_element_init
+
+   !> The same from the shape functions at the points.
+   pure subroutine space_element_place(self, table, x)
+      type(space_element_t), intent(inout) :: self
+      type(shape_table_t), intent(in) :: table   !! for stiffness
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node) [L]
+      integer :: k
+
       self%n_node = table%n_node
       self%n_gp = table%n_gp
       allocate(self%gradient(n_dim, self%n_node, self%n_gp), self%weight(self%n_gp))
@@ -67,7 +71,7 @@ contains
          call reference_gradient(x, table%slope(:, :, k), self%gradient(:, :, k), self%weight(k))
          self%weight(k) = table%weight(k)*self%weight(k)
       end do
-   end subroutine space_element_init
+   end subroutine space_element_place
 
    !> int rho N_i N_j.
    subroutine space_element_mass(shape, x, density, mass)
@@ -76,19 +80,33 @@ contains
       real(wp), intent(in) :: density            !! [M/L^3]
       real(wp), intent(out) :: mass(:, :)        !! (n_node, n_node) [M]
       type(shape_table_t) :: table
+      real(wp) :: at_node(size(mass, 1))
+
+      call shape_tabulate(shape, .true., table)
+      call space_element_add_mass(table, x, density, mass, at_node)
+   end subroutine space_element_mass
+
+   !> The same from the shape functions at the points, and int rho N_i.
+   pure subroutine space_element_add_mass(table, x, density, mass, at_node)
+      type(shape_table_t), intent(in) :: table   !! for mass
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node) [L]
+      real(wp), intent(in) :: density            !! [M/L^3]
+      real(wp), intent(out) :: mass(:, :)        !! (n_node, n_node) [M]
+      real(wp), intent(out) :: at_node(:)        !! (n_node) [M]
       real(wp) :: gradient(n_dim, size(x, 2)), det
       integer :: i, k
 
-      call shape_tabulate(shape, .true., table)
       mass = 0.0_wp
+      at_node = 0.0_wp
       do k = 1, table%n_gp
          call reference_gradient(x, table%slope(:, :, k), gradient, det)
          do i = 1, table%n_node
             mass(:, i) = mass(:, i) &
                + density*table%weight(k)*det*table%value(i, k)*table%value(:, k)
          end do
+         at_node = at_node + density*table%weight(k)*det*table%value(:, k)
       end do
-   end subroutine space_element_mass
+   end subroutine space_element_add_mass
 
    !> Gradient of the shape functions by X and the determinant of the Jacobian.
    pure subroutine reference_gradient(x, slope, gradient, det)
@@ -110,14 +128,6 @@ contains
       gradient = 0.0_wp
       if (abs(det) > 0.0_wp) gradient = matmul(cofactor, slope)/det
    end subroutine reference_gradient
-
-   !> a x b.
-   pure function product_of(a, b) result(c)
-      real(wp), intent(in) :: a(n_dim), b(n_dim)
-      real(wp) :: c(n_dim)
-
-      c = [a(2)*b(3) - a(3)*b(2), a(3)*b(1) - a(1)*b(3), a(1)*b(2) - a(2)*b(1)]
-   end function product_of
 
    !> Response to a motion.
    pure subroutine space_element_respond(self, law, motion, with_tangent, part)
@@ -144,6 +154,32 @@ contains
          if (with_tangent) call add_tangent(self, k, point, response, part)
       end do
    end subroutine space_element_respond
+
+   !> Cauchy stress F S F^T/det F and strain at the points of an element that does not move.
+   pure subroutine space_element_hold(self, law, motion, stress, strain)
+      type(space_element_t), intent(in) :: self
+      class(law_t), intent(in) :: law
+      type(space_motion_t), intent(in) :: motion       !! of no size
+      real(wp), intent(out) :: stress(:, :)      !! (6, >= n_gp) [M/(L T^2)]
+      real(wp), intent(out) :: strain(:, :)      !! (6, >= n_gp) E11, E22, E33, 2 E12, ...
+      type(point_t) :: point
+      type(space_response_t) :: response
+      real(wp) :: s(n_dim, n_dim), det
+      integer :: k, v
+
+      do k = 1, self%n_gp
+         call place_point(self, k, motion, point)
+         call law_response_space(law, point%strain, point%dstrain, response)
+         associate (f => point%f_end)
+            det = dot_product(f(:, 1), product_of(f(:, 2), f(:, 3)))
+            s = matmul(f, matmul(tensor_of(response%stress), transpose(f)))/det
+         end associate
+         do v = 1, n_strain
+            stress(v, k) = s(row(v), column(v))
+         end do
+         strain(:, k) = point%strain
+      end do
+   end subroutine space_element_hold
 
    !> The motion of point `k`: eq. (6).
    pure subroutine place_point(self, k, motion, point)

@@ -4,6 +4,7 @@ module emcon_solid
       element_response_t, point_is_regular, point_motion_t
    use emcon_element_pack_plane, only : element_pack_t, pack_add_point, pack_clear, pack_fill, &
       pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
+   use emcon_element_space, only : n_space, space_element_add_mass, space_element_place
    use emcon_errors, only : err_input, error_t, raise
    use emcon_host_law, only : host_answer, host_law_t, host_law_take, host_points_make_room, &
       host_response_t, host_rest_stiffness
@@ -27,6 +28,7 @@ module emcon_solid
    end type to_nodes_t
 
    type :: solid_t
+      integer :: n_dim = 0
       integer :: n_element = 0
       integer :: n_node = 0
       integer, allocatable :: label(:)                   !! (n_element)
@@ -75,6 +77,7 @@ contains
       integer :: e, k, n, n_most
 
       n = size(scene%element_kind)
+      self%n_dim = size(scene%x, 1)
       self%n_element = n
       self%n_node = size(scene%x, 2)
       self%label = scene%element_label
@@ -108,7 +111,8 @@ contains
          if (allocated(error)) return
          if (any(self%geometry(e)%weight <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
-               " is inverted or has no area; check the order of its nodes")
+               " is inverted or has no " // trim(merge("volume", "area  ", size(scene%x, 1) &
+               == n_space)) // "; check the order of its nodes")
             return
          end if
       end do
@@ -188,6 +192,10 @@ contains
       type(solid_t), intent(inout) :: self
       integer :: list(self%n_element), e, i, k, law, n, n_pack, pass
 
+      if (self%n_dim == n_space) then            ! their elements respond one by one
+         allocate(self%pack(0))
+         return
+      end if
       do pass = 1, 2                             ! count, then fill
          n_pack = 0
          do k = 1, maxval([0, self%kind])
@@ -317,16 +325,23 @@ contains
       real(wp), intent(in) :: x(:, :), density
       integer, intent(in) :: e
       type(shape_table_t), intent(in) :: stiffness, mass
-      real(wp) :: local(2, stiffness%n_node), gradient(2, stiffness%n_node), det, rho_dv
+      real(wp) :: local(size(x, 1), stiffness%n_node), gradient(size(x, 1), stiffness%n_node), det
+      real(wp) :: rho_dv, consistent(stiffness%n_node, stiffness%n_node)
       integer :: n, k, i
 
       n = stiffness%n_node
       do i = 1, n
          local(:, i) = x(:, self%node(i, e)) - x(:, self%node(1, e))
       end do
+      if (size(x, 1) == n_space) then
+         call space_element_place(self%geometry(e), stiffness, local)
+         call space_element_add_mass(mass, local, density, consistent, self%volume_mass(:n, e))
+         if (self%has_inertia(e)) self%mass(:n, :n, e) = consistent
+         return
+      end if
       self%geometry(e)%n_node = n
       self%geometry(e)%n_gp = stiffness%n_gp
-      allocate(self%geometry(e)%gradient(2, n, stiffness%n_gp), &
+      allocate(self%geometry(e)%gradient(size(x, 1), n, stiffness%n_gp), &
          self%geometry(e)%weight(stiffness%n_gp))
       do k = 1, stiffness%n_gp
          call reference_gradient(n, local, stiffness%slope(:, :, k), gradient, det)

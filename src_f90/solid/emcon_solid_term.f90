@@ -3,8 +3,8 @@
 !> Source: docs/theory.md, section 3.
 module emcon_solid_term
    use emcon_csr, only : csr_t
-   use emcon_element_frequency, only : element_frequency
    use emcon_element_lists, only : element_lists
+   use emcon_element_space, only : n_space
    use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_point_t, &
       pack_add_rounding, pack_response_t, pack_scatter
    use emcon_errors, only : err_analysis, error_t, raise
@@ -12,12 +12,13 @@ module emcon_solid_term
    use emcon_kinds, only : dp, wp
    use emcon_law, only : n_lane
    use emcon_law_registry, only : law_linear
-   use emcon_lumped_mass, only : lumped_mass
    use emcon_motion, only : motion_t
    use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
    use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_evaluate_given, solid_init, solid_pack_respond, solid_t
+   use emcon_solid_response_space, only : compare_frequency, element_slots_t, space_find_fastest, &
+      space_respond, space_tangent_times
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_term, only : fastest_t, response_t, role_internal, term_t
    use emcon_text, only : to_text
@@ -30,8 +31,7 @@ module emcon_solid_term
       logical :: nlgeom = .true.                 !! .false.: small strains
       logical :: has_linear_laws = .false.       !! all materials of its elements are
       logical, private :: is_empty = .false.     !! no elements are left
-      integer, allocatable, private :: slot(:)   !! element matrices by columns
-      integer, allocatable, private :: first(:)  !! (n_element) slot of each
+      type(element_slots_t), private :: to       !! places of element matrices
       type(host_response_t), private :: given   !! what given laws answer
       type(pack_shares_t), private :: shares    !! of the threads
    contains
@@ -88,13 +88,13 @@ contains
       integer :: e, next
 
       self%nlgeom = scene%step(i_step)%nlgeom
-      self%slot = slot
-      if (allocated(self%first)) deallocate(self%first)
-      allocate(self%first(self%solid%n_element), source=0)
+      self%to%slot = slot
+      if (allocated(self%to%first)) deallocate(self%to%first)
+      allocate(self%to%first(self%solid%n_element), source=0)
       next = 1
       do e = 1, self%solid%n_element
          if (self%solid%is_small(e)) cycle
-         self%first(e) = next
+         self%to%first(e) = next
          next = next + (size(scene%x, 1)*self%solid%geometry(e)%n_node)**2
       end do
    end subroutine begin_step
@@ -107,6 +107,10 @@ contains
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       integer :: t
 
+      if (self%solid%n_dim == n_space) then
+         call space_respond(self%solid, self%nlgeom, self%to, motion, response, value, side)
+         return
+      end if
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, &
             present(value), self%given)
@@ -260,14 +264,14 @@ contains
       integer :: a, c, i, j, k, l, place
 
       do l = 1, pack%n
-         k = self%first(pack%element(l)) - 1
+         k = self%to%first(pack%element(l)) - 1
          do j = 1, pack%n_node
             do c = 1, size(tangent, 4)
                do i = 1, pack%n_node
                   do a = 1, size(tangent, 2)
                      k = k + 1
                      if (self%shares%turn(pack%node(l, i)) /= turn) cycle
-                     place = self%slot(k)
+                     place = self%to%slot(k)
                      if (place > 0) then
                         value(place) = value(place) + real(factor*tangent(l, a, i, c, j), dp)
                      else if (place < 0) then
@@ -312,6 +316,10 @@ contains
       type(pack_motion_t) :: local
       integer :: k
 
+      if (self%solid%n_dim == n_space) then
+         call space_tangent_times(self%solid, self%nlgeom, motion, direction, product)
+         return
+      end if
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
             self%given)
@@ -405,6 +413,10 @@ contains
       type(pack_motion_t) :: local
       integer :: k, l
 
+      if (self%solid%n_dim == n_space) then
+         call space_find_fastest(self%solid, self%nlgeom, motion, fastest)
+         return
+      end if
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
             self%given)
@@ -417,27 +429,11 @@ contains
             call solid_pack_respond(self%solid, pack, local, self%given, .true., point, part)
             if (any(part%is_inverted)) return
             do l = 1, pack%n
-               call compare(self%solid, pack%element(l), motion%weight, &
+               call compare_frequency(self%solid, pack%element(l), motion%weight, &
                   part%tangent(l, :, :pack%n_node, :, :pack%n_node), fastest)
             end do
          end associate
       end do
    end subroutine find_fastest
-
-   !> Is element `e` faster than the fastest so far?
-   pure subroutine compare(solid, e, factor, tangent, fastest)
-      type(solid_t), intent(in) :: solid
-      integer, intent(in) :: e                   !! 1..n_element
-      real(wp), intent(in) :: factor             !! of the tangent
-      real(wp), intent(in) :: tangent(:, :, :, :)   !! (n_dim, n, n_dim, n)
-      type(fastest_t), intent(inout) :: fastest
-      real(wp) :: mass(size(tangent, 2)), square
-      integer :: m
-
-      m = size(tangent, 1)*size(tangent, 2)
-      call lumped_mass(solid%mass(:size(mass), :size(mass), e), mass)
-      square = element_frequency(factor*reshape(tangent, [m, m]), mass)
-      if (square > fastest%square) fastest = fastest_t(e, square)
-   end subroutine compare
 
 end module emcon_solid_term

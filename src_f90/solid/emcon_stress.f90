@@ -9,6 +9,7 @@ module emcon_stress
    use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t, &
       corotated_turn_stress
    use emcon_element, only : element_motion_t, element_point, point_motion_t
+   use emcon_element_space, only : n_space, space_element_hold, space_motion_t
    use emcon_host_law, only : host_response_t, host_state
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, law_response_t, n_lane
@@ -24,26 +25,20 @@ contains
    !> Stress at the nodes: each element's field through its quadrature points, mean over elements.
    subroutine nodal_stress(solid, u, nlgeom, stress)
       type(solid_t), intent(in) :: solid
-      real(wp), intent(in), contiguous :: u(:, :)            !! (2, n_node)
+      real(wp), intent(in), contiguous :: u(:, :)            !! (n_dim, n_node)
       logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
       type(host_response_t) :: given
-      type(element_motion_t) :: motion
-      type(law_points_t) :: points
       integer :: count_at(solid%n_node), e, i, k, node
       real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: at_gp, strain
-      real(wp) :: turn(size(u, 1), size(u, 1))
 
       call respond_at(solid, u, nlgeom, given)
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
          if (solid%is_rigid(e)) cycle
-         motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
-         call place(solid, e, u, motion, turn)
-         call element_state(solid, e, motion, given, points, at_gp, strain)
+         call state_of(solid, e, u, nlgeom, given, at_gp, strain)
          do k = 1, solid%geometry(e)%n_gp
-            if (solid%is_corotated(e)) call corotated_turn_stress(turn, at_gp(:, k))
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
                stress(:, node) = stress(:, node) &
@@ -58,6 +53,51 @@ contains
          if (count_at(i) > 0) stress(:, i) = stress(:, i)/real(count_at(i), wp)
       end do
    end subroutine nodal_stress
+
+   !> Stress and strain at the quadrature points of element `e`, whatever it is.
+   pure subroutine state_of(solid, e, u, nlgeom, given, stress, strain)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: u(:, :)
+      logical, intent(in) :: nlgeom
+      type(host_response_t), intent(in) :: given
+      real(wp), intent(inout) :: stress(:, :), strain(:, :)
+      type(law_points_t) :: points
+      type(element_motion_t) :: motion
+      real(wp) :: turn(size(u, 1), size(u, 1))
+      integer :: k
+
+      if (solid%n_dim == n_space) then
+         call state_in_space(solid, e, u, nlgeom, stress, strain)
+         return
+      end if
+      motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
+      call place(solid, e, u, motion, turn)
+      call element_state(solid, e, motion, given, points, stress, strain)
+      if (.not. solid%is_corotated(e)) return
+      do k = 1, solid%geometry(e)%n_gp
+         call corotated_turn_stress(turn, stress(:, k))
+      end do
+   end subroutine state_of
+
+   pure subroutine state_in_space(solid, e, u, nlgeom, stress, strain)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e
+      real(wp), intent(in), contiguous :: u(:, :)
+      logical, intent(in) :: nlgeom
+      real(wp), intent(inout) :: stress(:, :), strain(:, :)
+      type(space_motion_t) :: motion
+      integer :: i
+
+      motion%nlgeom = nlgeom
+      associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         do i = 1, size(node)
+            motion%from(:, i) = u(:, node(i)) - u(:, node(1))
+         end do
+      end associate
+      call space_element_hold(solid%geometry(e), solid%law(solid%law_of(e))%law, motion, stress, &
+         strain)
+   end subroutine state_in_space
 
    !> What the given laws answer at the displacement `u`.
    subroutine respond_at(solid, u, nlgeom, given)
@@ -166,17 +206,15 @@ contains
    !> Means over the reference volume of each element, and that volume.
    subroutine element_means(solid, u, nlgeom, stress, strain, volume)
       type(solid_t), intent(in) :: solid
-      real(wp), intent(in), contiguous :: u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u(:, :)   !! (n_dim, n_node) [L]
       logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out) :: stress(:, :)      !! (6, n_element)
-      real(wp), intent(out) :: strain(:, :)      !! (3, n_element) E11, E22, 2 E12
+      !> (3 or 6, n_element) E11, E22, 2 E12, or E11, E22, E33, 2 E12, 2 E23, 2 E13
+      real(wp), intent(out) :: strain(:, :)
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
       type(host_response_t) :: given
-      type(element_motion_t) :: motion
-      type(law_points_t) :: points
       real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: stress_k, strain_k
       real(wp) :: weight
-      real(wp) :: turn(size(u, 1), size(u, 1))
       integer :: e, k
 
       call respond_at(solid, u, nlgeom, given)
@@ -185,14 +223,11 @@ contains
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight)
          if (solid%is_rigid(e)) cycle
-         motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
-         call place(solid, e, u, motion, turn)
-         call element_state(solid, e, motion, given, points, stress_k, strain_k)
+         call state_of(solid, e, u, nlgeom, given, stress_k, strain_k)
          do k = 1, solid%geometry(e)%n_gp
-            if (solid%is_corotated(e)) call corotated_turn_stress(turn, stress_k(:, k))
             weight = solid%geometry(e)%weight(k)/volume(e)
             stress(:, e) = stress(:, e) + weight*stress_k(:, k)
-            strain(:, e) = strain(:, e) + weight*strain_k(:3, k)
+            strain(:, e) = strain(:, e) + weight*strain_k(:size(strain, 1), k)
          end do
       end do
    end subroutine element_means

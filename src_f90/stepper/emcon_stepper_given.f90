@@ -8,7 +8,7 @@ module emcon_stepper_given
    use emcon_constraint, only : constraint_t
    use emcon_csr, only : csr_t
    use emcon_element_kind, only : find_element_kind
-   use emcon_element_registry, only : element_rows
+   use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
    use emcon_host, only : host_add_constraint, host_add_force, host_add_law, &
       host_add_solver, host_copy_solvers, host_find_solver
@@ -106,8 +106,8 @@ contains
       k = find_element_kind(self%scene%kind, plain(name))
       call check_that(k > 0, "there is no element type " // plain(name) // " in the deck: to " // &
          "give its shape, it has to be the TYPE of a *USER ELEMENT", error)
-      call check_that(k > size(element_rows), "a shape cannot be given for " // plain(name) // &
-         ": EMCON has its own", error)
+      call check_that(find_element_row(plain(name)) == 0, "a shape cannot be given for " &
+         // plain(name) // ": EMCON has its own", error)
       if (allocated(error)) return
       associate (kind => self%scene%kind(k))
          call check_that(.not. allocated(kind%shape), "the shape of " // plain(name) // &

@@ -47,7 +47,7 @@ contains
       if (allocated(error)) return
       self%scene%is_hosted = .true.
       self%scene%step(1)%scheme = scheme_row("DYNAMIC", "")
-      call element_kinds_create(self%scene%kind)
+      call element_kinds_create(self%scene%n_dim, self%scene%kind)
       allocate(self%diagnostic(0))
       self%is_read = .true.
    end subroutine stepper_new

@@ -27,6 +27,7 @@ module emcon_stepper_query
    use emcon_system, only : system_check_response, system_renew, system_respond
    use emcon_term_registry, only : terms_mass
    use emcon_text, only : to_text
+   use emcon_rotation, only : n_turn
    implicit none
    private
    public :: query_t, query_free, query_sync, query_follow, query_place, query_forget
@@ -333,12 +334,15 @@ contains
    subroutine query_momenta(self, stepper, momenta, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), allocatable, intent(out) :: momenta(:, :)    !! (3, n_body) px, py [M L/T], lz
+      !> (3, n_body) px, py [M L/T], lz [M L^2/T]; in space (6, n_body), px to pz and lx to lz
+      real(wp), allocatable, intent(out) :: momenta(:, :)
       type(error_t), allocatable, intent(out) :: error
 
       call query_sync(self, stepper, error)
       if (allocated(error)) return
-      allocate(momenta(3, self%march%system%space%n_body))
+      associate (n_dim => stepper%scene%n_dim)
+         allocate(momenta(n_dim + n_turn(n_dim), self%march%system%space%n_body))
+      end associate
       call body_momenta(self%march%system, stepper%scene%x, self%march%state, momenta)
    end subroutine query_momenta
 

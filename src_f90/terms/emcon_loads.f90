@@ -6,10 +6,15 @@ module emcon_loads
    use emcon_motion, only : motion_t
    use emcon_pose, only : instant_t
    use emcon_prescribed, only : amplitude_at
+   use emcon_element_kind, only : max_face_nodes
+   use emcon_element_registry, only : face_shape_create
+   use emcon_element_space, only : n_space
    use emcon_moment_load_plane, only : add_moment, add_moment_stiffness
    use emcon_pressure_plane, only : add_pressure, add_pressure_stiffness
+   use emcon_pressure_space, only : press_face, press_face_stiffness
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
+   use emcon_shape, only : shape_t, shape_table_t, shape_tabulate
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_steps, only : load_gravity, load_moment, load_point, load_pressure, load_t
@@ -34,6 +39,7 @@ module emcon_loads
       integer, allocatable, private :: node(:, :)        !! (n_most, n_element)
       real(wp), allocatable, private :: volume_mass(:, :)   !! int rho N_i, like `node` [M]
       real(wp), allocatable, private :: thickness(:)     !! (n_element) [L]
+      type(shape_table_t), private :: on_face(max_face_nodes)   !! of faces of so many nodes
       real(wp), allocatable, private :: force(:, :)      !! (n_dim, n_node) [M L/T^2]
    contains
       procedure :: lay_out
@@ -43,13 +49,12 @@ module emcon_loads
       procedure :: is_symmetric
    end type loads_t
 
-   !> Nodes that one load may act on: an edge with one in its middle.
-   integer, parameter :: most_face_nodes = 3, moment_nodes = 2
+   integer, parameter :: moment_nodes = 2
 
 contains
 
    !> Loads on the elements of `solid` and their nodes; there are none before the first step.
-   pure subroutine loads_init(self, scene, solid)
+   subroutine loads_init(self, scene, solid)
       type(loads_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
@@ -67,7 +72,23 @@ contains
          self%frame(:, b) = scene%rigid(b)%frame
       end do
       allocate(self%force, mold=scene%x)
+      if (size(scene%x, 1) == n_space) call tabulate_faces(self, scene)
    end subroutine loads_init
+
+   !> Shape functions on the faces of the kinds of elements.
+   subroutine tabulate_faces(self, scene)
+      type(loads_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      class(shape_t), allocatable :: shape
+      integer :: k
+
+      do k = 1, size(scene%kind)
+         associate (n => scene%kind(k)%n_face_node)
+            call face_shape_create(n, shape)
+            if (allocated(shape)) call shape_tabulate(shape, .true., self%on_face(n))
+         end associate
+      end do
+   end subroutine tabulate_faces
 
    !> The frames of rigid bodies: their nodes meet under a moment, and are of one body.
    pure subroutine lay_out(self, lists)
@@ -91,7 +112,7 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not needed: they are found again
       integer, allocatable :: number(:)
-      integer :: dof(scene%n_dim, most_face_nodes), i, e, j, k, a
+      integer :: dof(scene%n_dim, maxval([moment_nodes, scene%kind%n_face_node])), i, e, j, k, a
 
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
@@ -103,7 +124,7 @@ contains
          self%duration = step%duration
       end associate
       if (allocated(self%face)) deallocate(self%face, self%n_on, self%slot)
-      allocate(self%face(most_face_nodes, size(self%load)), self%n_on(size(self%load)), source=0)
+      allocate(self%face(size(dof, 2), size(self%load)), self%n_on(size(self%load)), source=0)
       allocate(self%slot(size(dof), size(dof), size(self%load)), source=0)
       allocate(number, source=freedom_numbers(space%numbering))
       do i = 1, size(self%load)
@@ -189,12 +210,7 @@ contains
                end do
             case (load_pressure)
                p = p*self%thickness(load%target)
-               associate (face => self%face(:self%n_on(i), i), &
-                     m => size(self%force, 1)*self%n_on(i))
-                  call add_pressure(face, p, motion%x, motion%at, self%follows(i), self%force)
-                  if (present(value) .and. self%follows(i)) call add_pressure_stiffness( &
-                     p*motion%load_weight, self%slot(:m, :m, i), value, side)
-               end associate
+               call respond_pressure(self, i, p, motion, value, side)
             case (load_moment)
                associate (frame => self%face(:moment_nodes, i))
                   call add_moment(frame, p, motion%x, motion%at, self%force)
@@ -209,6 +225,37 @@ contains
          if (response%with_sizes) total%magnitude = total%magnitude + abs(self%force)
       end associate
    end subroutine respond
+
+   !> Pressure `i` on its face, p times the thickness.
+   subroutine respond_pressure(self, i, p, motion, value, side)
+      class(loads_t), intent(inout) :: self
+      integer, intent(in) :: i                   !! load
+      real(wp), intent(in) :: p                  !! [M/T^2], in space [M/(L T^2)]
+      type(motion_t), intent(in) :: motion       !! placed
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      real(wp) :: place(size(self%force, 1), self%n_on(i))
+      integer :: j, m
+
+      m = size(self%force, 1)*self%n_on(i)
+      associate (face => self%face(:self%n_on(i), i))
+         if (size(self%force, 1) == n_space) then
+            do j = 1, size(face)
+               place(:, j) = motion%x(:, face(j)) - motion%x(:, face(1))
+               if (self%follows(i)) place(:, j) = place(:, j) &
+                  + (motion%at(:, face(j)) - motion%at(:, face(1)))
+            end do
+            associate (table => self%on_face(size(face)))
+               call press_face(face, table, p, place, self%force)
+               if (present(value) .and. self%follows(i)) call press_face_stiffness(table, &
+                  p*motion%load_weight, place, self%slot(:m, :m, i), value, side)
+            end associate
+         else
+            call add_pressure(face, p, motion%x, motion%at, self%follows(i), self%force)
+            if (present(value) .and. self%follows(i)) call add_pressure_stiffness( &
+               p*motion%load_weight, self%slot(:m, :m, i), value, side)
+         end if
+      end associate
+   end subroutine respond_pressure
 
    !> It is, unless a pressure follows the surface, or there is a moment.
    pure logical function is_symmetric(self, motion)

@@ -38,7 +38,7 @@ contains
       scene%heading = ""
       allocate(scene%file(0), scene%node_label(0), scene%node_origin(0), scene%x(2, 0))
       allocate(scene%element_label(0), scene%element_origin(0), scene%element_kind(0))
-      call element_kinds_create(scene%kind)
+      call element_kinds_create(2, scene%kind)
       allocate(scene%element_node(4, 0), scene%element_section(0))
       allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
       allocate(scene%material(1), scene%section(1), scene%pair(0), scene%step(0))

@@ -340,7 +340,7 @@ contains
          if (.not. allocated(error)) call stepper_advance(own, increment, error)
          if (allocated(error)) return
          call check_near(error, given%march%ledger%total, total, 1.0e3_wp*eps, total, "total")
-         call check_near(error, given%march%ledger%angular, own%march%ledger%angular, &
+         call check_near(error, given%march%ledger%angular(1), own%march%ledger%angular(1), &
             1.0e3_wp*eps, 10.0_wp, "angular momentum")
          if (allocated(error)) return
       end do

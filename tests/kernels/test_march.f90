@@ -162,7 +162,7 @@ contains
          call check_near(error, increment%h, h, 2.0_wp*eps, 1.0_wp, "increment")
          call check_near(error, march%ledger%total, start%total, tol, start%total, "energy")
          call check_near(error, [march%ledger%momentum, march%ledger%angular], &
-            [start%momentum, start%angular], tol, start%angular, "momenta")
+            [start%momentum, start%angular], tol, start%angular(1), "momenta")
       end do
       call check_true(error, n_cut > 0, "something was cut")
       call march_free(march)

@@ -52,7 +52,7 @@ contains
 
       call open_well(stepper, .true., 0.5_wp, 0.1_wp, 1000, error)
       if (.not. allocated(error)) call run_conserving(stepper, 1.0_wp, error)
-      if (.not. allocated(error)) call check_near(error, stepper%march%ledger%angular, 0.5_wp, &
+      if (.not. allocated(error)) call check_near(error, stepper%march%ledger%angular(1), 0.5_wp, &
          32000.0_wp*eps, 1.0_wp, "angular momentum")
       call stepper_close(stepper)
    end subroutine test_harmonic

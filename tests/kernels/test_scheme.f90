@@ -141,7 +141,7 @@ contains
                   call check_near(error, now%momentum, start%momentum, tol, &
                      abs(start%momentum(2)), what // "momentum")
                   call check_near(error, now%angular, start%angular, tol, &
-                     max(abs(start%angular), lever/tol), what // "angular momentum")
+                     max(abs(start%angular(1)), lever/tol), what // "angular momentum")
                   call check_near(error, now%total, start%total, tol, start%total, what // "total")
                end associate
                if (allocated(error)) return

@@ -48,7 +48,7 @@ contains
       real(wp) :: point(2)
       integer :: i, k
 
-      call element_kinds_create(kind)
+      call element_kinds_create(2, kind)
       do k = 1, size(kind)
          call make_room(kind(k), value, slope)
          do i = 1, 20
@@ -76,7 +76,7 @@ contains
       real(wp) :: point(2)
       integer :: i, k
 
-      call element_kinds_create(kind)
+      call element_kinds_create(2, kind)
       do k = 1, size(kind)
          call make_room(kind(k), value, slope)
          call kind(k)%shape%places(place)
@@ -96,7 +96,7 @@ contains
       real(wp), allocatable :: value(:), slope(:, :), place(:, :), expected(:)
       integer :: i, k
 
-      call element_kinds_create(kind)
+      call element_kinds_create(2, kind)
       do k = 1, size(kind)
          call make_room(kind(k), value, slope)
          call kind(k)%shape%places(place)
@@ -119,7 +119,7 @@ contains
       real(wp) :: point(2), way(2)
       integer :: k, a
 
-      call element_kinds_create(kind)
+      call element_kinds_create(2, kind)
       do k = 1, size(kind)
          call make_room(kind(k), up, slope)
          call make_room(kind(k), down, other)
@@ -154,7 +154,7 @@ contains
       type(element_kind_t), allocatable :: kind(:)
       type(shape_table_t) :: table
 
-      call element_kinds_create(kind)
+      call element_kinds_create(2, kind)
       associate (shape => kind(find_element_row(name))%shape)
          call shape_tabulate(shape, .false., table)
          call check_rule(error, table, degree, name // ", stiffness")
@@ -197,7 +197,7 @@ contains
       real(wp), allocatable :: value(:), slope(:, :)
       integer :: i, k
 
-      call element_kinds_create(kind)
+      call element_kinds_create(2, kind)
       do k = 1, size(kind)
          call make_room(kind(k), value, slope)
          call shape_tabulate(kind(k)%shape, .true., mass)
@@ -220,7 +220,7 @@ contains
       real(wp), allocatable :: weight(:, :), place(:, :)
       integer :: k
 
-      call element_kinds_create(kind)
+      call element_kinds_create(2, kind)
       do k = 1, size(kind)
          call kind(k)%shape%to_nodes(weight)
          call shape_tabulate(kind(k)%shape, .false., table)

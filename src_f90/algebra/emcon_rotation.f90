@@ -1,0 +1,43 @@
+!> Cross products and moments in two and three dimensions.
+module emcon_rotation
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: n_turn, cross_product, moments_of
+
+   !> Of each axis the one behind it, and the one behind that.
+   integer, parameter :: n_axis = 3
+   integer, parameter :: behind(n_axis) = 1 + modulo([1, 2, 3], n_axis), &
+      last(n_axis) = behind(behind)
+
+contains
+
+   !> Rotations: that about z in the plane, those about x, y and z in space.
+   pure integer function n_turn(n_dim)
+      integer, intent(in) :: n_dim               !! 2 or 3
+
+      n_turn = n_dim*(n_dim - 1)/2
+   end function n_turn
+
+   !> a x b.
+   pure function cross_product(a, b) result(c)
+      real(wp), intent(in) :: a(n_axis), b(n_axis)
+      real(wp) :: c(n_axis)
+
+      c = a(behind)*b(last) - a(last)*b(behind)
+   end function cross_product
+
+   !> The moments about the origin of what acts at `place`; of a momentum: the angular momentum.
+   pure function moments_of(place, force) result(moment)
+      real(wp), intent(in) :: place(:)           !! (n_dim) [L]
+      real(wp), intent(in) :: force(:)           !! (n_dim) [M L/T^2], or momentum [M L/T]
+      real(wp) :: moment(n_turn(size(place)))
+      integer :: axis, k
+
+      do k = 1, size(moment)
+         axis = k + n_axis - size(moment)
+         moment(k) = place(behind(axis))*force(last(axis)) - place(last(axis))*force(behind(axis))
+      end do
+   end function moments_of
+
+end module emcon_rotation

@@ -1,0 +1,134 @@
+!> How many dimensions a deck has: those of its elements. What is of the plane alone is refused
+!> where there are three.
+module emcon_deck_dimension
+   use emcon_deck_reader, only : card_error, card_t, option_name, reader_t
+   use emcon_diagnostics, only : add_error
+   use emcon_kinds, only : wp
+   use emcon_materials, only : kinematics_nonlinear
+   use emcon_scene, only : scene_t
+   implicit none
+   private
+   public :: n_plane, n_space, type_dimension, other_dimension, find_dimension, freedoms_text
+   public :: refuse_plane_cards, check_dimension
+
+   integer, parameter :: n_plane = 2, n_space = 3
+
+   !> First letters of types of elements.
+   integer, parameter :: n_letter = 3
+   character(len=n_letter), parameter :: plane_types(*) = ["CPE", "CPS", "CAX"], &
+      space_types(*) = ["C3D"]
+
+   !> A card that is of the plane, and what it does.
+   type :: plane_card_t
+      character(len=14) :: name                    !! as `card_t` has it
+      character(len=45) :: what
+   end type plane_card_t
+
+   type(plane_card_t), parameter :: plane_cards(*) = [ &
+      plane_card_t("CONTACTPAIR", "contact in three dimensions is"), &
+      plane_card_t("CONTACT", "contact in three dimensions is"), &
+      plane_card_t("TIE", "ties in three dimensions are"), &
+      plane_card_t("RIGIDBODY", "rigid bodies in three dimensions are"), &
+      plane_card_t("USERELEMENT", "elements of a program in three dimensions are"), &
+      plane_card_t("USERMATERIAL", "laws of a program in three dimensions are"), &
+      plane_card_t("GIVENFORCES", "forces of a program in three dimensions are")]
+
+contains
+
+   !> Dimensions of the elements of a type, by its name in capitals; 0: the name does not tell.
+   pure integer function type_dimension(name) result(n_dim)
+      character(len=*), intent(in) :: name
+
+      n_dim = 0
+      if (len(name) < n_letter) return
+      if (any(plane_types == name(:n_letter))) n_dim = n_plane
+      if (any(space_types == name(:n_letter))) n_dim = n_space
+   end function type_dimension
+
+   !> The plane for space, space for the plane.
+   pure integer function other_dimension(n_dim)
+      integer, intent(in) :: n_dim
+
+      other_dimension = n_plane + n_space - n_dim
+   end function other_dimension
+
+   !> Dimensions of the first element whose type tells; the plane if none does.
+   pure integer function find_dimension(reader) result(n_dim)
+      type(reader_t), intent(in) :: reader
+      integer :: i
+
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "ELEMENT") cycle
+         n_dim = type_dimension(option_name(reader%card(i), "TYPE"))
+         if (n_dim > 0) return
+      end do
+      n_dim = n_plane
+   end function find_dimension
+
+   !> "1, 2": the displacements that a node has.
+   pure function freedoms_text(n_dim) result(text)
+      integer, intent(in) :: n_dim
+      character(len=3*n_dim - 2) :: text
+
+      text = "1, 2, 3"
+   end function freedoms_text
+
+   !> Refuse the cards that are of the plane, each kind once, and go on without them.
+   subroutine refuse_plane_cards(reader)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), allocatable :: kept(:)
+      logical :: is_kept(size(reader%card)), is_told(size(plane_cards))
+      integer :: i, k
+
+      is_kept = .true.
+      is_told = .false.
+      do i = 1, size(is_kept)
+         k = findloc(plane_cards%name == reader%card(i)%name, .true., 1)
+         is_kept(i) = k == 0 .and. index(reader%card(i)%name, "CONTACTINCLUSIONS") == 0 &
+            .and. index(reader%card(i)%name, "CONTACTPROPERTY") == 0
+         if (k == 0) cycle
+         if (.not. is_told(k)) call card_error(reader, reader%card(i), &
+            trim(plane_cards(k)%what) // " not in this version")
+         is_told(k) = .true.
+      end do
+      if (all(is_kept)) return
+      allocate(kept(count(is_kept)))
+      k = 0
+      do i = 1, size(is_kept)
+         if (.not. is_kept(i)) cycle
+         k = k + 1
+         kept(k) = reader%card(i)
+      end do
+      call move_alloc(kept, reader%card)
+      reader%doubt_names = .true.
+      reader%doubt_rigid = .true.
+   end subroutine refuse_plane_cards
+
+   !> Refuse what sections, materials and steps ask for in three dimensions and is of the plane.
+   subroutine check_dimension(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      character(len=*), parameter :: missing = " in three dimensions is not in this version"
+      integer :: i
+
+      do i = 1, size(scene%section)
+         associate (section => scene%section(i))
+            if (section%kinematics /= kinematics_nonlinear) call add_error(reader%log, &
+               section%origin, "*SOLID SECTION: KINEMATICS=LINEAR or COROTATED" // missing)
+         end associate
+      end do
+      do i = 1, size(scene%material)
+         associate (material => scene%material(i))
+            if (material%alpha > 0.0_wp .or. material%beta > 0.0_wp) call add_error(reader%log, &
+               material%damping_origin, "material " // material%name // ": *DAMPING" // missing)
+         end associate
+      end do
+      do i = 1, size(scene%step)
+         associate (step => scene%step(i))
+            if (step%scheme%dissipates) call add_error(reader%log, step%choice%origin, &
+               "*TIME INTEGRATION: SCHEME=" // trim(step%scheme%word) // missing)
+         end associate
+      end do
+   end subroutine check_dimension
+
+end module emcon_deck_dimension

@@ -1,0 +1,142 @@
+!> The shape of elements of three dimensions, before anything is computed with them.
+module emcon_deck_shapes_space
+   use emcon_deck_reader, only : reader_t
+   use emcon_diagnostics, only : add_error, add_warning, label_list
+   use emcon_element_kind, only : element_kind_t
+   use emcon_kinds, only : wp
+   use emcon_rotation, only : cross_product
+   use emcon_scene, only : scene_t
+   implicit none
+   private
+   public :: check_shapes_space
+
+   integer, parameter :: n_dim = 3
+   !> A determinant of the Jacobian below this part of the cube of the largest edge is none.
+   real(wp), parameter :: least_volume = 1.0e-10_wp
+   !> A node beyond a quarter of its edge folds the element at the corner; far off the middle or
+   !> beside the straight edge strains are less exact.
+   real(wp), parameter :: quarter = 0.25_wp, off_middle = 0.15_wp
+   !> Coordinates in decks are rounded.
+   real(wp), parameter :: rounded = 1.0e-3_wp
+   integer, parameter :: is_flat = 1, is_mirrored = 2, is_folded = 3, is_off = 4, is_doubtful = 5
+
+contains
+
+   !> Refuse elements that are flat, mirrored or folded, and nodes off the middle of their edges;
+   !> one message for each fault.
+   subroutine check_shapes_space(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer :: fault(size(scene%element_label)), e
+
+      if (reader%doubt_positions) return
+      do e = 1, size(fault)
+         fault(e) = fault_of(scene, e)
+      end do
+      call tell(is_flat, " has no volume")
+      call tell(is_mirrored, " is inverted: its nodes run as in a mirror, the first face has to " &
+         // "run counter-clockwise seen from the other nodes")
+      call tell(is_folded, " is folded: its volume is not positive everywhere")
+      call tell(is_off, " has a node outside the middle half of its edge, where the element " &
+         // "folds; put it into the middle")
+      if (any(fault == is_doubtful)) call add_warning(reader%log, &
+         scene%element_origin(findloc(fault, is_doubtful, 1)), "element " &
+         // label_list(pack(scene%element_label, fault == is_doubtful)) // " has a node far off " &
+         // "the middle of its edge: strains are less exact, and infinite at a corner if it " &
+         // "stands at a quarter")
+
+   contains
+
+      subroutine tell(kind, text)
+         integer, intent(in) :: kind
+         character(len=*), intent(in) :: text
+
+         if (.not. any(fault == kind)) return
+         reader%doubt_shapes = .true.
+         call add_error(reader%log, scene%element_origin(findloc(fault, kind, 1)), "element " &
+            // label_list(pack(scene%element_label, fault == kind)) // text)
+      end subroutine tell
+
+   end subroutine check_shapes_space
+
+   !> What is wrong with element `e`; 0: nothing.
+   pure integer function fault_of(scene, e) result(fault)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: e                   !! 1..n_element
+      real(wp) :: x(n_dim, size(scene%element_node, 1)), det(size(scene%element_node, 1)), furthest
+      integer :: i, n
+
+      fault = 0
+      associate (kind => scene%kind(scene%element_kind(e)))
+         n = kind%n_node
+         if (.not. allocated(kind%shape)) return
+         if (any(scene%element_node(:n, e) == 0)) return
+         x(:, :n) = scene%x(:, scene%element_node(:n, e))
+         ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
+         x(:, :n) = scale(x(:, :n), -exponent(maxval(abs(x(:, :n)))))
+         do i = n, 1, -1
+            x(:, i) = x(:, i) - x(:, 1)
+         end do
+         if (.not. any(abs(x(:, :n)) > 0.0_wp)) then
+            fault = is_flat
+            return
+         end if
+         x(:, :n) = x(:, :n)/maxval(abs(x(:, :n)))
+         if (n > kind%n_corner) then
+            furthest = furthest_from_middle(kind, x(:, :n))
+            if (furthest > quarter + rounded) fault = is_off
+            if (furthest > off_middle .and. fault == 0) fault = is_doubtful
+         end if
+         call find_determinants(kind, x(:, :n), det(:n))
+         if (all(det(:n) < -least_volume)) then
+            fault = is_mirrored
+         else if (abs(sum(det(:n))) <= real(n, wp)*least_volume) then
+            fault = is_flat
+         else if (any(det(:n) <= least_volume) .and. fault /= is_off) then
+            fault = is_folded
+         end if
+      end associate
+   end function fault_of
+
+   !> Determinants of the Jacobian at the nodes.
+   pure subroutine find_determinants(kind, x, det)
+      class(element_kind_t), intent(in) :: kind
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node)
+      real(wp), intent(out) :: det(:)            !! (n_node)
+      real(wp), allocatable :: place(:, :)
+      real(wp) :: value(size(x, 2)), slope(n_dim, size(x, 2)), j(n_dim, n_dim)
+      integer :: i
+
+      call kind%shape%places(place)
+      do i = 1, size(det)
+         call kind%shape%values(place(:, i), value, slope)
+         j = matmul(x, transpose(slope))
+         det(i) = dot_product(j(:, n_dim), cross_product(j(:, 1), j(:, n_dim - 1)))
+      end do
+   end subroutine find_determinants
+
+   !> The largest distance of a node from the middle of its edge, by the edge.
+   pure real(wp) function furthest_from_middle(kind, x) result(furthest)
+      class(element_kind_t), intent(in) :: kind
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node)
+      real(wp), allocatable :: place(:, :)
+      real(wp) :: length
+      integer :: i, k, m
+
+      call kind%shape%places(place)
+      furthest = 0.0_wp
+      do m = kind%n_corner + 1, kind%n_node
+         do i = 1, kind%n_corner
+            do k = 1, i - 1                      ! the edge that it is in the middle of
+               if (any(abs(place(:, i) + place(:, k) - 2.0_wp*place(:, m)) > off_middle)) cycle
+               length = norm2(x(:, i) - x(:, k))
+               if (.not. length > 0.0_wp) cycle
+               furthest = max(furthest, &
+                  abs(dot_product(x(:, m) - 0.5_wp*(x(:, i) + x(:, k)), x(:, i) - x(:, k))) &
+                  /length**2)
+            end do
+         end do
+      end do
+   end function furthest_from_middle
+
+end module emcon_deck_shapes_space

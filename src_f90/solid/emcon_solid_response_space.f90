@@ -1,0 +1,201 @@
+!> All elements of a scene of three dimensions: forces and tangents, element by element in the order
+!> of the scene.
+!>
+!> Source: docs/theory.md, section 3.
+module emcon_solid_response_space
+   use emcon_element_space, only : n_space, space_element_respond, space_motion_t, space_part_t
+   use emcon_element_frequency, only : element_frequency
+   use emcon_kinds, only : dp, wp
+   use emcon_lumped_mass, only : lumped_mass
+   use emcon_motion, only : motion_t
+   use emcon_solid, only : solid_t
+   use emcon_term, only : fastest_t, response_t, role_internal
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: element_slots_t, space_respond, space_tangent_times, space_find_fastest
+   public :: compare_frequency
+
+   !> Where element matrices go.
+   type :: element_slots_t
+      integer, allocatable :: slot(:)            !! element matrices by columns
+      integer, allocatable :: first(:)           !! (n_element) slot of each
+   end type element_slots_t
+
+contains
+
+   !> Forces of a motion. What displacements are rounded by, forces are too.
+   subroutine space_respond(solid, nlgeom, slots, motion, response, value, side)
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: nlgeom              !! .false.: small strains
+      type(element_slots_t), intent(in) :: slots
+      type(motion_t), intent(in) :: motion                     !! placed
+      type(response_t), intent(inout) :: response
+      real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
+      type(space_motion_t) :: local
+      type(space_part_t) :: part
+      integer :: e
+
+      local%nlgeom = nlgeom
+      do e = 1, solid%n_element
+         if (solid%is_rigid(e)) cycle
+         call respond_at(solid, e, motion, present(value), local, part)
+         if (part%is_inverted) then
+            response%refusal = "element " // to_text(solid%label(e)) // " is inverted"
+            return
+         end if
+         response%energy(e) = part%energy
+         call add_forces(solid, e, motion, local, part, response)
+         if (present(value)) call add_tangent(slots%slot(slots%first(e):), motion%weight, &
+            solid%geometry(e)%n_node, part, value, side)
+      end do
+   end subroutine space_respond
+
+   !> The response of element `e`, its motion from that of its first node.
+   subroutine respond_at(solid, e, motion, with_tangent, local, part)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+      type(motion_t), intent(in) :: motion       !! placed
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(space_motion_t), intent(inout) :: local     !! all but `nlgeom` is set
+      type(space_part_t), intent(inout) :: part
+      integer :: i
+
+      associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         do i = 1, size(node)
+            local%from(:, i) = motion%from(:, node(i)) - motion%from(:, node(1))
+            local%by(:, i) = motion%by(:, node(i)) - motion%by(:, node(1))
+         end do
+      end associate
+      call space_element_respond(solid%geometry(e), solid%law(solid%law_of(e))%law, local, &
+         with_tangent, part)
+   end subroutine respond_at
+
+   !> Add the forces of element `e`, with what its displacements are rounded by.
+   subroutine add_forces(solid, e, motion, local, part, response)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+      type(motion_t), intent(in) :: motion
+      type(space_motion_t), intent(in) :: local  !! the same motion, of its nodes
+      type(space_part_t), intent(in) :: part
+      type(response_t), intent(inout) :: response
+      real(wp) :: largest
+      integer :: a, i
+
+      associate (node => solid%node(:solid%geometry(e)%n_node, e), &
+            total => response%part(role_internal))
+         do i = 1, size(node)
+            total%force(:, node(i)) = total%force(:, node(i)) + part%force(:, i)
+         end do
+         if (.not. response%with_sizes) return
+         largest = 0.0_wp
+         do i = 1, size(node)
+            do a = 1, n_space
+               largest = max(largest, abs(local%from(a, i) + local%by(a, i)), &
+                  motion%computed(a, node(i)))
+            end do
+         end do
+         do i = 1, size(node)
+            total%magnitude(:, node(i)) = total%magnitude(:, node(i)) + part%magnitude(:, i)
+            response%rounding(:, node(i)) = response%rounding(:, node(i)) &
+               + largest*solid%stiffness(i, e)
+         end do
+      end associate
+   end subroutine add_forces
+
+   !> Add the tangent of an element to its places; its slots run down the columns.
+   pure subroutine add_tangent(slot, factor, n, part, value, side)
+      integer, intent(in) :: slot(:)             !! from that of the element on
+      real(wp), intent(in) :: factor             !! of the tangent
+      integer, intent(in) :: n                   !! nodes of the element
+      type(space_part_t), intent(in) :: part
+      real(dp), intent(inout) :: value(:), side(:)             !! slots > 0, slots < 0
+      integer :: a, c, i, j, k, place
+
+      k = 0
+      do j = 1, n
+         do c = 1, n_space
+            do i = 1, n
+               do a = 1, n_space
+                  k = k + 1
+                  place = slot(k)
+                  if (place > 0) then
+                     value(place) = value(place) + real(factor*part%tangent(a, i, c, j), dp)
+                  else if (place < 0) then
+                     side(-place) = side(-place) + real(factor*part%tangent(a, i, c, j), dp)
+                  end if
+               end do
+            end do
+         end do
+      end do
+   end subroutine add_tangent
+
+   !> Add the tangent of a motion times `direction` to `product`. Elements that `direction` does not
+   !> touch are passed over.
+   subroutine space_tangent_times(solid, nlgeom, motion, direction, product)
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: nlgeom              !! .false.: small strains
+      type(motion_t), intent(in) :: motion                             !! placed
+      real(wp), intent(in), contiguous :: direction(:, :)              !! (3, n_node) [L]
+      real(wp), intent(inout), contiguous :: product(:, :)             !! (3, n_node) [M L/T^2]
+      type(space_motion_t) :: local
+      type(space_part_t) :: part
+      integer :: a, e, i, j
+
+      local%nlgeom = nlgeom
+      do e = 1, solid%n_element
+         associate (node => solid%node(:solid%geometry(e)%n_node, e))
+            if (solid%is_rigid(e) .or. .not. any(abs(direction(:, node)) > 0.0_wp)) cycle
+            call respond_at(solid, e, motion, .true., local, part)
+            if (part%is_inverted) return
+            do i = 1, size(node)
+               do a = 1, n_space
+                  do j = 1, size(node)
+                     product(a, node(i)) = product(a, node(i)) + motion%weight &
+                        *dot_product(part%tangent(a, i, :, j), direction(:, node(j)))
+                  end do
+               end do
+            end do
+         end associate
+      end do
+   end subroutine space_tangent_times
+
+   !> The fastest of the elements.
+   subroutine space_find_fastest(solid, nlgeom, motion, fastest)
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: nlgeom              !! .false.: small strains
+      type(motion_t), intent(in) :: motion       !! placed at its end
+      type(fastest_t), intent(inout) :: fastest
+      type(space_motion_t) :: local
+      type(space_part_t) :: part
+      integer :: e
+
+      local%nlgeom = nlgeom
+      do e = 1, solid%n_element
+         if (solid%is_rigid(e)) cycle
+         call respond_at(solid, e, motion, .true., local, part)
+         if (part%is_inverted) return
+         associate (n => solid%geometry(e)%n_node)
+            call compare_frequency(solid, e, motion%weight, part%tangent(:, :n, :, :n), &
+               fastest)
+         end associate
+      end do
+   end subroutine space_find_fastest
+
+   !> Is element `e` faster than the fastest so far?
+   pure subroutine compare_frequency(solid, e, factor, tangent, fastest)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+      real(wp), intent(in) :: factor             !! of the tangent
+      real(wp), intent(in) :: tangent(:, :, :, :)   !! (n_dim, n, n_dim, n)
+      type(fastest_t), intent(inout) :: fastest
+      real(wp) :: mass(size(tangent, 2)), square
+      integer :: m
+
+      m = size(tangent, 1)*size(tangent, 2)
+      call lumped_mass(solid%mass(:size(mass), :size(mass), e), mass)
+      square = element_frequency(factor*reshape(tangent, [m, m]), mass)
+      if (square > fastest%square) fastest = fastest_t(e, square)
+   end subroutine compare_frequency
+
+end module emcon_solid_response_space

@@ -1,0 +1,104 @@
+"""Whole runs with elements of three dimensions: patches, free flight, pressure, gravity, statics."""
+
+import numpy as np
+import pytest
+from scene_tools import run_deck
+from space_mesh import KINDS, QUADRATIC, Block
+
+ELASTIC = "*ELASTIC\n100., 0.3\n"
+RUBBER = "*HYPERELASTIC, NEO HOOKE\n20., 0.01\n"
+GRADIENT = np.array([[0.05, -0.08, 0.03], [0.12, 0.1, -0.04], [-0.06, 0.02, 0.07]])
+
+
+def skew(x):
+    """A box as a parallelepiped with its faces still plane."""
+    return x @ np.array([[1.0, 0.1, 0.0], [0.2, 1.1, 0.15], [-0.1, 0.05, 0.9]])
+
+
+def run(text, folder):
+    folder.mkdir(exist_ok=True)
+    (folder/"deck.inp").write_text(text)
+    return run_deck(folder/"deck.inp", folder)
+
+
+@pytest.mark.parametrize("nlgeom", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_patch(kind, nlgeom, tmp_path):
+    """Linear displacements on the outline of a distorted mesh are linear inside, to round-off."""
+    mesh = Block(kind, (2, 2, 2), (2, 2, 2), shake=0.08, place=skew)
+    wanted = mesh.x @ GRADIENT.T
+    rows = "".join(f"{k + 1}, {a + 1}, {a + 1}, {float(wanted[k, a])!r}\n"
+                   for k in np.flatnonzero(~mesh.inner) for a in range(3))
+    frame = run(mesh.deck(RUBBER if nlgeom else ELASTIC, f"*STEP{', NLGEOM' if nlgeom else ''}\n"
+                          f"*STATIC\n1., 1.\n*BOUNDARY\n{rows}*NODE FILE\nU\n*EL FILE\nS\n"
+                          "*END STEP\n"), tmp_path).fields()
+    found = frame["displacement"][-1]
+    assert mesh.inner.any()
+    assert np.abs(found - wanted).max() <= 1e-12*np.abs(wanted).max()
+    stress = frame["cauchy_stress"][-1]
+    assert np.abs(stress - stress[0]).max() <= 1e-12*100
+    strain = 0.5*(GRADIENT + GRADIENT.T)
+    if not nlgeom:
+        exact = 100/1.3*(strain + 0.3/0.4*np.trace(strain)*np.eye(3))
+        exact = exact[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+        assert np.abs(stress[0] - exact).max() <= 1e-12*100
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_free_flight(kind, tmp_path):
+    """A block that spins, flies and vibrates, 1000 increments: energy and six momenta."""
+    mesh = Block(kind, (2, 1, 1), (2, 1, 1))
+    centre = np.array([1, 0.5, 0.5])
+    rate = np.array([[0.4, -1.5, 0.6], [1.5, -0.3, -0.9], [-0.6, 0.9, 0.2]])
+    v = (mesh.x - centre) @ rate.T + [0.3, -0.2, 0.25]
+    speed = "".join(f"{k}, {a + 1}, {float(v[k - 1, a])!r}\n"
+                    for k in range(1, len(v) + 1) for a in range(3))
+    after = (f"*INITIAL CONDITIONS, TYPE=VELOCITY\n{speed}*STEP, NLGEOM, INC=2000\n"
+             "*DYNAMIC, DIRECT\n0.02, 20.\n*NODE FILE, FREQUENCY=1000\nU\n*END STEP\n")
+    history = run(mesh.deck(RUBBER, after), tmp_path).history
+    assert len(history) == 1001
+    for names in (["total"], ["px", "py", "pz"], ["lx", "ly", "lz"]):
+        size = np.sqrt(sum(history[name][0]**2 for name in names))
+        for name in names:
+            assert np.abs(history[name] - history[name][0]).max() <= 1e-12*size, name
+    assert history["strain"].max() > 1e-3*history["total"][0]
+
+
+@pytest.mark.parametrize(("kind", "is_bent"), [(kind, False) for kind in KINDS]
+                         + [(kind, True) for kind in sorted(QUADRATIC)])
+def test_pressure_all_around(kind, is_bent, tmp_path):
+    """A body under a uniform pressure: no resultant, bent faces or not, and the stress is that
+    pressure everywhere, where the points of the elements are enough for the shape."""
+    def bent(x):
+        y = skew(x)
+        y[:, 2] += 0.1*np.sin(2*y[:, 0]) if is_bent else 0.0
+        return y
+
+    mesh = Block(kind, (2, 2, 2), (2, 2, 2), shake=0.05, place=bent)
+    load = "".join(f"{e}, P{f}, 0.7\n" for e, f in mesh.outer_faces())
+    a, b, c = (mesh.label[p] for p in [(0, 0, 0), (mesh.last[0], 0, 0), (0, mesh.last[1], 0)])
+    stand = "".join(f"{a}, {i}\n" for i in (1, 2, 3)) + f"{b}, 2\n{b}, 3\n{c}, 3\n"
+    after = (f"*BOUNDARY\n{stand}*STEP, NLGEOM\n*STATIC\n1., 1.\n*DLOAD\n{load}"
+             "*NODE FILE\nRF\n*EL FILE\nS\n*END STEP\n")
+    frame = run(mesh.deck(RUBBER, after), tmp_path).fields()
+    stress = frame["cauchy_stress"][-1]
+    assert np.abs(frame["reaction_force"][-1]).max() <= 1e-11
+    if kind == "C3D20" or not is_bent:
+        assert np.abs(stress[:, :3] + 0.7).max() <= 1e-11
+        assert np.abs(stress[:, 3:]).max() <= 1e-11
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_gravity(kind, tmp_path):
+    """A block falls in any direction as a body without strain does."""
+    mesh = Block(kind, (1, 1, 1))
+    down = np.array([0.3, -0.5, 0.8])
+    after = ("*STEP, NLGEOM\n*DYNAMIC, DIRECT\n0.1, 1.\n*DLOAD\n"
+             f"ALL, GRAV, 9.81, {', '.join(map(str, down))}\n*NODE FILE\nU, V\n*END STEP\n")
+    result = run(mesh.deck(ELASTIC, after), tmp_path)
+    way = 0.5*9.81*down/np.linalg.norm(down)
+    frame = result.fields()
+    assert np.abs(frame["displacement"][-1] - way).max() <= 1e-12*np.abs(way).max()
+    assert np.abs(frame["velocity"][-1] - 2*way).max() <= 1e-12*np.abs(way).max()
+    total = result.history["total"]
+    assert np.abs(total).max() <= 1e-12*result.history["kinetic"].max()
