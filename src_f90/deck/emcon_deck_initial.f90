@@ -210,8 +210,9 @@ contains
          if (data%ok) call get_real(reader, data, i, "coordinate", axis(i))
       end do
       if (n_dim /= n_plane) then
-         if (data%ok .and. .not. any(abs(axis(n_dim + 1:) - axis(:n_dim)) > 0.0_wp)) &
+         if (data%ok .and. .not. any(abs(axis(n_dim + 1:) - axis(:n_dim)) > 0.0_wp)) then
             call data_error(reader, data, "the axis needs two points: x, y, z and x, y, z")
+         end if
          return
       end if
       if (.not. data%ok .or. data%n <= 3) return
