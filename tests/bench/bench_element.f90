@@ -101,7 +101,7 @@ contains
       type(scene_t), intent(out) :: scene
       integer :: i, j, e, corner(4), n
 
-      call element_kinds_create(scene%kind)
+      call element_kinds_create(2, scene%kind)
       n = n_side**2*merge(1, 2, kind == "CPE4")
       allocate(scene%x(2, (n_side + 1)**2), scene%element_node(4, n), scene%rigid(0))
       allocate(scene%element_label(n), source=[(i, i = 1, n)])
