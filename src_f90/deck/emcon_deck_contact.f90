@@ -230,6 +230,7 @@ contains
          n = n + 1
          all(n) = pair(i)
          if (.not. pair(i)%both_sides .or. pair(i)%slave == pair(i)%master) cycle
+         if (min(pair(i)%slave, pair(i)%master) == 0) cycle       ! unknown, and told
          j = findloc(pair%slave == pair(i)%master .and. pair%master == pair(i)%slave, .true., 1)
          if (j == 0) then
             n = n + 1
