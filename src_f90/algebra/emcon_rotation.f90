@@ -3,7 +3,7 @@ module emcon_rotation
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: n_turn, cross_product, moments_of
+   public :: n_turn, cross_product, add_moments
 
    !> Of each axis the one behind it, and the one behind that.
    integer, parameter :: n_axis = 3
@@ -27,17 +27,19 @@ contains
       c = a(behind)*b(last) - a(last)*b(behind)
    end function cross_product
 
-   !> The moments about the origin of what acts at `place`; of a momentum: the angular momentum.
-   pure function moments_of(place, force) result(moment)
+   !> Add to `total` the moments about the origin of what acts at `place`; of a momentum: the
+   !> angular momentum.
+   pure subroutine add_moments(place, force, total)
       real(wp), intent(in) :: place(:)           !! (n_dim) [L]
       real(wp), intent(in) :: force(:)           !! (n_dim) [M L/T^2], or momentum [M L/T]
-      real(wp) :: moment(n_turn(size(place)))
+      real(wp), intent(inout) :: total(:)        !! (1 or 3) [M L^2/T^2], or [M L^2/T]
       integer :: axis, k
 
-      do k = 1, size(moment)
-         axis = k + n_axis - size(moment)
-         moment(k) = place(behind(axis))*force(last(axis)) - place(last(axis))*force(behind(axis))
+      do k = 1, size(total)
+         axis = k + n_axis - size(total)
+         total(k) = total(k) + (place(behind(axis))*force(last(axis)) &
+            - place(last(axis))*force(behind(axis)))
       end do
-   end function moments_of
+   end subroutine add_moments
 
 end module emcon_rotation

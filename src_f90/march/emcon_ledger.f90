@@ -2,7 +2,7 @@
 module emcon_ledger
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
-   use emcon_rotation, only : moments_of, n_turn
+   use emcon_rotation, only : add_moments, n_turn
    use emcon_state, only : state_t
    use emcon_system, only : mass_times, system_t
    use emcon_term_registry, only : terms_mass
@@ -65,7 +65,7 @@ contains
       self%angular = 0.0_wp
       do i = 1, size(x, 2)
          place(:n_dim) = x(:, i) + state%u(:, i)
-         self%angular = self%angular + moments_of(place(:n_dim), self%work(:, i))
+         call add_moments(place(:n_dim), self%work(:, i), self%angular)
       end do
    end subroutine ledger_measure
 
@@ -109,7 +109,7 @@ contains
          associate (to => momenta(:, body(i)))
             place(:n) = x(:, i) + u(:, i)
             to(:n) = to(:n) + momentum(:, i)
-            to(n + 1:) = to(n + 1:) + moments_of(place(:n), momentum(:, i))
+            call add_moments(place(:n), momentum(:, i), to(n + 1:))
          end associate
       end do
    end subroutine add_up

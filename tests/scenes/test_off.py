@@ -114,7 +114,7 @@ def test_without_a_pair_no_code_of_contact_runs(plain):
     calls, _ = plain
     assert called(calls, "emcon_march") and called(calls, "emcon_solid_term")
     contact = [name for name in FOLDER if FOLDER[name] == "contact"]
-    assert called(calls, *contact) == ["__emcon_moment_plane_MOD_moment_of"]     # of momenta
+    assert called(calls, *contact) == []
     sets = {"constraints_select", "constraints_evaluate", "constraints_rows", "linearise"}
     assert not [name for name in calls if name.split("_MOD_")[-1] in sets]
     assert not called(calls, "emcon_layer", "emcon_layer_push", "emcon_velocity_update",
@@ -221,7 +221,7 @@ def test_nothing_of_a_far_pair_is_called(tmp_path):
     deck.set_parameter("t_end", "{end}")
     calls, _ = per_increment(deck.text(), tmp_path)
     contact = [name for name in FOLDER if FOLDER[name] == "contact"]
-    assert called(calls, *contact) == ["__emcon_moment_plane_MOD_moment_of"]     # of momenta
+    assert called(calls, *contact) == []
     assert not called(calls, "emcon_gaps", "emcon_judge")
 
 
