@@ -30,6 +30,9 @@ module emcon_layer
    public :: layer_t, layer_init, layer_renew, layer_begin_step, layer_mark, layer_settle, &
       layer_free
 
+   !> Work below this part of what it is held against is round-off.
+   real(wp), parameter :: rounding = 1.0e3_wp*epsilon(1.0_wp)
+
 contains
 
    !> The layer of `scene` on its massless nodes, with the laws that the model is given.
@@ -262,8 +265,11 @@ contains
       end associate
       weight = merge(weight + self%lam, 0.0_wp, has_changed)
       call layer_find_push(self, weight, is_singular, error)
-      ! A contact that has lost its surface has no direction either.
+      ! A contact that has lost its surface has no direction either; one that held nothing no force
+      ! that could give back what z has released.
       is_singular = is_singular .or. .not. maxval(abs(self%push)) > epsilon(weight)*sum(abs(weight))
+      is_singular = is_singular .or. maxval(abs(self%push))*maxval(abs(self%du)) &
+         < rounding*abs(self%released)
       self%is_settled = .not. (is_singular .or. allocated(error))
       if (.not. is_singular) return
       status = step_singular
