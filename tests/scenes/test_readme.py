@@ -36,7 +36,7 @@ def code_spans(text):
 
 def commands(page):
     """Command lines as lists of words, a prompt and a remark left out; options that stand alone are
-    those of the program, or of its studies."""
+    those of the program, of its studies or of its meshes."""
     text = page.read_text()
     for line in [*code_blocks(text), *code_spans(text)]:
         line = line.removeprefix("$ ").split("  #")[0]
@@ -125,7 +125,8 @@ def test_options(page):
             continue
         known = options_of(program)
         if words[0] == "emcon" and rest[0].startswith("--"):
-            known = known | options_of((sys.executable, "-m", "emcon", "study"))
+            for verb in ("study", "mesh"):
+                known = known | options_of((sys.executable, "-m", "emcon", verb))
         assert options <= known, words
 
 
