@@ -59,7 +59,7 @@ contains
             .and. self%n_early < most_early
          call solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
-         self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
+         call keep_multipliers(self)
          if (status == newton_redundant) then
             call leave_out(self, newton%correction%redundant, newton%correction%is_near)
             cycle
@@ -90,6 +90,16 @@ contains
          if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> Keep the multipliers of the set by the numbers of its constraints, without copies.
+   pure subroutine keep_multipliers(self)
+      type(active_set_t), intent(inout) :: self
+      integer :: k
+
+      do k = 1, self%set%n
+         self%lam(self%set%id(k)) = self%set%lam(k)
+      end do
+   end subroutine keep_multipliers
 
    !> What follows from other constraints nearly waits, what does so clearly does not act.
    pure subroutine leave_out(self, redundant, is_near)
