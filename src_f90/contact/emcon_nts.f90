@@ -3,28 +3,21 @@
 !> The master surface is a polygon, or smoothed. A surface may be in contact with itself.
 !> Source: docs/theory.md, section 4.
 module emcon_nts
-   use emcon_chain, only : chain_corners, chain_init, chain_shortest, chain_t, chain_thickness, &
-      chain_tributary
+   use emcon_chain, only : chain_corners, chain_tributary
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t
+   use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_facing, only : facing_allows
    use emcon_hermite_gap_value, only : hermite_gap_value
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
       smoothing_none
-   use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
-   use emcon_near_list, only : near_list_init, near_list_t, near_list_update
+   use emcon_nts_choice, only : choice_covers, choice_init, choice_look, choice_make, &
+      choice_settle, choice_take_nearer, nts_choice_t
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap_value, only : nts_gap_value
-   use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, most_nodes, &
-      polygon_stencil, polygon_stencil_t, smooth_stencil, smooth_stencil_t, stencil_gather, &
-      stencil_length
+   use emcon_nts_stencil, only : most_nodes, stencil_gather, stencil_length
    use emcon_scene, only : scene_t
-   use emcon_self_contact, only : self_contact_is_apart
    use emcon_stance, only : stance_holds, stance_t, stance_take
-   use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_may, &
-      touch_rule_sees, touch_rule_t
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
@@ -41,26 +34,7 @@ module emcon_nts
       real(wp) :: xi = 0.0_wp                         !! projection on the edge
    end type start_t
 
-   type, extends(contact_t) :: nts_t
-      type(chain_t) :: slave
-      type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
-      logical :: is_self = .false.                    !! a surface in contact with itself
-      integer :: smoothing = smoothing_none
-      logical :: every_face = .false.                 !! also one that does not bear on the node
-      type(touch_rule_t) :: rule                      !! only of such a surface
-      integer, allocatable :: chain_node(:)           !! (n_constraint) index into the slave's nodes
-      integer, allocatable :: class(:)                !! (n_constraint) of bodies that it looks at
-      integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
-      real(wp), allocatable :: own_size(:)            !! (n_constraint) least slave edge there [L]
-      integer, allocatable :: other(:)                !! (n_constraint) the other one at a corner
-                                                      !! that the node stands over; 0: none
-      type(polygon_stencil_t), allocatable :: polygon(:, :)   !! (2, n_constraint) over these
-      type(near_list_t) :: near
-      integer, allocatable :: near_item(:)            !! (n_constraint) its place in that list
-      integer :: n_sifted = 0                         !! the list that was last sifted
-      logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
-                                                      !! first node
-      type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
+   type, extends(nts_choice_t) :: nts_t
       type(stance_t) :: stance                        !! of the nodes as stencils were chosen:
       integer :: n_list = 0                           !! by which list of candidates,
       logical :: were_sharp = .false.                 !! with which corners,
@@ -86,58 +60,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical, intent(in), optional :: has_twins !! both nodes of a joint have a gap: as parts of
                                                  !! other constraints
-      integer :: i
 
-      call chain_init(self%slave, scene, scene%surface(pair%slave), error)
+      call choice_init(self, scene, pair, error, has_twins)
       if (allocated(error)) return
-      allocate(self%master)
-      call chain_init(self%master, scene, scene%surface(pair%master), error)
-      if (allocated(error)) return
-      call chain_join(self%slave, scene)
-      call chain_join(self%master, scene)
-      self%is_self = pair%slave == pair%master
-      if (self%is_self) call touch_rule_init(self%rule, self%slave, scene, &
-         pair%both_sides)
-      associate (n => size(self%slave%node))
-         self%chain_node = [(1 + mod(i, n), i = 0, n*self%rule%n_class - 1)]
-         self%class = [(1 + i/n, i = 0, n*self%rule%n_class - 1)]
-      end associate
-      self%node = self%slave%node(self%chain_node)
-      self%twin = self%slave%twin(self%chain_node)
-      if (present(has_twins)) then
-         if (has_twins) call add_twins(self)
-      end if
-      self%n_constraint = size(self%node)
-      allocate(self%edge(self%n_constraint), self%other(self%n_constraint), source=0)
-      allocate(self%state(self%n_constraint), self%polygon(2, self%n_constraint))
-      allocate(self%start(self%n_constraint))
+      allocate(self%state(self%n_constraint), self%start(self%n_constraint))
       self%deepest_start = touch_tol
       self%slack = pair%slack
-      self%offset = pair%offset
       self%restitution = pair%restitution
-      self%both_sides = pair%both_sides
-      self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
-      call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
-      self%thickness = self%thickness(self%chain_node)
-      associate (n => self%n_constraint/self%rule%n_class)
-         self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
-         call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%edge, &
-            scene%u0, self%offset)
-      end associate
    end subroutine nts_init
-
-   !> Append the twins to the nodes.
-   pure subroutine add_twins(self)
-      type(nts_t), intent(inout) :: self
-
-      associate (twin => self%slave%twin)
-         self%node = [self%node, pack(twin, twin > 0)]
-         self%chain_node = [self%chain_node, pack(self%chain_node, twin > 0)]
-         self%class = [self%class, pack(self%class, twin > 0)]
-      end associate
-      deallocate(self%twin)
-      allocate(self%twin(size(self%node)), source=0)
-   end subroutine add_twins
 
    pure subroutine nts_configure(self, x, options)
       class(nts_t), intent(inout) :: self
@@ -161,12 +91,9 @@ contains
    pure subroutine nts_begin_step(self, x, u0, du)
       class(nts_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      integer :: i, k
-      real(wp) :: best
+      integer :: i
 
-      call near_list_update(self%near, x, u0, du, self%reach)
-      if (self%is_self .and. self%n_sifted /= self%near%n_list) call sift(self)
-      call self%has_looked(self%near%clearance)
+      call choice_look(self, x, u0, du)
       if (self%n_list == self%near%n_list .and. (self%were_sharp .eqv. self%is_sharp)) then
          if (stance_holds(self%stance, self%near%node, x, u0)) return
       end if
@@ -174,118 +101,10 @@ contains
       self%n_list = self%near%n_list
       self%were_sharp = self%is_sharp
       do i = 1, self%n_constraint
-         self%edge(i) = 0
-         best = huge(best)
-         associate (near => self%near%candidates, item => self%near_item(i))
-            do k = near%start(item), near%start(item + 1) - 1
-               call choose_nearer(self, i, near%edge(k), x, u0, best)
-            end do
-         end associate
-         call settle(self, i, x, u0)
+         call choice_make(self, i, x, u0)
          if (self%smoothing /= smoothing_hermite) self%start(i) = polygon_start(self, i, x, u0)
       end do
    end subroutine nts_begin_step
-
-   !> Leave out of a new list of candidates what a surface never touches of itself.
-   pure subroutine sift(self)
-      type(nts_t), intent(inout) :: self
-      integer :: item, k, from, n
-
-      n = 0
-      associate (near => self%near%candidates)
-         do item = 1, size(near%start) - 1
-            from = near%start(item)
-            near%start(item) = n + 1
-            do k = from, near%start(item + 1) - 1
-               if (.not. touch_rule_may(self%rule, self%slave, self%chain_node(item), &
-                  near%edge(k))) cycle
-               n = n + 1
-               near%edge(n) = near%edge(k)
-            end do
-         end do
-         near%start(size(near%start)) = n + 1
-      end associate
-      self%near%candidates%edge = self%near%candidates%edge(:n)
-      self%n_sifted = self%near%n_list
-   end subroutine sift
-
-   !> Take edge `e` for constraint `i` if it is nearer than `best`.
-   pure subroutine choose_nearer(self, i, e, x, u, best)
-      type(nts_t), intent(inout) :: self
-      integer, intent(in) :: i, e
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp), intent(inout) :: best
-      real(wp) :: distance
-
-      if (.not. touch_rule_sees(self%rule, self%class(i), e)) return
-      distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
-      if (.not. distance < best) return
-      if (.not. bears(self, i, e, x, u)) return
-      if (self%is_self) then
-         if (.not. touch_rule_allows(self%rule, self%slave, self%chain_node(i), e, x, u)) return
-      end if
-      best = distance
-      self%edge(i) = e
-   end subroutine choose_nearer
-
-   !> May edge `e` keep the node of constraint `i` out? A face that does not bear on the node counts
-   !> only from outside: where corners meet, a node behind it is not to slide past the face that
-   !> bears.
-   pure logical function bears(self, i, e, x, u)
-      type(nts_t), intent(in) :: self
-      integer, intent(in) :: i, e
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-
-      bears = self%every_face .or. self%smoothing == smoothing_hermite
-      if (.not. bears) bears = is_outside(x, u, self%node(i), self%master%edge(:, e))
-      if (.not. bears) bears = facing_allows(self%slave, self%chain_node(i), &
-         self%master%edge(:, e), x, u)
-   end function bears
-
-   !> Finish the choice for constraint `i`, with the stencils: a node beside its edge, over others
-   !> of its own surface that it must not touch, has none.
-   pure subroutine settle(self, i, x, u0)
-      type(nts_t), intent(inout) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-
-      self%other(i) = 0
-      if (self%edge(i) == 0) return
-      if (self%is_self) then
-         if (.not. is_covered(self, i, self%edge(i), x, u0)) self%edge(i) = 0
-      end if
-      if (self%edge(i) == 0) return
-      if (self%smoothing == smoothing_hermite) then
-         call smooth_stencil(self%smooth(i), self%master, self%is_corner, self%node(i), &
-            self%edge(i), x, u0)
-         self%smooth(i)%curve%rounding = self%rounding*self%master%length(self%edge(i))
-      else
-         call take_sector(self, i, x, u0)
-      end if
-      call stencil_of(self, i, self%edge(i), x, u0, self%polygon(1, i))
-      if (self%other(i) > 0) call stencil_of(self, i, self%other(i), x, u0, self%polygon(2, i))
-   end subroutine settle
-
-   !> Of the two edges at a corner take the one on whose side of the bisector constraint `i` is, or
-   !> both. What a surface must not touch of itself does not come in.
-   pure subroutine take_sector(self, i, x, u0)
-      type(nts_t), intent(inout) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      integer :: edge, other, new
-
-      edge = self%edge(i)
-      call edge_of_sector(self%master, self%node(i), x, u0, edge, other)
-      new = max(other, merge(edge, 0, edge /= self%edge(i)))
-      if (new == 0) return
-      if (.not. touch_rule_sees(self%rule, self%class(i), new)) return
-      if (.not. bears(self, i, new, x, u0)) return
-      if (self%is_self) then
-         if (.not. touch_rule_allows(self%rule, self%slave, self%chain_node(i), new, x, u0)) return
-      end if
-      self%edge(i) = edge
-      self%other(i) = other
-   end subroutine take_sector
 
    pure subroutine nts_measure(self, x, u0, du)
       class(nts_t), intent(inout) :: self
@@ -427,37 +246,9 @@ contains
       covers = self%state(i)%is_covered
       if (self%edge(i) == 0 .or. self%smoothing == smoothing_hermite) return
       call polygon_end(self, i, x, u0, du, gap, xi)
-      if (xi < 0.0_wp .or. xi > 1.0_wp) covers = is_covered(self, i, self%edge(i), x, u0, du)
-      if (self%other(i) > 0 .and. covers) covers = is_covered(self, i, self%other(i), x, u0, du)
+      if (xi < 0.0_wp .or. xi > 1.0_wp) covers = choice_covers(self, i, self%edge(i), x, u0, du)
+      if (self%other(i) > 0 .and. covers) covers = choice_covers(self, i, self%other(i), x, u0, du)
    end function nts_covers
-
-   !> Nodes over the polygon: slave node, edge, and what is there before and after that may keep the
-   !> node out.
-   pure subroutine stencil_of(self, i, edge, x, u0, stencil)
-      type(nts_t), intent(in) :: self
-      integer, intent(in) :: i, edge
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      type(polygon_stencil_t), intent(out) :: stencil
-
-      call polygon_stencil(stencil, self%master, self%node(i), edge, &
-         self%rounding*[1.0_wp, merge(0.0_wp, 1.0_wp, self%is_sharp)], x, u0)
-      stencil%goes_around = self%offset > 0.0_wp
-      associate (n => stencil%n, before => stencil%before, after => stencil%after)
-         if (after > 0) then
-            if (.not. bears(self, i, self%master%next(edge), x, u0)) then
-               n = n - 1
-               after = 0
-            end if
-         end if
-         if (before == 0) return
-         if (bears(self, i, self%master%previous(edge), x, u0)) return
-         n = n - 1
-         before = 0
-         if (after == 0) return
-         stencil%node(4) = stencil%node(5)
-         after = 4
-      end associate
-   end subroutine stencil_of
 
    pure subroutine smooth_state(self, i, x, u0, du, state, is_found)
       type(nts_t), intent(in) :: self
@@ -490,7 +281,7 @@ contains
          state%is_covered = (xi1 >= -1.0_wp .or. curve%node(1) == 0 .or. curve%is_corner(3)) .and. &
             (xi1 <= 2.0_wp .or. curve%node(6) == 0 .or. curve%is_corner(4))
          if (state%is_covered .and. (xi1 < 0.0_wp .or. xi1 > 1.0_wp)) then
-            state%is_covered = is_covered(self, i, self%edge(i), x, u0, du)
+            state%is_covered = choice_covers(self, i, self%edge(i), x, u0, du)
          end if
       end associate
    end subroutine smooth_state
@@ -509,54 +300,6 @@ contains
       end if
       is_over = (goes_on(1) .or. xi >= -end_tol) .and. (goes_on(2) .or. xi <= 1.0_wp + end_tol)
    end function is_over
-
-   !> Is `edge` or one of its neighbours the nearest after the motion `du`, rather than the edges
-   !> after next?
-   pure logical function is_covered(self, i, edge, x, u0, du)
-      type(nts_t), intent(in) :: self
-      integer, intent(in) :: i, edge
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp), intent(in), contiguous, optional :: du(:, :)
-      real(wp) :: inside, outside
-      integer :: e, k, side
-
-      inside = distance_of(edge)
-      outside = huge(outside)
-      do side = 1, 2
-         e = edge
-         do k = 1, 2
-            e = merge(self%master%previous(e), self%master%next(e), side == 1)
-            if (e == 0) exit
-            if (k == 1) inside = min(inside, distance_of(e))
-            if (k == 1) cycle
-            if (.not. bears(self, i, e, x, u0)) exit
-            if (self%is_self) then
-               if (.not. self_contact_is_apart(self%slave, self%chain_node(i), e)) exit
-            end if
-            outside = min(outside, distance_of(e))
-         end do
-      end do
-      is_covered = inside <= outside
-
-   contains
-
-      !> Distance of the slave node from edge `e`.
-      pure real(wp) function distance_of(e)
-         integer, intent(in) :: e
-         real(wp) :: u(2, 3), local(2, 3)
-
-         if (.not. present(du)) then
-            distance_of = edge_distance(x, u0, self%node(i), self%master%edge(:, e))
-            return
-         end if
-         associate (node => [self%node(i), self%master%edge(:, e)])
-            local = x(:, node)
-            u = u0(:, node) + du(:, node)
-         end associate
-         distance_of = edge_distance(local, u, 1, [2, 3])
-      end function distance_of
-
-   end function is_covered
 
    pure subroutine nts_evaluate(self, wanted, x, u0, du, target, item)
       class(nts_t), intent(inout) :: self
@@ -611,9 +354,9 @@ contains
       best = huge(best)
       self%edge(i) = 0
       do e = 1, self%master%n_edge
-         call choose_nearer(self, i, e, x, u, best)
+         call choice_take_nearer(self, i, e, x, u, best)
       end do
-      call settle(self, i, x, u)
+      call choice_settle(self, i, x, u)
       self%stance%is_known = .false.
       self%start(i) = polygon_start(self, i, x, u)
       zero = 0.0_wp
