@@ -50,8 +50,11 @@ endif
 include build/config.mk
 endif
 
-.venv/%.stamp: pyproject.toml build/config.mk
+.venv/%.stamp: .ci/pins/%.txt build/config.mk
 	@$(SETUP) python $*
+
+build/site/tools/docs.stamp: .ci/pins/docs.txt build/config.mk
+	@$(SETUP) tools
 
 PY := .venv/bin/python
 # The dense blocks are small here: threads inside BLAS would spin more than they work.
@@ -374,9 +377,9 @@ sanitize: .venv/test.stamp  ## build and run under the address and undefined-beh
 	$(BUILDING) MODE=sanitize PRECISION=double app lib kernels
 	@$(PY) tests/soak/sanitize.py
 
-docs: .venv/docs.stamp  ## the reference of all modules, build/docs/index.html
-	.venv/bin/python -m ford --quiet .ci/ford.md
-	@echo "build/docs/index.html"
+docs: .venv/run.stamp build/site/tools/docs.stamp  ## the site, build/site/html/index.html: gallery, references, all pages
+	$(BUILDING) MODE=release PRECISION=double app pywrap
+	@$(PY) docs/site/build.py --sphinx build/site/tools/bin/python
 
 # Prefixes may have blanks in their names; what is installed finds its parts from where it stands.
 TO = $(DESTDIR)$(PREFIX)

@@ -1,10 +1,12 @@
-"""The examples of docs/python.md, run in order; `python tests/embed/python_doc.py --write` puts
-what they print, and their pictures, into the page anew.
+"""The examples of docs/python.md and other pages, run in order; `python tests/embed/python_doc.py
+--write [--page tutorial]` puts what they print, and their pictures, into the page anew.
 
 A chapter is one namespace and one folder, with `input_decks` beside it and `emcon` on the path. A
 python block whose first line is `# name.py` is a file: all chapters find it, and it is run as a
-script where it stands. A text block right after a python block is what that prints; `text varies`
-says that it is not the same each time. Pictures of the page are files that its examples leave.
+script where it stands. So is a block of the language `text deck` that begins with `** name.inp`, which
+is not run; a block `sh run` is run by the shell. A text block right after one that runs is what that
+prints; `text varies` says that it is not the same each time. Pictures of the page are files that its
+examples leave.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT/"docs"/"python.md"
+PAGES = [ROOT/"docs"/f"{name}.md" for name in ("python", "tutorial", "howto")]
+#: Languages of blocks that are files or run.
+RUNS = {"python", "sh run", "text deck"}
 #: Of one chapter [s].
 LONGEST = 300
 
@@ -52,8 +56,8 @@ class Example:
 
     @property
     def file(self) -> str | None:
-        """The name of the script that the block is."""
-        name = re.match(r"# (\w+\.py)\n", self.code.text)
+        """The name of the file that the block is."""
+        name = re.match(r"(?:#|\*\*) (\w+\.(?:py|inp))\n", self.code.text)
         return name[1] if name else None
 
     @property
@@ -85,9 +89,9 @@ def examples(page: str) -> dict[str, list[Example]]:
     found: dict[str, list[Example]] = {}
     all_blocks = blocks(lines)
     for block, after in zip(all_blocks, [*all_blocks[1:], None]):
-        if block.language != "python":
+        if block.language not in RUNS:
             continue
-        shows = (after is not None and after.language.startswith("text")
+        shows = (after is not None and after.language in ("text", "text varies")
                  and not "".join(lines[block.last + 1:after.first]).strip())
         found.setdefault(block.chapter, []).append(Example(block, after if shows else None))
     return found
@@ -112,7 +116,8 @@ def run_chapter(page: str, title: str, folder: Path) -> list[str]:
     (folder/"input_decks").symlink_to(ROOT/"input_decks")
     path = os.pathsep.join([str(ROOT/"build"/"release"), os.environ.get("PATH", "")])
     env = os.environ | {"PYTHONPATH": str(ROOT/"pywrap"), "PATH": path, "MPLBACKEND": "agg"}
-    work = json.dumps([(example.code.text, example.file) for example in chapter])
+    work = json.dumps([(example.code.text, example.file, example.code.language)
+                       for example in chapter])
     done = subprocess.run([sys.executable, str(Path(__file__).resolve()), "--run"], cwd=folder,
                           env=env, input=work, capture_output=True, text=True, timeout=LONGEST)
     assert done.returncode == 0, done.stderr
@@ -120,7 +125,7 @@ def run_chapter(page: str, title: str, folder: Path) -> list[str]:
     printed: list[str] = answer["printed"]
     if answer["failed"]:
         block = chapter[len(printed)].code
-        raise AssertionError(f"docs/python.md, block at line {block.first + 1}: {answer['failed']}")
+        raise AssertionError(f"block at line {block.first + 1}: {answer['failed']}")
     return printed
 
 
@@ -130,16 +135,20 @@ def run_blocks() -> None:
     failed = ""
     namespace: dict[str, Any] = {"__name__": "__doc_example__"}
     sys.path[0] = os.getcwd()
-    for k, (text, file) in enumerate(json.load(sys.stdin)):
+    for k, (text, file, language) in enumerate(json.load(sys.stdin)):
         out = io.StringIO()
         try:
             with contextlib.redirect_stdout(out):
-                if file is None:
+                if language == "sh run":
+                    out.write(run_shell(text))
+                elif language == "text deck":
+                    pass
+                elif file is None:
                     name = "example.py"
                     linecache.cache[name] = (len(text), None, text.splitlines(True), name)
                     exec(compile(text, name, "exec"), namespace)
                 else:
-                    out.write(run_script(file))
+                    out.write(run_command([sys.executable, file]))
         except BaseException:
             failed = f"block {k + 1} of the chapter\n{out.getvalue()}{traceback.format_exc()}"
             break
@@ -147,10 +156,21 @@ def run_blocks() -> None:
     print("\n" + json.dumps({"printed": printed, "failed": failed}))
 
 
-def run_script(name: str) -> str:
-    done = subprocess.run([sys.executable, name], capture_output=True, text=True, check=False)
+def run_shell(text: str) -> str:
+    """What commands print, where `emcon` is the command of the package and `python` this one."""
+    tools = Path(".tools")
+    tools.mkdir(exist_ok=True)
+    for name, module in (("emcon", "-m emcon"), ("python", "")):
+        (tools/name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {module} "$@"\n')
+        (tools/name).chmod(0o755)
+    path = f"{tools.resolve()}{os.pathsep}{os.environ['PATH']}"
+    return run_command(["env", f"PATH={path}", "sh", "-e", "-c", text])
+
+
+def run_command(command: list[str]) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise RuntimeError(f"{name} ends with {done.returncode}\n{done.stdout}{done.stderr}")
+        raise RuntimeError(f"{command[-1]} ends with {done.returncode}\n{done.stdout}{done.stderr}")
     return done.stdout
 
 
@@ -162,7 +182,8 @@ def tidy(text: str) -> str:
 # --- writing the page --------------------------------------------------------------------------
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Run the examples of docs/python.md.")
+    parser = argparse.ArgumentParser(description="Run the examples of a page.")
+    parser.add_argument("--page", default="python", choices=[path.stem for path in PAGES])
     parser.add_argument("--write", action="store_true",
                         help="put outputs and pictures into the page anew")
     parser.add_argument("--only", metavar="TEXT", default="",
@@ -172,7 +193,8 @@ def main() -> None:
     if options.run:
         run_blocks()
         return
-    page = PAGE.read_text(encoding="utf-8")
+    path = ROOT/"docs"/f"{options.page}.md"
+    page = path.read_text(encoding="utf-8")
     lines = page.splitlines(keepends=True)
     changes: list[tuple[Block, str]] = []
     for title, chapter in examples(page).items():
@@ -183,7 +205,7 @@ def main() -> None:
             printed = run_chapter(page, title, Path(folder))
             for name, place in pictures(page).items():
                 if options.write and place == title:
-                    (PAGE.parent/name).write_bytes((Path(folder)/name).read_bytes())
+                    (path.parent/name).write_bytes((Path(folder)/name).read_bytes())
         print(f"{time.perf_counter() - start:6.1f} s  {title}")
         for example, text in zip(chapter, printed):
             if example.output is None:
@@ -194,7 +216,7 @@ def main() -> None:
         print(f"line {block.first + 1}:\n{text}", end="")
         lines[block.first + 1:block.last] = [text]
     if options.write:
-        PAGE.write_text("".join(lines), encoding="utf-8")
+        path.write_text("".join(lines), encoding="utf-8")
 
 
 if __name__ == "__main__":

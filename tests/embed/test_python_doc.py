@@ -1,39 +1,46 @@
-"""docs/python.md tells the truth: its examples run and print what the page shows."""
+"""docs/python.md, the tutorial and the recipes tell the truth: their examples run and print what the
+pages show."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
-from python_doc import PAGE, blocks, examples, pictures, run_chapter, tidy
+from python_doc import PAGES, RUNS, blocks, examples, pictures, run_chapter, tidy
 
-TEXT = PAGE.read_text(encoding="utf-8")
-CHAPTERS = examples(TEXT)
+TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
+CHAPTERS = [pytest.param(path, title, id=f"{path.stem}-{title}") for path, text in TEXTS.items()
+            for title in examples(text)]
 
 
-@pytest.mark.parametrize("title", CHAPTERS)
-def test_chapter(title: str, tmp_path: Path) -> None:
-    chapter = CHAPTERS[title]
-    printed = run_chapter(TEXT, title, tmp_path)
+@pytest.mark.parametrize("page, title", CHAPTERS)
+def test_chapter(page: Path, title: str, tmp_path: Path) -> None:
+    chapter = examples(TEXTS[page])[title]
+    printed = run_chapter(TEXTS[page], title, tmp_path)
     for example, text in zip(chapter, printed, strict=True):
-        where = f"docs/python.md, block at line {example.code.first + 1}"
+        where = f"docs/{page.name}, block at line {example.code.first + 1}"
         if example.output is None:
             assert not text, f"{where} prints what the page does not show: {text}"
         elif example.varies:
             assert text.strip(), f"{where} prints nothing"
         else:
             assert tidy(text) == example.output.text, where
-    for name, place in pictures(TEXT).items():
+    for name, place in pictures(TEXTS[page]).items():
         if place == title:
-            assert (tmp_path/name).is_file() and (PAGE.parent/name).is_file(), name
+            assert (tmp_path/name).is_file() and (page.parent/name).is_file(), name
 
 
-def test_page_is_understood() -> None:
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_page_is_understood(page: Path) -> None:
     """Every output belongs to an example, and every chapter with code is found."""
-    all_blocks = blocks(TEXT.splitlines(keepends=True))
-    assert {block.language for block in all_blocks} <= {"python", "text", "text varies", "sh"}
-    shown = [example.output for chapter in CHAPTERS.values() for example in chapter
+    text = TEXTS[page]
+    all_blocks = blocks(text.splitlines(keepends=True))
+    assert {block.language for block in all_blocks} <= RUNS | {"text", "text varies", "sh"}
+    chapters = examples(text)
+    shown = [example.output for chapter in chapters.values() for example in chapter
              if example.output]
-    assert len(shown) == sum(block.language.startswith("text") for block in all_blocks)
-    assert len(CHAPTERS) >= 8 and len(shown) >= 15
-    assert pictures(TEXT) and set(pictures(TEXT).values()) <= set(CHAPTERS)
+    assert len(shown) == sum(block.language in ("text", "text varies") for block in all_blocks)
+    least = {"python": (8, 15), "tutorial": (4, 6), "howto": (6, 6)}[page.stem]
+    assert len(chapters) >= least[0] and len(shown) >= least[1]
+    assert pictures(text) or page.stem == "howto"
+    assert set(pictures(text).values()) <= set(chapters)

@@ -22,7 +22,7 @@ import pytest
 from emcon.study.deck import DeckFile, read_deck
 from emcon.study.execution import RECORD, Task, call, record_of, run_member
 from emcon.study.plan import Member
-from python_doc import PAGE, examples
+from python_doc import PAGES, examples
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("EMCON", ROOT/"build"/"release"/"emcon"))
@@ -364,7 +364,7 @@ def test_any_executor(tmp_path: Path) -> None:
 
 
 def test_a_local_dask_cluster(tmp_path: Path) -> None:
-    (example,) = [found for chapter in examples(PAGE.read_text(encoding="utf-8")).values()
+    (example,) = [found for chapter in examples(PAGES[0].read_text(encoding="utf-8")).values()
                   for found in chapter if found.file == "cluster.py"]
     (tmp_path/"cluster.py").write_text(example.code.text)
     done = study(tmp_path, *FREE, "--executor", "cluster:dask")
