@@ -23,7 +23,7 @@ module emcon_kept_factor
    private
    public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
       kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
-      kept_factor_free, kept_factor_is_possible, kept_factor_multipliers
+      kept_factor_free, kept_factor_is_possible, kept_factor_multipliers, kept_factor_reach
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -47,7 +47,9 @@ module emcon_kept_factor
       integer, allocatable, private :: index(:)      !! (>= start(n + 1)) rows, from 0
       real(dp), allocatable, private :: w(:)         !! (>= start(n + 1))
       real(dp), allocatable, private :: l(:, :)      !! (n, n) Cholesky factor of W^T W
-      real(dp), allocatable, private :: product(:, :)   !! (n, n) W^T W, of contacts that give way
+      ! Of contacts that give way: W^T W, and what is added to its diagonal
+      real(dp), allocatable, private :: product(:, :)   !! (n, n)
+      real(dp), allocatable, private :: compliance(:)   !! (n)
       real(dp), allocatable, private :: y(:), x(:)   !! (n_unknown)
       real(dp), allocatable, private :: mu(:)        !! (n)
       real(dp), allocatable, private :: bend(:)      !! (n) of each, per multiplier [T^2/(M L)]
@@ -156,6 +158,7 @@ contains
       call fill_products(self)
       if (allocated(set%soft)) then
          self%product = self%l
+         self%compliance = 0.0_dp*self%mu
          call soften(self, set, is_fit)
       else
          call dense_cholesky(self%l, is_fit)
@@ -175,7 +178,8 @@ contains
       do k = set%n_held + 1, set%n
          associate (diagonal => self%l(k, k))
             stiffness = real(set%soft(k)%slope, dp)*self%blocks%scale*diagonal
-            diagonal = diagonal*(1.0_dp + max(rounding, 1.0_dp/max(stiffness, rounding)))
+            self%compliance(k) = diagonal*max(rounding, 1.0_dp/max(stiffness, rounding))
+            diagonal = diagonal + self%compliance(k)
          end associate
       end do
       call dense_cholesky(self%l, is_fit)
@@ -274,18 +278,22 @@ contains
    end function softness
 
    !> Is what the factor does not know, the curvature of the constraints as last looked at, small
-   !> beside it, by their present multipliers?
+   !> beside it, by their present multipliers? Those of contacts that give way follow the gaps, and
+   !> are far too large where a first guess closes these: of them the last correction says what is
+   !> left.
    pure logical function kept_factor_serves(self, set, is_near)
       type(kept_factor_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: is_near             !! the multipliers are about those of the solution
-      real(dp) :: most
+      real(dp) :: most, lam
       integer :: k
 
       kept_factor_serves = .true.
       most = merge(most_curved, most_curved_far, is_near)
       do k = set%n_linear + 1, set%n
-         if (real(abs(set%lam(k)), dp)*self%bend(k) > most) kept_factor_serves = .false.
+         lam = real(set%lam(k), dp)
+         if (allocated(set%soft)) lam = lam + self%mu(k)
+         if (abs(lam)*self%bend(k) > most) kept_factor_serves = .false.
       end do
    end function kept_factor_serves
 
@@ -306,6 +314,8 @@ contains
       if (allocated(error)) return
       do k = 1, set%n
          self%mu(k) = -real(set%defect(k), dp)/self%blocks%scale
+         if (allocated(set%soft)) self%mu(k) = self%mu(k) &
+            + self%compliance(k)*real(set%soft(k)%lack, dp)
          do j = self%start(k) + 1, self%start(k + 1)
             self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
          end do
@@ -320,6 +330,17 @@ contains
       if (allocated(error)) return
       dq = real(self%blocks%scale*self%x, wp)
    end subroutine kept_factor_correct
+
+   !> How far things move by a multiplier of one, each.
+   pure subroutine kept_factor_reach(self, reach)
+      type(kept_factor_t), intent(in) :: self    !! that took contacts that give way
+      real(wp), intent(out) :: reach(:)          !! (n) [T^2/M]
+      integer :: k
+
+      do k = 1, size(reach)
+         reach(k) = real(self%blocks%scale*self%product(k, k), wp)
+      end do
+   end subroutine kept_factor_reach
 
    !> The multipliers of the last correction: matrix times `dq` is -residual + G^T mu.
    pure subroutine kept_factor_multipliers(self, mu)

@@ -11,6 +11,7 @@ module emcon_saddle_point
    use emcon_csr, only : csr_find, csr_from_entries, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_soft_law, only : soft_t
    use emcon_solver_registry, only : factors_symmetric, solver_create, solver_default
    use emcon_sparse_solver, only : matrix_general, matrix_symmetric, sparse_solver_t
    implicit none
@@ -123,8 +124,8 @@ contains
       end do
       if (allocated(set%soft)) then
          do k = set%n_held + 1, set%n
-            self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_held)) = self%scale &
-               *(self%scale/max(real(set%soft(k)%slope, dp), rounding*self%scale))
+            self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_held)) = compliance(self, &
+               set%soft(k))
          end do
       end if
       self%is_symmetric = is_mirrored(self, set, matrix)
@@ -136,6 +137,14 @@ contains
       if (.not. allocated(error)) call self%solver%factorise(self%full%value, error)
       is_singular = self%solver%is_singular
    end subroutine saddle_point_factorise
+
+   !> Of a contact that gives way, in units of the matrix.
+   pure real(dp) function compliance(self, soft)
+      type(saddle_point_t), intent(in) :: self
+      type(soft_t), intent(in) :: soft
+
+      compliance = self%scale*(self%scale/max(real(soft%slope, dp), rounding*self%scale))
+   end function compliance
 
    !> Would the matrix be symmetric but for the sign of its lower rows, and is there a use for it?
    pure logical function is_mirrored(self, set, matrix)
@@ -181,11 +190,17 @@ contains
       real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
       real(wp), intent(out), contiguous :: dlam(:)         !! (n)
       type(error_t), allocatable, intent(out) :: error
-      integer :: n
+      integer :: k, n
 
       n = size(residual)
       self%rhs(:n) = -residual
       self%rhs(n + 1:) = -real(self%scale, wp)*set%defect
+      if (allocated(set%soft)) then
+         do k = set%n_held + 1, set%n
+            self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%soft(k)), wp) &
+               *(set%soft(k)%lack/real(self%scale, wp))
+         end do
+      end if
       if (self%is_symmetric) then
          self%rhs(n + 1:) = -self%rhs(n + 1:)
          call self%symmetric_solver%solve(self%rhs, self%x, error)

@@ -11,7 +11,8 @@ module emcon_keeping
    use emcon_errors, only : error_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
-      kept_factor_is_possible, kept_factor_look, kept_factor_renew, kept_factor_take
+      kept_factor_is_possible, kept_factor_look, kept_factor_multipliers, kept_factor_reach, &
+      kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
    use emcon_motion, only : at_rest, motion_t
@@ -49,7 +50,8 @@ module emcon_keeping
       integer, private :: n_least = 0, n_excess = 0      !! as in the base, with it
       type(mixing_t), private :: mixing
       real(wp), allocatable, private :: guess(:, :)      !! (n_dim, n_node) the solve's first [L]
-      real(wp), allocatable, private :: proposed(:)      !! (n_unknown) correction before mixing
+      !> Correction before mixing, with multipliers that are under way, and the last one after it
+      real(wp), allocatable, private :: proposed(:), made(:)
    end type keeping_t
 
 contains
@@ -108,15 +110,16 @@ contains
    !> A solve begins from `du`.
    pure subroutine keeping_begin(self, n_unknown, du)
       type(keeping_t), intent(inout) :: self
-      integer, intent(in) :: n_unknown           !! > 0
+      integer, intent(in) :: n_unknown           !! > 0, with multipliers that are under way
       real(wp), intent(in) :: du(:, :)           !! (n_dim, n_node) [L]
 
       self%guess = du
       call count_solve(self)
       if (allocated(self%proposed)) then
-         if (size(self%proposed) /= n_unknown) deallocate(self%proposed)
+         if (size(self%proposed) /= n_unknown) deallocate(self%proposed, self%made)
       end if
-      if (.not. allocated(self%proposed)) allocate(self%proposed(n_unknown))
+      if (.not. allocated(self%proposed)) allocate(self%proposed(n_unknown), &
+         self%made(n_unknown))
       self%knows_set = .false.
       self%n_look = 0
       call mixing_begin(self%mixing, n_unknown)
@@ -175,19 +178,34 @@ contains
       call mixing_begin(self%mixing, size(self%proposed))
    end subroutine keeping_renew
 
-   !> The next correction, where the last one was `dq`.
-   subroutine keeping_correct(self, correction, set, residual, dq, error)
+   !> The next correction, where the last one was `dq`, and `dlam` of multipliers under way.
+   subroutine keeping_correct(self, correction, set, residual, dq, dlam, error)
       type(keeping_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: residual(:)    !! (n_unknown) with contact forces
       real(wp), intent(inout), contiguous :: dq(:)       !! (n_unknown) [L]
+      real(wp), intent(inout), contiguous :: dlam(:)     !! (n) [M L/T^2]
       type(error_t), allocatable, intent(out) :: error
+      real(wp) :: reach(set%n)
 
-      call kept_factor_correct(correction%kept, set, residual, self%proposed, error)
-      if (allocated(error)) return
-      call mixing_move(self%mixing, self%proposed, dq)
       self%n_correction = self%n_correction + 1
+      associate (n => size(dq))
+         call kept_factor_correct(correction%kept, set, residual, self%proposed(:n), error)
+         if (allocated(error)) return
+         if (.not. set%is_under_way) then
+            call mixing_move(self%mixing, self%proposed, dq)
+            return
+         end if
+         call kept_factor_reach(correction%kept, reach)
+         call kept_factor_multipliers(correction%kept, self%proposed(n + 1:))
+         self%proposed(n + 1:) = reach*self%proposed(n + 1:)
+         self%made(:n) = dq
+         self%made(n + 1:) = reach*dlam
+         call mixing_move(self%mixing, self%proposed, self%made)
+         dq = self%made(:n)
+         dlam = self%made(n + 1:)/reach
+      end associate
    end subroutine keeping_correct
 
    !> A solve ends before its end: it tells nothing of what the factor costs.

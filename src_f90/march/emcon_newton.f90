@@ -109,12 +109,16 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
+      real(wp), allocatable :: lam(:)
       logical :: is_done
 
+      set%is_under_way = allocated(set%soft) .and. .not. pose_is_equilibrium(motion%pose)
+      if (set%is_under_way) lam = set%lam
       is_done = .false.
       if (self%keeping%is_allowed .and. size(self%residual) > 0) call solve_by_kept_factor(self, &
          system, set, motion, status, is_done, error)
       if (is_done .or. allocated(error)) return
+      if (set%is_under_way) set%lam = lam
       call solve_by_tangents(self, system, set, motion, status, error)
    end subroutine newton_solve
 
@@ -133,7 +137,8 @@ contains
 
       call begin(self, set%n)
       self%convergence%is_kept = .true.
-      call keeping_begin(self%keeping, size(self%residual), motion%du)
+      call keeping_begin(self%keeping, size(self%residual) + merge(set%n, 0, set%is_under_way), &
+         motion%du)
       is_done = .true.
       is_fit = .true.
       do
@@ -163,8 +168,9 @@ contains
             call keeping_renew(self%keeping, self%correction)
             cycle
          end if
-         call correct_by_kept_factor(self, system, set, motion%du, error)
+         call correct_by_kept_factor(self, system, set, motion%du, is_fit, error)
          if (allocated(error)) return
+         if (.not. is_fit) exit
       end do
       is_done = .false.
       call keeping_give_up(self%keeping, self%correction, is_fit, motion%du)
@@ -185,27 +191,34 @@ contains
       end if
       call phase_enter(system%phases, phase_factorise, left)
       call keeping_make(self%keeping, self%correction, system, set, motion, is_fit, error)
-      if (is_fit) is_fit = kept_factor_serves(self%correction%kept, set, &
-         self%convergence%knows_sizes)
+      if (is_fit .and. .not. allocated(set%soft)) is_fit = kept_factor_serves( &
+         self%correction%kept, set, self%convergence%knows_sizes)
       call phase_leave(system%phases, left)
    end subroutine make_factor
 
    !> The next correction of `du` by the kept factor.
-   subroutine correct_by_kept_factor(self, system, set, du, error)
+   subroutine correct_by_kept_factor(self, system, set, du, is_fit, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
-      type(constraint_set_t), intent(in) :: set
+      type(constraint_set_t), intent(inout) :: set
       real(wp), intent(inout), contiguous :: du(:, :)
+      logical, intent(out) :: is_fit             !! else `du` is as it was
       type(error_t), allocatable, intent(out) :: error
       integer :: left
 
       call phase_enter(system%phases, phase_solve, left)
-      call keeping_correct(self%keeping, self%correction, set, self%residual, self%dq, error)
+      call keeping_correct(self%keeping, self%correction, set, self%residual, self%dq, self%dlam, &
+         error)
       call phase_leave(system%phases, left)
+      is_fit = .true.
       if (allocated(error)) return
+      if (allocated(set%soft)) is_fit = kept_factor_serves(self%correction%kept, set, &
+         self%convergence%knows_sizes)
+      if (.not. is_fit) return
       system%phases%n_solve = system%phases%n_solve + 1
       self%n_solve = self%n_solve + 1
       call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
+      if (set%is_under_way) set%lam = set%lam + self%dlam
    end subroutine correct_by_kept_factor
 
    !> The step by Newton's method.
@@ -485,10 +498,29 @@ contains
       end do
       is_rounding = relative_size(self%residual, self%rounding) <= round_off &
          .and. defect <= round_off
+      if (set%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
       ! A body that moves as a rigid one has no forces to compare its round-off with.
       self%is_idle = is_rounding .and. .not. has_load(system)
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
+
+   !> What multipliers under way lack is measured as the residual is.
+   subroutine measure_lack(self, system, set, norm, is_rounding)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(inout) :: set
+      real(wp), intent(inout) :: norm
+      logical, intent(inout) :: is_rounding
+      real(wp) :: lam(set%n)
+
+      lam = set%lam
+      set%lam = set%soft%lack
+      call constraints_force(set, 1, self%left)
+      set%lam = lam
+      call pick_unknowns(system%space%numbering, self%left, self%scale)
+      norm = max(norm, relative_size(self%scale, self%forces))
+      is_rounding = is_rounding .and. relative_size(self%scale, self%rounding) <= round_off
+   end subroutine measure_lack
 
    !> What the residual is to be measured by.
    subroutine take_sizes(self, system)

@@ -35,6 +35,8 @@ module emcon_constraints
       !> (n) contacts that give way, whose multipliers follow from gaps; not there: none
       type(soft_t), allocatable :: soft(:)
       logical :: is_stored = .false.             !! by discrete gradients of what these store
+      !> Their multipliers are on the way to what the gaps say, as unknowns of a solve
+      logical :: is_under_way = .false.
       type(csr_t) :: force_rows                  !! (n x n_unknown) discrete gradients
       type(csr_t) :: gap_rows                    !! (n x n_unknown) gradients at the end
    end type constraint_set_t
@@ -59,6 +61,7 @@ contains
       self%n_held = 0
       self%id = id
       if (allocated(self%soft)) deallocate(self%soft)
+      self%is_under_way = .false.
       if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, &
          self%is_firm, self%lam, self%defect)
       allocate(self%item(self%n), self%is_kept(self%n), self%is_firm(self%n))
@@ -121,19 +124,22 @@ contains
 
    end subroutine constraints_evaluate
 
-   !> The multipliers of contacts that give way; they have no defect.
+   !> The multipliers of contacts that give way, or what those under way lack; they have no defect.
    pure subroutine give_way(self)
       type(constraint_set_t), intent(inout) :: self
+      real(wp) :: lam
       integer :: k
 
       do k = self%n_held + 1, self%n
          associate (soft => self%soft(k), item => self%item(k))
             soft%left = self%defect(k)
             if (self%is_stored) then
-               call soft_penalty(soft, item%gap0, item%gap1, self%lam(k))
+               call soft_penalty(soft, item%gap0, item%gap1, lam)
             else
-               call soft_augmented(soft, self%lam(k))
+               call soft_augmented(soft, lam)
             end if
+            soft%lack = merge(lam - self%lam(k), 0.0_wp, self%is_under_way)
+            self%lam(k) = lam - soft%lack
             self%defect(k) = 0.0_wp
          end associate
       end do

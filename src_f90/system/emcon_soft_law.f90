@@ -16,6 +16,7 @@ module emcon_soft_law
       real(wp) :: base = 0.0_wp                  !! multiplier where nothing is left [M L/T^2]
       real(wp) :: slope = 0.0_wp                 !! -d multiplier / d gap at the end, >= 0 [M/T^2]
       real(wp) :: left = 0.0_wp                  !! of the gap to the target, at the end [L]
+      real(wp) :: lack = 0.0_wp                  !! what a multiplier on its way lacks [M L/T^2]
    end type soft_t
 
 contains

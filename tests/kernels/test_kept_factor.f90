@@ -4,7 +4,8 @@ module test_kept_factor
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_free, kept_factor_look, &
-      kept_factor_renew, kept_factor_serves, kept_factor_set_up, kept_factor_t, kept_factor_take
+      kept_factor_multipliers, kept_factor_renew, kept_factor_serves, kept_factor_set_up, &
+      kept_factor_t, kept_factor_take
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_default
@@ -22,6 +23,7 @@ contains
       tests = [ &
          test_case_t("the correction of the saddle point", test_correction), &
          test_case_t("no correction where nothing is left", test_fixed_point), &
+         test_case_t("multipliers of contacts that give way are unknowns too", test_soft), &
          test_case_t("no factor of a pattern that is not symmetric", test_pattern), &
          test_case_t("no factor of what is not definite", test_indefinite), &
          test_case_t("strong curvature is told", test_curvature), &
@@ -76,6 +78,51 @@ contains
       call check_near(error, dq, 0.0_wp*dq, tol_dp, maxval(abs(problem%residual)), "dq")
       call kept_factor_free(kept)
    end subroutine test_fixed_point
+
+   !> [K, G^T; G, -1/s] [dq; -mu] = -[r; -lack/s] by LAPACK. One contact does not push.
+   subroutine test_soft(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      real(dp), allocatable :: full(:, :), rhs(:, :), x(:, :)
+      real(wp), allocatable :: dq(:), mu(:)
+      logical :: is_fit, is_singular
+      integer :: n, m, k
+
+      call prepare(problem, kept, is_fit, error)
+      if (allocated(error)) return
+      n = problem%numbering%n_unknown
+      m = problem%set%n
+      associate (set => problem%set)
+         set%defect = 0.0_wp
+         set%n_held = 0
+         allocate(set%soft(m))
+         set%soft%slope = [(0.5_wp**k, k = 1, m)]
+         set%soft%lack = [((-2.0_wp)**(k - m), k = 1, m)]
+         set%soft(m)%slope = 0.0_wp
+         call kept_factor_take(kept, set, is_fit, error)
+         if (allocated(error)) return
+         call check_true(error, is_fit, "there is a factor")
+         allocate(dq(n), mu(m), full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
+         call kept_factor_correct(kept, set, problem%residual, dq, error)
+         if (allocated(error)) return
+         call kept_factor_multipliers(kept, mu)
+         full(:n, :n) = 0.5_dp*(dense_of(problem%base) + transpose(dense_of(problem%base)))
+         full(:n, n + 1:) = transpose(dense_of(set%gap_rows))
+         rhs(:n, 1) = -real(problem%residual, dp)
+         ! Rows times the slope: without one the multiplier is to vanish.
+         do k = 1, m
+            full(n + k, :n) = real(set%soft(k)%slope, dp)*full(:n, n + k)
+            full(n + k, n + k) = -1.0_dp
+            rhs(n + k, 1) = real(set%soft(k)%lack, dp)
+         end do
+      end associate
+      call dense_solve(full, rhs, x, is_singular)
+      call check_near(error, dq, real(x(:n, 1), wp), tol_dp, maxval(abs(dq)), "dq")
+      if (allocated(error)) return
+      call check_near(error, mu, real(-x(n + 1:, 1), wp), tol_dp, maxval(abs(mu)), "mu")
+      call kept_factor_free(kept)
+   end subroutine test_soft
 
    subroutine test_pattern(error)
       type(error_t), allocatable, intent(out) :: error

@@ -114,6 +114,22 @@ def test_a_penalty_keeps_energy_and_momenta(formulation, sides, factor, tmp_path
     assert f"contact gives way by up to {run.verdict['give']:.3g}"[:30] in run.log
 
 
+def factorisations(run):
+    return int(re.search(r"(\d+) factorisations", run.log)[1])
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_a_stiff_penalty_costs_what_exact_contact_does(formulation, tmp_path):
+    """Its multipliers are unknowns on their way, so that no iterate is pushed by what its gaps
+    happen to be. The step to exact contact is as large as that to a softer one: twice at most."""
+    exact = run_deck(discs(ONE), tmp_path/"exact", formulation=formulation)
+    for factor in (1, 10, 100):
+        _, run = attempt(soft(discs(ONE), f"FACTOR={factor}"), tmp_path/str(factor), (),
+                         {"method": PENALTY, "formulation": formulation})
+        assert run.history["active"].max() > 1
+        assert factorisations(run) < 2*factorisations(exact), factor
+
+
 @pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])
 def test_a_penalty_with_integrated_gaps_on_a_flat_surface(smoothing, tmp_path):
     """Which edges a gap is made of does not change there: energy as for nodes."""
