@@ -310,7 +310,7 @@ contains
       n = count(self%layer%is_massless .and. is_slave)
       call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
          " nodes; " // to_text(count(is_slave) - n) // " slave nodes keep theirs, as they are " // &
-         "prescribed, tied, or given mass, or as an element has no other nodes")
+         "prescribed, tied, or given mass, or as too few others hold them")
    end subroutine begin_massless
 
    !> Tell of pairs whose surfaces were to be massless and are not; one side of two is enough.
@@ -330,7 +330,7 @@ contains
                scene%pair%slave == pair%master .and. scene%pair%master == pair%slave))) cycle
             call note_add(self%warnings, "the surface " // scene%surface(pair%slave)%name // &
                " of a contact pair keeps its mass in spite of TYPE=MASSLESS: it is prescribed, " &
-               // "tied, rigid, given mass or forces, or one element thick")
+               // "tied, rigid, given mass or forces, or held by too few other nodes")
          end associate
       end do
    end subroutine warn_of_mass

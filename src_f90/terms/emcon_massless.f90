@@ -6,6 +6,7 @@
 !> that the total is exact, and frequencies change by the square of the element size. Source:
 !> docs/theory.md, section 6.
 module emcon_massless
+   use emcon_bodies, only : bodies_find
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -68,7 +69,8 @@ contains
 
    !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those that are
    !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces,
-   !> and those of elements that would keep none. And all nodes that have none anyway.
+   !> and those of elements that would keep none, and those that others would not hold. And all
+   !> nodes that have none anyway.
    pure subroutine massless_find(scene, solid, is_given, is_bare, is_massless)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
@@ -95,6 +97,7 @@ contains
       end do
       call leave_joined(scene, is_given, is_massless)
       call keep_one(solid, is_massless)
+      call keep_swinging(solid, size(scene%x, 1), is_massless)
       is_massless = is_massless .or. is_bare
    end subroutine massless_find
 
@@ -113,6 +116,40 @@ contains
       end do
       is_massless = is_massless .and. .not. keeps
    end subroutine keep_one
+
+   !> Leave the nodes theirs that hang together on fewer others than a place has coordinates: with
+   !> those held they would swing about them freely, which no balance tells.
+   pure subroutine keep_swinging(solid, n_dim, is_massless)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: n_dim               !! coordinates of a node
+      logical, intent(inout) :: is_massless(:)
+      integer, allocatable :: part(:)            !! (n_node) number of what hangs together
+      integer, allocatable :: holder(:, :)       !! (n_dim, n_part) nodes that hold it; 0: no more
+      integer :: hanging(size(solid%node, 1), size(solid%node, 2)), n_part, e, i, k
+
+      hanging = solid%node
+      do e = 1, solid%n_element
+         associate (n => solid%geometry(e)%n_node)
+            hanging(n + 1:, e) = 0
+            where (.not. is_massless(solid%node(:n, e))) hanging(:n, e) = 0
+         end associate
+      end do
+      call bodies_find(hanging, size(is_massless), part, n_part)
+      allocate(holder(n_dim, n_part), source=0)
+      do e = 1, solid%n_element
+         k = maxval(hanging(:, e))
+         if (k == 0) cycle
+         associate (own => holder(:, part(k)), node => solid%node(:solid%geometry(e)%n_node, e))
+            do i = 1, size(node)
+               if (hanging(i, e) > 0 .or. any(own == node(i))) cycle
+               if (any(own == 0)) own(findloc(own, 0, 1)) = node(i)
+            end do
+         end associate
+      end do
+      do i = 1, size(is_massless)
+         if (part(i) > 0) is_massless(i) = all(holder(:, part(i)) > 0)
+      end do
+   end subroutine keep_swinging
 
    !> Move the mass of elements from their massless nodes to their others.
    pure subroutine massless_shed(solid, is_massless)

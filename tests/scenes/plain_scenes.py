@@ -359,11 +359,11 @@ def strips(h=0.1):
     return scene
 
 
-def corners(shift=0.0):
+def corners(shift=0.0, cells=(2, 2)):
     """Tip on tip: two squares that stand on their corners."""
     scene = Scene(0.02, 0.6)
-    scene.block("UPPER", (-0.5 + shift, 0.35), (1, 1), (2, 2), math.pi/4, velocity=(0, -1))
-    scene.block("LOWER", (-0.5, -1.12), (1, 1), (2, 2), math.pi/4)
+    scene.block("UPPER", (-0.5 + shift, 0.35), (1, 1), cells, math.pi/4, velocity=(0, -1))
+    scene.block("LOWER", (-0.5, -1.12), (1, 1), cells, math.pi/4)
     return scene
 
 

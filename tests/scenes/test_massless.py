@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from overlap import worst
-from plain_scenes import AUTO, SCENES, Scene
+from plain_scenes import AUTO, SCENES, Outcome, Scene, corners, crossing
 from scene_tools import DECKS, ROOT, Deck, run_deck
 
 from emcon import Stepper
@@ -184,23 +184,53 @@ def test_elements_without_other_nodes_keep_their_mass(tmp_path):
     assert (runs[0].history["kinetic"] == runs[1].history["kinetic"]).all()
 
 
+def test_nodes_around_one_other_keep_their_mass(tmp_path):
+    """A block of four elements would be its middle node, without inertia against turning."""
+    spin, size = 2.0, 0.4
+    scene = Scene(0.005, 0.2)
+    scene.block("SMALL", (0.0, 0.62), (size, size), (2, 2), math.pi/4, stiffness=400.0,
+                velocity=(0, -1), spin=spin)
+    scene.block("LARGE", (-0.5, 0.0), (1.0, 0.5), (4, 4))
+    done = Outcome(scene, tmp_path, "ALL", formulation="NODE TO SURFACE", initiation="MASSLESS")
+    assert done.code == 0
+    assert done.run.history["active"].max() >= 1
+    momentum = done.run.series("BODIES", "MOMENTUM")[1]
+    # About its own middle; bilinear elements have the moment of inertia of the square.
+    own = momentum[0, 0, 2] - (size/2*momentum[0, 0, 1] - (0.62 + size/2)*momentum[0, 0, 0])
+    assert own == pytest.approx(spin*size**4/6, rel=1e-12)
+    change = np.abs(momentum.sum(1) - momentum[0].sum(0)).max()
+    assert change <= 1e3*EPS*np.abs(momentum).max()
+
+
 # ---- nodes that find no balance without their mass ----------------------------------------------
 
 BACK = "contact nodes take their mass back"
 
+#: Squares of nine elements: of four the nodes around the middle one keep their mass.
+FINER = {"corners": lambda: corners(cells=(3, 3)), "crossing": lambda: crossing(n=3)}
+
 
 @pytest.mark.parametrize(("name", "choice"), [
-    ("tower", {"formulation": "NODE TO SURFACE"}), ("corners", {"formulation": "NODE TO SURFACE"}),
-    ("crossing", {"formulation": "SEGMENT"}), ("crossing", {"formulation": "MORTAR"}),
+    ("tower", {"formulation": "NODE TO SURFACE"}), ("crossing", {"formulation": "MORTAR"}),
     ("slide off", {"formulation": "MORTAR"}), ("slide off", {"formulation": "MORTAR", "h": 0.01}),
     ("slide off", {"formulation": "MORTAR", "h": 0.006})], ids=lambda x: x if isinstance(x, str) else "")
 def test_soft_bodies_on_corners(name, choice, tmp_path):
     """A massless node slips off a corner at once; with its mass back it takes its time."""
-    scene = SCENES[name]()
+    scene = (SCENES | FINER)[name]()
     run = run_deck(scene.deck("BOTH" if choice["formulation"].startswith("NODE") else "ONE"),
                    tmp_path, **MASSLESS, **choice)
     assert BACK in run.log
     assert run.history["time"][-1] == pytest.approx(scene.t_end)
+    assert balances(run.history) < 1e-12
+
+
+@pytest.mark.parametrize(("name", "formulation", "sides"), [
+    ("corners", "NODE TO SURFACE", "BOTH"), ("crossing", "SEGMENT", "ONE")])
+def test_bodies_that_meet_by_corners_need_no_mass_there(name, formulation, sides, tmp_path):
+    scene = FINER[name]()
+    run = run_deck(scene.deck(sides), tmp_path, **MASSLESS, formulation=formulation)
+    assert run.history["active"].max() >= 1
+    assert BACK not in run.log
     assert balances(run.history) < 1e-12
 
 
@@ -216,7 +246,7 @@ def test_corners_that_pass_each_other_stay_outside(h, tmp_path):
 
 def test_mass_comes_back_without_a_jump_of_the_momenta(tmp_path):
     """Two free bodies whose corners cross; bits hold through a restart behind the return."""
-    deck = SCENES["crossing"]().deck("ONE").text().replace("<initiation>", "MASSLESS").replace(
+    deck = FINER["crossing"]().deck("ONE").text().replace("<initiation>", "MASSLESS").replace(
         "<formulation>", "MORTAR")
     (tmp_path/"deck.inp").write_text(deck)
     with Stepper(tmp_path/"deck.inp") as whole:
