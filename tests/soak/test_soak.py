@@ -1,16 +1,29 @@
 """A few cases of each fuzzer, `make soak` runs more; the comparison of two programs."""
 
+import json
+
 import pytest
 import same_bits
-from scene_tools import DECKS, PROGRAM
+from random_scenes import SCENES, UNGUARDED, Outcome, judge
+from scene_tools import DECKS, PROGRAM, Run
 from soak import FUZZERS, soak
 
-CASES = {"decks": 25, "restart": 12, "calls": 4, "kill": 1}
+CASES = {"decks": 25, "restart": 12, "calls": 4, "kill": 1, "scenes": 12}
 
 
 @pytest.mark.parametrize("name", FUZZERS)
 def test_a_few_cases(name, tmp_path):
     assert soak(name, 1, tmp_path, cases=CASES[name]) == CASES[name]
+
+
+def test_the_judge_of_scenes_sees_what_is_told_wrong(tmp_path):
+    scene = SCENES["ledge"]()
+    done = Outcome(scene, tmp_path, UNGUARDED, formulation="NODE TO SURFACE")
+    assert judge(scene, done, meets_itself=False) == ""
+    told = tmp_path / "scene.json"
+    told.write_text(json.dumps(done.run.verdict | {"verdict": "good", "penetration": 0.0}) + "\n")
+    done.run = Run(tmp_path / "scene")
+    assert "told good" in judge(scene, done, meets_itself=False)
 
 
 def test_bits_of_two_programs(tmp_path, capsys, monkeypatch):
