@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from scene_tools import ROOT
+from scene_tools import ROOT, run_deck
 
 sys.path.insert(0, str(ROOT/"tests"/"bench"))
 
@@ -47,8 +47,8 @@ def test_files_of_calculix_are_read():
 
 def test_what_is_compared():
     """Nodes that both have, at times that both have."""
-    ours = {0.5: (np.array([12, 1]), np.array([[2.6e-4, -2e-3], [0, 1e-3]])),
-            1.0: (np.array([12, 1]), np.ones((2, 2)))}
+    ours = {0.5: {12: np.array([2.6e-4, -2e-3]), 1: np.array([0, 1e-3])},
+            1.0: {12: np.ones(2), 1: np.ones(2)}}
     count, largest, worst = bench_suite.difference(ours, calculix_suite.read_dat(DAT))
     assert (count, largest) == (4, 2e-3) and worst == pytest.approx(1e-5)
 
@@ -123,3 +123,37 @@ def test_the_brick_of_planestress3():
     u = np.linalg.solve(matrix[np.ix_(free, free)], force[free])
     assert u[0] == pytest.approx(5.288692e-2, rel=5e-7)      # as CalculiX prints
     assert u[1] == pytest.approx(1.639336e-2, rel=5e-7)
+
+
+def test_labels_of_nodes():
+    text = "*Node, nset=A\n** first\n7, 0, 0\n3, 1, 0\n*NODE PRINT\nU\n*NODE\n5, 1, 1\n7, 0, 0\n"
+    assert calculix_suite.node_labels(text) == [7, 3, 5]
+
+
+def test_the_closed_form_of_beamnh(tmp_path):
+    """A bar of neo-Hooke's law under a pull on what its end is: 2 of Cauchy stress."""
+    c10, d1, pull = 1.92505, 0.026, 2.0
+
+    def faults(stretch):
+        long, wide = stretch
+        volume = long*wide**2
+        shear = 4/3*c10*volume**(-5/3)*(long**2 - wide**2)
+        push = 2/d1*(volume - 1)
+        return np.array([shear + push - pull, push - shear/2])
+
+    stretch = np.array([1.1, 0.95])
+    for _ in range(20):
+        slope = [(faults(stretch + h) - faults(stretch - h))/2e-6 for h in 1e-6*np.eye(2)]
+        stretch = stretch - np.linalg.solve(np.transpose(slope), faults(stretch))
+    long, wide = stretch
+    faces = "*BOUNDARY\n1, 1, 3\n2, 2, 3\n3, 3\n4, 1\n4, 3\n"
+    corner = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    nodes = "".join(f"{4*z + k + 1}, {x}, {y}, {z}\n" for z in (0, 1) for k, (x, y) in
+                    enumerate(corner))
+    (tmp_path/"bar.inp").write_text(
+        f"*NODE\n{nodes}*ELEMENT, TYPE=C3D8, ELSET=E\n1, 1, 2, 3, 4, 5, 6, 7, 8\n{faces}"
+        f"*MATERIAL, NAME=M\n*HYPERELASTIC, NEO HOOKE\n{c10}, {d1}\n"
+        f"*SOLID SECTION, ELSET=E, MATERIAL=M\n*STEP, NLGEOM\n*STATIC\n1., 1.\n"
+        f"*DLOAD\n1, P2, {-pull}\n*NODE FILE\nU\n*END STEP\n")
+    u = run_deck(tmp_path/"bar.inp", tmp_path).fields()["displacement"][-1]
+    assert u[6] == pytest.approx([wide - 1, wide - 1, long - 1], rel=1e-9)

@@ -48,6 +48,18 @@ def element_types(text):
     return list(dict.fromkeys(match[1] for match in found if match))
 
 
+def node_labels(text):
+    """Labels of the nodes, each where it is first told, in the order of the deck."""
+    labels, is_node = {}, False
+    for line in text.splitlines():
+        if line.startswith("*"):
+            is_node = re.match(r"\*node\s*(,|$)", line, re.IGNORECASE) or (
+                is_node and line.startswith("**"))
+        elif is_node and line.strip():
+            labels[int(line.split(",")[0])] = None
+    return list(labels)
+
+
 def run(program, deck):
     """Displacements that a run of `deck` in its folder prints: {time: {node: (x, y, z)}}, and half
     a unit of the last digit, relative to the value; None where it fails or prints none."""
