@@ -27,6 +27,7 @@ module emcon_law
       real(wp) :: density = 0.0_wp               !! [M/L^3]
       real(wp) :: shear = 0.0_wp                 !! shear modulus at rest [M/(L T^2)]
       logical :: has_volume = .true.             !! W is infinite where det C = 0
+      logical :: is_plane = .false.              !! W is that of E33 = E13 = E23 = 0 alone
    contains
       procedure(take_interface), deferred :: take
       procedure(energy_interface), deferred :: energy

@@ -33,6 +33,7 @@ contains
       character(len=:), allocatable, intent(out) :: fault   !! what is wrong; empty: nothing
       integer :: i, n
 
+      self%is_plane = .true.
       n = size(constant)/3
       self%order = n
       self%mu(:n) = constant(1:2*n:2)

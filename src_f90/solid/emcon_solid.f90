@@ -122,19 +122,29 @@ contains
       call make_packs(self)
    end subroutine solid_init
 
-   !> A thin element asks for a law that is known in plane stress.
+   !> An element that grows normal to the plane, or in space, asks for a law that is known there.
    subroutine check_law(self, scene, e, error)
       type(solid_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: where_it_is
 
-      if (.not. self%is_thin(e) .or. self%is_rigid(e)) return
-      if (allocated(self%law(self%law_of(e))%law)) return
+      if (self%is_rigid(e)) return
+      if (self%is_thin(e)) then
+         if (allocated(self%law(self%law_of(e))%law)) return
+         where_it_is = "plane stress"
+      else if (self%n_dim == n_space) then
+         if (.not. allocated(self%law(self%law_of(e))%law)) return
+         if (.not. self%law(self%law_of(e))%law%is_plane) return
+         where_it_is = "in three dimensions"
+      else
+         return
+      end if
       call raise(error, err_input, where_text(scene, scene%element_origin(e)) // ": error: " &
          // "element " // to_text(self%label(e)) // " is of type " &
-         // trim(scene%kind(self%kind(e))%name) // ", plane stress, in which the law of material " &
-         // self%material(scene%section(scene%element_section(e))%material)%text &
+         // trim(scene%kind(self%kind(e))%name) // ", " // where_it_is // ", in which the law of " &
+         // "material " // self%material(scene%section(scene%element_section(e))%material)%text &
          // " is not known: it gives no stress normal to the plane; take ELASTIC, NEO HOOKE, " &
          // "MOONEY-RIVLIN or YEOH, or plane strain, CPE")
    end subroutine check_law
