@@ -2,7 +2,7 @@
 
 import numpy as np
 
-QUADRATIC = {"CPE6", "CPE8", "CPE8R", "CPS6", "CPS8", "CPS8R"}
+QUADRATIC = {"CPE6", "CPE8", "CPE8R", "CPS6", "CPS8", "CPS8R", "CAX6", "CAX8", "CAX8R"}
 
 
 class Mesh:

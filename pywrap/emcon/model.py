@@ -47,7 +47,7 @@ _FRICTIONLESS = "FRICTIONLESS CONTACT"
 
 #: Nodes of an element, by kind.
 KINDS = {"CPE3": 3, "CPE4": 4, "CPE4H": 4, "CPE6": 6, "CPE8": 8, "CPE8R": 8, "CPS3": 3, "CPS4": 4,
-         "CPS6": 6, "CPS8": 8, "CPS8R": 8}
+         "CPS6": 6, "CPS8": 8, "CPS8R": 8, "CAX3": 3, "CAX4": 4, "CAX6": 6, "CAX8": 8, "CAX8R": 8}
 
 
 class Model(Cards):

@@ -4,6 +4,7 @@
 !> restart file can carry the deck it belongs to.
 module emcon_deck
    use emcon_deck_cards, only : read_cards
+   use emcon_deck_axial_plane, only : check_axial
    use emcon_deck_check, only : check_materials, check_nodes
    use emcon_deck_check_contact, only : check_pairs, choose_slaves
    use emcon_deck_check_linear, only : check_linear
@@ -12,7 +13,8 @@ module emcon_deck
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
-   use emcon_deck_dimension, only : check_dimension, find_dimension, n_plane, refuse_plane_cards
+   use emcon_deck_dimension, only : check_dimension, find_dimension, is_axial_deck, n_plane, &
+      refuse_plane_cards
    use emcon_deck_equations, only : read_equations
    use emcon_deck_fields, only : data_open, data_t, next_line, refuse_lines
    use emcon_deck_general_contact, only : read_general_contact
@@ -68,6 +70,7 @@ contains
       scene%file = source%file_name
       call read_cards(reader, overrides)
       scene%n_dim = find_dimension(reader)
+      scene%is_axial = scene%n_dim == n_plane .and. is_axial_deck(reader)
       if (size(reader%card) > 0) call read_scene(reader, scene)
       diagnostics = reader%log
    end subroutine deck_read
@@ -77,7 +80,7 @@ contains
       type(scene_t), intent(inout) :: scene
 
       call check_data(reader)
-      if (scene%n_dim /= n_plane) call refuse_plane_cards(reader)
+      if (scene%n_dim /= n_plane .or. scene%is_axial) call refuse_plane_cards(reader, scene%n_dim)
       call read_heading(reader, scene)
       call read_nodes(reader, scene)
       call read_element_kinds(reader, scene)
@@ -118,6 +121,9 @@ contains
       if (scene%n_dim == n_plane) then
          call check_shapes(reader, scene)
          call check_sides(reader, scene)
+         if (.not. scene%is_axial) return
+         call check_axial(reader, scene)
+         call check_dimension(reader, scene)
       else
          call check_shapes_space(reader, scene)
          call check_dimension(reader, scene)

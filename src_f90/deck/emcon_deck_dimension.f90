@@ -1,5 +1,5 @@
 !> How many dimensions a deck has: those of its elements. What is of the plane alone is refused
-!> where there are three.
+!> where there are three, and for solids of revolution.
 module emcon_deck_dimension
    use emcon_deck_reader, only : card_error, card_t, option_name, reader_t
    use emcon_diagnostics, only : add_error
@@ -8,7 +8,8 @@ module emcon_deck_dimension
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: n_plane, n_space, type_dimension, other_dimension, find_dimension, freedoms_text
+   public :: n_plane, n_space, type_dimension, other_dimension, find_dimension, is_axial_deck
+   public :: freedoms_text
    public :: refuse_plane_cards, check_dimension
 
    integer, parameter :: n_plane = 2, n_space = 3
@@ -21,17 +22,22 @@ module emcon_deck_dimension
    !> A card that is of the plane, and what it does.
    type :: plane_card_t
       character(len=14) :: name                    !! as `card_t` has it
-      character(len=45) :: what
+      character(len=21) :: what
+      character(len=3) :: verb = "is"
    end type plane_card_t
 
    type(plane_card_t), parameter :: plane_cards(*) = [ &
-      plane_card_t("CONTACTPAIR", "contact in three dimensions is"), &
-      plane_card_t("CONTACT", "contact in three dimensions is"), &
-      plane_card_t("TIE", "ties in three dimensions are"), &
-      plane_card_t("RIGIDBODY", "rigid bodies in three dimensions are"), &
-      plane_card_t("USERELEMENT", "elements of a program in three dimensions are"), &
-      plane_card_t("USERMATERIAL", "laws of a program in three dimensions are"), &
-      plane_card_t("GIVENFORCES", "forces of a program in three dimensions are")]
+      plane_card_t("CONTACTPAIR", "contact"), &
+      plane_card_t("CONTACT", "contact"), &
+      plane_card_t("TIE", "ties", "are"), &
+      plane_card_t("RIGIDBODY", "rigid bodies", "are"), &
+      plane_card_t("USERELEMENT", "elements of a program", "are"), &
+      plane_card_t("USERMATERIAL", "laws of a program", "are"), &
+      plane_card_t("GIVENFORCES", "forces of a program", "are")]
+
+   !> What a card or a value is refused for.
+   character(len=*), parameter :: in_space = "in three dimensions", &
+      on_rings = "with elements CAX"
 
 contains
 
@@ -65,6 +71,20 @@ contains
       n_dim = n_plane
    end function find_dimension
 
+   !> Does it have elements of solids of revolution?
+   pure logical function is_axial_deck(reader) result(is_axial)
+      type(reader_t), intent(in) :: reader
+      character(len=:), allocatable :: name
+      integer :: i
+
+      is_axial = .false.
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "ELEMENT") cycle
+         name = option_name(reader%card(i), "TYPE")
+         if (index(name, "CAX") == 1) is_axial = .true.
+      end do
+   end function is_axial_deck
+
    !> "1, 2": the displacements that a node has.
    pure function freedoms_text(n_dim) result(text)
       integer, intent(in) :: n_dim
@@ -74,8 +94,9 @@ contains
    end function freedoms_text
 
    !> Refuse the cards that are of the plane, each kind once, and go on without them.
-   subroutine refuse_plane_cards(reader)
+   subroutine refuse_plane_cards(reader, n_dim)
       type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: n_dim               !! of the deck
       type(card_t), allocatable :: kept(:)
       logical :: is_kept(size(reader%card)), is_told(size(plane_cards))
       integer :: i, k
@@ -88,7 +109,8 @@ contains
             .and. index(reader%card(i)%name, "CONTACTPROPERTY") == 0
          if (k == 0) cycle
          if (.not. is_told(k)) call card_error(reader, reader%card(i), &
-            trim(plane_cards(k)%what) // " not in this version")
+            trim(plane_cards(k)%what) // " " // trim(merge(in_space, on_rings // "  ", &
+            n_dim == n_space)) // " " // trim(plane_cards(k)%verb) // " not in this version")
          is_told(k) = .true.
       end do
       if (all(is_kept)) return
@@ -104,13 +126,15 @@ contains
       reader%doubt_rigid = .true.
    end subroutine refuse_plane_cards
 
-   !> Refuse what sections, materials and steps ask for in three dimensions and is of the plane.
+   !> Refuse what sections, materials and steps ask for and is of the plane.
    subroutine check_dimension(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      character(len=*), parameter :: missing = " in three dimensions is not in this version"
+      character(len=:), allocatable :: missing
       integer :: i
 
+      missing = " " // trim(merge(in_space, on_rings // "  ", scene%n_dim == n_space)) &
+         // " is not in this version"
       do i = 1, size(scene%section)
          associate (section => scene%section(i))
             if (section%kinematics /= kinematics_nonlinear) call add_error(reader%log, &

@@ -336,8 +336,10 @@ contains
             if (data%ok .and. section%thickness <= 0.0_wp) call data_error(reader, data, &
                "the thickness " // to_text(section%thickness) // " is not positive")
             call check_count(reader, data, 0, 1, "thickness")
-            if (scene%n_dim /= n_plane .and. abs(section%thickness - 1.0_wp) > 0.0_wp) then
-               call data_warning(reader, data, "solids of three dimensions have no thickness: " &
+            if ((scene%n_dim /= n_plane .or. scene%is_axial) &
+               .and. abs(section%thickness - 1.0_wp) > 0.0_wp) then
+               call data_warning(reader, data, "solids of " // trim(merge("revolution      ", &
+                  "three dimensions", scene%is_axial)) // " have no thickness: " &
                   // to_text(section%thickness) // " has no effect")
                section%thickness = 1.0_wp
             end if

@@ -26,6 +26,7 @@ module emcon_element_kind
       integer :: n_vtk = 0                       !! nodes of that cell, the first
       logical :: has_mean_volume = .false.       !! volume resists in the mean over the element
       logical :: is_thin = .false.               !! plane stress, not plane strain
+      logical :: is_axial = .false.              !! of solids of revolution
    contains
       procedure :: face
       procedure :: may_lock

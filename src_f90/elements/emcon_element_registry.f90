@@ -1,5 +1,5 @@
 !> The registry of elements: the only module that knows their kinds. A new kind is one file, one row
-!> of `plane_rows` or `space_rows` and one case of `element_kinds_create`.
+!> of `plane_rows`, `axial_rows` or `space_rows` and one case of `element_kinds_create`.
 module emcon_element_registry
    use emcon_element_kind, only : element_kind_t, element_row_t, face_room, find_element_kind
    use emcon_shape, only : shape_t
@@ -13,7 +13,8 @@ module emcon_element_registry
    use emcon_shape_triangle_plane, only : shape_triangle_t
    implicit none
    private
-   public :: element_rows, plane_rows, space_rows, element_kinds_create, find_element_row, &
+   public :: element_rows, plane_rows, axial_rows, space_rows
+   public :: element_kinds_create, find_element_row, &
       face_shape_create
 
    type(element_row_t), parameter :: plane_rows(*) = [ &
@@ -41,6 +42,21 @@ module emcon_element_registry
          reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
          is_thin=.true.)]
 
+   !> Solids of revolution: their sections.
+   type(element_row_t), parameter :: axial_rows(*) = [ &
+      element_row_t("CAX3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3, &
+         is_axial=.true.), &
+      element_row_t("CAX4", 2, 4, 4, 4, 2, &
+         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_axial=.true.), &
+      element_row_t("CAX6", 2, 6, 3, 3, 3, &
+         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6, is_axial=.true.), &
+      element_row_t("CAX8", 2, 8, 4, 4, 3, &
+         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
+         is_axial=.true.), &
+      element_row_t("CAX8R", 2, 8, 4, 4, 3, &
+         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
+         is_axial=.true.)]
+
    !> Faces of hexahedra, seen from inside counter-clockwise: corners alone, and with the middles.
    integer, parameter :: hexahedron_faces(face_room(1)) = reshape([1, 2, 3, 4, 5, 8, 7, 6, &
       1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 8, 4, 4, 8, 5, 1], face_room, pad=[0])
@@ -58,7 +74,7 @@ module emcon_element_registry
       element_row_t("C3D20", 3, 20, 8, 6, 8, round_faces, 25, 20), &
       element_row_t("C3D20R", 3, 20, 8, 6, 8, round_faces, 25, 20)]
 
-   type(element_row_t), parameter :: element_rows(*) = [plane_rows, space_rows]
+   type(element_row_t), parameter :: element_rows(*) = [plane_rows, axial_rows, space_rows]
 
 contains
 
@@ -68,20 +84,22 @@ contains
       type(element_kind_t), allocatable, intent(out) :: kind(:)
       integer :: first, k
 
-      first = merge(0, size(plane_rows), n_dim == plane_rows(1)%n_dim)
-      allocate(kind(merge(size(plane_rows), size(space_rows), first == 0)))
+      first = findloc(element_rows%n_dim, n_dim, 1) - 1
+      allocate(kind(count(element_rows%n_dim == n_dim)))
       do k = 1, size(kind)
          kind(k)%element_row_t = element_rows(first + k)
          select case (kind(k)%name)
          case ("CPE3", "CPS3")
             allocate(shape_triangle_t :: kind(k)%shape)
-         case ("CPE4", "CPE4H", "CPS4")
+         case ("CAX3")
+            allocate(kind(k)%shape, source=shape_triangle_t(is_fine=.true.))
+         case ("CPE4", "CPE4H", "CPS4", "CAX4")
             allocate(shape_quadrilateral_t :: kind(k)%shape)
-         case ("CPE6", "CPS6")
+         case ("CPE6", "CPS6", "CAX6")
             allocate(shape_quadratic_triangle_t :: kind(k)%shape)
-         case ("CPE8", "CPS8")
+         case ("CPE8", "CPS8", "CAX8")
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=3))
-         case ("CPE8R", "CPS8R")
+         case ("CPE8R", "CPS8R", "CAX8R")
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=2))
          case ("C3D4")
             allocate(shape_tetrahedron_t :: kind(k)%shape)

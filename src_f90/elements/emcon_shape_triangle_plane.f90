@@ -1,4 +1,4 @@
-!> Triangle of three nodes: linear functions; one point, and three for the mass.
+!> Triangle of three nodes: linear functions; one point, three for the mass or of a fine one.
 module emcon_shape_triangle_plane
    use emcon_kinds, only : wp
    use emcon_shape, only : shape_t
@@ -7,6 +7,7 @@ module emcon_shape_triangle_plane
    public :: shape_triangle_t
 
    type, extends(shape_t) :: shape_triangle_t
+      logical :: is_fine = .false.               !! for stiffness, too, exact to degree 2
    contains
       procedure :: places => triangle_places
       procedure :: values => triangle_values
@@ -32,7 +33,7 @@ contains
       slope = reshape([-1.0_wp, -1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 3])
    end subroutine triangle_values
 
-   !> Exact to degree 1, for the mass to degree 2.
+   !> Exact to degree 1, for the mass and of a fine one to degree 2.
    pure subroutine triangle_rule(self, is_mass, point, weight)
       class(shape_triangle_t), intent(in) :: self
       logical, intent(in) :: is_mass             !! else for stiffness
@@ -40,7 +41,7 @@ contains
       real(wp), allocatable, intent(out) :: weight(:)        !! (n_gp)
       real(wp), parameter :: s = 1.0_wp/6.0_wp
 
-      if (is_mass) then
+      if (is_mass .or. self%is_fine) then
          point = reshape([s, s, 4*s, s, s, 4*s], [2, 3])
          weight = [s, s, s]
       else

@@ -3,6 +3,7 @@ module emcon_ledger
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
    use emcon_rotation, only : add_moments, n_turn
+   use emcon_space, only : space_t
    use emcon_state, only : state_t
    use emcon_system, only : mass_times, system_t
    use emcon_term_registry, only : terms_mass
@@ -67,6 +68,7 @@ contains
          place(:n_dim) = x(:, i) + state%u(:, i)
          call add_moments(place(:n_dim), self%work(:, i), self%angular)
       end do
+      if (system%space%is_axial) call leave_axis(self%momentum, self%angular)
    end subroutine ledger_measure
 
    !> Linear and angular momentum of each body, rows px, py, lz, in space px to pz and lx to lz, in
@@ -78,7 +80,7 @@ contains
       type(state_t), intent(in) :: state         !! the same
       real(wp), intent(out) :: momenta(:, :)     !! (3 or 6, n_body)
 
-      call add_up(system%space%body, x, state%u, self%work, momenta)
+      call add_up(system%space, x, state%u, self%work, momenta)
    end subroutine ledger_momenta
 
    !> The same in any state.
@@ -90,12 +92,12 @@ contains
       real(wp) :: momentum(size(x, 1), size(x, 2))
 
       call mass_times(system, state%v, momentum)
-      call add_up(system%space%body, x, state%u, momentum, momenta)
+      call add_up(system%space, x, state%u, momentum, momenta)
    end subroutine body_momenta
 
    !> Sums over the nodes of each body.
-   pure subroutine add_up(body, x, u, momentum, momenta)
-      integer, intent(in) :: body(:)             !! (n_node) of each node; 0: none
+   pure subroutine add_up(space, x, u, momentum, momenta)
+      type(space_t), intent(in) :: space         !! its bodies
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(in), contiguous :: momentum(:, :)     !! (n_dim, n_node) [M L/T]
       real(wp), intent(out) :: momenta(:, :)     !! (3 or 6, n_body)
@@ -105,14 +107,27 @@ contains
       n = size(x, 1)
       momenta = 0.0_wp
       do i = 1, size(x, 2)
-         if (body(i) == 0) cycle
-         associate (to => momenta(:, body(i)))
+         if (space%body(i) == 0) cycle
+         associate (to => momenta(:, space%body(i)))
             place(:n) = x(:, i) + u(:, i)
             to(:n) = to(:n) + momentum(:, i)
             call add_moments(place(:n), momentum(:, i), to(n + 1:))
          end associate
       end do
+      if (.not. space%is_axial) return
+      do i = 1, size(momenta, 2)
+         call leave_axis(momenta(:n, i), momenta(n + 1:, i))
+      end do
    end subroutine add_up
+
+   !> Of whole circles only the momentum along the axis is not 0.
+   pure subroutine leave_axis(momentum, angular)
+      real(wp), intent(inout) :: momentum(:)     !! (n_dim) along the radius first [M L/T]
+      real(wp), intent(inout) :: angular(:)      !! [M L^2/T]
+
+      momentum(1) = 0.0_wp
+      angular = 0.0_wp
+   end subroutine leave_axis
 
    !> Mass of each body.
    subroutine body_masses(system, mass)

@@ -1,7 +1,8 @@
 !> Bodies as rigid ones, and their motions.
 !>
 !> Every body has three motions: along x, along y, and a rotation about its centre in which its
-!> farthest node moves by one, so that what they do to a degree of freedom is of order one. A node
+!> farthest node moves by one, so that what they do to a degree of freedom is of order one. A solid
+!> of revolution has that along y alone. A node
 !> without element that stands in an equation is a body that does not rotate.
 module emcon_mechanisms
    use emcon_kinds, only : dp, wp
@@ -69,6 +70,7 @@ contains
       allocate(bodies%is_free(3, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh
          bodies%is_free(:, b) = .not. touches(b)
+         if (scene%is_axial) bodies%is_free([1, 3], b) = .false.
       end do
       do i = 1, size(bodies%of_node)
          b = bodies%of_node(i)

@@ -139,6 +139,10 @@ contains
                m = real(mass%value(k), wp)
                body(b)%mass = body(b)%mass + m
                body(b)%center = body(b)%center + m*x(:, i)
+               if (stepper%scene%is_axial) then
+                  body(b)%inertia = body(b)%inertia + m*x(1, i)*x(1, mass%column(k) + 1)
+                  cycle
+               end if
                body(b)%inertia = body(b)%inertia &
                   + m*about_axes(x(:, i), x(:, mass%column(k) + 1))
             end do
@@ -147,6 +151,10 @@ contains
       do b = 1, size(body)
          if (.not. body(b)%mass > 0.0_wp) cycle
          body(b)%center = body(b)%center/body(b)%mass
+         if (stepper%scene%is_axial) then        ! on the axis, and about it
+            body(b)%center(1) = 0.0_wp
+            cycle
+         end if
          body(b)%inertia = max(0.0_wp, body(b)%inertia &
             - body(b)%mass*about_axes(body(b)%center, body(b)%center))
       end do

@@ -23,6 +23,7 @@ module emcon_scene
       type(string_t), allocatable :: file(:)         !! names of the deck files
       character(len=:), allocatable :: heading
       integer :: n_dim = 2
+      logical :: is_axial = .false.                  !! solids of revolution: x is the radius
       integer, allocatable :: node_label(:)          !! (n_node)
       type(origin_t), allocatable :: node_origin(:)  !! (n_node)
       real(wp), allocatable :: x(:, :)               !! (n_dim, n_node) reference positions [L]

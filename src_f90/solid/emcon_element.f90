@@ -17,6 +17,8 @@ module emcon_element
       real(wp), allocatable :: gradient(:, :, :)           !! (n_dim, n_node, n_gp) of the shape
                                                            !! functions by X [1/L]
       real(wp), allocatable :: weight(:)                   !! (n_gp) reference volume [L^3]
+      !> (n_node, n_gp) of solids of revolution: the shape functions over the radius [1/L]
+      real(wp), allocatable :: circle(:, :)
    end type element_geometry_t
 
    !> Motion of the nodes of an element, from `from` by `by`.

@@ -29,6 +29,8 @@ module emcon_solid
 
    type :: solid_t
       integer :: n_dim = 0
+      logical :: is_axial = .false.                      !! solids of revolution
+      logical :: is_single = .false.                     !! elements respond one by one
       integer :: n_element = 0
       integer :: n_node = 0
       integer, allocatable :: label(:)                   !! (n_element)
@@ -64,6 +66,8 @@ module emcon_solid
       real(wp), allocatable :: stiffness(:, :)
    end type solid_t
 
+   real(wp), parameter :: two_pi = 8.0_wp*atan(1.0_wp)
+
 contains
 
    !> Geometry, laws and mass of the elements of `scene`, with the laws that a program gives.
@@ -78,6 +82,8 @@ contains
 
       n = size(scene%element_kind)
       self%n_dim = size(scene%x, 1)
+      self%is_axial = scene%is_axial
+      self%is_single = self%n_dim == n_space .or. self%is_axial
       self%n_element = n
       self%n_node = size(scene%x, 2)
       self%label = scene%element_label
@@ -134,10 +140,11 @@ contains
       if (self%is_thin(e)) then
          if (allocated(self%law(self%law_of(e))%law)) return
          where_it_is = "plane stress"
-      else if (self%n_dim == n_space) then
+      else if (self%is_single) then
          if (.not. allocated(self%law(self%law_of(e))%law)) return
          if (.not. self%law(self%law_of(e))%law%is_plane) return
-         where_it_is = "in three dimensions"
+         where_it_is = trim(merge("in three dimensions", "axisymmetric       ", &
+            self%n_dim == n_space))
       else
          return
       end if
@@ -202,7 +209,7 @@ contains
       type(solid_t), intent(inout) :: self
       integer :: list(self%n_element), e, i, k, law, n, n_pack, pass
 
-      if (self%n_dim == n_space) then            ! their elements respond one by one
+      if (self%is_single) then
          allocate(self%pack(0))
          return
       end if
@@ -336,7 +343,7 @@ contains
       integer, intent(in) :: e
       type(shape_table_t), intent(in) :: stiffness, mass
       real(wp) :: local(size(x, 1), stiffness%n_node), gradient(size(x, 1), stiffness%n_node), det
-      real(wp) :: rho_dv, consistent(stiffness%n_node, stiffness%n_node)
+      real(wp) :: rho_dv, consistent(stiffness%n_node, stiffness%n_node), depth
       integer :: n, k, i
 
       n = stiffness%n_node
@@ -353,14 +360,18 @@ contains
       self%geometry(e)%n_gp = stiffness%n_gp
       allocate(self%geometry(e)%gradient(size(x, 1), n, stiffness%n_gp), &
          self%geometry(e)%weight(stiffness%n_gp))
+      if (self%is_axial) allocate(self%geometry(e)%circle(n, stiffness%n_gp))
       do k = 1, stiffness%n_gp
          call reference_gradient(n, local, stiffness%slope(:, :, k), gradient, det)
+         call find_depth(self, e, x, stiffness%value(:, k), depth)
          self%geometry(e)%gradient(:, :, k) = gradient
-         self%geometry(e)%weight(k) = stiffness%weight(k)*det*self%thickness(e)
+         self%geometry(e)%weight(k) = stiffness%weight(k)*det*depth
+         if (self%is_axial) self%geometry(e)%circle(:, k) = stiffness%value(:, k)*(two_pi/depth)
       end do
       do k = 1, mass%n_gp
          call reference_gradient(n, local, mass%slope(:, :, k), gradient, det)
-         rho_dv = density*mass%weight(k)*det*self%thickness(e)
+         call find_depth(self, e, x, mass%value(:, k), depth)
+         rho_dv = density*mass%weight(k)*det*depth
          self%volume_mass(:n, e) = self%volume_mass(:n, e) + rho_dv*mass%value(:, k)
          if (.not. self%has_inertia(e)) cycle
          do i = 1, n
@@ -370,22 +381,36 @@ contains
       end do
    end subroutine init_element
 
+   !> How deep a point is: the thickness, or the length of its circle.
+   pure subroutine find_depth(self, e, x, value, depth)
+      type(solid_t), intent(in) :: self
+      integer, intent(in) :: e                   !! 1 to n_element
+      real(wp), intent(in) :: x(:, :)            !! (2, n_node) [L]
+      real(wp), intent(in) :: value(:)           !! shape functions at the point
+      real(wp), intent(out) :: depth             !! [L]
+
+      depth = self%thickness(e)
+      if (self%is_axial) depth = two_pi*dot_product(value, x(1, self%node(:size(value), e)))
+   end subroutine find_depth
+
    !> A displacement u rounds the strain by epsilon |grad N| |u|, however small the strain is; what
    !> force that makes follows from the law's stiffness at rest: docs/theory.md, eq. (26).
    pure subroutine estimate_stiffness(self, at_rest, e)
       type(solid_t), intent(inout) :: self
       real(wp), intent(in) :: at_rest
       integer, intent(in) :: e
-      real(wp) :: spread
+      real(wp) :: spread, by(self%geometry(e)%n_node)
       integer :: k, i
 
       associate (geometry => self%geometry(e))
          do k = 1, geometry%n_gp
+            by = 0.0_wp
+            if (self%is_axial) by = abs(geometry%circle(:, k))
             spread = geometry%weight(k)*at_rest &
-               *sum(abs(geometry%gradient(:, :, k)))
+               *(sum(abs(geometry%gradient(:, :, k))) + sum(by))
             do i = 1, geometry%n_node
                self%stiffness(i, e) = self%stiffness(i, e) &
-                  + spread*sum(abs(geometry%gradient(:, i, k)))
+                  + spread*(sum(abs(geometry%gradient(:, i, k))) + by(i))
             end do
          end do
       end associate

@@ -1,9 +1,10 @@
-!> All elements of a scene of three dimensions: forces and tangents, element by element in the order
-!> of the scene.
+!> All elements of a scene of three dimensions or of solids of revolution: forces and tangents,
+!> element by element in the order of the scene.
 !>
 !> Source: docs/theory.md, section 3.
 module emcon_solid_response_space
-   use emcon_element_space, only : n_space, space_element_respond, space_motion_t, space_part_t
+   use emcon_element_axial_plane, only : axial_element_respond
+   use emcon_element_space, only : space_element_respond, space_motion_t, space_part_t
    use emcon_element_frequency, only : element_frequency
    use emcon_kinds, only : dp, wp
    use emcon_lumped_mass, only : lumped_mass
@@ -47,11 +48,11 @@ contains
          response%energy(e) = part%energy
          call add_forces(solid, e, motion, local, part, response)
          if (present(value)) call add_tangent(slots%slot(slots%first(e):), motion%weight, &
-            solid%geometry(e)%n_node, part, value, side)
+            [solid%n_dim, solid%geometry(e)%n_node], part, value, side)
       end do
    end subroutine space_respond
 
-   !> The response of element `e`, its motion from that of its first node.
+   !> The response of element `e`, in space its motion from that of its first node.
    subroutine respond_at(solid, e, motion, with_tangent, local, part)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e                   !! 1..n_element
@@ -59,9 +60,17 @@ contains
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(space_motion_t), intent(inout) :: local     !! all but `nlgeom` is set
       type(space_part_t), intent(inout) :: part
-      integer :: i
+      integer :: i, n
 
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         n = solid%n_dim
+         if (solid%is_axial) then
+            local%from(:n, :size(node)) = motion%from(:, node)
+            local%by(:n, :size(node)) = motion%by(:, node)
+            call axial_element_respond(solid%geometry(e), solid%law(solid%law_of(e))%law, local, &
+               with_tangent, part)
+            return
+         end if
          do i = 1, size(node)
             local%from(:, i) = motion%from(:, node(i)) - motion%from(:, node(1))
             local%by(:, i) = motion%by(:, node(i)) - motion%by(:, node(1))
@@ -85,18 +94,19 @@ contains
       associate (node => solid%node(:solid%geometry(e)%n_node, e), &
             total => response%part(role_internal))
          do i = 1, size(node)
-            total%force(:, node(i)) = total%force(:, node(i)) + part%force(:, i)
+            total%force(:, node(i)) = total%force(:, node(i)) + part%force(:solid%n_dim, i)
          end do
          if (.not. response%with_sizes) return
          largest = 0.0_wp
          do i = 1, size(node)
-            do a = 1, n_space
+            do a = 1, solid%n_dim
                largest = max(largest, abs(local%from(a, i) + local%by(a, i)), &
                   motion%computed(a, node(i)))
             end do
          end do
          do i = 1, size(node)
-            total%magnitude(:, node(i)) = total%magnitude(:, node(i)) + part%magnitude(:, i)
+            total%magnitude(:, node(i)) = total%magnitude(:, node(i)) &
+               + part%magnitude(:solid%n_dim, i)
             response%rounding(:, node(i)) = response%rounding(:, node(i)) &
                + largest*solid%stiffness(i, e)
          end do
@@ -104,19 +114,19 @@ contains
    end subroutine add_forces
 
    !> Add the tangent of an element to its places; its slots run down the columns.
-   pure subroutine add_tangent(slot, factor, n, part, value, side)
+   pure subroutine add_tangent(slot, factor, sizes, part, value, side)
       integer, intent(in) :: slot(:)             !! from that of the element on
       real(wp), intent(in) :: factor             !! of the tangent
-      integer, intent(in) :: n                   !! nodes of the element
+      integer, intent(in) :: sizes(2)            !! directions, nodes of the element
       type(space_part_t), intent(in) :: part
       real(dp), intent(inout) :: value(:), side(:)             !! slots > 0, slots < 0
       integer :: a, c, i, j, k, place
 
       k = 0
-      do j = 1, n
-         do c = 1, n_space
-            do i = 1, n
-               do a = 1, n_space
+      do j = 1, sizes(2)
+         do c = 1, sizes(1)
+            do i = 1, sizes(2)
+               do a = 1, sizes(1)
                   k = k + 1
                   place = slot(k)
                   if (place > 0) then
@@ -136,8 +146,8 @@ contains
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: nlgeom              !! .false.: small strains
       type(motion_t), intent(in) :: motion                             !! placed
-      real(wp), intent(in), contiguous :: direction(:, :)              !! (3, n_node) [L]
-      real(wp), intent(inout), contiguous :: product(:, :)             !! (3, n_node) [M L/T^2]
+      real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
+      real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
       type(space_motion_t) :: local
       type(space_part_t) :: part
       integer :: a, e, i, j
@@ -149,10 +159,10 @@ contains
             call respond_at(solid, e, motion, .true., local, part)
             if (part%is_inverted) return
             do i = 1, size(node)
-               do a = 1, n_space
+               do a = 1, solid%n_dim
                   do j = 1, size(node)
                      product(a, node(i)) = product(a, node(i)) + motion%weight &
-                        *dot_product(part%tangent(a, i, :, j), direction(:, node(j)))
+                        *dot_product(part%tangent(a, i, :solid%n_dim, j), direction(:, node(j)))
                   end do
                end do
             end do
@@ -175,8 +185,8 @@ contains
          if (solid%is_rigid(e)) cycle
          call respond_at(solid, e, motion, .true., local, part)
          if (part%is_inverted) return
-         associate (n => solid%geometry(e)%n_node)
-            call compare_frequency(solid, e, motion%weight, part%tangent(:, :n, :, :n), &
+         associate (n => solid%geometry(e)%n_node, m => solid%n_dim)
+            call compare_frequency(solid, e, motion%weight, part%tangent(:m, :n, :m, :n), &
                fastest)
          end associate
       end do

@@ -4,7 +4,6 @@
 module emcon_solid_term
    use emcon_csr, only : csr_t
    use emcon_element_lists, only : element_lists
-   use emcon_element_space, only : n_space
    use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_point_t, &
       pack_add_rounding, pack_response_t, pack_scatter
    use emcon_errors, only : err_analysis, error_t, raise
@@ -107,7 +106,7 @@ contains
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       integer :: t
 
-      if (self%solid%n_dim == n_space) then
+      if (self%solid%is_single) then
          call space_respond(self%solid, self%nlgeom, self%to, motion, response, value, side)
          return
       end if
@@ -316,7 +315,7 @@ contains
       type(pack_motion_t) :: local
       integer :: k
 
-      if (self%solid%n_dim == n_space) then
+      if (self%solid%is_single) then
          call space_tangent_times(self%solid, self%nlgeom, motion, direction, product)
          return
       end if
@@ -413,7 +412,7 @@ contains
       type(pack_motion_t) :: local
       integer :: k, l
 
-      if (self%solid%n_dim == n_space) then
+      if (self%solid%is_single) then
          call space_find_fastest(self%solid, self%nlgeom, motion, fastest)
          return
       end if

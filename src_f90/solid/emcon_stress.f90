@@ -9,7 +9,8 @@ module emcon_stress
    use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t, &
       corotated_turn_stress
    use emcon_element, only : element_motion_t, element_point, point_motion_t
-   use emcon_element_space, only : n_space, space_element_hold, space_motion_t
+   use emcon_element_axial_plane, only : axial_element_hold
+   use emcon_element_space, only : space_element_hold, space_motion_t
    use emcon_host_law, only : host_response_t, host_state
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, law_response_t, n_lane
@@ -67,8 +68,8 @@ contains
       real(wp) :: turn(size(u, 1), size(u, 1))
       integer :: k
 
-      if (solid%n_dim == n_space) then
-         call state_in_space(solid, e, u, nlgeom, stress, strain)
+      if (solid%is_single) then
+         call state_of_single(solid, e, u, nlgeom, stress, strain)
          return
       end if
       motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
@@ -80,7 +81,7 @@ contains
       end do
    end subroutine state_of
 
-   pure subroutine state_in_space(solid, e, u, nlgeom, stress, strain)
+   pure subroutine state_of_single(solid, e, u, nlgeom, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: u(:, :)
@@ -91,13 +92,19 @@ contains
 
       motion%nlgeom = nlgeom
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
+         if (solid%is_axial) then
+            motion%from(:size(u, 1), :size(node)) = u(:, node)
+            call axial_element_hold(solid%geometry(e), solid%law(solid%law_of(e))%law, motion, &
+               stress, strain)
+            return
+         end if
          do i = 1, size(node)
             motion%from(:, i) = u(:, node(i)) - u(:, node(1))
          end do
       end associate
       call space_element_hold(solid%geometry(e), solid%law(solid%law_of(e))%law, motion, stress, &
          strain)
-   end subroutine state_in_space
+   end subroutine state_of_single
 
    !> What the given laws answer at the displacement `u`.
    subroutine respond_at(solid, u, nlgeom, given)

@@ -22,6 +22,7 @@ module emcon_space
    end type lists_t
 
    type :: space_t
+      logical :: is_axial = .false.              !! circles about the axis of y: momentum along it
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
       logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term, a row
@@ -85,6 +86,7 @@ contains
       integer :: i, n_node
 
       n_node = size(scene%x, 2)
+      self%is_axial = scene%is_axial
       call linear_rows_init(self%linear, scene)
       call bodies_find_lists(lists%start, (lists%freedom - 1)/lists%n_dim + 1, n_node, self%body, &
          self%n_body)

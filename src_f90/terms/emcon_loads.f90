@@ -11,6 +11,7 @@ module emcon_loads
    use emcon_element_space, only : n_space
    use emcon_moment_load_plane, only : add_moment, add_moment_stiffness
    use emcon_pressure_plane, only : add_pressure, add_pressure_stiffness
+   use emcon_pressure_ring_plane, only : press_ring, press_ring_stiffness
    use emcon_pressure_space, only : press_face, press_face_stiffness
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
@@ -33,6 +34,7 @@ module emcon_loads
       !> (n_dim*n, n_dim*n, n_load) places of the stiffness of pressure on it
       integer, allocatable, private :: slot(:, :, :)
       logical, private :: is_ramped = .false.    !! static: without amplitude, linear over the step
+      logical, private :: is_axial = .false.     !! on solids of revolution
       logical, allocatable, private :: is_linear(:)      !! (n_element) small strains in all steps
       logical, allocatable, private :: follows(:)        !! (n_load) a pressure on what deforms
       real(wp), private :: duration = 1.0_wp     !! [T]
@@ -65,6 +67,7 @@ contains
       self%node = solid%node
       self%volume_mass = solid%volume_mass
       self%thickness = solid%thickness
+      self%is_axial = solid%is_axial
       self%is_linear = solid%is_linear
       allocate(self%load(0))
       allocate(self%frame(size(scene%x, 1) + 1, size(scene%rigid)))
@@ -230,7 +233,7 @@ contains
    subroutine respond_pressure(self, i, p, motion, value, side)
       class(loads_t), intent(inout) :: self
       integer, intent(in) :: i                   !! load
-      real(wp), intent(in) :: p                  !! [M/T^2], in space [M/(L T^2)]
+      real(wp), intent(in) :: p                  !! [M/T^2], in space and on rings [M/(L T^2)]
       type(motion_t), intent(in) :: motion       !! placed
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       real(wp) :: place(size(self%force, 1), self%n_on(i))
@@ -249,6 +252,10 @@ contains
                if (present(value) .and. self%follows(i)) call press_face_stiffness(table, &
                   p*motion%load_weight, place, self%slot(:m, :m, i), value, side)
             end associate
+         else if (self%is_axial) then
+            call press_ring(face, p, motion%x, motion%at, self%follows(i), self%force)
+            if (present(value) .and. self%follows(i)) call press_ring_stiffness(face, &
+               p*motion%load_weight, motion%x, motion%at, self%slot(:m, :m, i), value, side)
          else
             call add_pressure(face, p, motion%x, motion%at, self%follows(i), self%force)
             if (present(value) .and. self%follows(i)) call add_pressure_stiffness( &

@@ -70,6 +70,8 @@ WHY = {
     "beamnldye": ("explicit, five increments from rest: what stands at a node as mass decides; "
                   "to twenty times that end", by_increments("1e-8", "1e-6"),
                   by_increments("1e-8", "1e-6")),
+    "ax6": ("CalculiX takes a wedge of two degrees with straight edges; EMCON meets the closed forms "
+            "of tests/scenes/test_axial.py", None, None),
     "planestress3": ("CalculiX takes a brick whose thickness its nodes interpolate, EMCON a sheet "
                      "as thick as each point likes: tests/scenes/test_suite.py has the brick's "
                      "digits", None, None),

@@ -29,6 +29,7 @@ program main
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
    use test_element_kinds, only : collect_element_kinds
+   use test_element_axial, only : collect_element_axial
    use test_element_space, only : collect_element_space
    use test_gauss, only : collect_gauss
    use test_host_check, only : collect_host_check
@@ -141,6 +142,7 @@ program main
    call run("law_thin", collect_law_thin)
    call run("element", collect_element)
    call run("element_kinds", collect_element_kinds)
+   call run("element_axial", collect_element_axial)
    call run("element_space", collect_element_space)
    call run("corotated", collect_corotated)
    call run("soft_law", collect_soft_law)

@@ -1,0 +1,391 @@
+!> Elements of solids of revolution, distorted, with each law, and pressure on their edges.
+module test_element_axial
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_element_axial_plane, only : axial_element_respond
+   use emcon_element_registry, only : axial_rows, plane_rows
+   use emcon_element_space, only : space_motion_t, space_part_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_mooney_rivlin, &
+      law_neo_hooke, law_yeoh
+   use emcon_law_space, only : law_response_space, space_response_t
+   use emcon_pressure_ring_plane, only : press_ring, press_ring_stiffness
+   use emcon_scene, only : scene_t
+   use emcon_shape, only : m => max_plane_nodes
+   use emcon_solid, only : solid_init, solid_t
+   use emcon_text, only : to_text
+   use small_scenes, only : scene_begin, shake, young
+   implicit none
+   private
+   public :: collect_element_axial
+
+   real(wp), parameter :: eps = epsilon(1.0_wp), two_pi = 8.0_wp*atan(1.0_wp)
+   !> Sums over up to nine points and nodes, each term of some dozen roundings.
+   real(wp), parameter :: tol = 512.0_wp*eps
+   integer, parameter :: n_law = 5
+
+   !> One distorted element of size 1 at radii about 1.5, with its law.
+   type :: sample_t
+      character(len=:), allocatable :: what
+      integer :: n = 0                           !! nodes
+      integer :: n_corner = 0
+      logical :: nlgeom = .true.
+      real(wp) :: x(2, m) = 0.0_wp
+      type(solid_t) :: solid
+   end type sample_t
+
+contains
+
+   subroutine collect_element_axial(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("identity and force along the axis of a step", test_step), &
+         test_case_t("tangent against differences", test_tangent), &
+         test_case_t("patch: energy and work of a uniform strain", test_patch), &
+         test_case_t("a motion along the axis costs nothing", test_along), &
+         test_case_t("rank", test_rank), &
+         test_case_t("mass and centre are those of the ring", test_mass), &
+         test_case_t("pressure: work on a closed section, tangent", test_pressure)]
+   end subroutine collect_element_axial
+
+   !> The corners moved, nodes between them in the middle, then moved by up to a quarter of `bend`.
+   subroutine make_sample(kind, law, nlgeom, bend, sample, error)
+      integer, intent(in) :: kind, law
+      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: bend
+      type(sample_t), intent(out) :: sample
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      real(wp), allocatable :: place(:, :)
+      real(wp) :: move(2, m)
+      integer :: i, n
+
+      call scene_begin(scene)
+      associate (row => axial_rows(kind))
+         n = row%n_node
+         sample%n_corner = row%n_corner
+         call scene%kind(size(plane_rows) + kind)%shape%places(place)
+         if (sample%n_corner == 4) place = 0.5_wp*place
+         call shake(move, 0.2_wp)
+         place(1, :) = place(1, :) + 1.5_wp
+         place(:, :row%n_corner) = place(:, :row%n_corner) + move(:, :row%n_corner)
+         call shake(move, 0.25_wp*bend)
+         do i = row%n_corner + 1, n
+            associate (a => i - row%n_corner)
+               place(:, i) = 0.5_wp*(place(:, a) + place(:, 1 + mod(a, row%n_corner))) + move(:, i)
+            end associate
+         end do
+         sample%what = trim(row%name) // ", law " // to_text(law) // ", nlgeom " &
+            // to_text(merge(1, 0, nlgeom))
+      end associate
+      deallocate(scene%element_node, scene%node_label, scene%node_origin, scene%x, scene%u0, &
+         scene%v0, scene%element_origin)
+      allocate(scene%element_node(n, 1), scene%node_label(n), scene%node_origin(n), &
+         scene%element_origin(1))
+      scene%is_axial = .true.
+      scene%element_node(:, 1) = [(i, i = 1, n)]
+      scene%node_label = scene%element_node(:, 1)
+      scene%element_label = [1]
+      scene%element_kind = [size(plane_rows) + kind]
+      scene%element_section = [1]
+      scene%x = place
+      scene%u0 = 0.0_wp*place
+      scene%v0 = 0.0_wp*place
+      call set_law(law, scene)
+      sample%n = n
+      sample%nlgeom = nlgeom
+      sample%x(:, :n) = place
+      call solid_init(sample%solid, scene, error)
+   end subroutine make_sample
+
+   subroutine set_law(law, scene)
+      integer, intent(in) :: law                 !! 1..n_law
+      type(scene_t), intent(inout) :: scene
+      integer, parameter :: codes(n_law) = [law_linear, law_coupled_neo_hooke, law_neo_hooke, &
+         law_mooney_rivlin, law_yeoh]
+      real(wp), parameter :: c = 0.2_wp*young, d = 1.0_wp/young
+
+      scene%material(1)%law = codes(law)
+      select case (law)
+      case (3)
+         scene%material(1)%constant = [c, d]
+      case (4)
+         scene%material(1)%constant = [c, 0.5_wp*c, d]
+      case (5)
+         scene%material(1)%constant = [c, 0.1_wp*c, 0.1_wp*c, d, d, d]
+      end select
+   end subroutine set_law
+
+   subroutine respond(sample, u0, du, with_tangent, part)
+      type(sample_t), intent(in) :: sample
+      real(wp), intent(in) :: u0(2, m), du(2, m)
+      logical, intent(in) :: with_tangent
+      type(space_part_t), intent(inout) :: part
+      type(space_motion_t) :: motion
+
+      motion%nlgeom = sample%nlgeom
+      motion%from(:2, :m) = u0
+      motion%by(:2, :m) = du
+      part = space_part_t()
+      call axial_element_respond(sample%solid%geometry(1), &
+         sample%solid%law(sample%solid%law_of(1))%law, motion, with_tangent, part)
+   end subroutine respond
+
+   !> A start up to 3 % off, a motion of up to 4 %, with nlgeom and an eighth of the radius more.
+   subroutine draw(sample, u0, du)
+      type(sample_t), intent(in) :: sample
+      real(wp), intent(out) :: u0(2, m), du(2, m)
+
+      call shake(u0, 0.03_wp)
+      call shake(du, 0.04_wp)
+      if (sample%nlgeom) du(1, :) = du(1, :) + 0.125_wp*sample%x(1, :)
+      u0(:, sample%n + 1:) = 0.0_wp
+      du(:, sample%n + 1:) = 0.0_wp
+   end subroutine draw
+
+   !> f.du = W1 - W0; no net force along the axis.
+   subroutine test_step(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: start, step
+      real(wp) :: u0(2, m), du(2, m), zero(2, m)
+      integer :: i, k
+
+      zero = 0.0_wp
+      do i = 0, 2*n_law*size(axial_rows) - 1
+         call make_sample(1 + mod(i/n_law, size(axial_rows)), 1 + mod(i, n_law), &
+            i >= n_law*size(axial_rows), 0.2_wp, sample, error)
+         if (allocated(error)) return
+         do k = 1, 4
+            call draw(sample, u0, du)
+            if (k == 4) du = scale(du, -20)
+            call respond(sample, u0, zero, .false., start)
+            call respond(sample, u0, du, .false., step)
+            call check_true(error, .not. step%is_inverted, sample%what // ": is not inverted")
+            call check_near(error, sum(step%force(:2, :m)*du), step%energy - start%energy, tol, &
+               sum(step%magnitude(:2, :m)*abs(du)) + merge(start%energy, 0.0_wp, k == 4), &
+               sample%what)
+            call check_near(error, sum(step%force(2, :)), 0.0_wp, tol, sum(step%magnitude), &
+               sample%what // ": force")
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_step
+
+   !> Central differences over four points, of step h = eps^(0.3): an error of order h^4 = eps^(1.2)
+   !> and one of eps/h = eps^(0.7).
+   subroutine test_tangent(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step, near(2), far(2)
+      real(wp) :: u0(2, m), du(2, m), way(2, m), h
+      integer :: a, i, j
+
+      h = eps**0.3_wp
+      do i = 0, n_law*size(axial_rows) - 1
+         call make_sample(1 + i/n_law, 1 + mod(i, n_law), mod(i, 3) > 0, 0.2_wp, sample, error)
+         if (allocated(error)) return
+         call draw(sample, u0, du)
+         call respond(sample, u0, du, .true., step)
+         do j = 1, sample%n
+            do a = 1, 2
+               way = 0.0_wp
+               way(a, j) = h
+               call respond(sample, u0, du + way, .false., near(1))
+               call respond(sample, u0, du - way, .false., near(2))
+               call respond(sample, u0, du + 2.0_wp*way, .false., far(1))
+               call respond(sample, u0, du - 2.0_wp*way, .false., far(2))
+               call check_near(error, step%tangent(:2, :m, a, j), &
+                  (8.0_wp*(near(1)%force(:2, :m) - near(2)%force(:2, :m)) &
+                  - (far(1)%force(:2, :m) - far(2)%force(:2, :m)))/(12.0_wp*h), &
+                  800.0_wp*eps**0.7_wp, two_pi*young, sample%what)
+            end do
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_tangent
+
+   !> u = (a r, b y + c r): the circle grows as the radius does, and the strain is uniform. W times
+   !> the volume of the ring, 2 pi int r, and the work of the forces on such fields.
+   subroutine test_patch(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step
+      type(space_response_t) :: state
+      real(wp), parameter :: a = 0.1_wp, b = -0.15_wp, c = 0.2_wp
+      real(wp) :: u0(2, m), zero(2, m), e(6), s(6), volume, two
+      integer :: i
+
+      zero = 0.0_wp
+      do i = 0, 2*n_law*size(axial_rows) - 1
+         call make_sample(1 + mod(i/n_law, size(axial_rows)), 1 + mod(i, n_law), &
+            i >= n_law*size(axial_rows), 0.0_wp, sample, error)
+         if (allocated(error)) return
+         u0(1, :) = a*sample%x(1, :)
+         u0(2, :) = b*sample%x(2, :) + c*sample%x(1, :)
+         two = merge(1.0_wp, 0.0_wp, sample%nlgeom)
+         e = [a + 0.5_wp*two*(a*a + c*c), b + 0.5_wp*two*b*b, a + 0.5_wp*two*a*a, &
+            c*(1.0_wp + two*b), 0.0_wp, 0.0_wp]
+         call law_response_space(sample%solid%law(1)%law, e, 0.0_wp*e, state)
+         volume = ring(sample%x(:, :sample%n_corner), .false.)
+         call check_near(error, sum(sample%solid%geometry(1)%weight), volume, tol, volume, &
+            sample%what // ": volume")
+         call respond(sample, u0, zero, .false., step)
+         call check_near(error, step%energy, volume*state%energy, tol, young, &
+            sample%what // ": energy")
+         s = volume*state%stress
+         call check_near(error, sum(step%force(1, :m)*sample%x(1, :)), &
+            (1.0_wp + two*a)*(s(1) + s(3)), tol, two_pi*young, sample%what // ": radial")
+         call check_near(error, sum(step%force(2, :m)*sample%x(2, :)), &
+            (1.0_wp + two*b)*s(2) + two*c*s(4), tol, two_pi*young, sample%what // ": axial")
+         if (allocated(error)) return
+      end do
+   end subroutine test_patch
+
+   !> 2 pi int r dA of a polygon, or 2 pi int r y dA: by its sides, from the theorem of Green.
+   pure real(wp) function ring(x, times_y)
+      real(wp), intent(in) :: x(:, :)            !! (2, n) corners
+      logical, intent(in) :: times_y
+      real(wp) :: cross
+      integer :: i, j
+
+      ring = 0.0_wp
+      do i = 1, size(x, 2)
+         j = 1 + mod(i, size(x, 2))
+         cross = x(1, i)*x(2, j) - x(2, i)*x(1, j)
+         if (times_y) then
+            ring = ring + cross*(x(1, i)*x(2, j) + 2.0_wp*x(1, i)*x(2, i) &
+               + 2.0_wp*x(1, j)*x(2, j) + x(1, j)*x(2, i))/24.0_wp
+         else
+            ring = ring + cross*(x(1, i) + x(1, j))/6.0_wp
+         end if
+      end do
+      ring = two_pi*ring
+   end function ring
+
+   subroutine test_along(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step
+      real(wp) :: u0(2, m), du(2, m)
+      integer :: k
+
+      do k = 1, size(axial_rows)
+         call make_sample(k, 1 + mod(k, n_law), .true., 0.2_wp, sample, error)
+         if (allocated(error)) return
+         u0 = 0.0_wp
+         du = 0.0_wp
+         u0(2, :sample%n) = 3.0_wp
+         du(2, :sample%n) = -5.0_wp
+         call respond(sample, u0, du, .false., step)
+         call check_near(error, step%energy, 0.0_wp, tol**2, young, sample%what // ": energy")
+         call check_near(error, step%force, 0.0_wp*step%force, tol, young, &
+            sample%what // ": forces")
+      end do
+   end subroutine test_along
+
+   !> Of the tangent at rest: all but the motion along the axis.
+   subroutine test_rank(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step
+      real(wp) :: zero(2, m)
+      integer :: k
+
+      zero = 0.0_wp
+      do k = 1, size(axial_rows)
+         call make_sample(k, 1 + mod(k, n_law), .true., 0.2_wp, sample, error)
+         if (allocated(error)) return
+         call respond(sample, zero, zero, .true., step)
+         associate (n => sample%n)
+            call check_equal(error, rank_of(reshape(step%tangent(:2, :n, :2, :n), [2*n, 2*n])), &
+               2*n - 1, sample%what)
+         end associate
+      end do
+   end subroutine test_rank
+
+   !> By elimination with the largest pivot; what is left below the root of epsilon is round-off.
+   pure integer function rank_of(matrix)
+      real(wp), intent(in) :: matrix(:, :)
+      real(wp) :: a(size(matrix, 1), size(matrix, 2)), row(size(matrix, 2))
+      integer :: at(2), j
+
+      a = matrix
+      rank_of = 0
+      do j = 1, size(a, 1)
+         at = maxloc(abs(a))
+         if (abs(a(at(1), at(2))) <= sqrt(eps)*maxval(abs(matrix))) return
+         rank_of = rank_of + 1
+         row = a(at(1), :)/a(at(1), at(2))
+         a = a - spread(a(:, at(2)), 2, size(row))*spread(row, 1, size(a, 1))
+      end do
+   end function rank_of
+
+   subroutine test_mass(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      integer :: k
+
+      do k = 1, size(axial_rows)
+         call make_sample(k, 1, .true., 0.0_wp, sample, error)
+         if (allocated(error)) return
+         associate (mass => sample%solid%mass(:sample%n, :sample%n, 1), &
+               corner => sample%x(:, :sample%n_corner))
+            call check_near(error, sum(mass), ring(corner, .false.), tol, two_pi, &
+               sample%what // ": mass")
+            call check_near(error, dot_product(sample%x(2, :sample%n), sum(mass, 2)), &
+               ring(corner, .true.), tol, two_pi, sample%what // ": centre")
+            call check_near(error, sum(mass, 2), sample%solid%volume_mass(:sample%n, 1), tol, &
+               two_pi, sample%what // ": gravity")
+         end associate
+         if (allocated(error)) return
+      end do
+   end subroutine test_mass
+
+   !> On all sides of a section: no force along the axis, the work on u = x is three times -p times
+   !> the volume. The force is quadratic in the places: central differences are exact.
+   subroutine test_pressure(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: p = 0.7_wp, h = 0.25_wp
+      type(sample_t) :: sample
+      real(wp) :: force(2, m), other(2, m), u(2, m), near(2, m)
+      real(dp) :: value(6*6), side(0)
+      integer :: edge(3), slot(6, 6), a, i, j, k, n
+
+      do k = 3, size(axial_rows)
+         call make_sample(k, 1, .true., 0.0_wp, sample, error)
+         if (allocated(error)) return
+         u = 0.0_wp
+         force = 0.0_wp
+         n = sample%n_corner
+         do i = 1, n
+            edge = [i, 1 + mod(i, n), n + i]
+            call press_ring(edge, p, sample%x, u, .true., force)
+         end do
+         call check_near(error, sum(force(2, :)), 0.0_wp, tol, two_pi*p, sample%what // ": axis")
+         call check_near(error, sum(force*sample%x), &
+            -3.0_wp*p*ring(sample%x(:, :n), .false.), tol, two_pi, sample%what // ": work")
+         edge = [1, 2, n + 1]
+         slot = reshape([(i, i = 1, size(slot))], shape(slot))
+         value = 0.0_dp
+         call press_ring_stiffness(edge, p, sample%x, u, slot, value, side)
+         do j = 1, 3
+            do a = 1, 2
+               u = 0.0_wp
+               u(a, edge(j)) = h
+               force = 0.0_wp
+               call press_ring(edge, p, sample%x, u, .true., force)
+               other = 0.0_wp
+               call press_ring(edge, p, sample%x, -u, .true., other)
+               near = -(force - other)/(2.0_wp*h)
+               call check_near(error, real(value(slot(:, 2*(j - 1) + a)), wp), &
+                  [near(:, edge(1)), near(:, edge(2)), near(:, edge(3))], tol, two_pi, &
+                  sample%what // ": tangent")
+            end do
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_pressure
+
+end module test_element_axial
