@@ -167,12 +167,11 @@ def goal_of_ring(folder, jobs):
 
 
 def goal_of_ball(folder, jobs):
-    write_decks(folder, {"ball": ball_deck("elastic"), "ball_on_linear": ball_deck("linear")})
-    steps = (0.01, 0.005, 0.0025, 0.00125, 0.000625, 0.0003125)
+    write_decks(folder, {"ball": ball_deck("elastic")})
+    steps = (0.01, 0.005, 0.0025, 0.00125, 0.000625)
     return study(folder, "ball", [
-        *vary(deck=("ball.inp", "ball_on_linear.inp"), initiation=("MASSLESS", "PERSISTENT"),
-              **precisions(), h=steps, formulation="NODE TO SURFACE"), "--repeat", "2",
-        "--goal", "position:1e-3"], jobs)
+        *vary(mesh=(1, 2), initiation=("MASSLESS", "PERSISTENT"), **precisions(), h=steps,
+              formulation="NODE TO SURFACE"), "--goal", "position:1e-3"], jobs)
 
 
 def goal_of_bar(folder, jobs, steps=BAR_STEPS, decks=("bar.inp", "bar_of_25.inp")):

@@ -121,13 +121,16 @@ def test_wrong_goals(text: str, words: str) -> None:
         parse_goals([text])
 
 
-def study_of(errors: dict[str, tuple[float, float]], limit: float, goal: str) -> Study:
-    """Members `h, initiation` with CPU times and errors of the impulse, around a reference of 1."""
-    plan = plan_of("h=0.1,0.01", "initiation=ADMISSIBLE,PERSISTENT")
+def study_of(errors: dict[str, tuple[float, float]], limit: float, goal: str,
+             *more: str) -> Study:
+    """Members `h, initiation`, and what `more` varies, with CPU times and errors of the impulse,
+    around a reference of 1."""
+    plan = plan_of("h=0.1,0.01", "initiation=ADMISSIBLE,PERSISTENT", *more)
     members = plan.members([], True)
     runs = []
     for member in members:
-        cpu, error = errors[f"{member.settings['h']} {member.settings['initiation'][0]}"]
+        cpu, error = errors[" ".join([member.settings["h"], member.settings["initiation"][0],
+                                      *(member.settings[knob.split("=")[0]] for knob in more)])]
         runs.append(Run(member, {"cpu": cpu, "verdict": "good"},
                         {"impulse": Measured(np.array([[1.0 + error, 0.0]]), 1.0)}, None))
     right = Run(Member(-1, "file", {}), {}, {"impulse": Measured(np.array([[1.0, 0.0]]), 1.0)},
@@ -161,6 +164,19 @@ def test_what_the_own_treatment_needs() -> None:
     words = goal_words(study, study.references[0], study.goals)
     assert words.endswith("with h alone the deck's own does not meet the goal down to h=0.01, "
                           "for 12 times the time")
+
+
+@pytest.mark.parametrize(("last", "words"), [
+    (0.04, "meets the goal at mesh=2, h=0.01, for 40 times the time"),
+    (0.2, "does not meet the goal down to mesh=2, h=0.01, for 40 times the time")])
+def test_a_finer_mesh_is_no_other_treatment(last: float, words: str) -> None:
+    """What the deck's own needs is looked for at all steps and meshes."""
+    errors = {f"{key} {mesh}": (4*cpu if mesh == 2 else cpu, 0.2) for key, (cpu, _) in
+              ERRORS.items() for mesh in (1, 2)}
+    errors.update({"0.1 A 1": (1.2, 0.01), "0.01 P 2": (48.0, last)})
+    study = study_of(errors, 0.005, "impulse:0.05", "mesh=1,2")
+    found = goal_words(study, study.references[0], study.goals)
+    assert found.endswith(f"with mesh and h alone the deck's own {words}")
 
 
 def test_each_knob_of_the_choice_is_asked_for_alone() -> None:

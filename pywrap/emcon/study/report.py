@@ -312,27 +312,30 @@ def _against_default(study: Study, reference: Reference, goals: Sequence[Goal], 
             met = excess(reference, alone, goals) <= 1.0
             words.append(f"{knob}={value} alone: {cpu/alone.record['cpu']:.2g} times"
                          + ("" if met else ", and the goal is not met"))
-    return "; ".join([*words, *_by_step_alone(study, reference, goals, chosen)])
+    return "; ".join([*words, *_by_refinement(study, reference, goals, chosen)])
 
 
-def _by_step_alone(study: Study, reference: Reference, goals: Sequence[Goal],
+def _by_refinement(study: Study, reference: Reference, goals: Sequence[Goal],
                    chosen: Run) -> list[str]:
-    """At which step the deck's own treatment meets the goal, and what it costs there."""
-    own, step = study.plan.default_settings(), study.plan.step
+    """At which step and mesh the deck's own treatment meets the goal, and what it costs there."""
+    own = study.plan.default_settings()
+    fine = [knob for knob in (MESH, study.plan.step) if knob in study.plan.knobs]
+    free = dict.fromkeys(fine, "")
     runs = [run for run in candidates(study)
-            if same_settings({**run.member.settings, step: ""}, {**own, step: ""})]
-    if step not in study.plan.knobs or len(runs) < 2:
+            if same_settings({**run.member.settings, **free}, {**own, **free})]
+    if study.plan.step not in fine or len(runs) < 2:
         return []
+    words = f"with {' and '.join(fine)} alone the deck's own "
     met = [run for run in runs if excess(reference, run, goals) <= 1.0]
     if met:
         run = min(met, key=lambda run: float(run.record["cpu"]))
-        words = f"with {step} alone the deck's own meets the goal at {step}="
+        words += "meets the goal at "
     else:
-        run = min(runs, key=lambda run: study.plan.size(run.member.settings))
-        words = f"with {step} alone the deck's own does not meet the goal down to {step}="
+        run = min(runs, key=lambda run: tuple(knob_size(run, knob) for knob in fine))
+        words += "does not meet the goal down to "
     gain = run.record["cpu"]/chosen.record["cpu"]
-    return [f"{words}{run.member.settings[step]}, for {gain:.2g} times the time"] \
-        if run is not chosen else []
+    where = ", ".join(f"{knob}={run.member.settings[knob]}" for knob in fine)
+    return [f"{words}{where}, for {gain:.2g} times the time"] if run is not chosen else []
 
 
 def excess(reference: Reference, run: Run, goals: Sequence[Goal]) -> float:
