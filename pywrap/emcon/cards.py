@@ -209,17 +209,19 @@ class Cards:
         return self._card("TIME POINTS", {"NAME": name}, [(value,) for value in t.tolist()])
 
     def boundary(self: _Cards, where: Where, dof: Dof = (1, 2), value: Number | ArrayLike = 0.0, *,
-                 amplitude: str | None = None, fixed: bool = False,
+                 amplitude: str | None = None, delay: Number | None = None, fixed: bool = False,
                  op: Literal["MOD", "NEW"] | None = None) -> _Cards:
         """`*BOUNDARY`: prescribe displacements [L]; before the first step as in it.
 
         dof        1, 2 or (1, 2); 6: rotation of the reference node of a rigid body, radians
         value      one for all, (n_dof,), or (k, n_dof) for k nodes
+        delay      how much later the amplitude begins [T]
         fixed      hold the degrees of freedom where the step finds them
         op         NEW: all supports of earlier steps go
         """
         self._valued("BOUNDARY", where, dof, value,
-                     {"OP": op, "AMPLITUDE": amplitude, "FIXED": fixed, "TYPE": "DISPLACEMENT"},
+                     {"OP": op, "AMPLITUDE": amplitude, "TIME DELAY": delay, "FIXED": fixed,
+                      "TYPE": "DISPLACEMENT"},
                      twice=True)
         return self
 

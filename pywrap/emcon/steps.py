@@ -39,19 +39,22 @@ class Step(Cards):
     # --- loads -----------------------------------------------------------------------------
 
     def load(self, where: Where, dof: Dof, force: Number | ArrayLike, *,
-             amplitude: str | None = None, op: Op | None = None) -> Step:
+             amplitude: str | None = None, delay: Number | None = None,
+             op: Op | None = None) -> Step:
         """`*CLOAD`: forces on nodes [M L/T^2].
 
         where   node set, node, or (k,) of them
         dof     1, 2 or (1, 2); 6: moment on the reference node of a rigid body [M L^2/T^2]
         force   one for all, (n_dof,), or (k, n_dof)
+        delay   how much later the amplitude begins [T]
         op      NEW: all forces of earlier steps go
         """
-        self._valued("CLOAD", where, dof, force, {"OP": op, "AMPLITUDE": amplitude})
+        self._valued("CLOAD", where, dof, force,
+                     {"OP": op, "AMPLITUDE": amplitude, "TIME DELAY": delay})
         return self
 
     def pressure(self, where: Where, face: int, value: Number, *, amplitude: str | None = None,
-                 op: Op | None = None) -> Step:
+                 delay: Number | None = None, op: Op | None = None) -> Step:
         """`*DLOAD`: pressure [M/(L T^2)], positive inwards, on face 1..4 of elements.
 
         Loads of one step on the same place add up; those of a later step replace them.
@@ -61,19 +64,20 @@ class Step(Cards):
         """
         if face not in (1, 2, 3, 4):
             raise InputError(f"a face is 1 to 4, not {face!r}")
-        return self._distributed(where, [f"P{int(face)}", value], op, amplitude)
+        return self._distributed(where, [f"P{int(face)}", value], op, amplitude, delay)
 
     def gravity(self, where: Where, g: Number, direction: Sequence[Number] = (0.0, -1.0), *,
-                amplitude: str | None = None, op: Op | None = None) -> Step:
+                amplitude: str | None = None, delay: Number | None = None,
+                op: Op | None = None) -> Step:
         """`*DLOAD`: acceleration `g` [L/T^2] of elements along `direction` (2,), of any length."""
         if isinstance(direction, str) or len(direction) != 2:
             raise InputError(f"the direction of gravity is a pair of numbers, not {direction!r}")
-        return self._distributed(where, ["GRAV", g, *direction], op, amplitude)
+        return self._distributed(where, ["GRAV", g, *direction], op, amplitude, delay)
 
     def _distributed(self, where: Where, load: Sequence[object], op: Op | None,
-                     amplitude: str | None) -> Step:
+                     amplitude: str | None, delay: Number | None) -> Step:
         names = self._names(where, self._elements, "*DLOAD")
-        return self._card("DLOAD", {"OP": op, "AMPLITUDE": amplitude},
+        return self._card("DLOAD", {"OP": op, "AMPLITUDE": amplitude, "TIME DELAY": delay},
                           [(name, *load) for name in names])
 
     # --- settings --------------------------------------------------------------------------

@@ -5,6 +5,7 @@
 module emcon_deck
    use emcon_deck_cards, only : read_cards
    use emcon_deck_axial_plane, only : check_axial
+   use emcon_deck_centrifugal, only : check_centrifugal
    use emcon_deck_check, only : check_materials, check_nodes
    use emcon_deck_check_contact, only : check_pairs, choose_slaves
    use emcon_deck_check_linear, only : check_linear
@@ -102,6 +103,7 @@ contains
       call read_steps(reader, scene)
       call check_geometry(reader, scene)
       call check_materials(reader, scene)
+      call check_centrifugal(reader, scene)
       call check_nodes(reader, scene)
       call check_linear(reader, scene)
       call check_massless_sections(reader, scene)

@@ -5,7 +5,7 @@ module emcon_deck_check
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_gravity, load_point
+   use emcon_steps, only : load_centrifugal, load_gravity, load_point
    implicit none
    private
    public :: check_materials, check_nodes
@@ -43,7 +43,7 @@ contains
       do i = 1, size(scene%step)
          needs_mass = needs_mass .or. scene%step(i)%scheme%masses_resist
          do k = 1, size(scene%step(i)%load)
-            if (scene%step(i)%load(k)%kind /= load_gravity) cycle
+            if (all(scene%step(i)%load(k)%kind /= [load_gravity, load_centrifugal])) cycle
             material = scene%element_section(scene%step(i)%load(k)%target)
             if (material > 0) material = scene%section(material)%material
             if (material > 0) has_weight(material) = .true.
@@ -61,7 +61,7 @@ contains
                   // " has no density: a dynamic step needs *DENSITY above 0")
             else if (has_weight(i)) then
                call add_error(reader%log, given%origin, "material " // given%name &
-                  // " has no density: gravity needs *DENSITY above 0")
+                  // " has no density: gravity and CENTRIF need *DENSITY above 0")
             end if
          end associate
       end do

@@ -31,7 +31,7 @@ module emcon_deck_conditions
       integer, allocatable :: load_next(:)
       integer, allocatable :: prescribed_slot(:, :)                    !! (freedoms, n_node)
       integer, allocatable :: point_slot(:, :)                         !! (freedoms, n_node)
-      integer, allocatable :: element_slot(:, :)                       !! (0:n_face, n_element)
+      integer, allocatable :: element_slot(:, :)                       !! (-1:n_face, n_element)
    end type conditions_t
 
 contains
@@ -47,7 +47,7 @@ contains
          allocate(self%prescribed_slot(sum([(k, k = 1, n_dim)]), n_node), source=0)
          allocate(self%point_slot(sum([(k, k = 1, n_dim)]), n_node), source=0)
       end associate
-      allocate(self%element_slot(0:maxval(scene%kind%n_face), size(scene%element_label)), &
+      allocate(self%element_slot(-1:maxval(scene%kind%n_face), size(scene%element_label)), &
          source=0)
    end subroutine conditions_init
 
@@ -255,7 +255,7 @@ contains
          associate (old => self%load(k))
             old%value = 0.0_wp
             old%amplitude = 0
-            if (all(old%direction == new%direction)) then
+            if (all(old%direction == new%direction) .and. all(old%point == new%point)) then
                value_start = value_start + old%value_start
                old%value_start = 0.0_wp
                i = k

@@ -85,16 +85,16 @@ module emcon_deck_keywords
       keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,!AUTOMATICTOLERANCES," &
          // "!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MASTER,!SLAVE,!MAXCHP,!PERRMX,!UERRMX," &
          // "!STIFFNESSSCALEFACTOR,!TANGENTFRACTION:1", has_data=.false.), &
-      keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,!TIMEDELAY:0,!LOADCASE:1," &
+      keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,TIMEDELAY=,!LOADCASE:1," &
          // "!USER,!SUBMODEL"), &
       keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,~UNSYMM:NO," &
          // "~EXTRAPOLATION,~CONVERTSDI,!PERTURBATION"), &
       keyword_t("STATIC", in_step, "DIRECT,SOLVER=,!STABILIZE:0,!RIKS,!EXPLICIT"), &
       keyword_t("DYNAMIC", in_step, "DIRECT,EXPLICIT,SOLVER=,!ALPHA:0,!APPLICATION,!INITIAL," &
          // "~NOHAF,~HAFTOL,~HALFINCSCALEFACTOR"), &
-      keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER,!FOLLOWER," &
+      keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER,!FOLLOWER," &
          // "!SECTOR"), &
-      keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,!TIMEDELAY:0,!LOADCASE:1,!USER"), &
+      keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER"), &
       keyword_t("CONSTRAINT METHOD", in_step, "TYPE=,STIFFNESS=,FACTOR=,TOLERANCE=", &
          has_data=.false.), &
       keyword_t("CONTACT INITIATION", in_step, "TYPE=,GAPTOLERANCE=", has_data=.false.), &
@@ -112,7 +112,7 @@ module emcon_deck_keywords
       keyword_t("EL PRINT", in_step, "ELSET=," // printed), &
       keyword_t("CONTACT PRINT", in_step, "~NSET,~SET," // printed), &
       keyword_t("ENERGY PRINT", in_step, "~ELSET,~FREQUENCY:1,~TIMEPOINTS"), &
-      keyword_t("RESTART", in_step, "WRITE,FREQUENCY=,~OVERLAY,!READ", has_data=.false.), &
+      keyword_t("RESTART", in_both, "WRITE,FREQUENCY=,~OVERLAY,!READ", has_data=.false.), &
       keyword_t("END STEP", in_step, has_data=.false.), &
       keyword_t("MPC", in_model, "", no_couple), &
       keyword_t("COUPLING", in_model, "", no_couple), &
@@ -283,8 +283,6 @@ contains
          reason = " (whole surfaces are tied)"
       case ("REMOVE", "REMOVEALL")
          reason = " (equations hold in all steps)"
-      case ("TIMEDELAY")
-         reason = " (shift the times of the amplitude)"
       case ("POLYNOMIAL", "REDUCEDPOLYNOMIAL", "ARRUDA-BOYCE", "VANDERWAALS", "MARLOW")
          call law_titles("HYPERELASTIC", reason)
          reason = " (laws are " // reason // ")"

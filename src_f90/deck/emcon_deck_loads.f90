@@ -10,11 +10,12 @@ module emcon_deck_loads
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
       refuse_option
    use emcon_deck_rigid, only : mark_rigid
-   use emcon_deck_tables, only : find_table, table_names
+   use emcon_deck_tables, only : card_table_name, find_table, table_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_gravity, load_moment, load_point, load_pressure, load_t, &
+   use emcon_steps, only : load_centrifugal, load_gravity, load_moment, load_point, &
+      load_pressure, load_t, &
       prescribed_t
    use emcon_text, only : to_text
    implicit none
@@ -49,10 +50,11 @@ contains
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable :: name
 
-      name = option_name(card, "AMPLITUDE")
+      call card_table_name(card, name)
       card_amplitude = 0
       if (name == "") return
       card_amplitude = find_table(scene%amplitude, name)
+      name = option_name(card, "AMPLITUDE")
       if (card_amplitude == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
          "unknown amplitude " // quoted(name) // suggestion(name, table_names(scene%amplitude)))
    end function card_amplitude
@@ -321,7 +323,8 @@ contains
       end if
    end subroutine check_force
 
-   !> *DLOAD: element or set, P1..P4, pressure; or element or set, GRAV, acceleration, direction.
+   !> *DLOAD: element or set, P1..P4, pressure; or GRAV, acceleration, direction; or CENTRIF, square
+   !> of the angular velocity, point and direction of the axis.
    subroutine read_dload(reader, card, scene, self)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -337,7 +340,7 @@ contains
       new%amplitude = card_amplitude(reader, card, scene)
       call data_open(data, card)
       do while (next_line(reader, data))
-         call check_count(reader, data, 2, 6, "element or element set, load type, magnitude")
+         call check_count(reader, data, 2, 9, "element or element set, load type, magnitude")
          if (data%ok) call read_load_type(reader, data, scene, new)
          if (data%ok) call get_elements(reader, data, 1, scene, item)
          if (data%ok) call check_faces(reader, data, scene, item, new%place)
@@ -370,13 +373,13 @@ contains
       type(scene_t), intent(in) :: scene
       type(load_t), intent(inout) :: new
       character(len=:), allocatable :: name
-      real(wp) :: length
-      integer :: k, n_face
+      integer :: n_face
 
       n_face = maxval(scene%kind%n_face)
       call get_name(reader, data, 2, "load type", name)
       new%value = 0.0_wp
       new%direction = 0.0_wp
+      new%point = 0.0_wp
       call get_real(reader, data, 3, "magnitude", new%value)
       if (.not. data%ok) return
       new%place = face_number(name, "P", n_face)
@@ -388,26 +391,56 @@ contains
       select case (name)
       case ("GRAV")
          new%kind = load_gravity
-         do k = 1, 3
-            call get_real(reader, data, 3 + k, "direction", new%direction(k))
-         end do
-         length = norm2(new%direction)
+         call check_count(reader, data, 2, 6, "element or element set, GRAV, g, nx, ny, nz")
+         call read_vector(reader, data, 4, "direction", new%direction)
          if (.not. data%ok) then
             return
          else if (any(abs(new%direction(scene%n_dim + 1:)) > 0.0_wp)) then
             call data_error(reader, data, "the model is plane: gravity has no third component")
-         else if (length <= 0.0_wp) then
-            call data_error(reader, data, "gravity needs a direction: set, GRAV, g, nx, ny")
-         else
-            new%direction = new%direction/length
          end if
-      case ("CENTRIF", "CORIO", "BX", "BY", "BZ", "P1NU", "P2NU", "P3NU", "P4NU", "HP1", "NEWTON")
+         call make_unit(reader, data, "gravity needs a direction: set, GRAV, g, nx, ny", new)
+      case ("CENTRIF")
+         new%kind = load_centrifugal
+         new%place = -1                            ! it holds beside gravity
+         call read_vector(reader, data, 4, "point of the axis", new%point)
+         call read_vector(reader, data, 7, "direction of the axis", new%direction)
+         call make_unit(reader, data, "CENTRIF needs an axis: set, CENTRIF, omega**2, px, py, " &
+            // "pz, nx, ny, nz", new)
+      case ("CORIO", "BX", "BY", "BZ", "P1NU", "P2NU", "P3NU", "P4NU", "HP1", "NEWTON")
          call data_error(reader, data, "load type " // name // " is known but not supported; " &
-            // "supported: " // face_names("P", n_face) // ", GRAV")
+            // "supported: " // face_names("P", n_face) // ", GRAV, CENTRIF")
       case default
          call data_error(reader, data, "unknown load type " // quoted(name) &
-            // "; known: " // face_names("P", n_face) // ", GRAV")
+            // "; known: " // face_names("P", n_face) // ", GRAV, CENTRIF")
       end select
    end subroutine read_load_type
+
+   !> Three numbers from field `first` on.
+   subroutine read_vector(reader, data, first, what, vector)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      integer, intent(in) :: first
+      character(len=*), intent(in) :: what
+      real(wp), intent(inout) :: vector(3)         !! what is left out stays
+      integer :: k
+
+      do k = 1, size(vector)
+         call get_real(reader, data, first - 1 + k, what, vector(k))
+      end do
+   end subroutine read_vector
+
+   !> The direction of a load to length 1.
+   subroutine make_unit(reader, data, missing, new)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      character(len=*), intent(in) :: missing      !! what is told where there is none
+      type(load_t), intent(inout) :: new
+      real(wp) :: length
+
+      if (.not. data%ok) return
+      length = norm2(new%direction)
+      if (length > 0.0_wp) new%direction = new%direction/length
+      if (.not. length > 0.0_wp) call data_error(reader, data, missing)
+   end subroutine make_unit
 
 end module emcon_deck_loads

@@ -59,6 +59,10 @@ contains
       end do
       allocate(scene%step(n_step))
       time = 0.0_wp
+      do i = 1, size(reader%card)
+         if (reader%card(i)%step == 0 .and. reader%card(i)%name == "RESTART") call read_restart( &
+            reader, reader%card(i), last)
+      end do
       i = 1
       do k = 1, n_step
          do while (reader%card(i)%step < k)

@@ -4,13 +4,14 @@ module emcon_deck_tables
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, next_line
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t, &
       refuse_option
+   use emcon_diagnostics, only : quoted
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
-   use emcon_text, only : string_t, to_text
+   use emcon_text, only : read_real, string_t, to_text
    implicit none
    private
    public :: read_amplitudes, read_time_points
-   public :: find_table, table_names
+   public :: find_table, table_names, card_table_name
 
    !> More output times than this are a slip of the pen.
    integer, parameter :: max_times = 1000000
@@ -24,7 +25,55 @@ contains
       type(scene_t), intent(inout) :: scene
 
       call read_tables(reader, scene, "AMPLITUDE", scene%amplitude)
+      call delay_tables(reader, scene%amplitude)
    end subroutine read_amplitudes
+
+   !> Of each amplitude that a card delays, one more, whose times are later.
+   subroutine delay_tables(reader, table)
+      type(reader_t), intent(inout) :: reader
+      type(amplitude_t), allocatable, intent(inout) :: table(:)
+      type(amplitude_t) :: later
+      character(len=:), allocatable :: name
+      real(wp) :: delay
+      integer :: i, k
+      logical :: ok
+
+      do i = 1, size(reader%card)
+         associate (card => reader%card(i))
+            if (.not. (any(card%name == ["BOUNDARY", "CLOAD   ", "DLOAD   "]) &
+               .and. has_option(card, "TIMEDELAY"))) cycle
+            call read_real(option_name(card, "TIMEDELAY"), delay, ok)
+            if (.not. ok) then
+               call card_error(reader, card, "TIME DELAY=" &
+                  // quoted(option_name(card, "TIMEDELAY")) // " is not a number")
+               cycle
+            end if
+            if (.not. has_option(card, "AMPLITUDE")) then
+               if (abs(delay) > 0.0_wp) call card_error(reader, card, "TIME DELAY delays an " &
+                  // "amplitude; name one by AMPLITUDE=")
+               cycle
+            end if
+            k = find_table(table, option_name(card, "AMPLITUDE"))
+            call card_table_name(card, name)
+            if (k == 0 .or. find_table(table, name) > 0) cycle
+            later = table(k)
+            later%name = name
+            later%time = later%time + delay
+            table = [table, later]
+         end associate
+      end do
+   end subroutine delay_tables
+
+   !> Name of the amplitude that a card names, with its delay; empty: none.
+   subroutine card_table_name(card, name)
+      type(card_t), intent(in) :: card
+      character(len=:), allocatable, intent(out) :: name
+
+      name = option_name(card, "AMPLITUDE")
+      ! No name of a deck has small letters.
+      if (name /= "" .and. has_option(card, "TIMEDELAY")) name = name // " later by " &
+         // option_name(card, "TIMEDELAY")
+   end subroutine card_table_name
 
    subroutine read_time_points(reader, scene)
       type(reader_t), intent(inout) :: reader

@@ -9,7 +9,7 @@ module emcon_steps
    implicit none
    private
    public :: prescribed_t, turn_t, load_t, scheme_choice_t, softness_t, step_t
-   public :: load_point, load_pressure, load_gravity, load_moment
+   public :: load_point, load_pressure, load_gravity, load_moment, load_centrifugal
    public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
       initiation_massless
    public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
@@ -17,7 +17,8 @@ module emcon_steps
    public :: events_pairs, events_nodes
    public :: prescribed_find
 
-   integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4
+   integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4, &
+      load_centrifugal = 5
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
       initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2, method_penalty = 3, &
@@ -54,10 +55,11 @@ module emcon_steps
       integer :: kind = 0                            !! one of `load_`
       integer :: target = 0                          !! node (point, moment) or element
       integer :: place = 0                           !! dof (point, moment) or face (pressure)
-      !> Force | pressure, > 0 inwards | acceleration | moment
+      !> Force | pressure, > 0 inwards | acceleration | moment | square of the angular velocity
       real(wp) :: value = 0.0_wp
       real(wp) :: value_start = 0.0_wp               !! its value at the end of the step before
-      real(wp) :: direction(3) = 0.0_wp              !! gravity: unit vector
+      real(wp) :: direction(3) = 0.0_wp              !! of gravity or an axis: unit vector
+      real(wp) :: point(3) = 0.0_wp                  !! on that axis [L]
       integer :: amplitude = 0
    end type load_t
 

@@ -18,13 +18,14 @@ module emcon_loads
    use emcon_shape, only : shape_t, shape_table_t, shape_tabulate
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
-   use emcon_steps, only : load_gravity, load_moment, load_point, load_pressure, load_t
+   use emcon_steps, only : load_centrifugal, load_gravity, load_moment, load_point, &
+      load_pressure, load_t
    use emcon_term, only : response_t, role_external, term_t
    implicit none
    private
    public :: loads_t, loads_init
 
-   !> Point loads, moments on rigid bodies, pressures and gravity of a step.
+   !> Point loads, moments on rigid bodies, pressures, gravity and centrifugal forces of a step.
    type, extends(term_t) :: loads_t
       type(load_t), allocatable :: load(:)
       type(amplitude_t), allocatable, private :: amplitude(:)   !! of the scene
@@ -40,6 +41,8 @@ module emcon_loads
       real(wp), private :: duration = 1.0_wp     !! [T]
       integer, allocatable, private :: node(:, :)        !! (n_most, n_element)
       real(wp), allocatable, private :: volume_mass(:, :)   !! int rho N_i, like `node` [M]
+      !> Where there are centrifugal forces, int rho N_i (1, x): like `node` [M, M L]
+      real(wp), allocatable, private :: own_mass(:, :), first_moment(:, :, :)
       real(wp), allocatable, private :: thickness(:)     !! (n_element) [L]
       type(shape_table_t), private :: on_face(max_face_nodes)   !! of faces of so many nodes
       real(wp), allocatable, private :: force(:, :)      !! (n_dim, n_node) [M L/T^2]
@@ -76,7 +79,33 @@ contains
       end do
       allocate(self%force, mold=scene%x)
       if (size(scene%x, 1) == n_space) call tabulate_faces(self, scene)
+      do b = 1, size(scene%step)
+         if (allocated(self%own_mass)) exit
+         if (any(scene%step(b)%load%kind == load_centrifugal)) call take_moments(self, scene%x, &
+            solid)
+      end do
    end subroutine loads_init
+
+   !> Mass and first moments of mass that belong to the nodes of each element.
+   subroutine take_moments(self, x, solid)
+      type(loads_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
+      type(solid_t), intent(in) :: solid
+      integer :: e
+
+      allocate(self%own_mass, mold=solid%volume_mass)
+      allocate(self%first_moment(size(x, 1), size(solid%node, 1), solid%n_element))
+      self%own_mass = 0.0_wp
+      self%first_moment = 0.0_wp
+      do e = 1, solid%n_element
+         associate (n => solid%geometry(e)%n_node)
+            associate (mass => solid%mass(:n, :n, e), node => solid%node(:n, e))
+               self%own_mass(:n, e) = sum(mass, 2)
+               self%first_moment(:, :n, e) = matmul(x(:, node), mass)
+            end associate
+         end associate
+      end do
+   end subroutine take_moments
 
    !> Shape functions on the faces of the kinds of elements.
    subroutine tabulate_faces(self, scene)
@@ -211,6 +240,8 @@ contains
                   self%force(:, node) = self%force(:, node) &
                      + p*self%volume_mass(j, load%target)*load%direction(:size(self%force, 1))
                end do
+            case (load_centrifugal)
+               call add_centrifugal(self, load, p)
             case (load_pressure)
                p = p*self%thickness(load%target)
                call respond_pressure(self, i, p, motion, value, side)
@@ -228,6 +259,28 @@ contains
          if (response%with_sizes) total%magnitude = total%magnitude + abs(self%force)
       end associate
    end subroutine respond
+
+   !> The forces of an element that turns about an axis: omega**2 int rho N_i times the distance
+   !> from the axis.
+   pure subroutine add_centrifugal(self, load, square)
+      type(loads_t), intent(inout) :: self
+      type(load_t), intent(in) :: load
+      real(wp), intent(in) :: square             !! omega**2 [1/T^2]
+      real(wp) :: arm(size(self%force, 1))
+      integer :: j
+
+      associate (n => size(arm))
+         do j = 1, size(self%node, 1)
+            if (self%node(j, load%target) == 0) cycle
+            arm = self%first_moment(:, j, load%target) &
+               - self%own_mass(j, load%target)*load%point(:n)
+            arm = arm - dot_product(load%direction(:n), arm)*load%direction(:n)
+            associate (force => self%force(:, self%node(j, load%target)))
+               force = force + square*arm
+            end associate
+         end do
+      end associate
+   end subroutine add_centrifugal
 
    !> Pressure `i` on its face, p times the thickness.
    subroutine respond_pressure(self, i, p, motion, value, side)

@@ -72,6 +72,8 @@ WHY = {
                   by_increments("1e-8", "1e-6")),
     "ax6": ("CalculiX takes a wedge of two degrees with straight edges; EMCON meets the closed forms "
             "of tests/scenes/test_axial.py", None, None),
+    "axial": ("CalculiX takes the mass, too, by the 2 x 2 points of CAX8R; with CAX8 the wedge of "
+              "two degrees is left", *2*(lambda text: text.replace("CAX8R", "CAX8"),)),
     "planestress3": ("CalculiX takes a brick whose thickness its nodes interpolate, EMCON a sheet "
                      "as thick as each point likes: tests/scenes/test_suite.py has the brick's "
                      "digits", None, None),

@@ -311,3 +311,37 @@ def test_a_refused_element_type_is_one_message(edits, tmp_path):
     deck.write_text(text)
     told = emcon("check", deck).stderr
     assert len(re.findall(r"(?:error|warning): ", told)) == 1 and "element type" in told, told
+
+
+@pytest.mark.parametrize("card", ["*CLOAD", "*BOUNDARY"])
+def test_a_delay_is_an_amplitude_with_later_times(card, tmp_path):
+    """Two delays of one amplitude, in two cards."""
+    more, other = (", 2", ", 1") if card == "*BOUNDARY" else ("", "")
+    pull = (f"{card}, AMPLITUDE=A{{}}\nEND, 2{more}, 0.1\n"
+            f"{card}, AMPLITUDE=A{{}}\nEND, 1{other}, 0.05\n")
+
+    def deck(tables, cards):
+        return moving().replace("*STEP\n", tables + "*STEP\n").replace(
+            "*CLOAD\nEND, 2, 1.\n", cards)
+
+    table = "*AMPLITUDE, NAME=A\n0., 0., 1., 1.\n"
+    later = "*AMPLITUDE, NAME=AB\n0.25, 0., 1.25, 1.\n*AMPLITUDE, NAME=AC\n0.5, 0., 1.5, 1.\n"
+    delayed = run(tmp_path/"delayed", deck(table, pull.format(
+        ", TIME DELAY=0.25", ", TIME DELAY=0.5")))
+    assert delayed.digits() == run(tmp_path/"plain", deck(later, pull.format("B", "C"))).digits()
+    assert delayed.digits() != run(tmp_path/"now", deck(table, pull.format("", ""))).digits()
+
+
+def test_a_delay_of_nothing_is_refused(tmp_path):
+    deck = tmp_path/"deck.inp"
+    deck.write_text(moving().replace("*CLOAD\n", "*CLOAD, TIME DELAY=0.1\n"))
+    assert "TIME DELAY delays an amplitude; name one by AMPLITUDE=" in emcon("check", deck).stderr
+
+
+def test_a_restart_file_may_be_asked_for_before_the_first_step(tmp_path):
+    card = "*RESTART, WRITE, FREQUENCY=1\n"
+    before = run(tmp_path/"before", moving().replace("*STEP\n", card + "*STEP\n"))
+    inside = run(tmp_path/"inside", moving().replace("*DYNAMIC", card + "*DYNAMIC"))
+    assert before.file(".rst.h5").exists() and inside.file(".rst.h5").exists()
+    assert before.digits() == inside.digits()
+    assert not run(tmp_path/"without", moving()).file(".rst.h5").exists()

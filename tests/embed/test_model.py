@@ -253,9 +253,9 @@ def everything() -> Model:
     step = model.step("DYNAMIC", "<h>", 1.0, 0.1, 0.2, direct=True, nlgeom=True, increments=9,
                       solver="MUMPS",
                       amplitude="STEP")
-    step.boundary("N", 1, 0.5, amplitude="AMP", fixed=True, op="NEW")
-    step.load([2, "N"], 2, 0.5, amplitude="AMP", op="MOD")
-    step.pressure("E", 1, 0.5, amplitude="AMP", op="NEW").gravity(0, 9.81, (0.0, -1.0))
+    step.boundary("N", 1, 0.5, amplitude="AMP", delay=0.25, fixed=True, op="NEW")
+    step.load([2, "N"], 2, 0.5, amplitude="AMP", delay=0.25, op="MOD")
+    step.pressure("E", 1, 0.5, amplitude="AMP", delay=0.25, op="NEW").gravity(0, 9.81, (0.0, -1.0))
     step.constraint_method("<method>")
     step.constraint_method("AUGMENTED LAGRANGE", stiffness=1e3, tolerance=1e-6)
     step.constraint_method("PENALTY", factor=2)

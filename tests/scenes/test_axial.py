@@ -137,6 +137,29 @@ def test_free_flight(kind, tmp_path):
     assert history["strain"].max() > 1e-3*history["total"][0]
 
 
+def rotor(n, kind, folder):
+    """The same of a cylinder that turns: u = A r + B/r - k r^3/8 between free sides,
+    k = rho omega^2 (1 + nu) (1 - 2 nu)/(E (1 - nu))."""
+    a, b, square, density, young, nu = 1.0, 2.0, 4.0, 0.5, 100.0, 0.3
+    mesh = Mesh(kind, n, n//2, [(a, 0), (b, 0), (b, 0.5), (a, 0.5)])
+    after = (f"*BOUNDARY\nNALL, 2\n{STEP.format('')}*DLOAD\n"
+             f"ALL, CENTRIF, {square}, 0., 0., 0., 0., 2., 0.\n*NODE FILE\nU\n*END STEP\n")
+    u = run(mesh.deck(ELASTIC, after), folder).fields()["displacement"][-1]
+    k = density*square*(1 + nu)*(1 - 2*nu)/(young*(1 - nu))
+    # On free sides (1 - nu) u' + nu u/r = 0.
+    rows = [[1, (2*nu - 1)/r**2] for r in (a, b)]
+    one, other = np.linalg.solve(rows, [k*r*r/8*(3 - 2*nu) for r in (a, b)])
+    r = mesh.x[:, 0]
+    return mean_error(mesh, u, np.stack([one*r + other/r - k*r**3/8, 0*r], 1))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rotor(kind, tmp_path):
+    coarse, fine = (rotor(n, kind, tmp_path) for n in (8, 16))
+    assert np.log2(coarse/fine) > (2.8 if kind in QUADRATIC else 1.8)
+    assert fine < (1e-4 if kind in QUADRATIC else 1e-2)
+
+
 def test_weight(tmp_path):
     """A ring on its lower side bears its weight: rho pi (b^2 - a^2) h g; forces on nodes are those
     on their circles."""
