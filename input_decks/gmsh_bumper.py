@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 
 import gmsh
+import gmsh_tools
+import numpy as np
 
 import emcon.mesh
 
@@ -22,32 +24,19 @@ HALF, HEIGHT, GAP = 15.0, 20.0, 0.5
 
 def draw(path: Path) -> None:
     """The mesh: what is to have a name in the deck is a physical group."""
-    gmsh.initialize()
-    gmsh.option.setNumber("General.Verbosity", 2)
+    gmsh_tools.begin()
     shapes = gmsh.model.occ
     ring, _ = shapes.cut([(2, shapes.addDisk(0, 0, 0, OUTER, OUTER))],
                          [(2, shapes.addDisk(0, 0, 0, INNER, INNER))])
     (arch,), _ = shapes.cut(ring, [(2, shapes.addRectangle(-OUTER, -OUTER, 0, 2*OUTER, OUTER))])
     block = (2, shapes.addRectangle(-HALF, OUTER + GAP, 0, 2*HALF, HEIGHT))
     shapes.synchronize()
-
-    def name(body: tuple[int, int], sides: dict[str, object], text: str) -> None:
-        gmsh.model.addPhysicalGroup(2, [body[1]], name=text)
-        for side, belongs in sides.items():
-            curves = [tag for _, tag in gmsh.model.getBoundary([body], oriented=False)
-                      if belongs(*gmsh.model.getBoundingBox(1, tag))]
-            gmsh.model.addPhysicalGroup(1, curves, name=side)
-
     near = 1e-3
-    name(arch, {"ARCH_OUTER": lambda x0, y0, _0, x1, y1, _1: x1 - x0 > 2*OUTER - near,
-                "FEET": lambda x0, y0, _0, x1, y1, _1: y1 < near}, "ARCH")
-    name(block, {"BLOCK_BOTTOM": lambda x0, y0, _0, x1, y1, _1: y1 < OUTER + GAP + near}, "BLOCK")
-    gmsh.option.setNumber("Mesh.MeshSizeMax", SIZE)
-    gmsh.option.setNumber("Mesh.RecombineAll", 1)
-    gmsh.option.setNumber("Mesh.Algorithm", 8)
-    gmsh.model.mesh.generate(2)
-    gmsh.write(str(path))
-    gmsh.finalize()
+    gmsh_tools.name(arch, "ARCH", {"ARCH_OUTER": lambda x0, y0, x1, y1: x1 - x0 > 2*OUTER - near,
+                                   "FEET": lambda x0, y0, x1, y1: y1 < near})
+    gmsh_tools.name(block, "BLOCK",
+                    {"BLOCK_BOTTOM": lambda x0, y0, x1, y1: y1 < OUTER + GAP + near})
+    gmsh_tools.write(path, SIZE)
 
 
 def scene(mesh: emcon.mesh.Mesh) -> emcon.Model:
@@ -65,34 +54,12 @@ def scene(mesh: emcon.mesh.Mesh) -> emcon.Model:
 
 def picture(base: Path, mesh: emcon.mesh.Mesh) -> Path:
     """Von Mises stress where the arch is lowest, beside the start."""
-    import numpy as np
-    import pyvista
-
     with emcon.Results(base) as results:
         times = results.fields.times
         top = results.fields["displacement"][:, mesh.rows(mesh.node_sets["BLOCK_BOTTOM"])[0], 1]
-    reader = pyvista.get_reader(f"{base}.vtkhdf").reader
-    plotter = pyvista.Plotter(shape=(1, 2), off_screen=True, window_size=(1400, 700), border=False)
-    for column, frame in enumerate((0, int(np.argmin(top)))):
-        reader.SetStep(frame)
-        reader.Update()
-        grid = pyvista.wrap(reader.GetOutput()).copy()
-        plotter.subplot(0, column)
-        plotter.add_mesh(grid.warp_by_vector("displacement"), scalars="von_mises", clim=(0.0, 1.0),
-                         cmap="magma_r", lighting=False, show_edges=True, edge_opacity=0.3,
-                         show_scalar_bar=column == 1, scalar_bar_args={
-                             "title": "von Mises [MPa]", "color": "black", "vertical": True,
-                             "n_labels": 3, "fmt": "%.1f", "position_x": 0.84, "position_y": 0.6,
-                             "height": 0.3})
-        plotter.add_text(f"t = {1e3*times[frame]:.1f} ms", font_size=14, color="black",
-                         position="upper_edge")
-        plotter.camera_position = "xy"
-        plotter.camera.focal_point = (0.0, 20.0, 0.0)
-        plotter.camera.parallel_projection = True
-        plotter.camera.parallel_scale = 27.0
-    plotter.set_background("white")
-    plotter.screenshot(f"{base}.png")
-    return base.with_suffix(".png")
+    frames = [0, int(np.argmin(top))]
+    titles = [f"t = {1e3*times[frame]:.1f} ms" for frame in frames]
+    return gmsh_tools.picture(base, frames, titles, view=(0.0, 20.0, 27.0), top=1.0)
 
 
 def main(folder: str = ".") -> None:

@@ -45,6 +45,9 @@ module emcon_recorder
       "ENER", "CDIS", "CSTR", "CF"]
    integer, parameter :: n_solid_fields = 5
 
+   !> The body that an element is part of, in the order of /sets/BODIES from 1 on; 0: of none.
+   type(field_t), parameter :: body_field = field_t("body", is_cell=.true., is_sparse=.true.)
+
    type :: recorder_t
       type(vtkhdf_t) :: fields
       type(history_t) :: history
@@ -165,6 +168,7 @@ contains
             call add(trim(default_fields(i)))
          end do
       end if
+      self%field = [self%field, body_field]
 
    contains
 
@@ -259,12 +263,28 @@ contains
       end if
       if (.not. due) return
       call vtkhdf_begin_frame(self%fields, real(stepper%march%state%time, dp))
+      if (self%fields%n_frame == 0) then
+         ! Bodies stay what they are, and so does a field that is not written again.
+         call vtkhdf_write(self%fields, trim(body_field%name), cell_bodies(stepper), error)
+         if (allocated(error)) return
+      end if
       do i = 1, size(self%variable)
          call write_variable(self, stepper, self%variable(i)%text, error)
          if (allocated(error)) return
       end do
       call vtkhdf_end_frame(self%fields, error)
    end subroutine write_fields
+
+   !> The body of each element, as `body_field`.
+   pure function cell_bodies(stepper) result(body)
+      type(stepper_t), intent(in) :: stepper
+      real(dp), allocatable :: body(:, :)        !! (1, n_element)
+
+      associate (first => stepper%scene%element_node(1, :))
+         allocate(body(1, size(first)))
+         body(1, :) = real(stepper%march%system%space%body(first), dp)
+      end associate
+   end function cell_bodies
 
    !> Number of the frame that `time` falls into, of those that every step gets by default.
    pure integer function default_frame(stepper, time)

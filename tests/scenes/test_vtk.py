@@ -56,6 +56,18 @@ def test_reader_finds_all_frames_and_fields(ring):
     np.testing.assert_allclose(times, np.arange(81)*0.1, atol=1e-9)
 
 
+def test_bodies_are_cell_data_of_every_frame(ring):
+    """By geometry: the ring is what has its middle above the foundation at the start."""
+    run = ring("PERSISTENT", 0.05)
+    expected = None
+    for _, grid in frames(run.file(".vtkhdf")):
+        body = numpy_support.vtk_to_numpy(grid.GetCellData().GetArray("body"))
+        if expected is None:
+            low = [grid.GetCell(k).GetBounds()[2] for k in range(grid.GetNumberOfCells())]
+            expected = np.where(np.array(low) >= 0.0, 1.0, 2.0)
+        np.testing.assert_array_equal(body, expected)
+
+
 def test_strain_energy_of_the_cells_is_that_of_the_history(ring):
     run = ring("PERSISTENT", 0.05)
     strain = {round(t, 6): e for t, e in zip(run.history["time"], run.history["strain"])}
