@@ -1,10 +1,11 @@
 """The pages that `make docs` makes of the sources: nothing public is left out, no link leads nowhere."""
 
 import re
+import subprocess
 import sys
 
 import pytest
-from scene_tools import DECKS, ROOT
+from scene_tools import DECKS, PROGRAM, ROOT
 
 sys.path.append(str(ROOT / "docs" / "site"))
 
@@ -12,6 +13,7 @@ import build  # noqa: E402
 import c_pages  # noqa: E402
 import fortran_pages  # noqa: E402
 import gallery  # noqa: E402
+import landing  # noqa: E402
 import links  # noqa: E402
 import python_pages  # noqa: E402
 from source_text import markdown  # noqa: E402
@@ -66,6 +68,13 @@ def test_every_page_is_in_the_contents():
     listed = {name for names in build.CONTENTS.values() for name in names.split()}
     pages = {path.stem for path in (ROOT / "docs").glob("*.md")}
     assert listed == pages | set(build.REFERENCES) | {"gallery/index", "changelog"}
+
+
+@pytest.mark.parametrize("scheme", [row[0] for row in landing.SCHEMES])
+def test_decks_of_the_first_figure(scheme, tmp_path):
+    (tmp_path / "a.inp").write_text(landing.deck(scheme))
+    done = subprocess.run([PROGRAM, "check", "a.inp"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize(

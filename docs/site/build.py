@@ -27,7 +27,7 @@ SITE = ROOT/"build"/"site"
 #: Titles of the contents at the left, and their pages.
 CONTENTS = {
     "Begin": "tutorial howto gmsh gallery/index",
-    "Use": "deck python embedding",
+    "Use": "deck python embedding hosts",
     "Reference": "reference_python reference_c reference_fortran modules",
     "How it works": "theory energy",
     "How well": "verification impacts stability trade performance",

@@ -245,3 +245,15 @@ def test_decks_are_complete():
         text = deck.read_text()
         assert text.startswith("*HEADING\n"), deck.name
         assert "Expected" in text.split("*NODE")[0], deck.name
+
+
+def test_other_codes_are_those_of_the_bench():
+    """The table of the README is the first lines of that of docs/performance.md."""
+    table = (ROOT / "docs/performance.md").read_text().split("<!-- peers -->")[1].split("<!-- end")[0]
+    rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in table.splitlines()]
+    bench = {row[1]: (row[2], row[5]) for row in rows if row[0] == "1250"}
+    shown = re.findall(r"^\| ((?:EMCON|Kratos|CalculiX).*?) \| (.*?) \| (.*?) \|$",
+                       README.read_text(), re.MULTILINE)
+    assert len(shown) == 3
+    for code, time, energy in shown:
+        assert bench[code] == (time, energy.removeprefix("kept to "))
