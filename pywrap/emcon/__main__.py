@@ -65,6 +65,12 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
                       help="picture to write, by suffix png, pdf, svg, ... (default NAME.png)")
     plot.add_argument("--times", metavar="T", type=_time, nargs="+",
                       help="times of the upper row (default: six, evenly spaced)")
+    plot.add_argument("--frame", metavar="N", type=int,
+                      help="a frame of the file in place of times; -1 is the last")
+    plot.add_argument("--field", metavar="NAME", default="von_mises",
+                      help="point or cell field that gives the colours (default von_mises)")
+    plot.add_argument("--clim", metavar=("LOW", "HIGH"), type=float, nargs=2,
+                      help="values at the ends of the colours (default by the values)")
     movie = commands.add_parser("animate", help=_COMMANDS["animate"])
     movie.add_argument("result", metavar="RESULT", help=_RESULT)
     movie.add_argument("--output", metavar="FILE", type=Path,
@@ -115,9 +121,11 @@ def _study(options: argparse.Namespace) -> int:
 
 def _plot(options: argparse.Namespace) -> None:
     # matplotlib takes half a second to load; the table does not need it
-    from .plotting import write_picture
+    from .plotting import View, write_picture
 
-    picture, notes = write_picture(locate(options.result), options.output, options.times)
+    view = View(options.times, options.frame, options.field,
+                tuple(options.clim) if options.clim else None)
+    picture, notes = write_picture(locate(options.result), options.output, view)
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
     print(f"picture: {picture}")

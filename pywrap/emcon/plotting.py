@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from .results import (Array, FieldFile, ResultError, ResultPaths, energy_drift, locate,
                       read_contact_force, read_history)
 from .scene import (BLACK, BLUE, GREY, LABEL_OFFSET, ORANGE, STYLE, Scene, colour_scale,
-                    draw_bodies, draw_colour_bar, frame_view, read_scene)
+                    draw_bodies, draw_colour_bar, fixed_scale, frame_view, read_scene)
 
 N_TIMES = 6
 #: Sizes on paper [inch].
@@ -35,6 +35,27 @@ def _choose_frames(file: FieldFile, times: Sequence[float] | None) -> list[int]:
     if times is None:
         times = np.linspace(file.times[0], file.times[-1], N_TIMES).tolist()
     return sorted({file.frame_at(time) for time in times})
+
+
+@dataclass(frozen=True)
+class View:
+    """What of the bodies a picture shows."""
+
+    times: Sequence[float] | None = None          #: default six, evenly spaced [T]
+    frame: int | None = None                      #: one frame of the file in place of times
+    field: str = "von_mises"
+    clim: tuple[float, float] | None = None       #: ends of the colours, default by the values
+
+    def frames(self, file: FieldFile) -> list[int]:
+        """Numbers of frames, ascending."""
+        if self.frame is None:
+            return _choose_frames(file, self.times)
+        count = len(file.times)
+        if self.times is not None:
+            raise ResultError("give times or a frame, not both")
+        if not -count <= self.frame < count:
+            raise ResultError(f"there is no frame {self.frame}; the file has {count}, from 0 on")
+        return [self.frame % count]
 
 
 @dataclass
@@ -63,7 +84,7 @@ def _force_of_frames(file: FieldFile) -> _Force:
 
 # --- drawing -----------------------------------------------------------------------------------
 
-def _draw_scene(figure: Figure, scene: Scene) -> None:
+def _draw_scene(figure: Figure, scene: Scene, clim: tuple[float, float] | None) -> None:
     """Draw the upper row, and give the figure the height that it takes."""
     views = scene.views()
     n = max(len(views), 1)
@@ -74,7 +95,7 @@ def _draw_scene(figure: Figure, scene: Scene) -> None:
     figure.set_size_inches(WIDTH, total)
     base = total - TOP - height
 
-    scale = colour_scale(scene)
+    scale = colour_scale(scene) if clim is None else fixed_scale(scene, *clim)
     for k, view in enumerate(views):
         x = LEFT + k*(width + SCENE_GAP)
         axes = figure.add_axes((x/WIDTH, base/total, width/WIDTH, height/total))
@@ -130,17 +151,14 @@ def _say(axes: Axes, text: str) -> None:
     axes.set_yticks([])
 
 
-def draw(paths: ResultPaths, times: Sequence[float] | None = None) -> tuple[Figure, list[str]]:
-    """The picture of a run as a matplotlib figure, and notes on what is missing in it.
-
-    times   wanted times of the upper row [T]; default six, evenly spaced over the run
-    """
+def draw(paths: ResultPaths, view: View = View()) -> tuple[Figure, list[str]]:
+    """The picture of a run as a matplotlib figure, and notes on what is missing in it."""
     notes: list[str] = []
     scene, history = None, None
     force = _Force(note=f"no field file\n{paths.field.name}")
     if paths.field.is_file():
         with FieldFile(paths.field) as file:
-            scene = read_scene(file, _choose_frames(file, times))
+            scene = read_scene(file, view.frames(file), view.field)
             force = _force_of_frames(file)
         notes += scene.notes
     else:
@@ -158,7 +176,7 @@ def draw(paths: ResultPaths, times: Sequence[float] | None = None) -> tuple[Figu
     with matplotlib.rc_context(STYLE):
         figure = Figure()
         if scene is not None:
-            _draw_scene(figure, scene)
+            _draw_scene(figure, scene, view.clim)
         else:
             figure.set_size_inches(WIDTH, TOP + PANEL_HEIGHT + BOTTOM)
         _draw_panels(figure, history, force, scene.times if scene is not None else [])
@@ -206,21 +224,26 @@ def _add_panels(figure: Figure) -> list[Axes]:
 
 
 def plot(result: str | os.PathLike[str], output: str | os.PathLike[str] | None = None,
-         times: Sequence[float] | None = None) -> Path:
+         times: Sequence[float] | None = None, *, frame: int | None = None,
+         field: str = "von_mises", clim: tuple[float, float] | None = None) -> Path:
     """Draw a run: bodies at some times, energies, drift, contact force; returns the picture's path.
 
     result   base name of the run, or any one of its files
     output   file to write, its suffix tells the format; default NAME.png
     times    of the bodies that are shown [T]
+    frame    a frame of the field file in place of times, from 0 on; -1 is the last
+    field    point or cell field that gives the colours; of a vector its length
+    clim     values at the ends of the colours; default from 0, or the lowest, to the highest
 
-    Raises `ResultError` for a result that cannot be drawn or a format that is not known, `OSError`
-    where the file cannot be written.
+    Raises `ResultError` for a result that cannot be drawn, a field or frame that is not there or a
+    format that is not known, `OSError` where the file cannot be written.
     """
-    return write_picture(locate(result), None if output is None else Path(output), times)[0]
+    view = View(times, frame, field, clim)
+    return write_picture(locate(result), None if output is None else Path(output), view)[0]
 
 
 def write_picture(paths: ResultPaths, output: Path | None = None,
-                  times: Sequence[float] | None = None) -> tuple[Path, list[str]]:
+                  view: View = View()) -> tuple[Path, list[str]]:
     """As `plot`; returns the path and notes on what is missing or left out."""
     output = paths.picture if output is None else output
     kind = output.suffix[1:].lower()
@@ -228,7 +251,7 @@ def write_picture(paths: ResultPaths, output: Path | None = None,
     if kind not in known:
         raise ResultError(f"{output}: '{output.suffix}' is not a picture format; "
                           f"known are {', '.join(known)}")
-    figure, notes = draw(paths, times)
+    figure, notes = draw(paths, view)
     with matplotlib.rc_context(STYLE):
         figure.savefig(output, dpi=RESOLUTION)
     return output, notes

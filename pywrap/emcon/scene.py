@@ -168,6 +168,16 @@ class ColourScale:
     extend: str
 
 
+def fixed_scale(scene: Scene, low: float, top: float) -> ColourScale:
+    """Between two values; raises `ResultError` where they are none."""
+    if not (np.isfinite([low, top]).all() and low < top):
+        raise ResultError(f"colours go from a value to a larger one, not from {low:g} to {top:g}")
+    every = np.concatenate(scene.values) if scene.values else np.zeros(1)
+    above, below = bool(np.nanmax(every) > top), bool(np.nanmin(every) < low)
+    extend = {(True, True): "both", (True, False): "max", (False, True): "min"}
+    return ColourScale(Normalize(low, top), _colours(), extend.get((above, below), "neither"))
+
+
 def _colours() -> LinearSegmentedColormap:
     """Pale to dark, equal steps in lightness; pale enough that unloaded bodies recede."""
     colours = matplotlib.colormaps["magma_r"](np.linspace(0.03, 0.86, 256))

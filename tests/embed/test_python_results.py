@@ -243,13 +243,44 @@ def test_plot_by_name(run: Path, tmp_path: Path) -> None:
 
 
 def test_plot_shows_the_frames_nearest_to_the_times(run: Path) -> None:
-    from emcon.plotting import draw
+    from emcon.plotting import View, draw
 
-    figure, notes = draw(locate(run), [0.1, 0.9, 1.1, 2.0])
+    figure, notes = draw(locate(run), View([0.1, 0.9, 1.1, 2.0]))
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert titles == ["$t = 0$", "$t = 1$", "$t = 2$"] and not notes
     figure, _ = draw(locate(run))
     assert sum(bool(axes.get_title()) for axes in figure.axes) == 6
+
+
+def test_plot_of_a_frame_a_field_and_colours(run: Path, tmp_path: Path) -> None:
+    """Bodies of one frame in the colours of a field of cells, between the values that are asked."""
+    from emcon import plot
+    from emcon.plotting import View, draw
+
+    figure, notes = draw(locate(run), View(frame=-1, field="strain_energy", clim=(0.5, 1.5)))
+    shown = [axes for axes in figure.axes if axes.get_title()]
+    (elements,) = (part for part in shown[0].collections if part.get_array() is not None)
+    assert len(shown) == 1 and not notes
+    assert shown[0].get_title() == f"$t = {TIMES[-1]:g}$"
+    assert np.array_equal(elements.get_array(), np.arange(3.0))
+    assert elements.get_clim() == (0.5, 1.5)
+    assert "strain energy" in [axes.get_ylabel() for axes in figure.axes]
+    assert is_png(plot(run, tmp_path/"one.png", frame=0, field="displacement", clim=(0, 2)))
+    for wrong, why in ((View(frame=99), "no frame 99"), (View([0.0], frame=0), "not both"),
+                       (View(field="heat"), "heat"), (View(clim=(1, 1)), "larger one"),
+                       (View(clim=(0, float("nan"))), "larger one")):
+        with pytest.raises(ResultError, match=why):
+            draw(locate(run), wrong)
+
+
+def test_plot_command_has_field_frame_and_colours(run: Path, tmp_path: Path,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path/"two.png"
+    assert main(["plot", str(run), "--output", str(output), "--frame", "-1", "--field",
+                 "strain_energy", "--clim", "-1", "2"]) == 0
+    assert is_png(output)
+    assert main(["plot", str(run), "--field", "heat"]) == 2
+    assert "no field heat" in capsys.readouterr().err
 
 
 def test_plot_force_is_the_sum_over_the_slave_nodes(run: Path) -> None:
