@@ -103,7 +103,8 @@ def program_of(words):
     if re.search(r"(^|/)python3?$", words[0]):
         words = words[1:]
     if words[0] == "-m":
-        n = 3 if words[1:3] == ["emcon", "study"] else 2
+        verbs = {"study", "plot", "animate", "compare", "summary", "mesh"}
+        n = 3 if words[1] == "emcon" and verbs & set(words[2:3]) else 2
         return (sys.executable, *words[:n]), words[n:]
     return (sys.executable, ROOT / words[0]), words[1:]
 
