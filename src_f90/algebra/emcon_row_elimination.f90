@@ -11,7 +11,7 @@ module emcon_row_elimination
    implicit none
    private
    public :: row_elimination_t, elimination_begin, elimination_add, elimination_left
-   public :: elimination_resolve, n_kind
+   public :: elimination_entries, elimination_resolve, n_kind
    public :: row_kept, row_redundant, row_poor, row_near
 
    !> Rows eliminated at once: those of forces, those of the motion.
@@ -126,6 +126,13 @@ contains
       call choose(self, k, own, left, fate)
       if (fate == row_kept) call keep(self, k)
    end subroutine elimination_add
+
+   !> Entries of the rows that are kept, without their pivots.
+   pure integer function elimination_entries(self)
+      type(row_elimination_t), intent(in) :: self
+
+      elimination_entries = self%row_start(self%n_row + 1)
+   end function elimination_entries
 
    !> What the last row, a redundant one, holds past the columns `n_free` but for round-off.
    pure subroutine elimination_left(self, column, value)

@@ -1,7 +1,7 @@
 !> Which constraints are independent, and for each an unknown that can be eliminated with it.
 !>
 !> The rows of discrete gradients and of gradients at the end are eliminated together, firm ones
-!> first, else in their order. What comes out depends on the present gradients only, not on earlier
+!> first, else in their order, or in one that fills them less. What comes out depends on the present gradients only, not on earlier
 !> choices. A row is round-off also where its terms cancel before any elimination, between nodes of
 !> which one follows the other by a tie. Source: docs/theory.md, section 5.
 module emcon_independent_rows
@@ -9,8 +9,9 @@ module emcon_independent_rows
    use emcon_csr, only : csr_t
    use emcon_kinds, only : hp
    use emcon_numbering, only : numbering_t
-   use emcon_row_elimination, only : elimination_add, elimination_begin, n_kind, &
-      row_elimination_t, row_near, row_poor, row_redundant
+   use emcon_row_elimination, only : elimination_add, elimination_begin, elimination_entries, &
+      n_kind, row_elimination_t, row_near, row_poor, row_redundant
+   use emcon_row_order, only : row_order_nested
    implicit none
    private
    public :: independent_rows_t, independent_rows_find
@@ -18,6 +19,9 @@ module emcon_independent_rows
    !> A constraint of which less than this part is left says nearly what others say: two nodes that
    !> face each other, held from both sides.
    real(hp), parameter :: nearness = 0.01_hp
+   !> Where elimination in the order of the constraints makes more entries than so many times those
+   !> of the rows, they are eliminated in an order that fills them less.
+   integer, parameter :: most_fill = 8
 
    type :: independent_rows_t
       integer :: n_redundant = 0
@@ -25,6 +29,7 @@ module emcon_independent_rows
       logical, allocatable :: is_near(:)         !! (n) of these: it depends on others nearly only
       integer, allocatable :: dependent(:)       !! (n) unknown to eliminate; 0: redundant
       logical :: is_poor = .false.               !! some row has no good pivot in both gradients
+      integer :: n_entry = 0                     !! that elimination left in the rows
       type(row_elimination_t), private :: elimination
    end type independent_rows_t
 
@@ -59,28 +64,45 @@ contains
       integer, intent(in) :: own(:, :)               !! (n_dim, n) unknowns of the slave nodes
       real(hp), intent(in) :: largest(:, :)          !! (n_kind, n) of their terms, by all freedoms
       logical, intent(in) :: is_firm(:)              !! (n)
-      integer :: order(size(is_firm)), i, k, fate
+      integer :: order(size(is_firm)), k
+      logical :: is_full
 
-      call begin(self, force)
-      order = [pack([(k, k = 1, size(is_firm))], is_firm), &
-         pack([(k, k = 1, size(is_firm))], .not. is_firm)]
-      do i = 1, size(order)
-         k = order(i)
-         self%elimination%nearness = merge(0.0_hp, nearness, is_firm(k))
-         associate (from => force%row_start(k) + 1, to => force%row_start(k + 1))
-            call elimination_add(self%elimination, force%column(from:to) + 1, &
-               real(force%value(from:to), hp), real(gap%value(from:to), hp), own(:, k), fate, &
-               largest(:, k))
-         end associate
-         self%dependent(k) = self%elimination%pivot(i)
-         if (fate == row_redundant .or. fate == row_near) then
-            self%n_redundant = self%n_redundant + 1
-            self%redundant(self%n_redundant) = k
-            self%is_near(self%n_redundant) = fate == row_near
-         end if
-         self%is_poor = fate == row_poor
-         if (self%is_poor) exit
-      end do
+      order = [(k, k = 1, size(order))]
+      call eliminate_in_order(most_fill*force%row_start(size(order) + 1))
+      if (.not. is_full) return
+      call row_order_nested(force, order)
+      call eliminate_in_order(huge(most_fill))
+
+   contains
+
+      !> As `order` has them; it is given up above `most` entries.
+      subroutine eliminate_in_order(most)
+         integer, intent(in) :: most
+         integer :: i, fate
+
+         call begin(self, force)
+         order = [pack(order, is_firm(order)), pack(order, .not. is_firm(order))]
+         do i = 1, size(order)
+            k = order(i)
+            self%elimination%nearness = merge(0.0_hp, nearness, is_firm(k))
+            associate (from => force%row_start(k) + 1, to => force%row_start(k + 1))
+               call elimination_add(self%elimination, force%column(from:to) + 1, &
+                  real(force%value(from:to), hp), real(gap%value(from:to), hp), own(:, k), fate, &
+                  largest(:, k))
+            end associate
+            self%dependent(k) = self%elimination%pivot(i)
+            if (fate == row_redundant .or. fate == row_near) then
+               self%n_redundant = self%n_redundant + 1
+               self%redundant(self%n_redundant) = k
+               self%is_near(self%n_redundant) = fate == row_near
+            end if
+            self%n_entry = elimination_entries(self%elimination)
+            is_full = self%n_entry > most
+            self%is_poor = fate == row_poor
+            if (self%is_poor .or. is_full) exit
+         end do
+      end subroutine eliminate_in_order
+
    end subroutine eliminate
 
    !> Nothing eliminated yet, with room for all rows of `force`.

@@ -69,6 +69,7 @@ program main
    use test_rigidity, only : collect_rigidity
    use test_rigid_bodies, only : collect_rigid_bodies
    use test_row_elimination, only : collect_row_elimination
+   use test_row_order, only : collect_row_order
    use test_lane_sums, only : collect_lane_sums
    use test_mixing, only : collect_mixing
    use test_saddle_point, only : collect_saddle_point
@@ -116,6 +117,7 @@ program main
    call run("csr", collect_csr)
    call run("triple_product", collect_triple_product)
    call run("row_elimination", collect_row_elimination)
+   call run("row_order", collect_row_order)
 #ifndef EMCON_PERMISSIVE
    call run("umfpack", collect_umfpack)
 #endif

@@ -26,6 +26,7 @@ contains
          test_case_t("a constraint without unknowns is redundant", test_prescribed), &
          test_case_t("a constraint between tied nodes is redundant", test_tied), &
          test_case_t("a chain has the slave nodes' larger unknowns", test_chain), &
+         test_case_t("a long chain is not filled", test_long_chain), &
          test_case_t("entries equal by symmetry: the first", test_tie), &
          test_case_t("no unknown good for both gradients", test_no_common)]
    end subroutine collect_independent_rows
@@ -289,5 +290,22 @@ contains
       end associate
       call make_rows(problem)
    end subroutine become_combination
+
+   !> Each node follows the one before, along directions that turn: row k would hold unknowns of all
+   !> k nodes, 512*513/2 and more together. They are found as in a short chain.
+   subroutine test_long_chain(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 512
+      type(problem_t) :: problem
+      type(independent_rows_t) :: rows
+      integer :: k
+
+      call make_chain([(k, k = 1, n)], [-1.0_wp, 1.0_wp, 0.0_wp], 0, 4, problem)
+      call independent_rows_find(rows, problem%set, problem%numbering)
+      call check_equal(error, rows%n_redundant, 0, "redundant constraints")
+      call check_true(error, .not. rows%is_poor, "pivots are good")
+      call check_equal(error, (rows%dependent + 1)/2, [(k, k = 1, n)], "slave nodes")
+      call check_true(error, rows%n_entry < 8*problem%set%force_rows%row_start(n + 1), "entries")
+   end subroutine test_long_chain
 
 end module test_independent_rows
