@@ -1,9 +1,10 @@
 !> Which constraints are independent, and for each an unknown that can be eliminated with it.
 !>
 !> The rows of discrete gradients and of gradients at the end are eliminated together, firm ones
-!> first, else in their order, or in one that fills them less. What comes out depends on the present gradients only, not on earlier
-!> choices. A row is round-off also where its terms cancel before any elimination, between nodes of
-!> which one follows the other by a tie. Source: docs/theory.md, section 5.
+!> first, else in their order, or in one that fills them less. What comes out depends on the present
+!> gradients only, not on earlier choices. A row is round-off also where its terms cancel before any
+!> elimination, between nodes of which one follows the other by a tie. Source: docs/theory.md,
+!> section 5.
 module emcon_independent_rows
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t

@@ -10,6 +10,7 @@ module test_nts
    use emcon_nts_stencil, only : smooth_stencil, smooth_stencil_t
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
+   use emcon_touch_rule, only : touch_rule_may
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, &
       make_two_blocks, right, scene_begin, shake, top
    implicit none
@@ -29,6 +30,7 @@ contains
          test_case_t("nearest edge all along a random walk", test_walk), &
          test_case_t("no candidates while far apart", test_apart), &
          test_case_t("evaluation equals the state", test_evaluate), &
+         test_case_t("a stencil holds up to the edge beside", test_covers), &
          test_case_t("areas", test_area), &
          test_case_t("smoothed: values, identity, momenta", test_smooth), &
          test_case_t("smoothed: lost near the centre of curvature", test_lost), &
@@ -304,6 +306,36 @@ contains
       call check_true(error, n_list <= 5, "few lists: " // to_text(n_list))
    end subroutine test_apart
 
+   !> Nodes 1/4 above edges of length 1 slide to a side. The first stands at 1/8 of its edge: after
+   !> 15/8 it is over the end of the edge beside; beyond, the edge after next is nearer.
+   subroutine test_covers(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way(5) = [-0.125_wp, 1.0_wp, 1.75_wp, 2.0_wp, 2.5_wp]
+      logical, parameter :: expected(5) = [.true., .true., .true., .false., .false.]
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(nts_t) :: nts
+      real(wp), allocatable :: du(:, :)
+      integer :: k
+
+      call make_two_blocks(scene, 0.25_wp, lower, upper)
+      call nts_init(nts, scene, scene%pair(1), error)
+      if (allocated(error)) return
+      allocate(du, source=0.0_wp*scene%x)
+      call nts%begin_step(scene%x, scene%u0, du)
+      do k = 1, size(way)
+         du(1, 11:) = way(k)
+         call nts%measure(scene%x, scene%u0, du)
+         call check_true(error, nts%covers(1, scene%x, scene%u0, du) .eqv. expected(k), &
+            "covered after way " // to_text(k))
+      end do
+      du(1, 11:) = 0.0_wp
+      call nts%measure(scene%x, scene%u0, du)
+      do k = 1, 3
+         call check_true(error, nts%covers(k, scene%x, scene%u0, du), "at rest: " // to_text(k))
+      end do
+   end subroutine test_covers
+
    subroutine test_evaluate(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -522,6 +554,15 @@ contains
       end do
       du(1, :) = 0.4_wp                          ! the search reaches from leg to leg
       call nts%begin_step(scene%x, u, du)
+      associate (near => nts%near%candidates)
+         call check_true(error, size(near%edge) > 0, "candidates")
+         do i = 1, nts%n_constraint
+            do k = near%start(i), near%start(i + 1) - 1
+               call check_true(error, touch_rule_may(nts%rule, nts%slave, nts%chain_node(i), &
+                  near%edge(k)), "nothing that is never touched, node " // to_text(nts%node(i)))
+            end do
+         end do
+      end associate
       do side = 0, 1
          do i = 1, n - 1
             node = block_node(block, i, side)
