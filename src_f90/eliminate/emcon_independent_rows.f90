@@ -69,23 +69,26 @@ contains
       logical :: is_full
 
       order = [(k, k = 1, size(order))]
-      call eliminate_in_order(most_fill*force%row_start(size(order) + 1))
+      call eliminate_in_order(most_fill*force%row_start(size(order) + 1), nearness)
       if (.not. is_full) return
       call row_order_nested(force, order)
-      call eliminate_in_order(huge(most_fill))
+      ! Of the links of a chain the one that closes it from both sides keeps but its share.
+      call eliminate_in_order(huge(most_fill), nearness/real(size(order), hp))
 
    contains
 
-      !> As `order` has them; it is given up above `most` entries.
-      subroutine eliminate_in_order(most)
+      !> As `order` has them; it is given up above `most` entries. A row of which less than `near`
+      !> is left says nearly what others say.
+      subroutine eliminate_in_order(most, near)
          integer, intent(in) :: most
+         real(hp), intent(in) :: near
          integer :: i, fate
 
          call begin(self, force)
          order = [pack(order, is_firm(order)), pack(order, .not. is_firm(order))]
          do i = 1, size(order)
             k = order(i)
-            self%elimination%nearness = merge(0.0_hp, nearness, is_firm(k))
+            self%elimination%nearness = merge(0.0_hp, near, is_firm(k))
             associate (from => force%row_start(k) + 1, to => force%row_start(k + 1))
                call elimination_add(self%elimination, force%column(from:to) + 1, &
                   real(force%value(from:to), hp), real(gap%value(from:to), hp), own(:, k), fate, &
