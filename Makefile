@@ -357,14 +357,15 @@ bench:  ## print the timed scenes of tests/bench; fail where the program does mo
 	@set -e; for script in tests/bench/bench_*.py; do $(PY) $$script; done
 
 trade: .venv/test.stamp  ## write the tables and the figure of docs/trade.md anew
-	$(BUILDING) app
+	$(BUILDING) MODE=release PRECISION=double app
+	$(BUILDING) MODE=release PRECISION=single app
 	$(PY) tests/bench/trade.py --update
 	$(PY) tests/bench/trade_knobs.py --update
 	$(PY) tests/bench/trade_first.py --update
 	$(PY) tests/bench/trade_studies.py --update
 
 extremes: .venv/test.stamp  ## drive everything to its extremes; write the table of docs/stability.md anew
-	$(BUILDING) app
+	$(BUILDING) app pywrap
 	$(PY) tests/bench/extremes.py --update
 
 SECONDS ?= 600

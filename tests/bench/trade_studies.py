@@ -168,7 +168,7 @@ def goal_of_ring(folder, jobs):
 
 def goal_of_ball(folder, jobs):
     write_decks(folder, {"ball": ball_deck("elastic")})
-    steps = (0.01, 0.005, 0.0025, 0.00125, 0.000625)
+    steps = (0.01, 0.005, 0.0025, 0.00125, 0.000625, 0.0003125)
     return study(folder, "ball", [
         *vary(mesh=(1, 2), initiation=("MASSLESS", "PERSISTENT"), **precisions(), h=steps,
               formulation="NODE TO SURFACE"), "--goal", "position:1e-3"], jobs)

@@ -103,7 +103,8 @@ contains
          call kept_factor_take(kept, set, is_fit, error)
          if (allocated(error)) return
          call check_true(error, is_fit, "there is a factor")
-         allocate(dq(n), mu(m), full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
+         allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
+         allocate(dq(n), mu(m))
          call kept_factor_correct(kept, set, problem%residual, dq, error)
          if (allocated(error)) return
          call kept_factor_multipliers(kept, mu)
