@@ -4,7 +4,8 @@
 
 Each function of the header becomes one of the extension, with its name. It returns the status, or
 what else the C function returns, and then what C writes. Handles, functions and texts of the
-library are addresses; counts that an input array tells are left out. The size of an array stands
+library are addresses; counts that an input array tells are left out, and further extents
+that the model tells (n_dim). The size of an array stands
 behind it in the header: `double *u /* n_node x 2 */`. An input that may be NULL is so where it has
 no entries, one of several output arrays where `no_u=1` is given. Structures are bytes; the constant
 STRUCTURES says what they hold, in JSON for numpy, and enumerations are constants too. The C
@@ -118,8 +119,16 @@ class Function:
             self.call = f"status = {cast}{self.call}"
         for extent in dict.fromkeys(a.extent for a in self.arguments if a.extent):
             self._count(extent)
+        self._further_counts()
         for a in outputs:
             self._add(f"no_{a.name}", f"integer intent(in,c),optional :: no_{a.name} = 0")
+
+    def _further_counts(self) -> None:
+        """Further extents that are sizes of the model, n_dim: it tells them, arrays have to fit."""
+        for extent in dict.fromkeys(e for a in self.arguments for e in a.extents[1:]
+                                    if not e.isdigit() and e not in self.names):
+            self._add(extent, f"integer intent(hide),depend(model) :: {extent} = "
+                              f"size_{extent}(model)")
 
     def _add(self, name: str, line: str) -> None:
         self.names.append(name)
@@ -170,19 +179,26 @@ def main() -> None:
     table = json.dumps(layouts(header)).replace('"', '\\"')
     constants = "\n".join(f'PyModule_AddIntConstant(m, "{name}", {name});'
                           for name in header.constants)
+    functions = [Function(found, header) for found in header.functions]
+    further = dict.fromkeys(e for f in functions for a in f.arguments for e in a.extents[1:]
+                            if not e.isdigit())
+    of_model = "\n".join(
+        f"static int size_{e}(npy_intp model) {{emcon_sizes s; return "
+        f"emcon_get_sizes((emcon_model *)model, &s) == EMCON_OK ? s.{e} : 0;}}" for e in further)
     print(f"""\
 !    -*- f90 -*-
 python module _core
   usercode '''
 #include "{path.name}"
 {sizes}
+{of_model}
 '''
   interface
     usercode '''
 {constants}
 PyModule_AddStringConstant(m, "STRUCTURES", "{table}");
 '''
-""" + "\n".join(Function(found, header).block() for found in header.functions) + """
+""" + "\n".join(f.block() for f in functions) + """
   end interface
 end python module _core""")
 

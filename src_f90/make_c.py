@@ -231,7 +231,7 @@ class Wrapper:
         self.locals.append(f"{of_f}{allocatable} :: f_{a.name}{shape(rank)}")
         self.check_count(a)
         if is_input:
-            extents = ", ".join(reversed([e if e.isdigit() else f"max(0, {e})" for e in a.extents]))
+            extents = ", ".join(self.extent(e) for e in reversed(a.extents))
             read = f"c_f_pointer({a.name}, c_{a.name}" + (f", [{extents}])" if rank else ")")
             self.before += self.given(a, [f"call {read}", f"allocate(f_{a.name}, "
                                           f"source={self.to_f(a, dummy)})"],
@@ -239,6 +239,12 @@ class Wrapper:
         if not a.is_in:
             self.after += self.put(a, self.to_c(a, dummy), rank)
         return f"f_{a.name}"
+
+    def extent(self, e: str) -> str:
+        """An extent in Fortran: a number, one of the model's, or an argument."""
+        if e in self.sizes and e not in {a.name for a in self.function.arguments}:
+            return f"sizes%{e}"
+        return e if e.isdigit() else f"max(0, {e})"
 
     def to_f(self, a: Argument, dummy: Dummy) -> str:
         if dummy.kind == "logical":

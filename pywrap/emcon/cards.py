@@ -23,7 +23,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f\ud800-\udfff]")
 Number: TypeAlias = float | str
 #: Nodes or elements: the name of a set, a number, or several of them.
 Where: TypeAlias = str | int | Sequence[str | int] | NDArray[np.integer[Any]]
-Dof: TypeAlias = Literal[1, 2, 6] | tuple[Literal[1, 2, 6], ...]
+Dof: TypeAlias = Literal[1, 2, 3, 6] | tuple[Literal[1, 2, 3, 6], ...]
 Numbers: TypeAlias = NDArray[np.int64]
 _Cards = TypeVar("_Cards", bound="Cards")
 
@@ -47,6 +47,7 @@ class Numbering:
         self.what = what
         self.rows = rows
         self.count = 0
+        self.n_dim = 2              # coordinates of nodes
         self._parts: list[Numbers] = []
 
     def extend(self, n: int, labels: ArrayLike | None) -> Numbers:
@@ -104,8 +105,8 @@ class Cards:
         """Data lines `node, dof, value` (`twice`: `node, dof, dof, value`)."""
         what = f"*{keyword}"
         axes = np.atleast_1d(whole(dof, f"degree of freedom of {what}", (None,)*np.ndim(dof)))
-        if axes.ndim != 1 or not np.isin(axes, (1, 2, 6)).all() or not len(axes):
-            raise InputError(f"{what}: a degree of freedom is 1 or 2, or 6, the "
+        if axes.ndim != 1 or not np.isin(axes, (1, 2, 3, 6)).all() or not len(axes):
+            raise InputError(f"{what}: a degree of freedom is 1, 2 or 3, or 6, the "
                              f"rotation of the reference node of a rigid body, not {dof!r}")
         names = self._names(where, self._nodes, what)
         if isinstance(value, str):
@@ -208,17 +209,21 @@ class Cards:
             raise InputError(f"time points are an array (k,), not {t.shape}")
         return self._card("TIME POINTS", {"NAME": name}, [(value,) for value in t.tolist()])
 
-    def boundary(self: _Cards, where: Where, dof: Dof = (1, 2), value: Number | ArrayLike = 0.0, *,
-                 amplitude: str | None = None, delay: Number | None = None, fixed: bool = False,
+    def boundary(self: _Cards, where: Where, dof: Dof | None = None,
+                 value: Number | ArrayLike = 0.0, *, amplitude: str | None = None,
+                 delay: Number | None = None, fixed: bool = False,
                  op: Literal["MOD", "NEW"] | None = None) -> _Cards:
         """`*BOUNDARY`: prescribe displacements [L]; before the first step as in it.
 
-        dof        1, 2 or (1, 2); 6: rotation of the reference node of a rigid body, radians
+        dof        1, 2, 3 or some of them; 6: rotation of the reference node of a rigid body,
+                   radians; default (1, 2), of nodes that `add_nodes` gave three coordinates (1, 2, 3)
         value      one for all, (n_dof,), or (k, n_dof) for k nodes
         delay      how much later the amplitude begins [T]
         fixed      hold the degrees of freedom where the step finds them
         op         NEW: all supports of earlier steps go
         """
+        if dof is None:
+            dof = (1, 2) if self._nodes.n_dim == 2 else (1, 2, 3)
         self._valued("BOUNDARY", where, dof, value,
                      {"OP": op, "AMPLITUDE": amplitude, "TIME DELAY": delay, "FIXED": fixed,
                       "TYPE": "DISPLACEMENT"},

@@ -24,14 +24,14 @@ class Conditions:
     _handle: Handle
 
     def set_point_load(self, node: ArrayLike, dof: ArrayLike, value: ArrayLike) -> None:
-        """Give the force on degree of freedom `dof` (1, 2) of `node` a new value [M L/T^2].
+        """Give the force on degree of freedom `dof` (1 to n_dim) of `node` a new value [M L/T^2].
 
         The arguments are numbers or lists, and the deck has such a load in the present step.
         """
         self._set_loads(_core.EMCON_LOAD_POINT, node, dof, value)
 
     def set_pressure(self, element: ArrayLike, face: ArrayLike, value: ArrayLike) -> None:
-        """Give the pressure on `face` (1 to 4) of `element`, > 0 inwards, a new value [M/(L T^2)].
+        """Give the pressure on `face` (1 to 4, in space to 6) of `element`, > 0 inwards, a new value [M/(L T^2)].
 
         The arguments are numbers or lists, and the deck has such a load in the present step.
         """
@@ -60,7 +60,7 @@ class Conditions:
         self._handle.change(_set_loads, kind, label.tolist(), place.tolist(), value.tolist())
 
     def prescribe(self, node: int, dof: int, value: float) -> None:
-        """Prescribe displacement `dof` (1, 2) of `node` [L], whether it was free before or not.
+        """Prescribe displacement `dof` (1 to n_dim) of `node` [L], whether it was free before or not.
 
         What was free gets no equation any more: `n_unknown` and `unknowns` change.
         """
@@ -68,7 +68,7 @@ class Conditions:
         self._handle.change(_core.emcon_prescribe, *_freedom(node, dof), value)
 
     def release(self, node: int, dof: int) -> None:
-        """Set displacement `dof` (1, 2) of `node` free, which was prescribed."""
+        """Set displacement `dof` (1 to n_dim) of `node` free, which was prescribed."""
         self._handle.change(_core.emcon_remove_prescribed, *_freedom(node, dof))
 
 

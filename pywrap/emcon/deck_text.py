@@ -41,6 +41,15 @@ def table(*columns: NDArray[Any]) -> str:
     return "".join(parts).replace(".0, ", "., ").replace(".0\n", ".\n")
 
 
+def element_table(labels: NDArray[Any], nodes: NDArray[Any]) -> str:
+    """Lines of elements: labels (m,), nodes (m, k); long ones go on in a second line."""
+    if nodes.shape[1] < _PER_LINE:
+        return table(labels, *nodes.T)
+    first = table(labels, *nodes[:, :_PER_LINE - 1].T).splitlines()
+    rest = table(*nodes[:, _PER_LINE - 1:].T).splitlines()
+    return "".join(f"{a},\n{b}\n" for a, b in zip(first, rest, strict=True))
+
+
 def _whole_table(values: NDArray[Any]) -> str:
     """The same for whole numbers (n, k), digit by digit for all of them at once."""
     n, k = values.shape

@@ -35,7 +35,7 @@ def check_derivatives(function: PointFunction, points: ArrayLike, scale: float =
     z = np.asarray(points, dtype=float)
     if z.ndim != 2 or not np.isfinite(z).all():
         raise InputError(f"points are an (n, m) array of finite numbers, not one of {z.shape}")
-    given = GivenPoints("the function", function, z.shape[1])
+    given = GivenPoints("the function", function)
     value = given.evaluate(z.copy())
     for array, what in zip(value, ("energy", "gradient", "second derivative")):
         if not np.isfinite(array).all():

@@ -51,10 +51,10 @@ class Solid(Protocol):
 
     def respond(self, u0: Array, du: Array,
                 wants_tangent: bool) -> tuple[ArrayLike, float, Any]:
-        """Forces of the step from displacements `u0` by `du`, both (n, 2) [L].
+        """Forces of the step from displacements `u0` by `du`, both (n, d) [L], d dimensions.
 
-        Returns forces (n, 2) [M L/T^2], the energy at the end, and the derivative of the forces by
-        u0 + du, (2 n, 2 n), freedom a of node i being 2 i + a: a sparse matrix of scipy, a `Csr`,
+        Returns forces (n, d) [M L/T^2], the energy at the end, and the derivative of the forces by
+        u0 + du, (d n, d n), freedom a of node i being d i + a: a sparse matrix of scipy, a `Csr`,
         or an array; None will do if `wants_tangent` is false. Nodes that meet in it at rest are
         those that may meet later; an attribute `pattern`, a matrix with all entries that may come,
         goes before. Energy is kept if force . du =
@@ -113,15 +113,14 @@ class _Given:
 
 
 class GivenPoints(_Given):
-    """An energy at points, of `variables` variables each."""
+    """An energy at points."""
 
     kind = _POINT
 
-    def __init__(self, name: str, function: PointFunction, variables: int) -> None:
+    def __init__(self, name: str, function: PointFunction) -> None:
         check_function(name, function)
         super().__init__(name)
         self.function = function
-        self.variables = variables
 
     def evaluate(self, points: ArrayLike) -> tuple[Array, Array, Array]:
         """Energies (n,), gradients (n, m) and second derivatives (n, m, m) at `points` (n, m).
@@ -131,7 +130,7 @@ class GivenPoints(_Given):
         z = np.asarray(points, dtype=float)
         result = self.function(z)
         _check_three(result, self.name, "energies, gradients and second derivatives")
-        n, m = len(z), self.variables
+        n, m = z.shape
         return (fitting(result[0], f"{self.name}: the energy", (n,)),
                 fitting(result[1], f"{self.name}: the gradient", (n, m)),
                 fitting(result[2], f"{self.name}: the second derivative", (n, m, m)))
@@ -151,7 +150,7 @@ class GivenLaw(GivenPoints):
     """The strain energy of a material."""
 
     def __init__(self, material: str, law: PointFunction) -> None:
-        super().__init__(f"the law of {material}", law, 3)
+        super().__init__(f"the law of {material}", law)
         self.material = material
 
     def give(self, handle: int) -> None:
@@ -163,7 +162,7 @@ class GivenPotential(GivenPoints):
 
     def __init__(self, name: str, potential: PointFunction,
                  nodes: str | NDArray[np.int64] | None) -> None:
-        super().__init__(name, potential, 2)
+        super().__init__(name, potential)
         self.nodes = nodes
 
     def give(self, handle: int) -> None:
@@ -200,11 +199,11 @@ class GivenSolid(_Given):
 
     kind = _FORCE
 
-    def __init__(self, name: str, solid: Solid, n_node: int) -> None:
+    def __init__(self, name: str, solid: Solid, n_node: int, n_dim: int) -> None:
         check_solid(name, solid)
         super().__init__(name)
         self.solid = solid
-        self.n_node = n_node
+        self.n_node, self.n_dim = n_node, n_dim
         self.pattern = self._first_pattern()
         #: Pattern of the last tangent that was not sorted like `pattern`, and its places there.
         self._foreign: tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None = None
@@ -218,17 +217,19 @@ class GivenSolid(_Given):
 
         There a spring along an axis has no entries across it.
         """
-        n = 2*self.n_node
+        d = self.n_dim
+        n = d*self.n_node
         matrix = getattr(self.solid, "pattern", None)
         if matrix is not None:
             pattern = as_csr(matrix, n, f"{self.name}: its pattern")
             check_csr(pattern, f"{self.name}: its pattern")
             return symmetric_pattern(n, *np.divmod(keys_of(pattern), n))
-        matrix = self.respond(np.zeros((self.n_node, 2)), np.zeros((self.n_node, 2)), True)[2]
+        rest = np.zeros((self.n_node, d))
+        matrix = self.respond(rest, rest.copy(), True)[2]
         tangent = as_csr(matrix, n, f"{self.name}: the tangent")
         check_csr(tangent, f"{self.name}: the tangent")
-        node = [part//2 for part in np.divmod(keys_of(tangent), n)]
-        row, column = (np.concatenate([2*node[k] + part[k] for part in np.ndindex(2, 2)])
+        node = [part//d for part in np.divmod(keys_of(tangent), n)]
+        row, column = (np.concatenate([d*node[k] + part[k] for part in np.ndindex(d, d)])
                        for k in (0, 1))
         return symmetric_pattern(n, row, column)
 
@@ -236,15 +237,16 @@ class GivenSolid(_Given):
         """What the solid returns, with forces and energy of the right shape."""
         result = self.solid.respond(u0, du, wants_tangent)
         _check_three(result, self.name, "forces, energy and tangent")
-        return (fitting(result[0], f"{self.name}: the force", (self.n_node, 2)),
+        return (fitting(result[0], f"{self.name}: the force", (self.n_node, self.n_dim)),
                 fitting(result[1], f"{self.name}: the energy", ()), result[2])
 
     def _call(self, user: int, n: int, u0: int, du: int, wants_tangent: int, force: int,
               magnitude: int, energy: int, tangent: int) -> int:
         def deed() -> None:
-            forces, last, matrix = self.respond(_view(u0, n, 2).copy(), _view(du, n, 2).copy(),
+            d = self.n_dim
+            forces, last, matrix = self.respond(_view(u0, n, d).copy(), _view(du, n, d).copy(),
                                                 bool(wants_tangent))
-            _view(force, n, 2)[:] = forces
+            _view(force, n, d)[:] = forces
             if wants_tangent:
                 self._put(matrix, _view(tangent, len(self.pattern.indices)))
             _view(energy, 1)[0] = last
@@ -252,7 +254,7 @@ class GivenSolid(_Given):
 
     def _put(self, matrix: Any, slots: Array) -> None:
         """Put the entries of a tangent into the slots of the pattern."""
-        pattern, n, what = self.pattern, 2*self.n_node, f"{self.name}: the tangent"
+        pattern, n, what = self.pattern, self.n_dim*self.n_node, f"{self.name}: the tangent"
         if not is_sparse(matrix):
             dense = fitting(matrix, what, (n, n))
             if len(slots) == n*n:
@@ -344,6 +346,12 @@ def raise_kept(given: list[Any], status: int, failure: Callable[[], str]) -> Non
 
 def count_nodes(handle: int) -> int:
     """Nodes of the library model `handle`, which was read."""
+    return node_shape(handle)[0]
+
+
+def node_shape(handle: int) -> tuple[int, int]:
+    """Nodes of the library model `handle`, which was read, and its dimensions."""
     status, sizes = _core.emcon_get_sizes(handle)
     check(handle, status)
-    return int(structure("emcon_sizes", sizes)["n_node"])
+    found = structure("emcon_sizes", sizes)
+    return found["n_node"], found["n_dim"]

@@ -32,6 +32,10 @@ def fitting(values: ArrayLike, what: str, shape: tuple[int, ...]) -> Array:
     return array
 
 
+_DIRECTIONS = {2: "two", 3: "three"}
+_ALL = {2: "both", 3: "all three"}
+
+
 def give_masses(handle: int, masses: list[Csr]) -> None:
     """Give the sum of masses between nodes to the library model `handle`."""
     if not masses:
@@ -44,30 +48,34 @@ def give_masses(handle: int, masses: list[Csr]) -> None:
     check(handle, _core.emcon_give_mass(handle, matrix_bytes(total)))
 
 
-def given_mass(matrix: Any, n_node: int) -> Csr:
-    """A mass matrix (n, n) between nodes, or (2 n, 2 n) that is the same in both directions.
+def given_mass(matrix: Any, n_node: int, n_dim: int) -> Csr:
+    """A mass matrix (n, n) between nodes, or of d dimensions (d n, d n), in all of them the same.
 
     Raises `InputError` for one that couples the directions, or differs between them.
     """
     shape = tuple(matrix.shape if is_sparse(matrix) else np.shape(matrix))
-    if shape not in ((n_node, n_node), (2*n_node, 2*n_node)):
+    n = n_dim*n_node
+    if shape not in ((n_node, n_node), (n, n)):
         raise InputError(f"the mass has the shape {shape}; it is between {n_node} nodes, "
-                         f"{(n_node, n_node)}, or their freedoms, {(2*n_node, 2*n_node)}")
+                         f"{(n_node, n_node)}, or their freedoms, {(n, n)}")
     mass = as_csr(matrix, shape[0], "the mass")
     check_csr(mass, "the mass")
     if shape[0] == n_node:
         return mass
-    row, column = np.divmod(keys_of(mass), 2*n_node)
-    along, across = [(row % 2 == a) & (column % 2 == a) for a in (0, 1)]
+    row, column = np.divmod(keys_of(mass), n)
+    along = [(row % n_dim == a) & (column % n_dim == a) for a in range(n_dim)]
     least = np.finfo(float).eps*np.abs(mass.data).max(initial=0.0)
-    if not np.all(np.abs(mass.data[~(along | across)]) <= least):
-        raise InputError("the mass couples the two directions; one of nodes is needed")
-    halves = [_sorted_csr(n_node, row[part]//2, column[part]//2, mass.data[part])
-              for part in (along, across)]
-    if (not np.array_equal(keys_of(halves[0]), keys_of(halves[1]))
-            or np.any(np.abs(halves[0].data - halves[1].data) > 8*least)):
-        raise InputError("the mass is not the same in both directions; one of nodes is needed")
-    return halves[0]
+    if not np.all(np.abs(mass.data[~np.any(along, axis=0)]) <= least):
+        raise InputError(f"the mass couples the {_DIRECTIONS[n_dim]} directions; one of nodes is "
+                         "needed")
+    first, *others = [_sorted_csr(n_node, row[part]//n_dim, column[part]//n_dim, mass.data[part])
+                      for part in along]
+    for other in others:
+        if (not np.array_equal(keys_of(first), keys_of(other))
+                or np.any(np.abs(first.data - other.data) > 8*least)):
+            raise InputError(f"the mass is not the same in {_ALL[n_dim]} directions; one of nodes "
+                             "is needed")
+    return first
 
 
 def is_sparse(matrix: Any) -> bool:

@@ -26,14 +26,14 @@ class Body:
     """A connected mesh in the present state.
 
     `nodes` are rows of arrays of nodes, `centre` is that of its mass, `velocity` that of this
-    centre, `spin` the angular momentum about it; `kinetic` and `strain` are its energies.
+    centre, `spin` the angular momentum about it, in space (3,); `kinetic` and `strain` are its energies.
     """
 
     nodes: NDArray[np.intp]
     mass: float
     centre: NDArray[np.float64]
     velocity: NDArray[np.float64]
-    spin: float
+    spin: float | NDArray[np.float64]
     kinetic: float
     strain: float
 
@@ -135,12 +135,12 @@ class Meshes:
 
     @property
     def reactions(self) -> NDArray[np.float64]:
-        """Forces of supports on the nodes, (n_node, 2) [M L/T^2]."""
+        """Forces of supports on the nodes, (n_node, n_dim) [M L/T^2]."""
         return self.field("RF")
 
     @property
     def contact_forces(self) -> NDArray[np.float64]:
-        """Forces of contact on the nodes of both sides, (n_node, 2) [M L/T^2]."""
+        """Forces of contact on the nodes of both sides, (n_node, n_dim) [M L/T^2]."""
         return self.field("CF")
 
     # ---- bodies -----------------------------------------------------------------------------
@@ -150,7 +150,7 @@ class Meshes:
         body = self._handle.call(_core.emcon_get_bodies, self.n_node)
         mass = self.mass                                                  # type: ignore[attr-defined]
         at, v = self.q, self.v                                              # type: ignore[attr-defined]
-        share, momentum = mass @ np.ones(self.n_node), np.stack([mass @ v[:, 0], mass @ v[:, 1]], 1)
+        share, momentum = mass @ np.ones(self.n_node), np.stack([mass @ along for along in v.T], 1)
         _, kind, node = self._elements()
         of_element = body[node[:, 0]] if len(kind) else np.empty(0, int)
         energy = self.strain_energy if len(kind) else np.empty(0)
@@ -161,11 +161,20 @@ class Meshes:
             centre = share[rows] @ at[rows]/m if m > 0.0 else at[rows].mean(0)
             p = momentum[rows].sum(0)
             arm = at[rows] - centre
-            spin = float((arm[:, 0]*momentum[rows, 1] - arm[:, 1]*momentum[rows, 0]).sum())
+            spin = _cross(arm, momentum[rows]).sum(0)
+            spin = float(spin) if spin.ndim == 0 else spin
             found.append(Body(rows, m, centre, p/m if m > 0.0 else 0.0*p, spin,
                               0.5*float((v[rows]*momentum[rows]).sum()),
                               float(energy[of_element == k].sum())))
         return found
+
+
+def _cross(arm: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Vector products (k, 3), in the plane (k,)."""
+    if arm.shape[1] == 3:
+        return np.cross(arm, vector)
+    product: NDArray[np.float64] = arm[:, 0]*vector[:, 1] - arm[:, 1]*vector[:, 0]
+    return product
 
 
 def _names(address: int) -> tuple[int, str]:

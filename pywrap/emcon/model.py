@@ -16,6 +16,7 @@ Messages about the model name the lines of Python that made its cards.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -26,11 +27,11 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from .cards import (Block, Cards, Dof, Number, Numbering, Where, array_of, caller, card, real,
                     text_lines, whole)
-from .deck_text import number, table, write_text
+from .deck_text import element_table, number, table, write_text
 from .derivatives import check_law
 from .errors import InputError
 from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_function,
-                    check_solid, count_nodes)
+                    check_solid, node_shape)
 from .given_matrices import give_masses, given_mass
 from .options import LAWS, words
 from .steps import Step
@@ -46,8 +47,7 @@ _FRICTIONLESS = "FRICTIONLESS CONTACT"
 
 
 #: Nodes of an element, by kind.
-KINDS = {"CPE3": 3, "CPE4": 4, "CPE4H": 4, "CPE6": 6, "CPE8": 8, "CPE8R": 8, "CPS3": 3, "CPS4": 4,
-         "CPS6": 6, "CPS8": 8, "CPS8R": 8, "CAX3": 3, "CAX4": 4, "CAX6": 6, "CAX8": 8, "CAX8R": 8}
+KINDS = {word: int(re.sub("C(PE|PS|AX|3D)|[A-Z]", "", word)) for word in words("element")}
 
 
 class Model(Cards):
@@ -104,10 +104,10 @@ class Model(Cards):
                     heading: str = "") -> Model:
         """The model of one mesh, with the sets ALL of its nodes and of its elements.
 
-        nodes            (n, 2) positions [L]
-        elements         (m, 3) or (m, 4) rows of `nodes`, counter-clockwise; or by kind, CPE3,
-                         CPE4, CPE4H, CPE6, CPE8, CPE8R, or CPS for CPE in plane stress; None where `given_forces` stand for
-                         elements
+        nodes            (n, 2) positions [L], or (n, 3)
+        elements         (m, 3) or (m, 4) rows of `nodes`, counter-clockwise; or by kind, a word of
+                         `emcon.options.words("element")`: CPE4H, C3D8, ...; None where
+                         `given_forces` stand for elements
         node_labels      (n,) whole numbers from 1 on, each once; default 1..n
         element_labels   (m,), or by kind; default 1.. in the order of `elements`
         """
@@ -186,28 +186,35 @@ class Model(Cards):
 
     def add_nodes(self, positions: ArrayLike, *, labels: ArrayLike | None = None,
                   name: str = "ALL") -> NDArray[np.int64]:
-        """`*NODE`: nodes at positions (n, 2) [L], in the node set `name`; returns their rows (n,).
+        """`*NODE`: nodes at positions (n, 2) or (n, 3) [L], in the node set `name`.
+
+        Returns their rows (n,).
 
         labels   (n,) whole numbers from 1 on; required in a model of a deck or a `Mesh`, which
                  gets labels back
         """
         x = real(positions, "nodes")
-        if x.ndim != 2 or x.shape[1] != 2:
-            raise InputError(f"nodes are an (n, 2) array of positions, not {x.shape}")
+        if x.ndim != 2 or x.shape[1] not in (2, 3):
+            raise InputError(f"nodes are an (n, 2) or (n, 3) array of positions, not {x.shape}")
+        if self._nodes.count and x.shape[1] != self._nodes.n_dim:
+            raise InputError(f"nodes have {x.shape[1]} coordinates here, and {self._nodes.n_dim} "
+                             "before")
+        self._nodes.n_dim = x.shape[1]
         head = card("NODE", {"NSET": name})
         first = self._nodes.count
         label = self._nodes.extend(len(x), labels)
-        self._add(head + (table(label, x[:, 0], x[:, 1]) if len(x) else ""))
+        self._add(head + (table(label, *x.T) if len(x) else ""))
         return np.arange(first, first + len(x)) if self._nodes.rows else label
 
     def add_elements(self, corners: ArrayLike, *, labels: ArrayLike | None = None,
                      name: str = "ALL", kind: str | None = None) -> NDArray[np.int64]:
         """`*ELEMENT`: elements of three nodes (m, 3), CPE3, or of four (m, 4), CPE4, or of a kind.
 
-        corners   nodes, counter-clockwise; of CPE6 and CPE8 with those between them behind
+        corners   nodes, counter-clockwise, in space as docs/deck.md counts them; of quadratic
+                  kinds with those between them behind
         labels    (m,), as with `add_nodes`
         name      of the element set that they are in
-        kind      CPE3, CPE4, CPE4H, CPE6, CPE8 or CPE8R; CPS for CPE in plane stress, without H
+        kind      a word of `emcon.options.words("element")`: CPE4H, CPS4, C3D8, C3D20R, ...
 
         Returns the rows (m,) of the elements.
         """
@@ -217,13 +224,15 @@ class Model(Cards):
             raise InputError(f"elements of {kind} are an (m, {KINDS[kind]}) array of nodes, not "
                              f"{array.shape}" if kind in KINDS else f"{kind!r} is no kind of "
                              f"element; known are {', '.join(words('element'))}")
+        if kind is None and self._nodes.n_dim == 3:
+            raise InputError("elements of nodes with three coordinates have a kind: C3D8, ...")
         if kind is None and n not in (3, 4):
             raise InputError(f"elements are an (m, 3) or (m, 4) array of nodes, not {array.shape}")
         nodes = self._nodes.labels(array, "elements", (None, n))
         head = card("ELEMENT", {"TYPE": kind or f"CPE{n}", "ELSET": name})
         first = self._elements.count
         label = self._elements.extend(len(nodes), labels)
-        self._add(head + (table(label, *nodes.T) if len(nodes) else ""))
+        self._add(head + (element_table(label, nodes) if len(nodes) else ""))
         return np.arange(first, first + len(nodes)) if self._elements.rows else label
 
     def surface(self, name: str, *, faces: ArrayLike | Sequence[tuple[Any, int]] | None = None,
@@ -233,7 +242,7 @@ class Model(Cards):
         """`*SURFACE`: made of faces, of the free faces of elements, of nodes, of edges, or a profile.
 
         faces      (k, 2): element (or element set) and face 1..4; face i of an element goes from
-                   corner i to the next
+                   corner i to the next; in space 1..6, as docs/deck.md counts them
         elements   element set, or (k,) elements
         nodes      node set, or (k,) nodes; only for slave surfaces of NODE TO SURFACE
         edges      (k, 2): first and last node of each edge
@@ -276,9 +285,9 @@ class Model(Cards):
                 raise InputError(f"{what}: faces are pairs of an element or an element set and a "
                                  "face")
             pairs = [(self._names(item, self._elements, what)[0], face) for item, face in pairs]
-        wrong = [face for _, face in pairs if np.ndim(face) or face not in (1, 2, 3, 4)]
+        wrong = [face for _, face in pairs if np.ndim(face) or face not in range(1, 7)]
         if wrong or not pairs:
-            raise InputError(f"{what}: a face is 1 to 4, not {wrong[0]!r}" if wrong
+            raise InputError(f"{what}: a face is 1 to 6, not {wrong[0]!r}" if wrong
                              else f"{what} has no faces")
         return [(item, int(face)) for item, face in pairs]
 
@@ -351,7 +360,7 @@ class Model(Cards):
                 value: Number | ArrayLike) -> Model:
         """`*INITIAL CONDITIONS`: velocities [L/T] or displacements [L] at the start.
 
-        dof     1, 2 or (1, 2); 6: spin of the reference node of a rigid body [1/T]
+        dof     1, 2, 3 or some of them; 6: spin of the reference node of a rigid body [1/T]
         value   one for all, (n_dof,), or (k, n_dof) for k nodes
         """
         self._valued("INITIAL CONDITIONS", where, dof, value, {"TYPE": type})
@@ -443,12 +452,12 @@ class Model(Cards):
     def equation(self, terms: Sequence[tuple[str | int, int, Number]]) -> Model:
         """`*EQUATION`: the sum of coefficient times displacement over the terms is 0.
 
-        terms   node or node set, 1 or 2, coefficient; the first one is eliminated
+        terms   node or node set, 1 to 3, coefficient; the first one is eliminated
         """
         rows: list[Sequence[object]] = [(len(terms),)]
         for term in terms:
             if len(term) != 3:
-                raise InputError(f"a term is node, 1 or 2, coefficient, not {term!r}")
+                raise InputError(f"a term is node, degree of freedom, coefficient, not {term!r}")
             rows.append((*self._names(term[0], self._nodes, "*EQUATION"), *term[1:]))
         return self._card("EQUATION", rows=rows)
 
@@ -472,7 +481,7 @@ class Model(Cards):
 
         solid   an object with a method respond(u0, du, wants_tangent), see `emcon.given.Solid`; it
                 may stand for any forces between nodes
-        mass    (n, n) between nodes, or (2 n, 2 n), the same in both directions, over all nodes of
+        mass    (n, n) between nodes, or (d n, d n), the same in all d directions, over all nodes of
                 the model: a sparse matrix of scipy, a `Csr`, or an array [M]; those of several
                 solids, and of elements, add up
         nodes   node set; default the nodes that belong to no element
@@ -484,8 +493,8 @@ class Model(Cards):
     def potential(self, function: PointFunction, nodes: Where | None = None) -> Model:
         """A potential of the present position of each of some nodes: V [M L^2/T^2].
 
-        function   of positions (n, 2) [L]; returns V (n,) and its first and second derivatives,
-                   (n, 2) and (n, 2, 2)
+        function   of positions (n, d) [L], d dimensions; returns V (n,) and its first and second
+                   derivatives, (n, d) and (n, d, d)
         nodes      node set, or (k,) nodes; default all
 
         Energies count it as `potential`; the discrete gradient made of it keeps the total.
@@ -578,10 +587,10 @@ class Model(Cards):
         given += [GivenPotential(f"potential {k}", function, nodes)
                   for k, (function, nodes) in enumerate(self._potentials, 1)]
         if self._hosts:
-            n = count_nodes(handle)
-            given += [GivenSolid(f"solid {k}", solid, n)
+            shape = node_shape(handle)
+            given += [GivenSolid(f"solid {k}", solid, *shape)
                       for k, (solid, _) in enumerate(self._hosts, 1)]
-            give_masses(handle, [given_mass(mass, n) for _, mass in self._hosts
+            give_masses(handle, [given_mass(mass, *shape) for _, mass in self._hosts
                                  if mass is not None])
         for item in given:
             item.give(handle)

@@ -42,7 +42,7 @@ class Evaluation:
         return self._handle.call(function, *arguments)
 
     def residual(self, *, contact: bool = True) -> NDArray[np.float64]:
-        """Inertia and internal forces less loads, (n_node, 2) [M L/T^2].
+        """Inertia and internal forces less loads, (n_node, n_dim) [M L/T^2].
 
         With `contact` also less contact forces. At prescribed freedoms it is the reaction.
         """
@@ -63,7 +63,7 @@ class Evaluation:
         return self._call(_matrices, _core.emcon_tangent, int(contact))
 
     def null_space(self) -> tuple[Csr, Csr]:
-        """P and DF, each (2 n_node, independent unknowns), for the constraints that act.
+        """P and DF, each (n_dim n_node, independent unknowns), for the constraints that act.
 
         P^T G^T = 0 and C DF = 0 for their discrete gradients G and their gradients C at the end.
         Ties, equations and prescribed freedoms are taken account of. Raises `AnalysisError` if
@@ -97,20 +97,21 @@ class ConstraintReport:
     gap1: NDArray[np.float64]        #: (n) at the end
     dgap: NDArray[np.float64]        #: (n) the difference, to relative accuracy
     size: NDArray[np.float64]        #: (n) length of an edge [L]
-    discrete_gradient: Csr           #: (n, 2 n_node) G
-    jacobian: Csr                    #: (n, 2 n_node) C: gradient of gap1 by the end
+    discrete_gradient: Csr           #: (n, n_dim n_node) G
+    jacobian: Csr                    #: (n, n_dim n_node) C: gradient of gap1 by the end
     _handle: Handle = field(repr=False)
     _n_reports: int = field(repr=False)
     _n_node: int = field(repr=False)
+    _n_dim: int = field(repr=False)
 
     def curvature_times(self, factor: ArrayLike, direction: ArrayLike) -> NDArray[np.float64]:
-        """Sum over the constraints of factor times (dG/du1) times direction, (n_node, 2).
+        """Sum over the constraints of factor times (dG/du1) times direction, (n_node, n_dim).
 
-        `factor` (n,) for instance multipliers, `direction` (n_node, 2). Belongs to the last
+        `factor` (n,) for instance multipliers, `direction` (n_node, n_dim). Belongs to the last
         report or evaluation of a stepper; raises `InputError` for earlier ones.
         """
         factor = real_array(factor, "the factor", self.id.shape)
-        direction = real_array(direction, "the direction", (self._n_node, 2))
+        direction = real_array(direction, "the direction", (self._n_node, self._n_dim))
         if self._handle.address and self._n_reports != self._handle.n_reports:
             raise InputError("this report is stale: constraints were asked for again, "
                              "or a step was evaluated")
@@ -122,6 +123,7 @@ class Queries:
 
     _handle: Handle
     n_node: int
+    n_dim: int
     n_constraint: int
     n_body: int
 
@@ -134,25 +136,25 @@ class Queries:
         raise NotImplementedError
 
     def guess(self, h: float) -> NDArray[np.float64]:
-        """Displacements from which a step of size h would start to iterate, (n_node, 2) [L]."""
+        """Displacements from which a step of size h would start to iterate, (n_node, n_dim) [L]."""
         return self._handle.call(_core.emcon_guess, positive(h, "h"), self.n_node)
 
     def evaluate(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
                  active: ArrayLike | None = None, with_tangent: bool = True) -> Evaluation:
-        """Evaluate the step of size h [T] from the present state to `u1` (n_node, 2) [L].
+        """Evaluate the step of size h [T] from the present state to `u1` (n_node, n_dim) [L].
 
         `lam` [M L/T^2] and `active`, both (n_constraint,), are those of the state if not given.
         Constraints that have no surface near do not act. Dependent nodes of ties and equations
         follow the others. Raises `AnalysisError` where `u1` inverts an element.
         """
-        u1 = real_array(u1, "u1", (self.n_node, 2))
+        u1 = real_array(u1, "u1", (self.n_node, self.n_dim))
         h = positive(h, "h")
         lam, active = contact_arguments(lam, active, self.n_constraint)
         return Evaluation(self, with_tangent, h, u1, lam, active)
 
     def residual(self, u1: ArrayLike, h: float, *, lam: ArrayLike | None = None,
                  active: ArrayLike | None = None, contact: bool = True) -> NDArray[np.float64]:
-        """Residual at the nodes, (n_node, 2): of `evaluate`, where the arguments are told."""
+        """Residual at the nodes, (n_node, n_dim): of `evaluate`, where the arguments are told."""
         evaluation = self.evaluate(u1, h, lam=lam, active=active, with_tangent=False)
         return evaluation.residual(contact=contact)
 
@@ -169,27 +171,27 @@ class Queries:
 
     @property
     def mass(self) -> Csr:
-        """The consistent mass between nodes, the same in both directions, (n_node, n_node) [M]."""
+        """The consistent mass between nodes, the same in all directions, (n_node, n_node) [M]."""
         return self._handle.call(_matrices, _core.emcon_mass)
 
     @property
     def links(self) -> Csr:
-        """T, (2 n_node, n_unknown): displacements are T times unknowns, up to prescribed motion.
+        """T, (n_dim n_node, n_unknown): displacements are T times unknowns, up to prescribed motion.
 
-        Row 2 i + a is direction a of node i, both from 0. That of a prescribed freedom is empty,
+        Row n_dim i + a is direction a of node i, both from 0. That of a prescribed freedom is empty,
         that of a dependent one has the weights of those that it follows.
         """
         return self._handle.call(_matrices, _core.emcon_links)
 
     @property
     def unknowns(self) -> NDArray[np.int32]:
-        """Unknown of each freedom, (n_node, 2), from 0; -1: prescribed, dependent, no element."""
+        """Unknown of each freedom, (n_node, n_dim), from 0; -1: prescribed, dependent, no element."""
         return self._handle.call(_core.emcon_unknowns, self.n_node)
 
     def constraint(self, q0: ArrayLike | None = None, q1: ArrayLike | None = None, *,
                    u0: ArrayLike | None = None, u1: ArrayLike | None = None,
                    keeps_gap: bool = False) -> ConstraintReport:
-        """Contact between positions `q0` and `q1`, or displacements `u0` and `u1`, (n_node, 2) [L].
+        """Contact between positions `q0` and `q1`, or displacements `u0` and `u1`, (n_node, n_dim) [L].
 
         The library works with displacements. X + u and back costs a rounding of X, about 1e-16 of
         it, which the gaps then have: give displacements where that counts. With `keeps_gap` the
@@ -199,17 +201,21 @@ class Queries:
         if (q0 is None) != (q1 is None) or (u0 is None) != (u1 is None) \
                 or (q0 is None) == (u0 is None):
             raise InputError("give either q0 and q1 or u0 and u1")
-        shape = (self.n_node, 2)
+        shape = (self.n_node, self.n_dim)
         if q0 is not None:
             x = self.positions
             u0, u1 = real_array(q0, "q0", shape) - x, real_array(q1, "q1", shape) - x
         u0, u1 = real_array(u0, "u0", shape), real_array(u1, "u1", shape)
         self._handle.n_reports += 1
         report = self._handle.change(_constraints, u0, u1, int(bool(keeps_gap)))
-        return ConstraintReport(*report, self._handle, self._handle.n_reports, self.n_node)
+        return ConstraintReport(*report, self._handle, self._handle.n_reports, self.n_node,
+                                self.n_dim)
 
     def body_momenta(self) -> NDArray[np.float64]:
-        """px, py [M L/T] and lz about the origin [M L^2/T] of each body, (n_body, 3)."""
+        """px, py [M L/T] and lz about the origin [M L^2/T] of each body, (n_body, 3).
+
+        In space px, py, pz, lx, ly, lz, (n_body, 6).
+        """
         return self._handle.call(_core.emcon_get_momenta, self.n_body)
 
 
@@ -250,7 +256,9 @@ def _evaluate(address: int, with_tangent: int, h: float, u1: NDArray[np.float64]
 def _multipliers(address: int) -> tuple[int, NDArray[np.float64]]:
     """Those of contact."""
     n, before = _counts(address)
-    status, lam = _core.emcon_multipliers(address, 0, np.empty((0, 2)), n)
+    _, sizes = _core.emcon_get_sizes(address)
+    nothing = np.empty((0, structure("emcon_sizes", sizes)["n_dim"]))
+    status, lam = _core.emcon_multipliers(address, 0, nothing, n)
     return status, lam[before:]
 
 

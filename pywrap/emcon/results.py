@@ -201,15 +201,22 @@ class Bodies:
     px: Array       #: (n_row, n_body) [M L/T]
     py: Array       #: (n_row, n_body) [M L/T]
     lz: Array       #: (n_row, n_body) about the origin [M L^2/T]
+    pz: Array | None = None     #: in space; None in the plane
+    lx: Array | None = None
+    ly: Array | None = None
+
+    @property
+    def momentum(self) -> Array:
+        """Linear momenta (n_row, n_body, n_dim) [M L/T]."""
+        return np.stack([p for p in (self.px, self.py, self.pz) if p is not None], axis=2)
 
     def main(self) -> int:
         """Index of the body with the largest momentum at any time: the one that is thrown."""
-        return int(np.argmax(np.max(np.hypot(self.px, self.py), axis=0)))
+        return int(np.argmax(np.max(np.linalg.norm(self.momentum, axis=2), axis=0)))
 
-    def velocity(self, body: int, row: int) -> tuple[float, float]:
+    def velocity(self, body: int, row: int) -> tuple[float, ...]:
         """Velocity [L/T] of the centre of mass of `body` in history row `row`."""
-        mass = self.mass[body]
-        return float(self.px[row, body]/mass), float(self.py[row, body]/mass)
+        return tuple((self.momentum[row, body]/self.mass[body]).tolist())
 
 
 def read_bodies(paths: ResultPaths) -> Bodies | None:
@@ -225,10 +232,14 @@ def read_bodies(paths: ResultPaths) -> Bodies | None:
         except ResultError:
             return None
     mass = mass.ravel()
-    fits = momentum.ndim == 3 and momentum.shape[1:] == (len(mass), 3) and len(momentum) > 0
+    fits = (momentum.ndim == 3 and momentum.shape[1] == len(mass)
+            and momentum.shape[2] in (3, 6) and len(momentum) > 0)
     if not (fits and (mass >= 0.0).all() and (mass > 0.0).any()):
         return None
-    return Bodies(mass, momentum[..., 0], momentum[..., 1], momentum[..., 2])
+    if momentum.shape[2] == 3:
+        return Bodies(mass, momentum[..., 0], momentum[..., 1], momentum[..., 2])
+    px, py, pz, lx, ly, lz = np.moveaxis(momentum, 2, 0)
+    return Bodies(mass, px, py, lz, pz, lx, ly)
 
 
 def read_contact_force(paths: ResultPaths) -> tuple[Array, Array] | None:

@@ -31,6 +31,8 @@ __all__ = ["AnalysisError", "ConstraintReport", "Csr", "Evaluation", "Increment"
 
 #: Times that differ by less than this part are the same: sums of many steps are rounded.
 _SAME_TIME = 64*np.finfo(float).eps
+#: Momenta, by the number of dimensions.
+_MOMENTA = {2: ("px", "py", "lz"), 3: ("px", "py", "pz", "lx", "ly", "lz")}
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,8 @@ class Stepper(Queries, Conditions, Meshes):
     """A model at some point of its analysis; `model` is one, or the path of a deck.
 
     Parameters of the deck are given as keywords: ``Stepper("ring.inp", h=0.005)``. Arrays are
-    copies, of shape (n_node, 2) where they belong to nodes. Any number of steppers live side by
+    copies, of shape (n_node, n_dim) where they belong to nodes; `n_dim` is 2 or, of decks of three
+    dimensions, 3. Any number of steppers live side by
     side; each may run in a thread of its own, but not in two at once: that raises `InputError`,
     as do a bad deck, bad arguments, and any call after `close`.
 
@@ -121,6 +124,7 @@ class Stepper(Queries, Conditions, Meshes):
         self.n_node, self.n_element = sizes["n_node"], sizes["n_element"]
         self.n_constraint, self.n_pair = sizes["n_contact"], sizes["n_pair"]
         self.n_body, self.n_step = sizes["n_body"], sizes["n_step"]
+        self.n_dim = sizes["n_dim"]
 
     @classmethod
     def from_restart(cls, path: str | os.PathLike[str], model: Model | None = None) -> Stepper:
@@ -319,7 +323,7 @@ class Stepper(Queries, Conditions, Meshes):
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """Reference positions X, (n_node, 2) [L]."""
+        """Reference positions X, (n_node, n_dim) [L]."""
         return self._handle.call(_core.emcon_get_positions, self.n_node)
 
     @property
@@ -329,17 +333,17 @@ class Stepper(Queries, Conditions, Meshes):
 
     @property
     def u(self) -> NDArray[np.float64]:
-        """Displacements, (n_node, 2) [L]."""
+        """Displacements, (n_node, n_dim) [L]."""
         return self._handle.call(lambda a: _core.emcon_get_state(a, self.n_node, no_v=1)[:2])
 
     @property
     def q(self) -> NDArray[np.float64]:
-        """Present positions X + u, (n_node, 2) [L]."""
+        """Present positions X + u, (n_node, n_dim) [L]."""
         return self.positions + self.u
 
     @property
     def v(self) -> NDArray[np.float64]:
-        """Velocities, (n_node, 2) [L/T]."""
+        """Velocities, (n_node, n_dim) [L/T]."""
         return self._handle.call(lambda a: _core.emcon_get_state(a, self.n_node, no_u=1)[::2])
 
     @property
@@ -363,8 +367,8 @@ class Stepper(Queries, Conditions, Meshes):
         present step of the deck. Raises `InputError`, and `AnalysisError` where `u` inverts an
         element.
         """
-        shape = (self.n_node, 2)
-        none = np.empty((0, 2))
+        shape = (self.n_node, self.n_dim)
+        none = np.empty((0, self.n_dim))
         u = none if u is None else real_array(u, "u", shape)
         v = none if v is None else real_array(v, "v", shape)
         lam, active = contact_arguments(lam, active, self.n_constraint)
@@ -433,7 +437,7 @@ class Stepper(Queries, Conditions, Meshes):
         """`energies` and `momenta` together."""
         names = ("kinetic", "strain", "potential", "external_work", "contact_work",
                  "stabilization", "restitution_loss", "scheme_loss", "damping_loss", "contact_energy",
-                 "total", "px", "py", "lz")
+                 "total", *_MOMENTA[self.n_dim])
         found = structure("emcon_ledger", self._handle.call(_core.emcon_get_ledger))
         return {name: found[name] for name in names}
 
@@ -447,7 +451,10 @@ class Stepper(Queries, Conditions, Meshes):
         return dict(list(self.ledger.items())[:11])
 
     def momenta(self) -> dict[str, float]:
-        """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`."""
+        """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`.
+
+        In space px, py, pz, lx, ly, lz.
+        """
         return dict(list(self.ledger.items())[11:])
 
 

@@ -44,7 +44,7 @@ class Step(Cards):
         """`*CLOAD`: forces on nodes [M L/T^2].
 
         where   node set, node, or (k,) of them
-        dof     1, 2 or (1, 2); 6: moment on the reference node of a rigid body [M L^2/T^2]
+        dof     1, 2, 3 or some of them; 6: moment on the reference node of a rigid body [M L^2/T^2]
         force   one for all, (n_dof,), or (k, n_dof)
         delay   how much later the amplitude begins [T]
         op      NEW: all forces of earlier steps go
@@ -55,23 +55,26 @@ class Step(Cards):
 
     def pressure(self, where: Where, face: int, value: Number, *, amplitude: str | None = None,
                  delay: Number | None = None, op: Op | None = None) -> Step:
-        """`*DLOAD`: pressure [M/(L T^2)], positive inwards, on face 1..4 of elements.
+        """`*DLOAD`: pressure [M/(L T^2)], positive inwards, on face 1..4 of elements, in
+        space 1..6.
 
         Loads of one step on the same place add up; those of a later step replace them.
 
         where   element set, element, or (k,) of them
         op      NEW: all pressures and gravity of earlier steps go
         """
-        if face not in (1, 2, 3, 4):
-            raise InputError(f"a face is 1 to 4, not {face!r}")
+        if face not in range(1, 7):
+            raise InputError(f"a face is 1 to 6, not {face!r}")
         return self._distributed(where, [f"P{int(face)}", value], op, amplitude, delay)
 
     def gravity(self, where: Where, g: Number, direction: Sequence[Number] = (0.0, -1.0), *,
                 amplitude: str | None = None, delay: Number | None = None,
                 op: Op | None = None) -> Step:
-        """`*DLOAD`: acceleration `g` [L/T^2] of elements along `direction` (2,), of any length."""
-        if isinstance(direction, str) or len(direction) != 2:
-            raise InputError(f"the direction of gravity is a pair of numbers, not {direction!r}")
+        """`*DLOAD`: acceleration `g` [L/T^2] of elements along `direction` (2,) or (3,), of any
+        length."""
+        if isinstance(direction, str) or len(direction) not in (2, 3):
+            raise InputError("the direction of gravity is two numbers, in space three, not "
+                             f"{direction!r}")
         return self._distributed(where, ["GRAV", g, *direction], op, amplitude, delay)
 
     def _distributed(self, where: Where, load: Sequence[object], op: Op | None,

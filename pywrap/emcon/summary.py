@@ -11,7 +11,8 @@ from .results import (Bodies, ResultPaths, cpu_seconds, energy_drift, read_bodie
 _QUANTITIES = (("kinetic", "kinetic energy"), ("strain", "strain energy"),
                ("external_work", "external work"), ("total", "total energy"),
                ("px", "linear momentum x"), ("py", "linear momentum y"),
-               ("lz", "angular momentum z"))
+               ("pz", "linear momentum z"), ("lx", "angular momentum x"),
+               ("ly", "angular momentum y"), ("lz", "angular momentum z"))
 
 
 def summary(paths: ResultPaths) -> str:
@@ -54,9 +55,9 @@ def _rebound_lines(history: NDArray[np.void], bodies: Bodies | None) -> list[str
         return ["  rebound velocity                (masses of the bodies are not in the history)"]
     body = bodies.main()
     start, end = bodies.velocity(body, 0), bodies.velocity(body, -1)
-    return [f"  velocity of body {body + 1}, start      ({start[0]:.6g}, {start[1]:.6g})"
+    return [f"  velocity of body {body + 1}, start      ({', '.join(f'{v:.6g}' for v in start)})"
             f"   mass {bodies.mass[body]:.6g}",
-            f"  rebound velocity, end           ({end[0]:.6g}, {end[1]:.6g})"]
+            f"  rebound velocity, end           ({', '.join(f'{v:.6g}' for v in end)})"]
 
 
 def _effort_lines(history: NDArray[np.void], wall: float | None) -> list[str]:

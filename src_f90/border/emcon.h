@@ -8,11 +8,13 @@
  * the text here says otherwise. A model that was closed must not be used again: that cannot be
  * checked.
  *
- * Arrays belong to the caller, who says how long they are. Those of nodes hold x and y of node 0,
- * x and y of node 1 and so on, 2*n_node numbers; their order is that of the deck, as
- * emcon_get_labels tells. An output that is NULL is left out. Inputs that may be NULL are named.
- * Labels and degrees of freedom (1, 2) are those of the deck; all else is counted from 0, but in
- * messages from 1. Units are those of the deck.
+ * Arrays belong to the caller, who says how long they are. Those of nodes hold x, y and in
+ * space z of node 0, then those of node 1 and so on, n_dim*n_node numbers; their order is that of
+ * the deck, as emcon_get_labels tells. Whether n_dim is 2 or 3 depends on the deck: emcon_get_sizes
+ * tells it as soon as the deck is read, and who takes any deck has to ask. An output that is NULL
+ * is left out. Inputs that may be NULL are named. Labels and degrees of freedom (1 to n_dim) are
+ * those of the deck; all else is counted from 0, but in messages from 1. Units are those of the
+ * deck.
  */
 #ifndef EMCON_H
 #define EMCON_H
@@ -67,6 +69,8 @@ typedef struct emcon_sizes {
    int n_surface;
    int n_tie;
    int n_selected;   /* constraints that were selected or evaluated last */
+   int n_dim;        /* 2: in the plane; 3: in space */
+   int n_momentum;   /* momenta of a body: n_dim linear ones, then 1 angular one, in space 3 */
 } emcon_sizes;
 
 typedef struct emcon_increment {
@@ -85,13 +89,14 @@ typedef struct emcon_ledger {
    double external_work;
    double contact_work;
    double total;     /* kinetic + strain + potential + contact_energy - external_work */
-   double px, py;    /* momentum */
+   double px, py;    /* momentum; pz, lx and ly stand at the end */
    double lz;        /* angular momentum about the origin */
    double stabilization;   /* work of what *CONTACT CONTROLS, STABILIZE bears: round-off */
    double restitution_loss;   /* of contact work: what impacts took by RESTITUTION, >= 0 */
    double scheme_loss;        /* what the damping of the scheme took, >= 0 */
    double damping_loss;       /* what *DAMPING of materials took, >= 0 */
    double contact_energy;     /* what contact by penalty stores, >= 0 */
+   double pz, lx, ly;         /* 0 in the plane */
 } emcon_ledger;
 
 /* A sparse matrix by rows: row i has the entries row_start[i] to row_start[i + 1] - 1 of `column`
@@ -121,8 +126,8 @@ typedef struct emcon_constraint_report {
    const double *dgap;            /* gap1 - gap0, to relative accuracy */
    const double *defect;          /* is to be 0: dgap where the gap of the start is held, or gap1 */
    const double *size;            /* length of an edge, to which defects relate */
-   emcon_csr discrete_gradient;   /* n x 2*n_node, times the motion it is dgap */
-   emcon_csr end_gradient;        /* n x 2*n_node, the gradient at the end */
+   emcon_csr discrete_gradient;   /* n x n_dim*n_node, times the motion it is dgap */
+   emcon_csr end_gradient;        /* n x n_dim*n_node, the gradient at the end */
 } emcon_constraint_report;
 
 /* Where a possible contact stands at both ends of a step. */
@@ -230,12 +235,12 @@ typedef int (*emcon_point_function)(void *user, int n_point, int n_variable, con
                                     int wants_hessian, double *value, double *gradient,
                                     double *hessian);
 
-/* Forces of a step from displacements `u0` by `du`, both 2*n_node: `force` (2*n_node), the energy
- * at the end, and unless it is NULL `tangent`, the derivative of the forces by u0 + du, in the
- * slots of the pattern that was given. The energy is kept if force . du is its change. For du = 0
- * the forces are the gradient of the energy, and the tangent of a discrete gradient is half its
- * second derivative. `magnitude` (2*n_node), sums of |contributions| to the forces, tells what of
- * them is round-off; left at 0, it is taken as |force|. */
+/* Forces of a step from displacements `u0` by `du`, both n_dim*n_node: `force` (n_dim*n_node), the
+ * energy at the end, and unless it is NULL `tangent`, the derivative of the forces by u0 + du, in
+ * the slots of the pattern that was given. The energy is kept if force . du is its change. For du =
+ * 0 the forces are the gradient of the energy, and the tangent of a discrete gradient is half its
+ * second derivative. `magnitude` (n_dim*n_node), sums of |contributions| to the forces, tells what
+ * of them is round-off; left at 0, it is taken as |force|. */
 typedef int (*emcon_force_function)(void *user, int n_node, const double *u0, const double *du,
                                     int wants_tangent, double *force, double *magnitude,
                                     double *energy, double *tangent);
@@ -244,16 +249,17 @@ typedef int (*emcon_force_function)(void *user, int n_node, const double *u0, co
  * E11, E22, 2*E12. */
 int emcon_give_law(emcon_model *model, const char *name, emcon_point_function law, void *user);
 
-/* A potential of the present position of each of n nodes, numbers from 0. `name` is for messages. */
+/* A potential of the present position of each of n nodes, counted from 0. `name` is for
+ * messages. The variables are its n_dim coordinates. */
 int emcon_give_potential(emcon_model *model, const char *name /* or NULL */, int n,
                          const int *node /* n */, emcon_point_function potential, void *user);
 
-/* Forces between nodes: `pattern` (2*n_node x 2*n_node, its values are not looked at) tells which
- * depend on which. Nodes of no element are part of the model where they stand in it. */
+/* Forces between nodes: `pattern` (n_dim*n_node x n_dim*n_node, its values are not looked at) tells
+ * which depend on which. Nodes of no element are part of the model where they stand in it. */
 int emcon_give_force(emcon_model *model, const char *name /* or NULL */, const emcon_csr *pattern,
                      emcon_force_function force, void *user);
 
-/* A mass beside that of the elements, n_node x n_node, the same in both directions. */
+/* A mass beside that of the elements, n_node x n_node, the same in all directions. */
 int emcon_give_mass(emcon_model *model, const emcon_csr *mass);
 
 /* ---- a model of a host code ------------------------------------------------------------------ */
@@ -284,7 +290,7 @@ int emcon_add_pair(emcon_model *model, int slave, int master, int formulation,
 int emcon_add_tie(emcon_model *model, int slave, int master, int multiplier, double tolerance);
 
 /* Freedoms that the host moves by itself: 1, else 0. None, if this is not called. */
-int emcon_hold(emcon_model *model, int n_node, const int *held /* n_node x 2 */);
+int emcon_hold(emcon_model *model, int n_node, const int *held /* n_node x n_dim */);
 
 /* Settings, also between steps. */
 int emcon_set_contact(emcon_model *model, const emcon_contact_settings *settings);
@@ -327,8 +333,8 @@ int emcon_next_step(emcon_model *model);
  * others; energies and momenta are measured anew, the works stand. `lam` is 0 where a constraint
  * does not act; `time` is not before the start of the present step of the deck. With `u` the forces
  * of the last step are forgotten. */
-int emcon_set_state(emcon_model *model, int n_node, const double *u /* n_node x 2, or NULL */,
-                    const double *v /* n_node x 2, or NULL */, int n_constraint,
+int emcon_set_state(emcon_model *model, int n_node, const double *u /* n_node x n_dim, or NULL */,
+                    const double *v /* n_node x n_dim, or NULL */, int n_constraint,
                     const double *lam /* n_constraint, or NULL */,
                     const int *is_active /* n_constraint, or NULL */,
                     const double *time /* 1, or NULL */);
@@ -353,7 +359,8 @@ int emcon_resume(emcon_model *model, const char *path);
 
 /* ---- what a model holds ---------------------------------------------------------------------- */
 
-/* Before emcon_build only n_node, n_element and n_step are known; the others are 0. */
+/* Before emcon_build only n_node, n_element, n_step, n_dim and n_momentum are known; the others
+ * are 0. */
 int emcon_get_sizes(emcon_model *model, emcon_sizes *sizes);
 
 int emcon_get_time(emcon_model *model, double *time);
@@ -373,8 +380,8 @@ int emcon_get_verdict(emcon_model *model, int *is_good, const char **json);
  * emcon_get_verdict. */
 int emcon_get_notes(emcon_model *model, const char **text);
 
-/* What the scene consists of, what of the program it needs, sizes, advice: the report of `emcon check
- * --json` but for the cost, one JSON object: `*json` as that of emcon_get_verdict. */
+/* What the scene consists of, what of the program it needs, sizes, advice: the report of `emcon
+ * check --json` but for the cost, one JSON object: `*json` as that of emcon_get_verdict. */
 int emcon_get_report(emcon_model *model, const char **json);
 
 /* Which nodes are in the node set `name`: 1, else 0. */
@@ -391,8 +398,8 @@ int emcon_find_elements(emcon_model *model, const char *name, int n_element,
 int emcon_find_faces(emcon_model *model, const char *name, int n_element,
                      int *is_in /* n_element x 6 */);
 
-/* Elements: labels, what VTK calls their kind (5 and 9: CPE3 and CPE4), and their nodes in VTK's
- * order, which is that of the deck; -1 behind the last. */
+/* Elements: labels, what VTK calls their kind (5 and 9: CPE3 and CPE4, 10 and 12: C3D4 and C3D8),
+ * and their nodes in VTK's order, which is that of the deck; -1 behind the last. */
 int emcon_get_elements(emcon_model *model, int n_element, int *label /* n_element */,
                        int *kind /* n_element */, int *node /* n_element x 20 */);
 
@@ -403,11 +410,11 @@ int emcon_get_bodies(emcon_model *model, int n_node, int *body /* n_node */);
 int emcon_get_labels(emcon_model *model, int n_node, int *label /* n_node */);
 
 /* Reference positions. emcon_build may move nodes, to close a tie or an initial contact. */
-int emcon_get_positions(emcon_model *model, int n_node, double *x /* n_node x 2 */);
+int emcon_get_positions(emcon_model *model, int n_node, double *x /* n_node x n_dim */);
 
 /* Displacements and velocities. */
-int emcon_get_state(emcon_model *model, int n_node, double *u /* n_node x 2 */,
-                    double *v /* n_node x 2 */);
+int emcon_get_state(emcon_model *model, int n_node, double *u /* n_node x n_dim */,
+                    double *v /* n_node x n_dim */);
 
 /* Of each constraint: multiplier (force), and whether it acts. */
 int emcon_get_multipliers(emcon_model *model, int n_constraint, double *lam /* n_constraint */,
@@ -435,8 +442,9 @@ int emcon_get_pairs(emcon_model *model, int n_pair, double *total /* n_pair x 7 
 int emcon_get_field(emcon_model *model, const char *name, int *n_place, int *n_component,
                     const double **value);
 
-/* Of each body: px, py, and the angular momentum about the origin; 3*n_body. */
-int emcon_get_momenta(emcon_model *model, int n_body, double *momenta /* n_body x 3 */);
+/* Of each body: momentum, and angular momentum about the origin; in the plane px, py, lz, in space
+ * px, py, pz, lx, ly, lz. */
+int emcon_get_momenta(emcon_model *model, int n_body, double *momenta /* n_body x n_momentum */);
 
 /* ---- loads and boundary values --------------------------------------------------------------- */
 
@@ -464,32 +472,32 @@ int emcon_remove_prescribed(emcon_model *model, int label, int dof);
 /* Queries change neither the state nor what later steps give, to the last bit. The displacements of
  * all nodes are T times the unknowns, up to prescribed motion. */
 
-/* Number of the unknown of each degree of freedom, 2*n_node; -1: prescribed, dependent, or of no
- * element. */
-int emcon_unknowns(emcon_model *model, int n_node, int *unknown /* n_node x 2 */);
+/* Number of the unknown of each degree of freedom, n_dim*n_node; -1: prescribed, dependent, or of
+ * no element. */
+int emcon_unknowns(emcon_model *model, int n_node, int *unknown /* n_node x n_dim */);
 
-/* T, 2*n_node x n_unknown: row 2*node + direction. */
+/* T, n_dim*n_node x n_unknown: row n_dim*node + direction. */
 int emcon_links(emcon_model *model, emcon_csr *matrix);
 
 /* Dependent freedoms of a displacement or velocity follow the others; forces on dependent freedoms
  * go to those that they follow. `field` is changed in place, unchanged after a failure. */
-int emcon_follow(emcon_model *model, int n_node, double *field /* n_node x 2, in and out */);
-int emcon_gather(emcon_model *model, int n_node, double *field /* n_node x 2, in and out */);
+int emcon_follow(emcon_model *model, int n_node, double *field /* n_node x n_dim, in and out */);
+int emcon_gather(emcon_model *model, int n_node, double *field /* n_node x n_dim, in and out */);
 
-/* D and M of a tie, over nodes, one row for each multiplier: D x = M x in both directions. */
+/* D and M of a tie, over nodes, one row for each multiplier: D x = M x in each direction. */
 int emcon_get_tie_matrices(emcon_model *model, int tie, emcon_csr *d, emcon_csr *m);
 
-/* The consistent mass, n_node x n_node, the same in both directions. */
+/* The consistent mass, n_node x n_node, the same in all directions. */
 int emcon_mass(emcon_model *model, emcon_csr *matrix);
 
 /* Where a step of the size h from the present state would start its iteration. */
-int emcon_guess(emcon_model *model, double h, int n_node, double *u1 /* n_node x 2 */);
+int emcon_guess(emcon_model *model, double h, int n_node, double *u1 /* n_node x n_dim */);
 
 /* Evaluate the step of the size h from the present state to displacements `u1`: what the functions
  * below give belongs to the last evaluation. Constraints that act are those of the state, or
  * `is_active` unless it is NULL, less those that have no surface near; their multipliers those of
  * the state, or `lam` unless it is NULL. */
-int emcon_evaluate(emcon_model *model, double h, int n_node, const double *u1 /* n_node x 2 */,
+int emcon_evaluate(emcon_model *model, double h, int n_node, const double *u1 /* n_node x n_dim */,
                    int with_tangent, int n_constraint,
                    const double *lam /* n_constraint, or NULL */,
                    const int *is_active /* n_constraint, or NULL */);
@@ -497,7 +505,7 @@ int emcon_evaluate(emcon_model *model, double h, int n_node, const double *u1 /*
 /* Residual: inertia, internal forces less loads, and `with_contact` less those of the constraints.
  * At the nodes, where it is the reaction on prescribed freedoms; and T^T times it. */
 int emcon_residual(emcon_model *model, int with_contact, int n_node,
-                   double *nodal /* n_node x 2 */, int n_unknown,
+                   double *nodal /* n_node x n_dim */, int n_unknown,
                    double *unknown /* n_unknown */);
 
 /* Derivative of the residual by the unknowns at the end of the step, n_unknown x n_unknown, for
@@ -507,10 +515,10 @@ int emcon_tangent(emcon_model *model, int with_contact, emcon_csr *matrix);
 
 /* Null-space matrix P, and DF of the reparametrisation, for the constraints that act in the last
  * evaluation, of whichever function: P^T G^T = 0 and C DF = 0 for their discrete gradients G and
- * gradients at the end C; 2*n_node x independent unknowns. If some constraints follow from others,
- * `redundant` are the `*n_redundant` places of these, to be given to emcon_drop, and there are no
- * matrices; a failure where `n_redundant` is NULL. EMCON_ERROR_ANALYSIS: there are no good unknowns
- * to eliminate, solve with the multipliers. */
+ * gradients at the end C; n_dim*n_node x independent unknowns. If some constraints follow from
+ * others, `redundant` are the `*n_redundant` places of these, to be given to emcon_drop, and there
+ * are no matrices; a failure where `n_redundant` is NULL. EMCON_ERROR_ANALYSIS: there are no good
+ * unknowns to eliminate, solve with the multipliers. */
 int emcon_null_space(emcon_model *model, emcon_csr *p, emcon_csr *df, int *n_redundant,
                      const int **redundant);
 
@@ -518,69 +526,69 @@ int emcon_null_space(emcon_model *model, emcon_csr *p, emcon_csr *df, int *n_red
  * dependent unknowns of the last null space: `residual` at the nodes, NULL: that of the last
  * emcon_evaluate. 0 where a constraint does not act. */
 int emcon_multipliers(emcon_model *model, int n_node,
-                      const double *residual /* n_node x 2, or NULL */, int n_constraint,
+                      const double *residual /* n_node x n_dim, or NULL */, int n_constraint,
                       double *lam /* n_constraint */);
 
 /* After emcon_null_space: the motion of dependent unknowns alone that closes the `defect` of the
  * n_selected constraints. Newton's step is this plus DF times that of the others. */
 int emcon_particular(emcon_model *model, int n_selected, const double *defect /* n_selected */,
-                     int n_node, double *du /* n_node x 2 */);
+                     int n_node, double *du /* n_node x n_dim */);
 
 /* Sum over the n_selected constraints of the last evaluation of `factor` times the derivative of
- * the discrete gradient by the end of the step, 2*n_node x 2*n_node, which the tangent gets with a
- * minus sign if the factors are multipliers; and the same times `direction`. */
+ * the discrete gradient by the end of the step, n_dim*n_node x n_dim*n_node, which the tangent gets
+ * with a minus sign if the factors are multipliers; and the same times `direction`. */
 int emcon_curvature(emcon_model *model, int n_selected, const double *factor /* n_selected */,
                     emcon_csr *matrix);
 int emcon_curvature_times(emcon_model *model, int n_selected,
                           const double *factor /* n_selected */, int n_node,
-                          const double *direction /* n_node x 2 */,
-                          double *product /* n_node x 2 */);
+                          const double *direction /* n_node x n_dim */,
+                          double *product /* n_node x n_dim */);
 
 /* ---- contact over a step --------------------------------------------------------------------- */
 
 /* All contacts near from displacements u0 to u1. With `keeps_gap` they are those that hold the mean
  * gap of u0, as persistent contact does: all gaps are counted from there. */
-int emcon_constraints(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                      const double *u1 /* n_node x 2 */, int keeps_gap,
+int emcon_constraints(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                      const double *u1 /* n_node x n_dim */, int keeps_gap,
                       emcon_constraint_report *report);
 
 /* Begin a step from the displacements u0 with the motion du that is expected. Flags of n_constraint
  * constraints: which acted at the end of the step before, and which of them still can. One array
  * may be given for both. Any other evaluation ends the step. */
-int emcon_begin_contact(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                        const double *du /* n_node x 2 */, int n_constraint,
+int emcon_begin_contact(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                        const double *du /* n_node x n_dim */, int n_constraint,
                         const int *was_active /* n_constraint */,
                         int *active /* n_constraint */);
 
 /* All gaps; rows of ties and equations have none. */
-int emcon_get_gaps(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                   const double *du /* n_node x 2 */, int n_constraint,
+int emcon_get_gaps(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                   const double *du /* n_node x n_dim */, int n_constraint,
                    emcon_gap *gap /* n_constraint */);
 
 /* Select the constraints that act, by flags; `*n` becomes their number. */
-int emcon_select(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                 const double *du /* n_node x 2 */, int n_constraint,
+int emcon_select(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                 const double *du /* n_node x n_dim */, int n_constraint,
                  const int *active /* n_constraint */, int *n);
 
 /* Select n constraints by their numbers, ascending, with gaps to hold of the caller's own choice.
  * emcon_update_active does not go with these. */
-int emcon_choose(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                 const double *du /* n_node x 2 */, int n, const int *id /* n */,
+int emcon_choose(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                 const double *du /* n_node x n_dim */, int n, const int *id /* n */,
                  const double *target /* n */);
 
 /* Values and gradients of the selected constraints. */
-int emcon_evaluate_contact(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                           const double *du /* n_node x 2 */, emcon_constraint_report *report);
+int emcon_evaluate_contact(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                           const double *du /* n_node x n_dim */, emcon_constraint_report *report);
 
 /* The next active set from a solved step: takes in what would penetrate, releases what pulls.
  * `lam`: the multipliers of the n_selected constraints, forces, > 0 pressing. `active`: those
  * selected, then the next ones. `*is_done`: the set stands, or `*outcome` is not EMCON_STEP_DONE
  * and the step cannot be ended. `magnitude`: sums of the sizes of the contributions to the
  * residual, which tell signs of round-off from tension; NULL: the contact forces themselves. */
-int emcon_update_active(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                        const double *du /* n_node x 2 */, int n_selected,
+int emcon_update_active(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                        const double *du /* n_node x n_dim */, int n_selected,
                         const double *lam /* n_selected */,
-                        const double *magnitude /* n_node x 2, or NULL */, int n_constraint,
+                        const double *magnitude /* n_node x n_dim, or NULL */, int n_constraint,
                         int *active /* n_constraint, in and out */, int *is_done, int *outcome);
 
 /* Leave selected constraints out for the rest of the step; `active`: what is left. */
@@ -589,15 +597,15 @@ int emcon_drop(emcon_model *model, int n_redundant, const int *redundant /* n_re
 
 /* Areas that the multipliers of the step to `u1` act on, so that the pressure is lam/area, and
  * lengths of slave surface that belong to them at its end. */
-int emcon_get_areas(emcon_model *model, int n_node, const double *u1 /* n_node x 2 */,
+int emcon_get_areas(emcon_model *model, int n_node, const double *u1 /* n_node x n_dim */,
                     int n_constraint, double *area /* n_constraint */,
                     double *length /* n_constraint */);
 
 /* The deepest overlap of bodies in a step, per edge, found by geometry alone, whatever contact
  * says; and the node that is behind, -1: none. Surfaces of pairs are their outlines: of two of
  * which neither closes around its body nothing is found. */
-int emcon_overlap(emcon_model *model, int n_node, const double *u0 /* n_node x 2 */,
-                  const double *du /* n_node x 2 */, double *depth, int *node);
+int emcon_overlap(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                  const double *du /* n_node x n_dim */, double *depth, int *node);
 
 /* ---- tables: what decks may say -------------------------------------------------------------- */
 

@@ -128,7 +128,7 @@ public:
       return model;
    }
 
-   // A model of a host: nodes at the positions x0, y0, x1, y1, ...
+   // A model of a host in the plane: nodes at the positions x0, y0, x1, y1, ...
    static Model of_nodes(const std::vector<double> &x)
    {
       Model model;
@@ -229,25 +229,28 @@ public:
       return label;
    }
 
-   // x and y of each node, side by side.
+   // The sizes().n_dim coordinates of each node, side by side.
    std::vector<double> positions() const
    {
-      std::vector<double> x(n_freedom());
-      call(emcon_get_positions, static_cast<int>(x.size()/2), x.data());
+      const emcon_sizes of = sizes();
+      std::vector<double> x(n_freedom(of));
+      call(emcon_get_positions, of.n_node, x.data());
       return x;
    }
 
    std::vector<double> displacements() const
    {
-      std::vector<double> u(n_freedom());
-      call(emcon_get_state, static_cast<int>(u.size()/2), u.data(), nullptr);
+      const emcon_sizes of = sizes();
+      std::vector<double> u(n_freedom(of));
+      call(emcon_get_state, of.n_node, u.data(), nullptr);
       return u;
    }
 
    std::vector<double> velocities() const
    {
-      std::vector<double> v(n_freedom());
-      call(emcon_get_state, static_cast<int>(v.size()/2), nullptr, v.data());
+      const emcon_sizes of = sizes();
+      std::vector<double> v(n_freedom(of));
+      call(emcon_get_state, of.n_node, nullptr, v.data());
       return v;
    }
 
@@ -256,8 +259,12 @@ public:
    {
       if (!u.empty() && !v.empty() && u.size() != v.size())
          throw InputError(EMCON_ERROR_INPUT, "displacements and velocities differ in length");
+      const emcon_sizes of = sizes();
       const std::size_t n = u.empty() ? v.size() : u.size();
-      call(emcon_set_state, static_cast<int>(n/2), u.empty() ? nullptr : u.data(),
+      if (n != 0 && n != n_freedom(of))
+         throw InputError(EMCON_ERROR_INPUT, "the state has " + std::to_string(n)
+            + " numbers, but the model has " + std::to_string(n_freedom(of)));
+      call(emcon_set_state, of.n_node, u.empty() ? nullptr : u.data(),
            v.empty() ? nullptr : v.data(), 0, nullptr, nullptr, nullptr);
    }
 
@@ -343,7 +350,10 @@ private:
 
    Model() : owned_(new Owned) {}
    emcon_model **address() noexcept { return &owned_->model; }
-   std::size_t n_freedom() const { return 2*static_cast<std::size_t>(sizes().n_node); }
+   static std::size_t n_freedom(const emcon_sizes &of)
+   {
+      return static_cast<std::size_t>(of.n_dim)*static_cast<std::size_t>(of.n_node);
+   }
 
    void rethrow() const
    {

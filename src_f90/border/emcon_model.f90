@@ -11,6 +11,7 @@ module emcon_model
    use emcon_errors, only : err_input, err_none, error_t, raise
    use emcon_kinds, only : dp
    use emcon_recorder, only : recorder_t
+   use emcon_rotation, only : n_turn
    use emcon_stepper, only : stepper_t
    use emcon_stepper_query, only : query_follow, query_t
    use emcon_stepper_report, only : contact_report_t
@@ -140,6 +141,8 @@ contains
          sizes%n_step = size(scene%step)
          sizes%n_surface = size(scene%surface)
          sizes%n_tie = size(scene%tie)
+         sizes%n_dim = scene%n_dim
+         sizes%n_momentum = scene%n_dim + n_turn(scene%n_dim)
       end associate
       sizes%n_selected = model%query%march%active%set%n
       if (.not. allocated(model%stepper%march%scheme)) return

@@ -59,13 +59,13 @@ contains
 
       call check(potential, error)
       if (.not. allocated(error)) call stepper_give_potential(stepper, name, node, &
-         point_callback_t(n_variable=2, function=potential, user=user), error)
+         point_callback_t(n_variable=stepper%scene%n_dim, function=potential, user=user), error)
    end subroutine model_give_potential
 
    subroutine model_give_force(stepper, name, pattern, force, user, error)
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: name           !! for messages
-      type(csr_t), intent(in) :: pattern             !! (2 n_node x 2 n_node) of the tangent
+      type(csr_t), intent(in) :: pattern             !! (n_dim n_node, twice) of the tangent
       type(c_funptr), intent(in) :: force            !! emcon_force_function of emcon.h
       type(c_ptr), intent(in) :: user                !! handed to the function
       type(error_t), allocatable, intent(out) :: error

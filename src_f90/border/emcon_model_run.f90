@@ -31,7 +31,6 @@ contains
 
       call stepper_read(model%stepper, trim(deck), lines_of(parameters), is_lenient, error)
       call tell_all(model, error)
-      call refuse_space(model, error)
    end subroutine model_read
 
    subroutine model_read_text(model, text, name, parameters, is_lenient, error)
@@ -43,7 +42,6 @@ contains
       call stepper_read_text(model%stepper, text, [passage_t()], lines_of(name), &
          lines_of(parameters), is_lenient, error)
       call tell_all(model, error)
-      call refuse_space(model, error)
    end subroutine model_read_text
 
    subroutine model_read_passages(model, text, passage, names, parameters, is_lenient, error)
@@ -62,7 +60,6 @@ contains
          passage(3, k), passage(4, k) /= 0), k = 1, size(passage, 2))], lines_of(names), &
          lines_of(parameters), is_lenient, error)
       call tell_all(model, error)
-      call refuse_space(model, error)
    end subroutine model_read_passages
 
    subroutine model_open(model, deck, parameters, is_lenient, error)
@@ -74,18 +71,6 @@ contains
       call model_read(model, deck, parameters, is_lenient, error)
       if (.not. allocated(error)) call stepper_build(model%stepper, error)
    end subroutine model_open
-
-   !> The arrays of the interface are of the plane: a deck of three dimensions is run in one go.
-   subroutine refuse_space(model, error)
-      type(model_t), intent(inout) :: model
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (allocated(error) .or. .not. model%stepper%is_read) return
-      if (model%stepper%scene%n_dim < 3) return
-      model%stepper%is_read = .false.            ! no function may touch it
-      call raise(error, err_input, "the deck has three dimensions: the arrays of this interface " &
-         // "are of the plane; run it by the program emcon or by emcon_run")
-   end subroutine refuse_space
 
    !> Let the message of a failure hold all that is wrong with the deck, one per line.
    subroutine tell_all(model, error)
@@ -194,7 +179,6 @@ contains
       call restart_read(restart, path, error)
       if (.not. allocated(error)) call stepper_load(model%stepper, restart, error)
       if (.not. allocated(error)) call conditions_exchange(model%stepper, restart, error)
-      call refuse_space(model, error)
       if (allocated(error)) model%stepper%is_read = .false.    ! there is nothing to work with
    end subroutine model_load
 

@@ -38,6 +38,8 @@ contains
    pure subroutine model_ledger(model, ledger)
       type(model_t), intent(in) :: model
       type(ledger_c), intent(out) :: ledger
+      integer, parameter :: x = 1, y = 2, z = 3
+      real(c_double) :: p(z), l(z)                   !! momentum, angular momentum
 
       associate (from => model%stepper%march%ledger)
          ledger%kinetic = real(from%kinetic, c_double)
@@ -46,15 +48,22 @@ contains
          ledger%external_work = real(from%external_work, c_double)
          ledger%contact_work = real(from%contact_work, c_double)
          ledger%total = real(from%total, c_double)
-         ledger%px = real(from%momentum(1), c_double)
-         ledger%py = real(from%momentum(2), c_double)
-         ledger%lz = real(from%angular(size(from%angular)), c_double)
          ledger%stabilization = real(from%stabilization, c_double)
          ledger%restitution_loss = real(from%restitution, c_double)
          ledger%scheme_loss = real(from%decay, c_double)
          ledger%damping_loss = real(from%damping, c_double)
          ledger%contact_energy = real(from%contact_energy, c_double)
+         p = 0.0_c_double
+         l = 0.0_c_double
+         p(:size(from%momentum)) = real(from%momentum, c_double)
+         l(z + 1 - size(from%angular):) = real(from%angular, c_double)
       end associate
+      ledger%px = p(x)
+      ledger%py = p(y)
+      ledger%pz = p(z)
+      ledger%lx = l(x)
+      ledger%ly = l(y)
+      ledger%lz = l(z)
    end subroutine model_ledger
 
    subroutine model_verdict(model, is_good, json)

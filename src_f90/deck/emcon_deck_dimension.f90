@@ -24,6 +24,7 @@ module emcon_deck_dimension
       character(len=14) :: name                    !! as `card_t` has it
       character(len=21) :: what
       character(len=3) :: verb = "is"
+      logical :: is_of_space = .false.             !! may stand in three dimensions
    end type plane_card_t
 
    type(plane_card_t), parameter :: plane_cards(*) = [ &
@@ -33,7 +34,7 @@ module emcon_deck_dimension
       plane_card_t("RIGIDBODY", "rigid bodies", "are"), &
       plane_card_t("USERELEMENT", "elements of a program", "are"), &
       plane_card_t("USERMATERIAL", "laws of a program", "are"), &
-      plane_card_t("GIVENFORCES", "forces of a program", "are")]
+      plane_card_t("GIVENFORCES", "forces of a program", "are", .true.)]
 
    !> What a card or a value is refused for.
    character(len=*), parameter :: in_space = "in three dimensions", &
@@ -104,7 +105,8 @@ contains
       is_kept = .true.
       is_told = .false.
       do i = 1, size(is_kept)
-         k = findloc(plane_cards%name == reader%card(i)%name, .true., 1)
+         k = findloc(plane_cards%name == reader%card(i)%name .and. .not. &
+            (plane_cards%is_of_space .and. n_dim == n_space), .true., 1)
          is_kept(i) = k == 0 .and. index(reader%card(i)%name, "CONTACTINCLUSIONS") == 0 &
             .and. index(reader%card(i)%name, "CONTACTPROPERTY") == 0
          if (k == 0) cycle

@@ -34,7 +34,7 @@ static void stale(void)
 {
    emcon_csr a, b;
    WORKS(emcon_get_sizes(m, &sizes));
-   double *nodal = numbers(2*sizes.n_node), *unknown = numbers(sizes.n_unknown),
+   double *nodal = numbers(sizes.n_dim*sizes.n_node), *unknown = numbers(sizes.n_unknown),
           *lam = numbers(sizes.n_constraint);
    REFUSED(emcon_residual(m, 1, sizes.n_node, nodal, sizes.n_unknown, unknown));
    REFUSED(emcon_tangent(m, 1, &a));
@@ -51,7 +51,7 @@ static void evaluate(void)
    emcon_constraint_report report;
    WORKS(emcon_get_sizes(m, &sizes));
    const int n = sizes.n_node, nc = sizes.n_constraint;
-   double *u1 = numbers(2*n), *nodal = numbers(2*n), *unknown = numbers(sizes.n_unknown),
+   double *u1 = numbers(sizes.n_dim*n), *nodal = numbers(sizes.n_dim*n), *unknown = numbers(sizes.n_unknown),
           *lam = numbers(nc);
    int *active = calloc((size_t)nc + 1, sizeof *active);
    WORKS(emcon_guess(m, 1e-3, n, u1));
@@ -116,11 +116,21 @@ static void look(void)
    const char *text = NULL;
    double fraction = -1, t_end = -1;
    WORKS(emcon_get_elements(m, n, label, kind, node));
-   need(node[0] >= 0 && node[19] == -1 && kind[0] == 9, "an element");
+   need(node[0] >= 0 && node[19] == -1 && kind[0] == (sizes.n_dim == 2 ? 9 : 12), "an element");
    WORKS(emcon_get_elements(m, n, NULL, NULL, node));
    REFUSED(emcon_get_elements(m, n + 1, label, kind, node));
    WORKS(emcon_get_bodies(m, sizes.n_node, body));
    need(body[node[0]] >= 0 && body[node[0]] < sizes.n_body, "its body");
+   double *momenta = numbers(sizes.n_momentum*sizes.n_body);
+   double *x = numbers(sizes.n_dim*sizes.n_node), *u = numbers(sizes.n_dim*sizes.n_node);
+   WORKS(emcon_get_momenta(m, sizes.n_body, momenta));
+   WORKS(emcon_get_positions(m, sizes.n_node, x));
+   WORKS(emcon_get_state(m, sizes.n_node, u, x));
+   WORKS(emcon_set_state(m, sizes.n_node, u, x, 0, NULL, NULL, NULL));
+   WORKS(emcon_gather(m, sizes.n_node, u));
+   free(momenta);
+   free(x);
+   free(u);
    REFUSED(emcon_get_bodies(m, sizes.n_node - 1, body));
    REFUSED(emcon_find_elements(m, "no such set", n, label));
    REFUSED(emcon_find_faces(m, "no such surface", n, face));
@@ -197,23 +207,24 @@ int main(int argc, char **argv)
    look();
    kernels();
    int *label = calloc((size_t)sizes.n_node, sizeof *label),
-       *unknown = calloc(2*(size_t)sizes.n_node, sizeof *unknown);
+       *unknown = calloc((size_t)sizes.n_dim*(size_t)sizes.n_node, sizeof *unknown);
    WORKS(emcon_get_labels(m, sizes.n_node, label));
    WORKS(emcon_unknowns(m, sizes.n_node, unknown));
+   const int n_dim = sizes.n_dim;
    int n_changed = 0, changed[3];
-   for (int d = 0; d < 2*sizes.n_node && n_changed < 3; ++d) {
+   for (int d = 0; d < n_dim*sizes.n_node && n_changed < 3; ++d) {
       if (unknown[d] < 0) continue;
-      WORKS(emcon_prescribe(m, label[d/2], d%2 + 1, 0));
+      WORKS(emcon_prescribe(m, label[d/n_dim], d%n_dim + 1, 0));
       changed[n_changed++] = d;
       stale();
       evaluate();
-      WORKS(emcon_prescribe(m, label[d/2], d%2 + 1, 1e-9));
-      REFUSED(emcon_add_prescribed(m, label[d/2], d%2 + 1, 0));
+      WORKS(emcon_prescribe(m, label[d/n_dim], d%n_dim + 1, 1e-9));
+      REFUSED(emcon_add_prescribed(m, label[d/n_dim], d%n_dim + 1, 0));
    }
    WORKS(emcon_step(m, 1e-3, NULL));
    evaluate();
    for (int i = 0; i < n_changed; ++i) {
-      WORKS(emcon_remove_prescribed(m, label[changed[i]/2], changed[i]%2 + 1));
+      WORKS(emcon_remove_prescribed(m, label[changed[i]/n_dim], changed[i]%n_dim + 1));
       stale();
       evaluate();
    }

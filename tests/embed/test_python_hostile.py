@@ -261,7 +261,7 @@ def test_names_of_files_that_are_none(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_faces_that_are_arrays() -> None:
-    with pytest.raises(InputError, match="a face is 1 to 4"):
+    with pytest.raises(InputError, match="a face is 1 to 6"):
         square().surface("S", faces=[(0, np.array([1, 2]))])
 
 

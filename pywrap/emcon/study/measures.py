@@ -58,7 +58,7 @@ def measure(paths: ResultPaths, windows: int = WINDOWS) -> dict[str, Measured]:
     bodies = read_bodies(paths)
     found = {**_of_history(history), **_of_pairs(history, windows), **_of_verdict(paths)}
     if bodies is not None:
-        p = np.stack([bodies.px, bodies.py], axis=2)
+        p = bodies.momentum
         v = _per_mass(p, bodies.mass[:, None])
         found["rebound"] = _of_rows(v[-1], v)
     pairs = read_pairs(paths)
