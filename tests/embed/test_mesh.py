@@ -262,10 +262,11 @@ SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
 
 
 @pytest.mark.parametrize(("nodes", "elements", "message"), [
-    ([[0, 0, 0]], {"CPE3": [[1, 2, 3]]}, r"\(n, 2\) array"),
+    ([[0, 0, 0]], {"CPE3": [[1, 2, 3]]}, "nodes with 2 coordinates, not 3"),
+    ([[0, 0, 0, 0]], {"CPE3": [[1, 2, 3]]}, r"\(n, 2\) or \(n, 3\) array"),
     ([[0, 0], [1, math.nan], [1, 1]], {"CPE3": [[1, 2, 3]]}, r"nodes\[1\] is not finite"),
     (SQUARE, {}, "no elements"),
-    (SQUARE, {"CPE8": [[1, 2, 3, 4]]}, "no kind of element; known are CPE3, CPE4"),
+    (SQUARE, {"CPE9": [[1, 2, 3, 4]]}, "no kind of element; known are CPE3, CPE4"),
     (SQUARE, {"CPE4": [[1, 2, 3]]}, r"shape \(k, 4\) is wanted, not \(1, 3\)"),
     (SQUARE, {"CPE4": [[1.0, 2.0, 3.0, 4.0]]}, "whole numbers, not float64"),
     (SQUARE, {"CPE4": [[0, 1, 2, 3]]}, "labels are from 1"),
@@ -314,7 +315,7 @@ def test_sets_and_labels_that_cannot_be() -> None:
 def test_shapes_that_cannot_be() -> None:
     for call, message in (
             (lambda: block(size=(0.0, 1.0)), "size"), (lambda: block(cells=(0, 1)), "cells"),
-            (lambda: block(cells=(1.5, 1)), "cells"), (lambda: block(kind="CPE6"), "CPE6"),
+            (lambda: block(cells=(1.5, 1)), "cells"), (lambda: block(kind="CPE5"), "CPE5"),
             (lambda: ring(radii=(2.0, 1.0)), "radii that grow"),
             (lambda: ring(cells=(2, 1)), "at least 3"), (lambda: disc(radius=-1.0), "radius"),
             (lambda: strip([(0, 0), (1, 0)], 0.0), "thickness"),

@@ -179,9 +179,9 @@ def test_abaqus_needs_no_meshio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize(("old", "new", "message"), [
-    ("TYPE=CPS4R", "TYPE=C3D8R", r"a\.inp:11: the mesh is three-dimensional.*C3D8R"),
-    ("TYPE=CPS4R", "TYPE=CPE8R", r"a\.inp:11: elements of higher order, of the kind CPE8R"),
-    ("TYPE=T2D2", "TYPE=B22", "higher order, of the kind B22"),
+    ("TYPE=CPS4R", "TYPE=C3D6", r"a\.inp:11: EMCON has no elements of the kind C3D6"),
+    ("TYPE=CPS4R", "TYPE=CPE8R", "the last element has too few nodes"),
+    ("TYPE=T2D2", "TYPE=B23", "no elements of the kind B23"),
     ("TYPE=CPS4R", "TYPE=SPRING1", "no elements of the kind SPRING1"),
     ("TYPE=CPS4R,", "", r"of the kind \(none\)"),
     (" 20, 1., 0., 0.", " 20, 1., 0., 0.5", "three-dimensional: z goes from 0 to 0.5"),
@@ -210,7 +210,7 @@ def test_bad_abaqus_files(tmp_path: Path, old: str, new: str, message: str) -> N
 
 
 def test_files_without_a_mesh(tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match="no plane elements"):
+    with pytest.raises(MeshError, match="no elements in the plane or in space"):
         read(write(tmp_path/"a.inp", ""))
     with pytest.raises(FileNotFoundError):
         read(tmp_path/"none.inp")
@@ -268,9 +268,9 @@ def test_gmsh_element_may_be_in_two_groups(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("old", "new", "message"), [
     ("3 2 0 0.5", "3 2 0 0.6", "three-dimensional: z goes from 0.5 to 0.6"),
     ("3 2 0 0.5", "3 nan 0 0.5", "not finite"),
-    ("7 2 2 3 1 2 5 6", "7 4 2 3 1 2 5 6 3", "three-dimensional.*tetra"),
-    ("7 2 2 3 1 2 5 6", "7 9 2 3 1 2 5 6 1 3 4", "higher order, of the kind triangle6"),
-    ("2 1 2 1 1 4 1", "2 8 2 1 1 4 1 2", "higher order, of the kind line3"),
+    ("7 2 2 3 1 2 5 6", "7 4 2 3 1 2 5 6 3", "of C3D4 has no volume"),
+    ("7 2 2 3 1 2 5 6", "7 21 2 3 1 2 5 6 1 3 4 2 5 6 1", "no elements of the kind triangle10"),
+    ("2 1 2 1 1 4 1", "2 26 2 1 1 4 1 2 5", "no elements of the kind line4"),
     ("7 2 2 3 1 2 5 6", "7 2 2 3 1 2 3 3", "no area"),
     ('1 4 "Middle"', '1 4 "left_side"', "two groups would have the name LEFT_SIDE"),
     ("$MeshFormat\n2.2", "$MeshFormat\n9.9", "meshio cannot read it"),

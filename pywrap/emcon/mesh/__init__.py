@@ -1,4 +1,4 @@
-"""Meshes of CPE3 and CPE4 elements with sets and surfaces.
+"""Meshes in the plane and in space, with sets and surfaces.
 
     from emcon.mesh import block, ring
     from emcon.model import Model
@@ -13,7 +13,8 @@
 The sides of what the builders make have names: BLOCK_TOP, RING_OUTER, ... Each is a surface and
 the set of its nodes; the body itself is a set of nodes and of elements. `read` takes meshes from
 files of Gmsh and Abaqus; `refine` cuts each element in four; `boundary_edges` finds the edges of
-bodies in cells of any code.
+bodies in cells of any code. Elements are of any kind that decks know: `block(kind="C3D10")`,
+`Mesh.retype({"C3D8": "C3D20R"})`.
 
 Lengths are in the deck's unit [L], angles in radians, counter-clockwise. Nodes and elements are
 named by their labels, whole numbers from 1 on, as in a deck.

@@ -12,14 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from .checks import KINDS, Labels, MeshError
+from .checks import Labels, MeshError, kind_of
+from .kinds import shape_of
 from .mesh import Mesh
 from .repair import add_lines, check_plane, fresh_name, turn_clockwise, warn
 
 #: Families of plane elements: plane strain, plane stress, shells and membranes of a flat mesh.
 _PLANE = re.compile(r"(?:CPE|CPS|CPEG|CAX|CGAX|M3D|STRI|S|R3D|SFM3D)(\d+)[A-Z]*\d*")
 _LINE = re.compile(r"(?:T2D|T3D|B2|B3|R2D|RB2D|RB3D|RAX|SAX|F2D)(\d+)[A-Z]*")
-_SOLID = re.compile(r"C3D\d+[A-Z]*|SC[68]R?|CSS8")
+_SOLID = re.compile(r"C3D(4|8|10|20)[A-Z]*")
+#: Kinds in space that keep their name.
+_OWN = ("C3D4", "C3D8", "C3D8H", "C3D10", "C3D20", "C3D20R")
 _MAX_DEPTH = 20
 
 
@@ -95,7 +98,8 @@ class _Model:
     def __init__(self, source: str) -> None:
         self.source = source
         self.node: dict[int, list[float]] = {}
-        self.element: dict[int, list[int]] = {}       # plane ones and lines
+        self.element: dict[int, list[int]] = {}       # solids, those in the plane, lines
+        self.kind: dict[int, str] = {}                # of each; "" of a line
         self.node_set: dict[str, list[int]] = {}
         self.element_set: dict[str, list[int]] = {}
         self.surface: dict[str, list[tuple[str, list[str]]]] = {}
@@ -126,7 +130,7 @@ class _Model:
             self._join(self.node_set, card.options.get("NSET"), [label])
 
     def _element(self, card: _Card) -> None:
-        n = self._node_count(card)
+        kind, n = self._kind(card)
         words: list[str] = []
         for place, more in card.data:
             words += more
@@ -143,17 +147,18 @@ class _Model:
                 raise MeshError(f"{place}: element {label} names node {missing[0]}, which is not "
                                 "there")
             self.element[label] = nodes
+            self.kind[label] = kind
             self._join(self.element_set, card.options.get("ELSET"), [label])
             words = []
         if words:
             raise MeshError(f"{card.place}: the last element has too few nodes")
 
-    def _node_count(self, card: _Card) -> int:
-        """Nodes of the element kind: 2 for lines, 3, 4."""
+    def _kind(self, card: _Card) -> tuple[str, int]:
+        """The kind that elements become, "" for lines, and how many nodes they have."""
         kind = card.options.get("TYPE", "").upper()
-        if _SOLID.fullmatch(kind):
-            raise MeshError(f"{card.place}: the mesh is three-dimensional: elements of the kind "
-                            f"{kind}; EMCON takes plane meshes")
+        solid = _SOLID.fullmatch(kind)
+        if solid:
+            return kind if kind in _OWN else f"C3D{solid[1]}", int(solid[1])
         plane, line = _PLANE.fullmatch(kind), _LINE.fullmatch(kind)
         if line:
             # beams are counted otherwise: B21 and B31 are straight, B22 and B32 curved
@@ -163,10 +168,9 @@ class _Model:
             count = int(plane[1]) if not kind.startswith("STRI") else (6 if "65" in kind else 3)
         else:
             raise MeshError(f"{card.place}: EMCON has no elements of the kind {kind or '(none)'}")
-        if count > (2 if line else 4):
-            raise MeshError(f"{card.place}: elements of higher order, of the kind {kind}; EMCON "
-                            "takes linear ones")
-        return count
+        if count > 3 if line else not shape_of(f"CPE{count}"):
+            raise MeshError(f"{card.place}: EMCON has no elements of the kind {kind}")
+        return "" if line else f"CPE{count}", count
 
     @staticmethod
     def _join(sets: dict[str, list[int]], name: str | None, labels: list[int]) -> None:
@@ -214,15 +218,17 @@ class _Model:
 
     def mesh(self) -> Mesh:
         """All that was defined, as a mesh."""
-        plane = {label: nodes for label, nodes in self.element.items() if len(nodes) > 2}
-        if not plane:
-            raise MeshError(f"{self.source} has no plane elements")
+        found = sorted({kind for kind in self.kind.values() if kind})
+        if not found:
+            raise MeshError(f"{self.source} has no elements in the plane or in space")
+        n_dim = max(kind_of(kind).n_dim for kind in found)
+        kinds = [kind for kind in found if kind_of(kind).n_dim == n_dim]
+        plane = {e: nodes for e, nodes in self.element.items() if self.kind[e] in kinds}
         elements, labels = {}, {}
-        for kind, count in KINDS.items():
-            chosen = {label: nodes for label, nodes in plane.items() if len(nodes) == count}
-            if chosen:
-                labels[kind] = np.array(list(chosen), dtype=np.int64)
-                elements[kind] = np.array(list(chosen.values()), dtype=np.int64)
+        for kind in kinds:
+            chosen = {label: nodes for label, nodes in plane.items() if self.kind[label] == kind}
+            labels[kind] = np.array(list(chosen), dtype=np.int64)
+            elements[kind] = np.array(list(chosen.values()), dtype=np.int64)
         used = np.unique(np.concatenate([nodes.ravel() for nodes in elements.values()]))
         if len(used) < len(self.node):
             warn(f"{self.source}: {len(self.node) - len(used)} nodes belong to no element; "
@@ -230,10 +236,13 @@ class _Model:
         kept = set(used.tolist())
         order = np.array([label for label in self.node if label in kept], dtype=np.int64)
         x = np.array([self.node[label] for label in order.tolist()])
-        check_plane(self.source, x)
+        if n_dim == 2:
+            check_plane(self.source, x)
+        elif not np.isfinite(x).all():
+            raise MeshError(f"{self.source}: a coordinate is not finite")
         ascending = np.argsort(order)
-        turned = turn_clockwise(self.source, x[ascending, :2], order[ascending], elements, labels)
-        mesh = Mesh(x[:, :2], elements, node_labels=order, element_labels=labels)
+        turned = turn_clockwise(self.source, x[ascending, :n_dim], order[ascending], elements, labels)
+        mesh = Mesh(x[:, :n_dim], elements, node_labels=order, element_labels=labels)
         self._add_sets(mesh, plane, kept)
         for name, data in self.surface.items():
             faces = self._faces(mesh, data, plane, turned)
@@ -248,14 +257,25 @@ class _Model:
             solid = list(dict.fromkeys(e for e in members if e in plane))
             if solid:
                 mesh.add_element_set(fresh_name(mesh.element_sets, self.source, name), solid)
-            lines = np.array([self.element[e] for e in members if e not in plane])
-            if len(lines) and name not in self.surface:
-                add_lines(mesh, self.source, name, lines)
-                node_set.setdefault(name, np.unique(lines).tolist())
+            other = [e for e in members if e not in plane]
+            lines = [row for row in (self._side(e, mesh.n_dim) for e in other) if row]
+            if other and name not in self.surface:
+                if len(lines) == len(other):
+                    add_lines(mesh, self.source, name, np.array(lines))
+                node_set.setdefault(name, sorted({k for e in other for k in self.element[e]}))
         for name, members in node_set.items():
             inside = list(dict.fromkeys(k for k in members if k in kept))
             if inside:
                 mesh.add_node_set(fresh_name(mesh.node_sets, self.source, name), inside)
+
+    def _side(self, e: int, n_dim: int) -> list[int]:
+        """Corners of a line or, in space, of a face, 0 behind three; none for what is no side."""
+        kind, nodes = self.kind[e], self.element[e]
+        if n_dim == 2:
+            return nodes[:2]
+        if not kind:
+            return []
+        return (nodes[:kind_of(kind).n_corner] + [0])[:4]
 
     def _faces(self, mesh: Mesh, data: list[tuple[str, list[str]]],
                plane: dict[int, list[int]], turned: set[int]) -> Labels:
@@ -268,11 +288,12 @@ class _Model:
                 free = mesh.boundary() if free is None else free
                 rows += [(int(e), int(f)) for e, f in free if e in set(members)]
                 continue
-            if not re.fullmatch(r"S[1-4]", words[1].upper()):
-                raise MeshError(f"{place}: {words[1]} is not a face of a plane element, S1 to S4")
+            if not re.fullmatch(r"S[1-6]", words[1].upper()):
+                raise MeshError(f"{place}: {words[1]} is not a face of an element, S1 to S6")
             face = int(words[1][1])
-            short = [e for e in members if len(plane[e]) < face]
+            short = [e for e in members if len(kind_of(self.kind[e]).faces) < face]
             if short:
                 raise MeshError(f"{place}: element {short[0]} has no face S{face}")
-            rows += [(e, len(plane[e]) + 1 - face if e in turned else face) for e in members]
+            rows += [(e, 1 + kind_of(self.kind[e]).mirrored_faces[face - 1] if e in turned else face)
+                     for e in members]
         return np.array(rows, dtype=np.int64).reshape(-1, 2)

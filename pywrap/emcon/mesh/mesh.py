@@ -10,29 +10,32 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..deck_text import set_text, table, write_text
-from .checks import (KINDS, Array, Labels, MeshError, checked_name, corner_fault, label_array,
-                     places, point_of, positions, refuse_twice)
+from ..deck_text import element_table, set_text, table, write_text
+from .checks import (FAULTS, Array, Labels, MeshError, checked_name, corner_fault, kind_of,
+                     label_array, places, point_of, positions, refuse_twice)
+from .kinds import middles
 
 
 class Mesh:
     """Nodes, elements, sets and surfaces.
 
-    nodes           (n, 2) positions [L]
-    elements        by kind, CPE3 or CPE4: (m, 3) or (m, 4) node labels, counter-clockwise
+    nodes           (n, 2) positions [L], or (n, 3)
+    elements        by kind, as decks call it (CPE4, C3D10, ...): (m, k) node labels in the order of
+                    docs/deck.md, in the plane counter-clockwise
     node_labels     (n,) whole numbers from 1 on, each once; default 1..n
     element_labels  by kind, (m,); default 1.. in the order of `elements`
     node_sets       by name, (k,) node labels
     element_sets    by name, (k,) element labels
-    surfaces        by name, (k, 2) rows of element label and face 1..4; face i goes from corner i
-                    to the next
+    surfaces        by name, (k, 2) rows of element label and face from 1; in the plane face i goes
+                    from corner i to the next
 
     The attributes have the same names and shapes. Names are kept in capitals, as decks do not
     distinguish case. Positions, elements and labels do not change once the mesh is made: `move`,
     `rotate`, `scale`, `mirror` and `+` give new meshes.
 
     Raises `MeshError` for wrong shapes, positions that are not finite, labels that are missing or
-    used twice, nodes without element, and elements without area, folded or numbered clockwise.
+    used twice, nodes without element, elements in the plane beside others in space, and elements
+    without area or volume, folded, or numbered clockwise or as their mirror image.
     """
 
     def __init__(self, nodes: ArrayLike, elements: Mapping[str, ArrayLike], *,
@@ -42,7 +45,7 @@ class Mesh:
                  element_sets: Mapping[str, ArrayLike] | None = None,
                  surfaces: Mapping[str, ArrayLike] | None = None) -> None:
         self.nodes: Array = positions(nodes)
-        n = len(self.nodes)
+        n, self.n_dim = self.nodes.shape
         self.node_labels = label_array(np.arange(1, n + 1) if node_labels is None else node_labels,
                                    "node_labels", (n,))
         refuse_twice(self.node_labels, "node")
@@ -70,9 +73,11 @@ class Mesh:
                             f"{_listed(elements)}")
         first = 1
         for kind, nodes in elements.items():
-            if kind not in KINDS:
-                raise MeshError(f"{kind!r} is no kind of element; known are {_listed(KINDS)}")
-            array = label_array(nodes, f"elements[{kind!r}]", (None, KINDS[kind]))
+            shape = kind_of(kind)
+            if shape.n_dim != self.n_dim:
+                raise MeshError(f"elements of {kind} have nodes with {shape.n_dim} coordinates, "
+                                f"not {self.n_dim}")
+            array = label_array(nodes, f"elements[{kind!r}]", (None, shape.n_node))
             if not len(array):
                 continue
             self.elements[kind] = array
@@ -88,9 +93,8 @@ class Mesh:
         used = np.zeros(len(self.nodes), dtype=bool)
         for kind, nodes in self.elements.items():
             used[self.rows(nodes)] = True
-            fault = corner_fault(self.nodes[self.rows(nodes)])
-            for code, text in ((1, "has no area"), (2, "is numbered clockwise"),
-                               (3, "is folded: the angle at a corner is 180 degrees or more")):
+            fault = corner_fault(self.nodes[self.rows(nodes[:, :kind_of(kind).n_corner])])
+            for code, text in enumerate(FAULTS[self.n_dim], 1):
                 bad = self.element_labels[kind][fault == code]
                 if len(bad):
                     others = f" (and {len(bad) - 1} others)" if len(bad) > 1 else ""
@@ -129,56 +133,68 @@ class Mesh:
         return places(self.node_labels, self._node_order, labels, "node")
 
     def connectivity(self, kind: str) -> NDArray[np.int64]:
-        """Elements of one kind as rows of `nodes`, from 0: (m, 3) or (m, 4)."""
+        """Elements of one kind as rows of `nodes`, from 0: (m, k)."""
         return self.rows(self.elements[kind])
 
     def faces_of(self, labels: ArrayLike) -> NDArray[np.int64]:
         """Number of faces of each element, same shape. Raises `MeshError` for unknown labels."""
         known = np.concatenate(list(self.element_labels.values()))
-        count = np.repeat([KINDS[k] for k in self.elements],
+        count = np.repeat([len(kind_of(k).faces) for k in self.elements],
                           [len(e) for e in self.elements.values()])
         found: Labels = count[places(known, np.argsort(known, kind="stable"), labels, "element")]
         return found
 
     def all_faces(self) -> tuple[Labels, Labels]:
-        """Faces of all elements: (k, 2) element and face; (k, 2) labels of its two nodes."""
+        """Faces of all elements: (k, 2) element and face; labels of its corners.
+
+        These are (k, 2) in the plane, (k, 4) in space, the last one 0 where a face has three.
+        """
         faces, ends = [], []
+        width = 2 if self.n_dim == 2 else 4
         for kind, nodes in self.elements.items():
-            for i in range(KINDS[kind]):
+            for i, corners in enumerate(kind_of(kind).faces):
                 label = self.element_labels[kind]
                 faces.append(np.column_stack([label, np.full(len(label), i + 1)]))
-                ends.append(np.column_stack([nodes[:, i], nodes[:, (i + 1) % KINDS[kind]]]))
+                at = np.zeros((len(label), width), dtype=np.int64)
+                at[:, :len(corners)] = nodes[:, list(corners)]
+                ends.append(at)
         return np.concatenate(faces), np.concatenate(ends)
 
-    def boundary(self, where: Callable[[Array, Array], ArrayLike] | None = None) -> Labels:
+    def boundary(self, where: Callable[..., ArrayLike] | None = None) -> Labels:
         """Free faces as (k, 2) rows of element and face, for `add_surface`.
 
-        where   function of x and y, both (k,) [L], that gives truth values (k,): a face counts if
-                both its ends do; default all free faces
+        where   function of x and y, in space of x, y and z, all (k,) [L], that gives truth values
+                (k,): a face counts if all its corners do; default all free faces
         """
         faces, ends = self.all_faces()
         _, inverse, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True,
                                       return_counts=True)
         chosen = count[inverse.ravel()] == 1
         if where is not None:
-            chosen &= self._true_at(where)[self.rows(ends)].all(axis=1)
+            known = np.where(ends > 0, ends, ends[:, :1])
+            chosen &= self._true_at(where)[self.rows(known)].all(axis=1)
         found: Labels = faces[chosen]
         return found
 
-    def nodes_where(self, where: Callable[[Array, Array], ArrayLike]) -> Labels:
-        """Labels (k,) of the nodes at which `where(x, y)` is true, for `add_node_set`."""
+    def nodes_where(self, where: Callable[..., ArrayLike]) -> Labels:
+        """Labels (k,) of the nodes at which `where(x, y)` is true, for `add_node_set`.
+
+        In space `where(x, y, z)`.
+        """
         return self.node_labels[self._true_at(where)]
 
-    def _true_at(self, where: Callable[[Array, Array], ArrayLike]) -> NDArray[np.bool_]:
-        return np.broadcast_to(np.asarray(where(self.nodes[:, 0], self.nodes[:, 1]), dtype=bool),
-                               len(self.nodes))
+    def _true_at(self, where: Callable[..., ArrayLike]) -> NDArray[np.bool_]:
+        return np.broadcast_to(np.asarray(where(*self.nodes.T), dtype=bool), len(self.nodes))
 
     def surface_nodes(self, name: str) -> Labels:
         """Labels (k,) of the nodes of a surface, each once, ascending."""
-        faces, ends = self.all_faces()
         wanted = self.surfaces[name.upper()]
-        key, chosen = (8*array[:, 0] + array[:, 1] for array in (faces, wanted))
-        return np.unique(ends[np.isin(key, chosen)])
+        found = [np.empty(0, np.int64)]
+        for kind, nodes in self.elements.items():
+            for i in range(len(kind_of(kind).faces)):
+                chosen = np.isin(self.element_labels[kind], wanted[wanted[:, 1] == i + 1, 0])
+                found.append(nodes[chosen][:, kind_of(kind).face_nodes(i)].ravel())
+        return np.unique(np.concatenate(found))
 
     def __repr__(self) -> str:
         elements = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in self.elements.items())
@@ -193,39 +209,87 @@ class Mesh:
                     node_sets=self.node_sets, element_sets=self.element_sets,
                     surfaces=self.surfaces if surfaces is None else surfaces)
 
-    def move(self, dx: float, dy: float) -> Mesh:
-        """Shifted by (dx, dy) [L]."""
-        return self._with(self.nodes + np.array([dx, dy]))
+    def move(self, *by: float) -> Mesh:
+        """Shifted by dx, dy, in space dx, dy, dz [L]."""
+        return self._with(self.nodes + point_of(by, "the way", self.n_dim))
 
-    def rotate(self, angle: float, centre: ArrayLike = (0.0, 0.0)) -> Mesh:
-        """Turned by `angle` [rad] about `centre` (2,) [L]."""
+    def rotate(self, angle: float, centre: ArrayLike | None = None,
+               axis: ArrayLike = (0.0, 0.0, 1.0)) -> Mesh:
+        """Turned by `angle` [rad] about `centre` (2,) [L], default the origin.
+
+        In space about the axis through `centre` (3,) along `axis` (3,), of any length.
+        """
         c, s = math.cos(angle), math.sin(angle)
-        arm = self.nodes - point_of(centre, "centre")
-        return self._with(point_of(centre, "centre") + arm @ np.array([[c, s], [-s, c]]))
+        arm = self.nodes - self._point(centre)
+        if self.n_dim == 2:
+            return self._with(self._point(centre) + arm @ np.array([[c, s], [-s, c]]))
+        e = point_of(axis, "axis", 3)
+        if not np.linalg.norm(e) > 0.0:
+            raise MeshError("the axis of a turn is 0")
+        e = e/np.linalg.norm(e)
+        turned = c*arm + s*np.cross(e, arm) + (1.0 - c)*np.outer(arm @ e, e)
+        return self._with(self._point(centre) + turned)
 
-    def scale(self, factor: ArrayLike, centre: ArrayLike = (0.0, 0.0)) -> Mesh:
-        """Stretched from `centre` (2,) [L] by one factor, or by two along x and y, all above 0."""
-        by = np.broadcast_to(np.asarray(factor, dtype=float), 2)
+    def _point(self, centre: ArrayLike | None) -> Array:
+        return point_of(np.zeros(self.n_dim) if centre is None else centre, "centre", self.n_dim)
+
+    def scale(self, factor: ArrayLike, centre: ArrayLike | None = None) -> Mesh:
+        """Stretched from `centre` [L], default the origin, by one factor, or by one along each axis.
+
+        All are above 0.
+        """
+        by = np.broadcast_to(np.asarray(factor, dtype=float), self.n_dim)
         if not (by > 0.0).all():
             raise MeshError(f"factors are above 0, not {by}; `mirror` gives mirror images")
-        return self._with(point_of(centre, "centre") + by*(self.nodes - point_of(centre, "centre")))
+        return self._with(self._point(centre) + by*(self.nodes - self._point(centre)))
 
     def mirror(self, point: ArrayLike, direction: ArrayLike) -> Mesh:
         """Mirror image in the line through `point` (2,) [L] along `direction` (2,).
 
-        Elements begin at the same corner and are turned; surfaces keep their places.
+        In space in the plane through `point` (3,) that `direction` (3,) is square to. Elements
+        begin at the same corner and are turned; surfaces keep their places.
         """
-        along = point_of(direction, "direction")
+        along = point_of(direction, "direction", self.n_dim)
         if not np.abs(along).max() > 0.0:
             raise MeshError("the direction of the mirror line is 0")
         along = along/np.abs(along).max()
         along = along/np.linalg.norm(along)
-        arm = self.nodes - point_of(point, "point")
-        image = point_of(point, "point") + 2.0*np.outer(arm @ along, along) - arm
-        turned = {k: np.column_stack([e[:, :1], e[:, :0:-1]]) for k, e in self.elements.items()}
-        faces = {name: np.column_stack([f[:, 0], self.faces_of(f[:, 0]) + 1 - f[:, 1]])
-                 for name, f in self.surfaces.items()}
+        start = point_of(point, "point", self.n_dim)
+        arm = self.nodes - start
+        image = 2.0*np.outer(arm @ along, along) - arm
+        image = start + (image if self.n_dim == 2 else -image)
+        turned = {k: e[:, kind_of(k).mirrored] for k, e in self.elements.items()}
+        faces = {name: self.mirrored_faces(f) for name, f in self.surfaces.items()}
         return self._with(image, turned, faces)
+
+    def mirrored_faces(self, faces: Labels) -> Labels:
+        """Faces (k, 2), element and face, where elements are numbered as their mirror images."""
+        found = np.array(faces)
+        for kind, labels in self.element_labels.items():
+            chosen = np.isin(faces[:, 0], labels)
+            place = np.array(kind_of(kind).mirrored_faces)
+            found[chosen, 1] = 1 + place[faces[chosen, 1] - 1]
+        return found
+
+    def retype(self, kinds: Mapping[str, str]) -> Mesh:
+        """With elements of other kinds, `{old: new}`: of the same nodes, or quadratic for linear.
+
+        The nodes between the corners then stand in the middle of straight edges, with labels above
+        those that there are; they are in a node set where both ends of the edge are.
+        """
+        mesh = self
+        for old, new in kinds.items():
+            if old not in mesh.elements:
+                raise MeshError(f"there are no elements of {old}; there are {_listed(mesh.elements)}")
+        quadratic = {old for old, new in kinds.items()
+                     if kind_of(new).n_node > kind_of(old).n_node}
+        if quadratic and (quadratic != set(mesh.elements) or any(
+                kind_of(old).n_node > kind_of(old).n_corner for old in quadratic)):
+            raise MeshError("all elements of a mesh become quadratic, or none; they are linear before")
+        for old, new in kinds.items():
+            if kind_of(new).faces != kind_of(old).faces:
+                raise MeshError(f"elements of {old} have another shape than those of {new}")
+        return _with_middles(mesh, kinds) if quadratic else _retyped(mesh, kinds)
 
     def rename(self, names: Mapping[str, str]) -> Mesh:
         """With other names of sets and surfaces, `{old: new}`; raises `MeshError` for unknown."""
@@ -251,7 +315,7 @@ class Mesh:
         new = np.concatenate(list(other.element_labels.values()))
         node = _shift(self.node_labels, other.node_labels)
         element = _shift(own, new)
-        kinds = [k for k in KINDS if k in self.elements or k in other.elements]
+        kinds = sorted({*self.elements, *other.elements})
         faces = {name: f + np.array([element, 0]) for name, f in other.surfaces.items()}
         return Mesh(
             np.concatenate([self.nodes, other.nodes]),
@@ -268,9 +332,9 @@ class Mesh:
 
     def text(self) -> str:
         """The mesh as cards of a deck: nodes, elements, sets, surfaces."""
-        parts = ["*NODE\n", table(self.node_labels, self.nodes[:, 0], self.nodes[:, 1])]
+        parts = ["*NODE\n", table(self.node_labels, *self.nodes.T)]
         for kind, nodes in self.elements.items():
-            parts += [f"*ELEMENT, TYPE={kind}\n", table(self.element_labels[kind], *nodes.T)]
+            parts += [f"*ELEMENT, TYPE={kind}\n", element_table(self.element_labels[kind], nodes)]
         for card, sets in (("NSET", self.node_sets), ("ELSET", self.element_sets)):
             parts += [set_text(card, name, labels) for name, labels in sets.items()]
         for name, faces in self.surfaces.items():
@@ -281,6 +345,39 @@ class Mesh:
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the mesh alone, for `*INCLUDE, INPUT=`; returns the path. May raise `OSError`."""
         return write_text(path, self.text())
+
+
+# --- other kinds -------------------------------------------------------------------------------
+
+def _retyped(mesh: Mesh, kinds: Mapping[str, str]) -> Mesh:
+    """`mesh` with other words for its kinds."""
+    elements: dict[str, list[Labels]] = {}
+    labels: dict[str, list[Labels]] = {}
+    for old, nodes in mesh.elements.items():
+        elements.setdefault(kinds.get(old, old), []).append(nodes)
+        labels.setdefault(kinds.get(old, old), []).append(mesh.element_labels[old])
+    return Mesh(mesh.nodes, {k: np.concatenate(e) for k, e in elements.items()},
+                node_labels=mesh.node_labels,
+                element_labels={k: np.concatenate(e) for k, e in labels.items()},
+                node_sets=mesh.node_sets, element_sets=mesh.element_sets, surfaces=mesh.surfaces)
+
+
+def _with_middles(mesh: Mesh, kinds: Mapping[str, str]) -> Mesh:
+    """`mesh` of linear elements with nodes in the middle of all edges."""
+    ends = {old: middles(old, nodes) for old, nodes in mesh.elements.items()}
+    pairs, place = np.unique(np.sort(np.concatenate([e.reshape(-1, 2) for e in ends.values()])),
+                             axis=0, return_inverse=True)
+    new = int(mesh.node_labels.max()) + 1 + np.arange(len(pairs))
+    of_kind = np.split(new[place.ravel()], np.cumsum([e.shape[0]*e.shape[1]
+                                                     for e in ends.values()])[:-1])
+    elements = {kinds[old]: np.column_stack([mesh.elements[old], part.reshape(ends[old].shape[:2])])
+                for (old, part) in zip(ends, of_kind, strict=True)}
+    return Mesh(np.concatenate([mesh.nodes, mesh.nodes[mesh.rows(pairs)].mean(axis=1)]), elements,
+                node_labels=np.concatenate([mesh.node_labels, new]),
+                element_labels={kinds[old]: mesh.element_labels[old] for old in ends},
+                node_sets={name: np.concatenate([s, new[np.isin(pairs, s).all(axis=1)]])
+                           for name, s in mesh.node_sets.items()},
+                element_sets=mesh.element_sets, surfaces=mesh.surfaces)
 
 
 # --- joining -----------------------------------------------------------------------------------

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .abaqus import read_abaqus
-from .checks import KINDS, Array, MeshError
+from .checks import Array, MeshError, kind_of
+from .kinds import CELLS, SIDES
 from .mesh import Mesh
 from .repair import add_lines, check_plane, fresh_name, turn_clockwise, warn
 
 _Index = NDArray[np.int64]
 
-_PLANE = {"triangle": "CPE3", "quad": "CPE4"}
-_SOLID = ("tetra", "hexahedron", "wedge", "pyramid")
 
 
 @dataclass
@@ -34,24 +33,26 @@ class _Raw:
 
 
 def read(path: str | os.PathLike[str]) -> Mesh:
-    """The plane mesh in a file of Gmsh (.msh), Abaqus (.inp), or another format of meshio.
+    """The mesh in a file of Gmsh (.msh), Abaqus (.inp), or another format of meshio.
 
+    A mesh with tetrahedra or hexahedra is one of three dimensions, any other one of the plane.
     Groups become sets and surfaces under their names, in capitals, with `_` for blanks:
 
-    - a physical group (Gmsh) or set of triangles and quadrilaterals an element set and the set of
-      its nodes;
-    - one of line elements a surface, of the element faces that the lines lie on, and the set of
-      its nodes; only that set where a line lies between two elements or on none;
-    - one of points a node set.
+    - a physical group (Gmsh) or set of elements an element set and the set of its nodes;
+    - one of line elements, in space of triangles and quadrilaterals, a surface, of the element
+      faces that they lie on, and the set of its nodes; only that set where one lies between two
+      elements or on none;
+    - one of points, in space of lines too, a node set.
 
-    A group of Gmsh without a name is called CURVE_7 or REGION_7, by its number. Nodes that belong
-    to no element are left out, clockwise elements are turned, each with a `MeshWarning`. An Abaqus
-    file is read here, without meshio, with its labels, `*NSET`, `*ELSET` and `*SURFACE`; all
-    elements become CPE3 and CPE4, whatever plane kind they had. Labels of other formats are 1, 2,
-    ... in the order of the file.
+    A group of Gmsh without a name is called POINT_7, CURVE_7, REGION_7 or VOLUME_7, by its number.
+    Nodes that belong to no element are left out, elements that are clockwise or mirror images are
+    turned, each with a `MeshWarning`. An Abaqus file is read here, without meshio, with its labels,
+    `*NSET`, `*ELSET` and `*SURFACE`; all elements in the plane become CPE3, CPE4, CPE6 and CPE8,
+    whatever kind they had, and those in space C3D4, C3D8, C3D10 and C3D20 unless EMCON has theirs;
+    `Mesh.retype` changes that. Labels of other formats are 1, 2, ... in the order of the file.
 
-    Raises `ImportError` if meshio is needed and not there; `MeshError` for a mesh that is not
-    plane, for elements of higher order or of other kinds, without area or folded, and for a file
+    Raises `ImportError` if meshio is needed and not there; `MeshError` for a mesh of the plane that
+    is not in one, for elements of other kinds, without area or volume or folded, and for a file
     that cannot be understood; `OSError` for one that cannot be read.
     """
     path = Path(path)
@@ -91,7 +92,8 @@ def _raw(source: str, found: Any) -> _Raw:
     for cells in found.cells:
         raw.kind.append(str(cells.type))
         nodes = np.asarray(cells.data, dtype=np.int64)
-        count = KINDS.get(_PLANE.get(raw.kind[-1], ""), nodes.shape[-1])
+        known = CELLS.get(raw.kind[-1])
+        count = kind_of(known).n_node if known else nodes.shape[-1]
         if nodes.ndim != 2 or nodes.shape[1] != count or (
                 nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points)):
             raise MeshError(f"{source}: the elements of the kind {cells.type} are broken")
@@ -111,22 +113,37 @@ def _add_physical(raw: _Raw, found: Any) -> None:
     """Groups of Gmsh by number, for versions of its format in which meshio gives no sets."""
     names = {(int(d), int(tag)): name for name, (tag, d) in found.field_data.items()}
     for block, tags in enumerate(found.cell_data.get("gmsh:physical", [])):
-        dim = {"vertex": 0, "line": 1}.get(raw.kind[block], 2)
+        dim = _dimension(raw.kind[block])
         for tag in np.unique(tags):
             if tag <= 0:
                 continue
-            name = names.get((dim, int(tag)), f"{('POINT', 'CURVE', 'REGION')[dim]}_{tag}")
+            name = names.get((dim, int(tag)), f"{_GROUPS[dim]}_{tag}")
             rows = raw.groups.setdefault(name, [np.empty(0, dtype=np.int64)]*len(raw.kind))
             rows[block] = np.flatnonzero(np.asarray(tags) == tag)
 
 
+_GROUPS = ("POINT", "CURVE", "REGION", "VOLUME")
+
+
+def _dimension(kind: str) -> int:
+    """Of a cell of meshio."""
+    if kind in CELLS:
+        return kind_of(CELLS[kind]).n_dim
+    return 0 if kind == "vertex" else 1
+
+
 def _build(source: str, raw: _Raw) -> Mesh:
     _check_kinds(source, raw.kind)
-    plane = [k for k, kind in enumerate(raw.kind) if kind in _PLANE and len(raw.nodes[k])]
-    if not plane:
-        raise MeshError(f"{source} has no triangles and no quadrilaterals")
+    there = [k for k, kind in enumerate(raw.kind) if kind in CELLS and len(raw.nodes[k])]
+    if not there:
+        raise MeshError(f"{source} has no triangles, quadrilaterals, tetrahedra or hexahedra")
+    n_dim = max(_dimension(raw.kind[k]) for k in there)
+    plane = [k for k in there if _dimension(raw.kind[k]) == n_dim]
     used = np.unique(np.concatenate([raw.nodes[k].ravel() for k in plane]))
-    check_plane(source, raw.points[used])
+    if n_dim == 2:
+        check_plane(source, raw.points[used])
+    elif not np.isfinite(raw.points[used]).all():
+        raise MeshError(f"{source}: a coordinate is not finite")
     label = np.zeros(len(raw.points), dtype=np.int64)
     label[used] = np.arange(1, len(used) + 1)
     if len(used) < len(raw.points):
@@ -137,12 +154,12 @@ def _build(source: str, raw: _Raw) -> Mesh:
     first = 1
     for k in plane:
         of_block[k] = np.arange(first, first + len(raw.nodes[k]))
-        elements.setdefault(_PLANE[raw.kind[k]], []).append(label[raw.nodes[k]])
-        labels.setdefault(_PLANE[raw.kind[k]], []).append(of_block[k])
+        elements.setdefault(CELLS[raw.kind[k]], []).append(label[raw.nodes[k]])
+        labels.setdefault(CELLS[raw.kind[k]], []).append(of_block[k])
         first += len(raw.nodes[k])
     joined = {kind: np.concatenate(blocks) for kind, blocks in elements.items()}
     numbers = {kind: np.concatenate(blocks) for kind, blocks in labels.items()}
-    x = raw.points[used, :2]
+    x = raw.points[used, :n_dim]
     turn_clockwise(source, x, np.arange(1, len(used) + 1), joined, numbers)
     mesh = Mesh(x, joined, element_labels=numbers)
     for name, rows in raw.point_sets.items():
@@ -154,15 +171,13 @@ def _build(source: str, raw: _Raw) -> Mesh:
 
 def _check_kinds(source: str, kinds: Iterable[str]) -> None:
     for kind in kinds:
-        if kind in _PLANE or kind in ("line", "vertex"):
+        if kind in CELLS or kind in SIDES or kind == "vertex":
             continue
-        if kind.rstrip("0123456789") in _SOLID:
-            raise MeshError(f"{source} is three-dimensional: it has elements of the kind {kind}; "
-                            "EMCON takes plane meshes")
-        if kind.startswith(("triangle", "quad", "line")):
-            raise MeshError(f"{source} has elements of higher order, of the kind {kind}; EMCON "
-                            "takes linear ones: mesh it with order 1")
-        raise MeshError(f"{source}: EMCON has no elements of the kind {kind}")
+        hint = ""
+        if kind.startswith(("triangle", "quad", "line", "tetra", "hexahedron")):
+            hint = ("; of second order it has those with nodes on their edges alone (in Gmsh "
+                    "Mesh.SecondOrderIncomplete = 1)")
+        raise MeshError(f"{source}: EMCON has no elements of the kind {kind}{hint}")
 
 
 def _add_group(mesh: Mesh, source: str, name: str, raw: _Raw, blocks: list[_Index],
@@ -175,8 +190,11 @@ def _add_group(mesh: Mesh, source: str, name: str, raw: _Raw, blocks: list[_Inde
         nodes.append(label[raw.nodes[k][rows]].ravel())
         if k in of_block:
             elements.append(of_block[k][rows])
-        elif raw.kind[k] == "line":
-            lines.append(label[raw.nodes[k][rows]])
+        elif raw.kind[k] in SIDES and _dimension(raw.kind[k]) == mesh.n_dim - 1:
+            n = SIDES[raw.kind[k]][1]
+            corners = np.zeros((len(rows), 2 if mesh.n_dim == 2 else 4), dtype=np.int64)
+            corners[:, :n] = label[raw.nodes[k][rows]][:, :n]
+            lines.append(corners)
     if not nodes:
         return
     if elements:

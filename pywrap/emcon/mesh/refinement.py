@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .checks import KINDS, Labels, MeshError
+from .checks import Labels, MeshError, kind_of
 from .mesh import Mesh
 
 
 def refine(mesh: Mesh, times: int = 1, *, above: int = 0) -> Mesh:
     """`mesh` with each element cut in four, `times` times.
 
-    times   how often; the edges become 2**times times as short
+    times   how often, 0 for elements in space and quadratic ones; the edges become 2**times times as short
     above   labels of new nodes are larger than this, and than those of `mesh`
 
     Old nodes keep their labels, and an element set holds all parts of its elements. A new node, in
@@ -20,6 +20,10 @@ def refine(mesh: Mesh, times: int = 1, *, above: int = 0) -> Mesh:
     mean of do. A face of a surface becomes two. New nodes lie on the straight edges of `mesh`: a
     curved boundary stays the polygon that it was, also where its nodes lie on a curve.
     """
+    wrong = [kind for kind in mesh.elements
+             if kind_of(kind).n_dim != 2 or kind_of(kind).n_node > kind_of(kind).n_corner]
+    if wrong and times > 0:
+        raise MeshError(f"linear elements in the plane are cut in four, none of {wrong[0]}")
     if times < 0:
         raise MeshError(f"a mesh is refined 0 times or more, not {times}")
     for _ in range(times):
@@ -63,7 +67,7 @@ def _new_nodes(mesh: Mesh, above: int) -> tuple[Labels, Labels]:
     for kind, corners in mesh.elements.items():
         ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
         means.append(np.repeat(ends, 2, axis=1))
-        if KINDS[kind] == 4:
+        if kind_of(kind).n_corner == 4:
             means.append(corners)
     parents: Labels = np.unique(np.sort(np.concatenate(means), axis=1), axis=0)
     first = max(int(mesh.node_labels.max()), above) + 1
@@ -76,7 +80,7 @@ def _parts(kind: str, corners: Labels, parents: Labels, new: Labels) -> Labels:
     Part i holds corner i at its own corner i, so that faces keep their numbers; a triangle has its
     inner one last.
     """
-    n = KINDS[kind]
+    n = kind_of(kind).n_corner
     middle = _label(np.repeat(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2), 2, axis=2),
                     parents, new)
     parts = np.empty((len(corners), 4, n), dtype=np.int64)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import Array, Labels, MeshError, MeshWarning, corner_fault, usable_name
+from .checks import Array, Labels, MeshError, MeshWarning, corner_fault, kind_of, usable_name
 from .mesh import Mesh
 
 #: A mesh is plane if its points leave a plane z = const by less than this, over its extent.
@@ -34,27 +34,35 @@ def turn_clockwise(source: str, x: Array, node_labels: Labels, elements: dict[st
                    labels: Mapping[str, Labels]) -> set[int]:
     """Turn clockwise elements, first corner kept, in place; returns their labels, with a warning.
 
-    x            (n, 2) positions [L]
+    In space those numbered as their mirror images.
+
+    x            (n, 2) or (n, 3) positions [L]
     node_labels  (n,) ascending
-    elements     by kind, (m, 3) or (m, 4) node labels
+    elements     by kind, (m, k) node labels
     labels       by kind, (m,) element labels
     """
     turned: set[int] = set()
     for kind, nodes in elements.items():
-        wrong = corner_fault(x[np.searchsorted(node_labels, nodes)]) == 2
-        nodes[wrong] = np.column_stack([nodes[wrong, :1], nodes[wrong, :0:-1]])
+        shape = kind_of(kind)
+        wrong = corner_fault(x[np.searchsorted(node_labels, nodes[:, :shape.n_corner])]) == 2
+        nodes[wrong] = nodes[wrong][:, shape.mirrored]
         turned |= set(labels[kind][wrong].tolist())
     if turned:
-        warn(f"{source}: {len(turned)} elements are numbered clockwise, among them "
-             f"{min(turned)}; turned")
+        how = "clockwise" if x.shape[1] == 2 else "as their mirror images"
+        warn(f"{source}: {len(turned)} elements are numbered {how}, among them {min(turned)}; "
+             "turned")
     return turned
 
 
 def add_lines(mesh: Mesh, source: str, name: str, ends: Labels) -> None:
-    """Add the surface of the element faces on which lines (k, 2), node labels, lie."""
+    """Add the surface of the element faces on which lines (k, 2), node labels, lie.
+
+    In space faces (k, 4) lie on them, the last corner 0 where there are three.
+    """
     faces, corners = mesh.all_faces()
-    base = int(mesh.node_labels.max()) + 1
-    key, wanted = (np.sort(pairs, axis=1) @ np.array([base, 1]) for pairs in (corners, ends))
+    both = np.sort(np.concatenate([corners, ends]), axis=1)
+    number = np.unique(both, axis=0, return_inverse=True)[1].ravel()
+    key, wanted = number[:len(corners)], number[len(corners):]
     order = np.argsort(key, kind="stable")
     low, high = (np.searchsorted(key, wanted, side, sorter=order)
                  for side in ("left", "right"))
@@ -62,7 +70,8 @@ def add_lines(mesh: Mesh, source: str, name: str, ends: Labels) -> None:
         mesh.add_surface(fresh_name(mesh.surfaces, source, name), faces[order[low]])
         return
     why = "between two elements" if (high - low > 1).any() else "on no side of an element"
-    warn(f"{source}: a line of {name} lies {why}; there is no surface of that name, only the set "
+    what = "line" if mesh.n_dim == 2 else "face"
+    warn(f"{source}: a {what} of {name} lies {why}; there is no surface of that name, only the set "
          "of its nodes")
 
 

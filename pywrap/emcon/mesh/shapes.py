@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .checks import KINDS, Array, MeshError
+from .checks import Array, MeshError, kind_of
+from .boxes import box
 from .mesh import Mesh
 
 _Index = NDArray[np.int64]
@@ -52,14 +53,24 @@ def grid(points: ArrayLike, name: str = "GRID", *, sides: Mapping[str, str] | No
                      {side: (rows[end], _FACES[end], nodes[end]) for end, side in names.items()})
 
 
-def block(corner: ArrayLike = (0.0, 0.0), size: ArrayLike = (1.0, 1.0),
-          cells: tuple[int, int] = (1, 1), name: str = "BLOCK", *, kind: str = "CPE4") -> Mesh:
-    """A rectangle; sides LEFT, RIGHT, BOTTOM, TOP.
+def block(corner: ArrayLike | None = None, size: ArrayLike | None = None,
+          cells: tuple[int, ...] | None = None, name: str = "BLOCK", *,
+          kind: str = "CPE4") -> Mesh:
+    """A rectangle; sides LEFT, RIGHT, BOTTOM, TOP. Of a C3D kind a box, which has BACK, FRONT too.
 
-    corner   the lower left one (2,) [L]
-    size     width and height (2,) [L], above 0
-    cells    numbers of elements along x and y
+    corner   the one with the least coordinates (2,) or (3,) [L]; default the origin
+    size     lengths along the axes [L], above 0; default 1
+    cells    numbers of elements along the axes; default 1
+
+    In space x runs from LEFT to RIGHT, y from BOTTOM to TOP, z from BACK to FRONT; tetrahedra are
+    six to each box.
     """
+    n_dim = kind_of(kind).n_dim
+    corner = np.zeros(n_dim) if corner is None else corner
+    size = np.ones(n_dim) if size is None else size
+    cells = (1,)*n_dim if cells is None else cells
+    if n_dim == 3:
+        return box(corner, size, cells, name, kind)
     n = _counts(cells)
     low, length = _pair(corner, "corner"), _pair(size, "size", positive=True)
     x, y = (low[k] + length[k]*np.arange(n[k] + 1)/n[k] for k in (0, 1))
@@ -175,18 +186,22 @@ def _quads(label: _Index, closed: bool) -> tuple[_Index, _Index]:
 def _assemble(nodes: Array, quads: _Index, name: str, kind: str,
               sides: Mapping[str, tuple[_Index, int, _Index]]) -> Mesh:
     """The mesh of quadrilaterals (m, 4); sides by name: rows of `quads`, face, node labels."""
+    shape = kind_of(kind)
+    if shape.n_dim == 3:
+        raise MeshError(f"{kind!r} is a kind of elements in space; `block` makes boxes of it")
+    linear = f"CPE{shape.n_corner}"
+    if kind != linear:
+        return _assemble(nodes, quads, name, linear, sides).retype({linear: kind})
     if kind == "CPE4":
         mesh = Mesh(nodes, {kind: quads})
         faces = {side: (rows + 1, np.full(len(rows), face)) for side, (rows, face, _)
                  in sides.items()}
-    elif kind == "CPE3":
+    else:
         # a diagonal of a quadrilateral that is no element may give two that are
         Mesh(nodes, {"CPE4": quads})
         halves, holder = _halves(nodes, quads)
         mesh = Mesh(nodes, {kind: halves})
         faces = {side: tuple(holder[rows, face - 1].T) for side, (rows, face, _) in sides.items()}
-    else:
-        raise MeshError(f"{kind!r} is no kind of element; known are {', '.join(KINDS)}")
     mesh.add_node_set(name, mesh.node_labels)
     mesh.add_element_set(name, mesh.element_labels[kind])
     for side, pair in faces.items():
