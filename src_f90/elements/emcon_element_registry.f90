@@ -68,6 +68,7 @@ module emcon_element_registry
       element_row_t("C3D4", 3, 4, 4, 4, 3, &
          reshape([1, 2, 3, 1, 4, 2, 2, 4, 3, 3, 4, 1], face_room, pad=[0]), 10, 4), &
       element_row_t("C3D8", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8), &
+      element_row_t("C3D8H", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8, .true.), &
       element_row_t("C3D10", 3, 10, 4, 4, 6, &
          reshape([1, 2, 3, 5, 6, 7, 1, 4, 2, 8, 9, 5, 2, 4, 3, 9, 10, 6, 3, 4, 1, 10, 8, 7], &
             face_room, pad=[0]), 24, 10), &
@@ -103,7 +104,7 @@ contains
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=2))
          case ("C3D4")
             allocate(shape_tetrahedron_t :: kind(k)%shape)
-         case ("C3D8")
+         case ("C3D8", "C3D8H")
             allocate(shape_hexahedron_t :: kind(k)%shape)
          case ("C3D10")
             allocate(shape_quadratic_tetrahedron_t :: kind(k)%shape)

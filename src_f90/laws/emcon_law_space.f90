@@ -9,7 +9,7 @@ module emcon_law_space
    use emcon_law, only : law_t
    implicit none
    private
-   public :: n_strain, space_response_t, law_response_space
+   public :: n_strain, space_response_t, law_response_space, space_change_t, law_change_space
 
    integer, parameter :: n_strain = 6, n_shear = 3
    !> Components 11, 22, 33, 12, 23, 13; a strain has twice the last three.
@@ -22,6 +22,22 @@ module emcon_law_space
       real(wp) :: tangent(n_strain, n_strain) = 0.0_wp   !! derivative of S_alg by E1
    end type space_response_t
 
+   !> Change of volume v: `energy` is v at the end, `stress` its discrete gradient.
+   type, extends(space_response_t) :: space_change_t
+      real(wp) :: start = 0.0_wp                 !! v at the start
+      real(wp) :: by = 0.0_wp                    !! its increment, to relative accuracy
+      real(wp) :: at_end(n_strain) = 0.0_wp      !! gradient at the end
+   end type space_change_t
+
+   !> Strains and invariants over a step; shears are those of tensors.
+   type :: path_t
+      real(wp) :: mean(n_strain) = 0.0_wp        !! strain in the middle
+      real(wp) :: by(n_strain) = 0.0_wp          !! its increment
+      type(dg_t) :: e1, e2, e3
+      real(wp) :: n(n_strain, 3) = 0.0_wp        !! discrete gradients of e1, e2, e3
+      real(wp) :: at_end(n_strain, 3) = 0.0_wp   !! gradients at the end
+   end type path_t
+
 contains
 
    !> Response to a strain that goes from `strain` to `strain + dstrain`.
@@ -29,30 +45,66 @@ contains
       class(law_t), intent(in) :: law
       real(wp), intent(in) :: strain(n_strain), dstrain(n_strain)   !! E11, E22, E33, 2 E12, ...
       type(space_response_t), intent(out) :: response
-      real(wp), dimension(n_strain) :: e0, d, mean, last
-      real(wp) :: n(n_strain, 3), at_end(n_strain, 3)    ! gradients of e1, e2, e3
-      type(dg_t) :: w
-      integer :: i, j
+      type(path_t) :: path
+
+      call find_path(strain, dstrain, path)
+      call chain(path, law%energy(path%e1, path%e2, path%e3), response)
+   end subroutine law_response_space
+
+   !> Change of volume over the same step, with its gradients.
+   pure subroutine law_change_space(law, strain, dstrain, change)
+      class(law_t), intent(in) :: law
+      real(wp), intent(in) :: strain(n_strain), dstrain(n_strain)   !! E11, E22, E33, 2 E12, ...
+      type(space_change_t), intent(out) :: change
+      type(path_t) :: path
+      type(dg_t) :: v
+
+      call find_path(strain, dstrain, path)
+      v = law%change(path%e1, path%e2, path%e3)
+      change%start = v%f0
+      change%by = v%df
+      call chain(path, v, change%space_response_t)
+      change%at_end = matmul(path%at_end, v%c)
+   end subroutine law_change_space
+
+   !> The invariants over a step, and their gradients.
+   pure subroutine find_path(strain, dstrain, path)
+      real(wp), intent(in) :: strain(n_strain), dstrain(n_strain)   !! E11, E22, E33, 2 E12, ...
+      type(path_t), intent(out) :: path
+      real(wp), dimension(n_strain) :: e0, last
 
       e0 = entry_of*strain
-      d = entry_of*dstrain
-      mean = e0 + 0.5_wp*d
-      last = e0 + d
-      n(:, 1) = unit
-      n(:, 2) = trace(mean)*unit - mean
-      n(:, 3) = 0.5_wp*cross(mean, mean) + cross(d, d)/24.0_wp
-      at_end(:, 1) = unit
-      at_end(:, 2) = trace(last)*unit - last
-      at_end(:, 3) = 0.5_wp*cross(last, last)
-      w = law%energy(dg_variable(1, trace(e0), trace(d)), &
-         dg_variable(2, 0.5_wp*product_of(trace(e0)*unit - e0, e0), product_of(n(:, 2), d)), &
-         dg_variable(3, product_of(cross(e0, e0), e0)/6.0_wp, product_of(n(:, 3), d)))
+      path%by = entry_of*dstrain
+      path%mean = e0 + 0.5_wp*path%by
+      last = e0 + path%by
+      associate (n => path%n, at_end => path%at_end, mean => path%mean, d => path%by)
+         n(:, 1) = unit
+         n(:, 2) = trace(mean)*unit - mean
+         n(:, 3) = 0.5_wp*cross(mean, mean) + cross(d, d)/24.0_wp
+         at_end(:, 1) = unit
+         at_end(:, 2) = trace(last)*unit - last
+         at_end(:, 3) = 0.5_wp*cross(last, last)
+         path%e1 = dg_variable(1, trace(e0), trace(d))
+         path%e2 = dg_variable(2, 0.5_wp*product_of(trace(e0)*unit - e0, e0), &
+            product_of(n(:, 2), d))
+         path%e3 = dg_variable(3, product_of(cross(e0, e0), e0)/6.0_wp, product_of(n(:, 3), d))
+      end associate
+   end subroutine find_path
+
+   !> From a function of the invariants to one of the strain.
+   pure subroutine chain(path, w, response)
+      type(path_t), intent(in) :: path
+      type(dg_t), intent(in) :: w                !! of e1, e2, e3
+      type(space_response_t), intent(out) :: response
+      real(wp) :: d(n_strain)
+      integer :: i, j
+
       response%energy = w%f1
-      response%stress = matmul(n, w%g)
-      response%tangent = 0.0_wp
+      response%stress = matmul(path%n, w%g)
       do j = 1, size(w%g)
          do i = 1, size(w%g)
-            response%tangent = response%tangent + w%h(i, j)*outer(n(:, i), at_end(:, j))
+            response%tangent = response%tangent &
+               + w%h(i, j)*outer(path%n(:, i), path%at_end(:, j))
          end do
       end do
       do j = 1, n_strain
@@ -60,9 +112,9 @@ contains
          d(j) = entry_of(j)
          response%tangent(:, j) = response%tangent(:, j) &
             + (0.5_wp*w%g(2))*(trace(d)*unit - d) &
-            + w%g(3)*cross(0.5_wp*mean + (dstrain*entry_of)/12.0_wp, d)
+            + w%g(3)*cross(0.5_wp*path%mean + path%by/12.0_wp, d)
       end do
-   end subroutine law_response_space
+   end subroutine chain
 
    pure real(wp) function trace(a)
       real(wp), intent(in) :: a(n_strain)

@@ -266,7 +266,8 @@ contains
             body(i)%n_rigid == body(i)%n_element) cycle
          call row_begin(row, "advice", "body")
          call row_put(row, "body", i, " #")
-         call row_put(row, "poisson", body(i)%ratio, " at nu = # locks: " // locking_advice)
+         call row_put(row, "poisson", body(i)%ratio, " at nu = # locks: " &
+            // trim(locking_advice(size(body(i)%center))))
          call rows_add(rows, row)
       end do
    end subroutine advise_locking

@@ -14,6 +14,8 @@ module emcon_element_space
    public :: n_space, space_element_t, space_motion_t, space_part_t
    public :: space_element_init, space_element_place, space_element_mass, space_element_add_mass
    public :: space_element_respond, space_element_hold
+   public :: space_point_t, space_point, space_point_is_regular, space_point_strain_by, &
+      space_point_cauchy, space_part_clear, space_part_add, space_part_add_tangent
 
    integer, parameter :: n_space = 3, n_dim = n_space
    !> Rows and columns of the components of a strain.
@@ -36,13 +38,13 @@ module emcon_element_space
    end type space_part_t
 
    !> One point; without NLGEOM deformation gradients are the identity.
-   type :: point_t
+   type :: space_point_t
       real(wp) :: strain(n_strain) = 0.0_wp      !! at the start
       real(wp) :: dstrain(n_strain) = 0.0_wp
       real(wp) :: f_mid(n_dim, n_dim) = 0.0_wp
       real(wp) :: f_end(n_dim, n_dim) = 0.0_wp
       real(wp) :: geometric = 0.0_wp             !! df_mid/df_end: 1/2 or 0
-   end type point_t
+   end type space_point_t
 
 contains
 
@@ -136,57 +138,75 @@ contains
       type(space_motion_t), intent(in) :: motion
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(space_part_t), intent(inout) :: part
-      type(point_t) :: point
+      type(space_point_t) :: point
       type(space_response_t) :: response
       integer :: k
 
-      part%energy = 0.0_wp
-      part%force(:, :self%n_node) = 0.0_wp
-      part%magnitude(:, :self%n_node) = 0.0_wp
-      if (with_tangent) part%tangent(:, :self%n_node, :, :self%n_node) = 0.0_wp
-      part%is_inverted = .false.
+      call space_part_clear(self%n_node, with_tangent, part)
       do k = 1, self%n_gp
-         call place_point(self, k, motion, point)
-         part%is_inverted = .not. is_regular(point, law%has_volume)
+         call space_point(self, k, motion, point)
+         part%is_inverted = .not. space_point_is_regular(point, law%has_volume)
          if (part%is_inverted) return
          call law_response_space(law, point%strain, point%dstrain, response)
-         call add_point(self, k, point, response, part)
-         if (with_tangent) call add_tangent(self, k, point, response, part)
+         call space_part_add(self, k, point, response, part)
+         if (with_tangent) call space_part_add_tangent(self, k, point, response, part)
       end do
    end subroutine space_element_respond
 
-   !> Cauchy stress F S F^T/det F and strain at the points of an element that does not move.
+   !> Nothing, for so many nodes.
+   pure subroutine space_part_clear(n, with_tangent, part)
+      integer, intent(in) :: n
+      logical, intent(in) :: with_tangent        !! else the tangent stays as it is
+      type(space_part_t), intent(inout) :: part
+
+      part%energy = 0.0_wp
+      part%force(:, :n) = 0.0_wp
+      part%magnitude(:, :n) = 0.0_wp
+      if (with_tangent) part%tangent(:, :n, :, :n) = 0.0_wp
+      part%is_inverted = .false.
+   end subroutine space_part_clear
+
+   !> Cauchy stress and strain at the points of an element that does not move.
    pure subroutine space_element_hold(self, law, motion, stress, strain)
       type(space_element_t), intent(in) :: self
       class(law_t), intent(in) :: law
       type(space_motion_t), intent(in) :: motion       !! of no size
       real(wp), intent(out) :: stress(:, :)      !! (6, >= n_gp) [M/(L T^2)]
       real(wp), intent(out) :: strain(:, :)      !! (6, >= n_gp) E11, E22, E33, 2 E12, ...
-      type(point_t) :: point
+      type(space_point_t) :: point
       type(space_response_t) :: response
-      real(wp) :: s(n_dim, n_dim), det
-      integer :: k, v
+      integer :: k
 
       do k = 1, self%n_gp
-         call place_point(self, k, motion, point)
+         call space_point(self, k, motion, point)
          call law_response_space(law, point%strain, point%dstrain, response)
-         associate (f => point%f_end)
-            det = dot_product(f(:, 1), product_of(f(:, 2), f(:, 3)))
-            s = matmul(f, matmul(tensor_of(response%stress), transpose(f)))/det
-         end associate
-         do v = 1, n_strain
-            stress(v, k) = s(row(v), column(v))
-         end do
+         stress(:, k) = space_point_cauchy(point, response%stress)
          strain(:, k) = point%strain
       end do
    end subroutine space_element_hold
 
+   !> F S F^T/det F.
+   pure function space_point_cauchy(point, stress) result(cauchy)
+      type(space_point_t), intent(in) :: point
+      real(wp), intent(in) :: stress(n_strain)   !! S11, S22, S33, S12, S23, S13 [M/(L T^2)]
+      real(wp) :: cauchy(n_strain), s(n_dim, n_dim), det
+      integer :: v
+
+      associate (f => point%f_end)
+         det = dot_product(f(:, 1), product_of(f(:, 2), f(:, 3)))
+         s = matmul(f, matmul(tensor_of(stress), transpose(f)))/det
+      end associate
+      do v = 1, n_strain
+         cauchy(v) = s(row(v), column(v))
+      end do
+   end function space_point_cauchy
+
    !> The motion of point `k`: eq. (6).
-   pure subroutine place_point(self, k, motion, point)
+   pure subroutine space_point(self, k, motion, point)
       type(space_element_t), intent(in) :: self
       integer, intent(in) :: k
       type(space_motion_t), intent(in) :: motion
-      type(point_t), intent(out) :: point
+      type(space_point_t), intent(out) :: point
       real(wp), dimension(n_dim, n_dim) :: h, d, c
       integer :: a, i
 
@@ -212,7 +232,7 @@ contains
       point%strain = strain_of(c)
       c = matmul(transpose(point%f_mid), d)
       point%dstrain = strain_of(c + transpose(c))
-   end subroutine place_point
+   end subroutine space_point
 
    !> E11, E22, E33, 2 E12, 2 E23, 2 E13 of a tensor 2 E.
    pure function strain_of(c) result(e)
@@ -226,8 +246,8 @@ contains
    end function strain_of
 
    !> Is the end one that the law can answer to?
-   pure logical function is_regular(point, has_volume)
-      type(point_t), intent(in) :: point
+   pure logical function space_point_is_regular(point, has_volume) result(is_regular)
+      type(space_point_t), intent(in) :: point
       logical, intent(in) :: has_volume          !! as in law_t
       real(wp), parameter :: largest = huge(1.0_wp)**0.1_wp   ! its powers in energies are finite
       real(wp), parameter :: noise = 64.0_wp*epsilon(1.0_wp)
@@ -246,13 +266,13 @@ contains
       end do
       is_regular = dot_product(c(:, 1), product_of(c(:, 2), c(:, 3))) &
          > noise*product(sum(abs(c), 1))
-   end function is_regular
+   end function space_point_is_regular
 
    !> Add the forces of a point, F S grad N.
-   pure subroutine add_point(self, k, point, response, part)
+   pure subroutine space_part_add(self, k, point, response, part)
       type(space_element_t), intent(in) :: self
       integer, intent(in) :: k
-      type(point_t), intent(in) :: point
+      type(space_point_t), intent(in) :: point
       type(space_response_t), intent(in) :: response
       type(space_part_t), intent(inout) :: part
       real(wp) :: s(n_dim, n_dim), nominal(n_dim, n_dim), f(n_dim)
@@ -266,7 +286,7 @@ contains
          part%force(:, i) = part%force(:, i) + f
          part%magnitude(:, i) = part%magnitude(:, i) + abs(f)
       end do
-   end subroutine add_point
+   end subroutine space_part_add
 
    pure function tensor_of(stress) result(s)
       real(wp), intent(in) :: stress(n_strain)
@@ -280,10 +300,10 @@ contains
    end function tensor_of
 
    !> Add B(F_mid)^T D B(F_end) and what the stress at fixed strain does: eq. (11).
-   pure subroutine add_tangent(self, k, point, response, part)
+   pure subroutine space_part_add_tangent(self, k, point, response, part)
       type(space_element_t), intent(in) :: self
       integer, intent(in) :: k
-      type(point_t), intent(in) :: point
+      type(space_point_t), intent(in) :: point
       type(space_response_t), intent(in) :: response
       type(space_part_t), intent(inout) :: part
       real(wp) :: b(n_strain, n_dim, max_node), flow(n_strain), s(n_dim, n_dim), steep(n_dim)
@@ -292,10 +312,10 @@ contains
 
       s = (point%geometric*self%weight(k))*tensor_of(response%stress)
       do i = 1, self%n_node
-         b(:, :, i) = strain_by(point%f_mid, self%gradient(:, i, k))
+         b(:, :, i) = space_point_strain_by(point%f_mid, self%gradient(:, i, k))
       end do
       do j = 1, self%n_node
-         at_end = self%weight(k)*strain_by(point%f_end, self%gradient(:, j, k))
+         at_end = self%weight(k)*space_point_strain_by(point%f_end, self%gradient(:, j, k))
          steep = matmul(s, self%gradient(:, j, k))
          do c = 1, n_dim
             flow = matmul(response%tangent, at_end(:, c))
@@ -308,10 +328,10 @@ contains
             end do
          end do
       end do
-   end subroutine add_tangent
+   end subroutine space_part_add_tangent
 
    !> Derivative of the strain by the displacement of a node.
-   pure function strain_by(f, gradient) result(b)
+   pure function space_point_strain_by(f, gradient) result(b)
       real(wp), intent(in) :: f(n_dim, n_dim), gradient(n_dim)
       real(wp) :: b(n_strain, n_dim)
       integer :: v
@@ -323,6 +343,6 @@ contains
             b(v, :) = f(:, row(v))*gradient(column(v)) + f(:, column(v))*gradient(row(v))
          end if
       end do
-   end function strain_by
+   end function space_point_strain_by
 
 end module emcon_element_space

@@ -9,8 +9,10 @@ module emcon_locking
 
    !> Elements with nodes at their corners alone lock above this ratio of Poisson.
    real(wp), parameter :: locking_limit = 0.45_wp
-   character(len=*), parameter :: locking_advice = &
-      "it is too stiff in bending and contact; take CPE4H, CPE6 or CPE8R"
+   !> By the number of dimensions.
+   character(len=*), parameter :: locking_advice(2:3) = [character(len=66) :: &
+      "it is too stiff in bending and contact; take CPE4H, CPE6 or CPE8R", &
+      "it is too stiff in bending; take C3D8H, C3D10 or C3D20R"]
 
 contains
 

@@ -170,7 +170,8 @@ contains
          if (allocated(self%rest(k)%law)) cycle
          call raise(error, err_input, "element " // to_text(self%label(e)) // " takes the mean " &
             // "change of volume, which the law given for material " // self%material(k)%text // &
-            " does not tell apart; take CPE4 or CPE8")
+            " does not tell apart; take " // trim(merge("C3D8 or C3D20", "CPE4 or CPE8 ", &
+            self%n_dim == n_space)))
          return
       end do
    end subroutine divide_laws

@@ -8,6 +8,7 @@ module emcon_solid_response_space
    use emcon_element_frequency, only : element_frequency
    use emcon_kinds, only : dp, wp
    use emcon_lumped_mass, only : lumped_mass
+   use emcon_mean_volume_space, only : mean_volume_space_respond
    use emcon_motion, only : motion_t
    use emcon_solid, only : solid_t
    use emcon_term, only : fastest_t, response_t, role_internal
@@ -76,8 +77,14 @@ contains
             local%by(:, i) = motion%by(:, node(i)) - motion%by(:, node(1))
          end do
       end associate
-      call space_element_respond(solid%geometry(e), solid%law(solid%law_of(e))%law, local, &
-         with_tangent, part)
+      associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
+         if (solid%has_mean(e)) then
+            call mean_volume_space_respond(solid%geometry(e), law%law, rest%law, local, &
+               with_tangent, part)
+         else
+            call space_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
+         end if
+      end associate
    end subroutine respond_at
 
    !> Add the forces of element `e`, with what its displacements are rounded by.

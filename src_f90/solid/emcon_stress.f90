@@ -15,6 +15,7 @@ module emcon_stress
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, law_response_t, n_lane
    use emcon_mean_volume_plane, only : mean_volume_hold
+   use emcon_mean_volume_space, only : mean_volume_space_hold
    use emcon_push_forward_plane, only : push_forward
    use emcon_solid, only : solid_evaluate_given, solid_t
    implicit none
@@ -102,8 +103,14 @@ contains
             motion%from(:, i) = u(:, node(i)) - u(:, node(1))
          end do
       end associate
-      call space_element_hold(solid%geometry(e), solid%law(solid%law_of(e))%law, motion, stress, &
-         strain)
+      associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
+         if (solid%has_mean(e)) then
+            call mean_volume_space_hold(solid%geometry(e), law%law, rest%law, motion, stress, &
+               strain)
+         else
+            call space_element_hold(solid%geometry(e), law%law, motion, stress, strain)
+         end if
+      end associate
    end subroutine state_of_single
 
    !> What the given laws answer at the displacement `u`.

@@ -9,6 +9,7 @@ module test_element_space
    use emcon_law_registry, only : law_coupled_neo_hooke, law_create, law_linear, &
       law_mooney_rivlin, law_neo_hooke, law_yeoh
    use emcon_law_space, only : law_response_space, space_response_t
+   use emcon_mean_volume_space, only : mean_volume_space_respond
    use emcon_shape, only : m => max_element_nodes, shape_fault, shape_t
    use emcon_shape_hexahedron_space, only : shape_hexahedron_t
    use emcon_shape_quadratic_tetrahedron_space, only : shape_quadratic_tetrahedron_t
@@ -23,9 +24,9 @@ module test_element_space
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Sums over up to 27 points and 20 nodes, each term of some dozen roundings.
    real(wp), parameter :: tol = 1024.0_wp*eps
-   integer, parameter :: n_law = 5, n_kind = 5
+   integer, parameter :: n_law = 5, n_kind = 6
    character(len=6), parameter :: name(n_kind) = [character(len=6) :: "C3D4", "C3D8", "C3D10", &
-      "C3D20", "C3D20R"]
+      "C3D20", "C3D20R", "C3D8H"]
 
    type :: sample_t
       character(len=:), allocatable :: what
@@ -35,6 +36,7 @@ module test_element_space
       type(space_element_t) :: element
       class(shape_t), allocatable :: shape
       class(law_t), allocatable :: law
+      class(law_t), allocatable :: rest          !! where volume resists in the mean
    end type sample_t
 
 contains
@@ -50,6 +52,7 @@ contains
          test_case_t("a turned element responds turned", test_turned), &
          test_case_t("patch: energy and work of a uniform strain", test_patch), &
          test_case_t("rank", test_rank), &
+         test_case_t("mean volume: bending does not change it", test_bending), &
          test_case_t("mass, centre and inertia", test_mass), &
          test_case_t("free flight of one element", test_flight)]
    end subroutine collect_element_space
@@ -102,6 +105,7 @@ contains
          constant = [young, 0.3_wp]
       end select
       call law_create(codes(law), constant, sample%law, error)
+      if (trim(name(kind)) == "C3D8H") call sample%law%divide(sample%rest)
       call space_element_init(sample%element, sample%shape, place)
       call check_true(error, all(sample%element%weight > 0.0_wp), sample%what // ": volume")
    end subroutine make_sample
@@ -113,7 +117,7 @@ contains
       select case (kind)
       case (1)
          allocate(shape_tetrahedron_t :: shape)
-      case (2)
+      case (2, 6)
          allocate(shape_hexahedron_t :: shape)
       case (3)
          allocate(shape_quadratic_tetrahedron_t :: shape)
@@ -133,7 +137,12 @@ contains
       motion%from = u0
       motion%by = du
       part = space_part_t()
-      call space_element_respond(sample%element, sample%law, motion, with_tangent, part)
+      if (allocated(sample%rest)) then
+         call mean_volume_space_respond(sample%element, sample%law, sample%rest, motion, &
+            with_tangent, part)
+      else
+         call space_element_respond(sample%element, sample%law, motion, with_tangent, part)
+      end if
    end subroutine respond
 
    !> A start up to 2 % off, and a motion of up to 3 % plus, with nlgeom, a turn of 0.7 rad.
@@ -384,6 +393,31 @@ contains
             min(3*n - 6, 6*sample%element%n_gp), sample%what)
       end do
    end subroutine test_rank
+
+   !> The motion u = (x y, 0, 0) of a cube has div u = y, whose mean is 0: the deviator alone resists,
+   !> mu (e:e - y^2/3), and the mean of y^2 + x^2/2 - y^2/3 is 7/72.
+   subroutine test_bending(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: step
+      real(wp), allocatable :: place(:, :)
+      real(wp) :: u(3, m), zero(3, m)
+      real(wp), parameter :: nu = 0.4999_wp, small = 1.0e-3_wp
+      real(wp), parameter :: mu = 0.5_wp*young/(1.0_wp + nu)
+
+      zero = 0.0_wp
+      call make_sample(n_kind, 1, .false., 0.0_wp, sample, error)
+      call sample%shape%places(place)
+      place = 0.5_wp*place
+      call space_element_init(sample%element, sample%shape, place)
+      call law_create(law_linear, [young, nu], sample%law, error)
+      if (allocated(error)) return
+      call sample%law%divide(sample%rest)
+      u = 0.0_wp
+      u(1, :sample%n) = small*place(1, :)*place(2, :)
+      call respond(sample, u, zero, .false., step)
+      call check_near(error, step%energy, mu*7.0_wp/72.0_wp*small**2, tol, young*small**2, sample%what)
+   end subroutine test_bending
 
    !> By elimination with the largest pivot; what is left below the root of epsilon is round-off.
    pure integer function rank_of(matrix)
