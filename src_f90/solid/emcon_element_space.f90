@@ -155,7 +155,7 @@ contains
 
    !> Nothing, for so many nodes.
    pure subroutine space_part_clear(n, with_tangent, part)
-      integer, intent(in) :: n
+      integer, intent(in) :: n                   !! nodes
       logical, intent(in) :: with_tangent        !! else the tangent stays as it is
       type(space_part_t), intent(inout) :: part
 
@@ -204,7 +204,7 @@ contains
    !> The motion of point `k`: eq. (6).
    pure subroutine space_point(self, k, motion, point)
       type(space_element_t), intent(in) :: self
-      integer, intent(in) :: k
+      integer, intent(in) :: k                   !! 1 to n_gp
       type(space_motion_t), intent(in) :: motion
       type(space_point_t), intent(out) :: point
       real(wp), dimension(n_dim, n_dim) :: h, d, c
@@ -271,7 +271,7 @@ contains
    !> Add the forces of a point, F S grad N.
    pure subroutine space_part_add(self, k, point, response, part)
       type(space_element_t), intent(in) :: self
-      integer, intent(in) :: k
+      integer, intent(in) :: k                   !! 1 to n_gp
       type(space_point_t), intent(in) :: point
       type(space_response_t), intent(in) :: response
       type(space_part_t), intent(inout) :: part
@@ -302,7 +302,7 @@ contains
    !> Add B(F_mid)^T D B(F_end) and what the stress at fixed strain does: eq. (11).
    pure subroutine space_part_add_tangent(self, k, point, response, part)
       type(space_element_t), intent(in) :: self
-      integer, intent(in) :: k
+      integer, intent(in) :: k                   !! 1 to n_gp
       type(space_point_t), intent(in) :: point
       type(space_response_t), intent(in) :: response
       type(space_part_t), intent(inout) :: part
@@ -332,7 +332,8 @@ contains
 
    !> Derivative of the strain by the displacement of a node.
    pure function space_point_strain_by(f, gradient) result(b)
-      real(wp), intent(in) :: f(n_dim, n_dim), gradient(n_dim)
+      real(wp), intent(in) :: f(n_dim, n_dim)    !! deformation gradient
+      real(wp), intent(in) :: gradient(n_dim)    !! of the node's function by X [1/L]
       real(wp) :: b(n_strain, n_dim)
       integer :: v
 
