@@ -383,8 +383,9 @@ class Model(Cards):
     def interaction(self, name: str, *, friction: Number | None = None,
                     pad_thickness: Number | None = None,
                     restitution: Number | None = None) -> Model:
-        """`*SURFACE INTERACTION` with hard contact; `friction` may only be 0.
+        """`*SURFACE INTERACTION` with hard contact.
 
+        friction        coefficient of Coulomb's law, 0 or more; default 0
         pad_thickness   of a layer that keeps the surfaces apart, 0 or more [L]; a node with a pad
                         as thick as a radius is a circle
         restitution     0 to 1: the part of the velocity at which nodes with mass meet that is

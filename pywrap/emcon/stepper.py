@@ -436,26 +436,27 @@ class Stepper(Queries, Conditions, Meshes):
     def ledger(self) -> dict[str, float]:
         """`energies` and `momenta` together."""
         names = ("kinetic", "strain", "potential", "external_work", "contact_work",
-                 "stabilization", "restitution_loss", "scheme_loss", "damping_loss", "contact_energy",
-                 "total", *_MOMENTA[self.n_dim])
+                 "stabilization", "restitution_loss", "scheme_loss", "damping_loss",
+                 "friction_loss", "contact_energy", "total", *_MOMENTA[self.n_dim])
         found = structure("emcon_ledger", self._handle.call(_core.emcon_get_ledger))
         return {name: found[name] for name in names}
 
     def energies(self) -> dict[str, float]:
         """Energies and works [M L^2/T^2]: kinetic, strain, potential, external_work, contact_work,
-        stabilization, restitution_loss, scheme_loss, damping_loss, contact_energy, total.
+        stabilization, restitution_loss, scheme_loss, damping_loss, friction_loss,
+        contact_energy, total.
 
         `potential` is that of given forces; total = kinetic + strain + potential
         + contact_energy - external_work.
         """
-        return dict(list(self.ledger.items())[:11])
+        return dict(list(self.ledger.items())[:12])
 
     def momenta(self) -> dict[str, float]:
         """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`.
 
         In space px, py, pz, lx, ly, lz.
         """
-        return dict(list(self.ledger.items())[11:])
+        return dict(list(self.ledger.items())[12:])
 
 
 def _text(address: int, function: Callable[..., Any]) -> tuple[int, str]:

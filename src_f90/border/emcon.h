@@ -96,6 +96,7 @@ typedef struct emcon_ledger {
    double scheme_loss;        /* what the damping of the scheme took, >= 0 */
    double damping_loss;       /* what *DAMPING of materials took, >= 0 */
    double contact_energy;     /* what contact by penalty stores, >= 0 */
+   double friction_loss;      /* what friction took, >= 0 */
    double pz, lx, ly;         /* 0 in the plane */
 } emcon_ledger;
 

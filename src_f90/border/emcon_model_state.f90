@@ -53,6 +53,7 @@ contains
          ledger%scheme_loss = real(from%decay, c_double)
          ledger%damping_loss = real(from%damping, c_double)
          ledger%contact_energy = real(from%contact_energy, c_double)
+         ledger%friction_loss = real(from%friction, c_double)
          p = 0.0_c_double
          l = 0.0_c_double
          p(:size(from%momentum)) = real(from%momentum, c_double)

@@ -10,7 +10,7 @@ module emcon_contact
    use emcon_pose, only : pose_is_equilibrium
    implicit none
    private
-   public :: contact_t, contact_box_t, condition_resize, gap_state_t
+   public :: contact_t, contact_box_t, condition_resize, condition_resize_slip, gap_state_t
    public :: deepest_arrival
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
@@ -46,6 +46,7 @@ module emcon_contact
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
       real(wp) :: restitution = 1.0_wp                !! of impacts, 0 to 1
+      real(wp) :: friction = 0.0_wp                   !! mu >= 0 of Coulomb's law
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> No state changes before a node has moved farther from where the last step began [L].
       real(wp) :: clearance = 0.0_wp
@@ -69,6 +70,7 @@ module emcon_contact
       procedure :: share
       procedure :: mean_gap
       procedure :: covers
+      procedure :: slip
       procedure(configure_interface), deferred :: configure
       procedure(begin_interface), deferred :: begin_step
       procedure(measure_interface), deferred :: measure
@@ -187,6 +189,16 @@ contains
       covers = self%state(i)%is_covered
    end function covers
 
+   !> How far the node of constraint `i` slides along the surface over the step, or would by a
+   !> field `du` that is small: docs/theory.md, eq. (14e).
+   pure real(wp) function slip(self, i, x, u0, du)
+      class(contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+
+      slip = 0.0_wp
+   end function slip
+
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push
    !> along gradients at the start or the end, where a scheme says so.
@@ -197,20 +209,27 @@ contains
       real(wp), intent(in) :: target(:)               !! (n) mean gaps to hold [L]
       type(condition_t), intent(inout) :: item(:)     !! (n)
       real(wp), dimension(size(item)) :: gap0, dgap
+      type(condition_t), allocatable :: over(:)
       integer :: k
 
       if (motion%pose%is_gradient .and. .not. motion%pose%place > 0.0_wp) then
          call from_start(self, wanted, motion, target, item)
          return
       end if
-      if (.not. pose_is_equilibrium(motion%pose)) call self%evaluate(wanted, motion%x, motion%u0, &
-         motion%du, target, item)
+      if (.not. pose_is_equilibrium(motion%pose) .or. any(item%rubs)) call self%evaluate(wanted, &
+         motion%x, motion%u0, motion%du, target, item)
       if (.not. (pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end)) return
       gap0 = item%gap0
       dgap = item%dgap
+      if (any(item%rubs)) over = item
       call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
       do k = 1, size(item)
          if (.not. item(k)%leaves_second) item(k)%h = motion%weight*item(k)%h
+         if (.not. item(k)%rubs) cycle
+         if (.not. item(k)%leaves_second) item(k)%ht = motion%weight*item(k)%ht
+         ! Slip is over the step, wherever it pushes.
+         item(k)%slip = over(k)%slip
+         item(k)%t1 = over(k)%t1
       end do
       if (pose_is_equilibrium(motion%pose)) return
       item%gap0 = gap0
@@ -253,5 +272,20 @@ contains
       allocate(self%node(n), source=0)
       allocate(self%g(2, n), self%c(2, n), self%h(2*n, 2*n), source=0.0_wp)
    end subroutine condition_resize
+
+   !> Make room for the derivatives of slip, and set them to 0.
+   pure subroutine condition_resize_slip(self)
+      type(condition_t), intent(inout) :: self   !! resized
+
+      if (allocated(self%t)) then
+         if (size(self%t, 2) /= size(self%g, 2)) deallocate(self%t, self%t1, self%ht)
+      end if
+      if (.not. allocated(self%t)) allocate(self%t, self%t1, mold=self%g)
+      if (.not. allocated(self%ht)) allocate(self%ht, mold=self%h)
+      self%slip = 0.0_wp
+      self%t = 0.0_wp
+      self%t1 = 0.0_wp
+      self%ht = 0.0_wp
+   end subroutine condition_resize_slip
 
 end module emcon_contact

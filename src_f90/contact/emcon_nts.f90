@@ -15,7 +15,7 @@ module emcon_nts
       choice_settle, choice_take_nearer, nts_choice_t
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap_value, only : nts_gap_value
-   use emcon_nts_stencil, only : most_nodes, stencil_gather, stencil_length
+   use emcon_nts_stencil, only : most_nodes, polygon_slip, stencil_gather, stencil_length
    use emcon_scene, only : scene_t
    use emcon_stance, only : stance_holds, stance_t, stance_take
    implicit none
@@ -48,6 +48,7 @@ module emcon_nts
       procedure :: evaluate => nts_evaluate
       procedure :: covers => nts_covers
       procedure :: area => nts_area
+      procedure :: slip => nts_slip
    end type nts_t
 
 contains
@@ -67,6 +68,7 @@ contains
       self%deepest_start = touch_tol
       self%slack = pair%slack
       self%restitution = pair%restitution
+      if (.not. pair%slack > 0.0_wp) self%friction = pair%friction
    end subroutine nts_init
 
    pure subroutine nts_configure(self, x, options)
@@ -324,6 +326,22 @@ contains
          end associate
       end do
    end subroutine nts_evaluate
+
+   !> As `contact_t` has it: by the places on the line of the edge at both ends of the step.
+   pure real(wp) function nts_slip(self, i, x, u0, du) result(slip)
+      class(nts_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      integer :: k, n
+
+      slip = 0.0_wp
+      if (self%edge(i) == 0) return
+      n = 1
+      if (self%other(i) > 0) n = size(self%polygon, 1)
+      do k = 1, n
+         slip = slip + polygon_slip(self%polygon(k, i), x, u0, du)/n
+      end do
+   end function nts_slip
 
    pure subroutine nts_area(self, x, u, area, length)
       class(nts_t), intent(in) :: self

@@ -4,10 +4,11 @@ module emcon_nts_stencil
    use emcon_hermite, only : hermite_stencil_t
    use emcon_hermite_gap_value, only : hermite_begin
    use emcon_kinds, only : wp
+   use emcon_nts_gap_value, only : first, last, slave
    implicit none
    private
    public :: polygon_stencil_t, polygon_stencil, smooth_stencil_t, smooth_stencil, edge_of_sector
-   public :: stencil_gather, stencil_length, edge_distance, is_outside
+   public :: polygon_slip, stencil_gather, stencil_length, edge_distance, is_outside
    public :: most_nodes
 
    !> Nodes of a stencil at most: slave node and five edges.
@@ -201,6 +202,25 @@ contains
          dlocal(:, k) = du(:, node(k))
       end do
    end subroutine stencil_gather
+
+   !> How far the slave node slides along the edge: docs/theory.md, eq. (14e).
+   pure real(wp) function polygon_slip(self, x, u0, du) result(slip)
+      type(polygon_stencil_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), dimension(size(x, 1), size(self%node)) :: local, dlocal
+      real(wp), dimension(size(x, 1)) :: a, b, da, db
+      real(wp) :: xi
+
+      call stencil_gather(x, u0, du, self%n, self%node, local, dlocal)
+      a = local(:, last) - local(:, first)
+      b = local(:, slave) - local(:, first)
+      da = dlocal(:, last) - dlocal(:, first)
+      db = dlocal(:, slave) - dlocal(:, first)
+      xi = dot_product(b, a)/dot_product(a, a)
+      ! (b + db).(a + da) - xi |a + da|^2, without what cancels
+      slip = sqrt(dot_product(a, a))*(dot_product(db, a + da) + dot_product(b, da) &
+         - xi*dot_product(da, a + a + da))/dot_product(a + da, a + da)
+   end function polygon_slip
 
    !> Reference length of the stencil's edge: what gaps are measured against.
    pure real(wp) function stencil_length(x, node)

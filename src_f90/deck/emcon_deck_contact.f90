@@ -1,8 +1,8 @@
 !> *SURFACE INTERACTION, *SURFACE BEHAVIOR, *FRICTION and *CONTACT PAIR.
 module emcon_deck_contact
    use emcon_deck_contact_settings, only : read_pair_initiation
-   use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, drop_zeros, &
-      get_real, next_line, refuse_lines
+   use emcon_deck_fields, only : data_error, data_open, data_t, next_line, refuse_lines
+   use emcon_deck_friction, only : read_friction
    use emcon_deck_named, only : find_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
       option_name, reader_t, refuse_option
@@ -21,14 +21,14 @@ module emcon_deck_contact
 
 contains
 
-   !> The surface interactions: names, pads and restitution. All mean hard contact, no friction.
+   !> The surface interactions: names, pads, restitution and friction. All mean hard contact.
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
       integer :: i, n
 
       allocate(reader%interaction(size(reader%card)))
-      allocate(reader%pad(size(reader%card)), source=0.0_wp)
+      allocate(reader%pad(size(reader%card)), reader%friction(size(reader%card)), source=0.0_wp)
       allocate(reader%restitution(size(reader%card)), source=1.0_wp)
       n = 0
       do i = 1, size(reader%card)
@@ -47,7 +47,7 @@ contains
                if (n == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
                if (card%name == "FRICTION") then
-                  call check_friction(reader, card)
+                  call read_friction(reader, card, reader%friction(max(1, n)))
                else
                   call check_behavior(reader, card)
                end if
@@ -56,6 +56,7 @@ contains
       end do
       reader%interaction = reader%interaction(:n)
       reader%pad = reader%pad(:n)
+      reader%friction = reader%friction(:n)
       reader%restitution = reader%restitution(:n)
    end subroutine read_interactions
 
@@ -99,25 +100,6 @@ contains
          call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", "")
       end select
    end subroutine check_behavior
-
-   !> Only a coefficient of 0 is what this version computes.
-   subroutine check_friction(reader, card)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(data_t) :: data
-      real(wp) :: coefficient
-
-      call data_open(data, card)
-      do while (next_line(reader, data))
-         coefficient = 0.0_wp
-         call get_real(reader, data, 1, "friction coefficient", coefficient)
-         call drop_zeros(data, 1)
-         if (data%n > 1) call data_warning(reader, data, "what stands behind the coefficient has " &
-            // "no effect without friction")
-         if (coefficient /= 0.0_wp) call data_error(reader, data, "friction is known but not " &
-            // "supported; the coefficient must be 0, not " // to_text(coefficient))
-      end do
-   end subroutine check_friction
 
    !> All *CONTACT PAIR cards.
    subroutine read_pairs(reader, scene)
@@ -338,11 +320,12 @@ contains
          pair(i)%is_guarded = of_card%is_guarded
          pair(i)%offset = of_card%offset
          pair(i)%restitution = of_card%restitution
+         pair(i)%friction = of_card%friction
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
 
-   !> INTERACTION= of a card: the thickness of its pad, and restitution.
+   !> INTERACTION= of a card: the thickness of its pad, restitution, and friction.
    subroutine read_interaction(reader, card, pair, of_card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -359,6 +342,7 @@ contains
          is_known = .true.
          of_card%offset = reader%pad(i)
          of_card%restitution = reader%restitution(i)
+         of_card%friction = reader%friction(i)
       end do
       if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))

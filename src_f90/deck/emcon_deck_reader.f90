@@ -59,6 +59,7 @@ module emcon_deck_reader
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
       real(wp), allocatable :: pad(:)                    !! PAD THICKNESS of each [L]
       real(wp), allocatable :: restitution(:)            !! RESTITUTION of each
+      real(wp), allocatable :: friction(:)               !! coefficient of each
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
 

@@ -10,6 +10,7 @@ module emcon_deck_step
       pairs_ask, read_controls, read_initiation, read_interference
    use emcon_deck_damping, only : check_damping
    use emcon_deck_explicit, only : check_explicit_cards, suit_explicit
+   use emcon_deck_friction, only : check_friction
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
    use emcon_deck_increments, only : check_increments, read_events, read_tolerance
@@ -86,6 +87,7 @@ contains
       call check_restitution(reader, scene%pair, scene%step)
       call check_softness(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
+      call check_friction(reader, scene%pair, scene%step, scene%rigid)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
       end if

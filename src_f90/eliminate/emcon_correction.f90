@@ -161,9 +161,10 @@ contains
       type(constraint_set_t), intent(in) :: set
       integer :: n
 
-      n = set%force_rows%row_start(set%n + 1)
+      n = set%force_rows%row_start(set%n_row + 1)
       has_pattern = allocated(self%row_start)
-      if (has_pattern) has_pattern = size(self%row_start) == set%n + 1 .and. size(self%column) == n
+      if (has_pattern) has_pattern = size(self%row_start) == set%n_row + 1 &
+         .and. size(self%column) == n
       if (has_pattern) has_pattern = all(self%row_start == set%force_rows%row_start)
       if (has_pattern) has_pattern = all(self%column == set%force_rows%column(:n))
    end function has_pattern
@@ -174,7 +175,8 @@ contains
       type(constraint_set_t), intent(in) :: set
 
       associate (start => set%force_rows%row_start)
-         n_merged = size(system%matrix%column) + sum((start(2:set%n + 1) - start(:set%n))**2)
+         n_merged = size(system%matrix%column) &
+            + sum((start(2:set%n_row + 1) - start(:set%n_row))**2)
       end associate
    end function n_merged
 
@@ -184,7 +186,7 @@ contains
       type(constraint_set_t), intent(in) :: set
 
       self%row_start = set%force_rows%row_start
-      self%column = set%force_rows%column(:set%force_rows%row_start(set%n + 1))
+      self%column = set%force_rows%column(:set%force_rows%row_start(set%n_row + 1))
       self%is_merged = .false.
       self%has_saddle_point = .false.
    end subroutine take_pattern

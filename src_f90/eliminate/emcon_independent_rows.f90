@@ -41,8 +41,9 @@ contains
       type(independent_rows_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
-      real(hp) :: largest(n_kind, set%n)
-      integer :: own(size(numbering%unknown, 1), set%n), k
+      real(hp) :: largest(n_kind, set%n_row)
+      integer :: own(size(numbering%unknown, 1), set%n_row), k
+      logical :: is_firm(set%n_row)
 
       do k = 1, set%n
          associate (item => set%item(k), n => set%item(k)%n_node)
@@ -50,10 +51,19 @@ contains
             largest(:, k) = real([maxval(abs(item%g(:, :n))), maxval(abs(item%c(:, :n)))], hp)
          end associate
       end do
-      call eliminate(self, set%force_rows, set%gap_rows, own, largest, set%is_firm)
+      do k = set%n + 1, set%n_row
+         associate (item => set%item(set%stuck(k - set%n)), n => set%item(set%stuck(k &
+               - set%n))%n_node)
+            own(:, k) = numbering%unknown(:, item%node(1))
+            largest(:, k) = real([maxval(abs(item%t(:, :n))), maxval(abs(item%t1(:, :n)))], hp)
+         end associate
+      end do
+      is_firm(:set%n) = set%is_firm
+      is_firm(set%n + 1:) = .true.
+      call eliminate(self, set%force_rows, set%gap_rows, own, largest, is_firm)
       ! Where no unknown serves both, only the forces tell what is redundant.
       if (.not. self%is_poor) return
-      call eliminate(self, set%force_rows, set%force_rows, own, largest([1, 1], :), set%is_firm)
+      call eliminate(self, set%force_rows, set%force_rows, own, largest([1, 1], :), is_firm)
       self%is_poor = .true.
    end subroutine independent_rows_find
 

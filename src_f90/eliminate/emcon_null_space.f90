@@ -9,6 +9,7 @@
 !> Every decision here depends on the present gradients and the pattern only, so that a run does
 !> not remember how it came to where it is.
 module emcon_null_space
+   use emcon_constraint, only : condition_push
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_multiply, csr_multiply_transposed, csr_t
    use emcon_dependent_block, only : dependent_block_factorise, dependent_block_init, &
@@ -67,7 +68,7 @@ contains
       integer, intent(in) :: n_entry                     !! of N, to compare with
       type(numbering_t), intent(in) :: numbering
 
-      call begin(self, numbering%n_unknown, set%n)
+      call begin(self, numbering%n_unknown, set%n_row)
       self%n_entry = n_entry
       call null_space_update(self, set, numbering)
    end subroutine null_space_init
@@ -78,7 +79,7 @@ contains
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
 
-      call begin(self, numbering%n_unknown, set%n)
+      call begin(self, numbering%n_unknown, set%n_row)
       self%n_entry = huge(self%n_entry)                  ! no N to be compared with
       call null_space_update(self, set, numbering)
       if (self%obstacle /= obstacle_none) return
@@ -124,7 +125,7 @@ contains
       if (.not. is_same(self%present%dependent, self%rows%dependent)) then
          call dependent_block_init(self%present, set%force_rows, self%rows%dependent)
          self%owner = 0
-         self%owner(self%present%dependent) = [(k, k = 1, set%n)]
+         self%owner(self%present%dependent) = [(k, k = 1, set%n_row)]
       end if
       if (is_too_full(self)) then
          self%obstacle = obstacle_fill
@@ -272,8 +273,8 @@ contains
       type(numbering_t), intent(in) :: numbering
       real(wp), intent(in) :: residual(:)                  !! (n_unknown)
       real(wp), intent(out) :: lam(:)                      !! (n)
-      real(wp) :: rest(set%n), trial(set%n), best, next
-      real(dp) :: x(set%n)
+      real(wp) :: rest(set%n_row), trial(set%n_row), best, next
+      real(dp) :: x(set%n_row)
       integer :: i
 
       rest = residual(self%present%dependent)
@@ -292,38 +293,63 @@ contains
    end subroutine null_space_multipliers
 
    !> r_d - Gb_d^T lam, and its largest entry relative to the sum of what it consists of.
-   pure subroutine remainder(self, set, numbering, residual, lam, rest, relative)
+   subroutine remainder(self, set, numbering, residual, lam, rest, relative)
       type(null_space_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
       real(wp), intent(in) :: residual(:), lam(:)
       real(wp), intent(out) :: rest(:)                     !! (n)
       real(wp), intent(out) :: relative
-      real(wp) :: magnitude(set%n), term
-      integer :: k, i, a, t, l, dof, n_dim
+      real(wp) :: magnitude(set%n_row)
+      integer :: k
 
-      n_dim = size(numbering%unknown, 1)
       rest = residual(self%present%dependent)
       magnitude = abs(rest)
-      do k = 1, set%n
-         do i = 1, set%item(k)%n_node
-            do a = 1, n_dim
-               dof = n_dim*(set%item(k)%node(i) - 1) + a
+      do k = 1, set%n_row
+         if (k > set%n) then
+            associate (item => set%item(set%stuck(k - set%n)))
+               call subtract(item%node(:item%n_node), -item%t, lam(k))
+            end associate
+         else if (set%item(k)%rubs) then
+            associate (item => set%item(k))
+               call subtract(item%node(:item%n_node), condition_push(item), lam(k))
+            end associate
+         else
+            associate (item => set%item(k))
+               call subtract(item%node(:item%n_node), item%g, lam(k))
+            end associate
+         end if
+      end do
+      relative = 0.0_wp
+      do k = 1, set%n_row
+         if (magnitude(k) > 0.0_wp) relative = max(relative, abs(rest(k))/magnitude(k))
+      end do
+
+   contains
+
+      !> Subtract the force of a multiplier along `push`.
+      subroutine subtract(node, push, factor)
+         integer, intent(in) :: node(:)                    !! of the scene
+         real(wp), intent(in) :: push(:, :)                !! (n_dim, >= nodes)
+         real(wp), intent(in) :: factor
+         real(wp) :: term
+         integer :: i, a, t, l, dof
+
+         do i = 1, size(node)
+            do a = 1, size(push, 1)
+               dof = size(push, 1)*(node(i) - 1) + a
                do t = numbering%start(dof) + 1, numbering%start(dof + 1)
                   if (numbering%column(t) == 0) cycle
                   l = self%owner(numbering%column(t))
                   if (l == 0) cycle
-                  term = numbering%weight(t)*set%item(k)%g(a, i)*lam(k)
+                  term = numbering%weight(t)*push(a, i)*factor
                   rest(l) = rest(l) - term
                   magnitude(l) = magnitude(l) + abs(term)
                end do
             end do
          end do
-      end do
-      relative = 0.0_wp
-      do k = 1, set%n
-         if (magnitude(k) > 0.0_wp) relative = max(relative, abs(rest(k))/magnitude(k))
-      end do
+      end subroutine subtract
+
    end subroutine remainder
 
 end module emcon_null_space

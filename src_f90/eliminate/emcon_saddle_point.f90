@@ -71,14 +71,14 @@ contains
 
       n = matrix%n_row
       n_matrix = size(matrix%column)
-      n_rows = set%force_rows%row_start(set%n + 1)
+      n_rows = set%force_rows%row_start(set%n_row + 1)
       n_soft = merge(set%n - set%n_held, 0, allocated(set%soft))
       allocate(row(n_matrix + 2*n_rows + n_soft), column(n_matrix + 2*n_rows + n_soft))
       do i = 1, n
          row(matrix%row_start(i) + 1:matrix%row_start(i + 1)) = i
       end do
       column(:n_matrix) = matrix%column + 1
-      do i = 1, set%n
+      do i = 1, set%n_row
          associate (from => n_matrix + set%force_rows%row_start(i) + 1, &
                to => n_matrix + set%force_rows%row_start(i + 1))
             column(from:to) = n + i
@@ -87,12 +87,12 @@ contains
       end do
       row(n_matrix + 1:n_matrix + n_rows) = set%force_rows%column(:n_rows) + 1
       column(n_matrix + n_rows + 1:n_matrix + 2*n_rows) = set%force_rows%column(:n_rows) + 1
-      row(n_matrix + 2*n_rows + 1:) = [(n + i, i = set%n - n_soft + 1, set%n)]
+      row(n_matrix + 2*n_rows + 1:) = [(n + i, i = set%n_row - n_soft + 1, set%n_row)]
       column(n_matrix + 2*n_rows + 1:) = row(n_matrix + 2*n_rows + 1:)
-      call csr_from_entries(self%full, n + set%n, n + set%n, row, column, self%slot)
+      call csr_from_entries(self%full, n + set%n_row, n + set%n_row, row, column, self%slot)
       if (.not. allocated(self%solver)) call saddle_point_reset(self, solver_default)
       if (allocated(self%rhs)) deallocate(self%rhs, self%x, self%diagonal)
-      allocate(self%rhs(n + set%n), self%x(n + set%n), self%diagonal(n))
+      allocate(self%rhs(n + set%n_row), self%x(n + set%n_row), self%diagonal(n))
       do i = 1, n
          self%diagonal(i) = csr_find(matrix, i, i)
       end do
@@ -114,7 +114,7 @@ contains
 
       self%scale = maxval(abs(matrix%value(self%diagonal)))
       n_matrix = size(matrix%value)
-      n_rows = set%force_rows%row_start(set%n + 1)
+      n_rows = set%force_rows%row_start(set%n_row + 1)
       do k = 1, n_matrix
          self%full%value(self%slot(k)) = matrix%value(k)
       end do
@@ -130,7 +130,7 @@ contains
       end if
       self%is_symmetric = is_mirrored(self, set, matrix)
       if (self%is_symmetric) then
-         call factorise_symmetric(self, set%n, n_matrix + n_rows, is_singular, error)
+         call factorise_symmetric(self, set%n_row, n_matrix + n_rows, is_singular, error)
          return
       end if
       call self%solver%analyse(self%full, error)
@@ -155,7 +155,7 @@ contains
 
       is_mirrored = allocated(self%symmetric_solver)
       if (.not. is_mirrored) return
-      n = set%force_rows%row_start(set%n + 1)
+      n = set%force_rows%row_start(set%n_row + 1)
       is_mirrored = all(self%mirror > 0)
       if (is_mirrored) is_mirrored = all(abs(matrix%value - matrix%value(self%mirror)) &
          <= rounding*self%scale)

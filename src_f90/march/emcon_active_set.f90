@@ -2,6 +2,7 @@
 !> what is let go, put off and dropped. How it goes on: emcon_active_set_update.
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
+   use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
    use emcon_gaps, only : pair_measure, pair_search
    use emcon_holding, only : holding_forget, holding_t
    use emcon_kinds, only : wp
@@ -73,6 +74,7 @@ module emcon_active_set
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
       real(wp) :: left(0:1) = 0.0_wp
+      type(friction_t) :: friction               !! what sticks, what slides
       type(softness_state_t) :: softness         !! how stiff contacts are that give way
       type(holding_t) :: holding                 !! bodies that contact alone holds, in statics
       type(travel_t) :: travel                   !! of all nodes, over the steps
@@ -100,6 +102,7 @@ contains
       allocate(self%lam(system%n_constraint), source=0.0_wp)
       allocate(self%tried(system%n_constraint, most_sets), source=.false.)
       call constraints_select(self%set, [integer ::])
+      call friction_init(self%friction, system, most_sets)
    end subroutine active_set_init
 
    !> With `is_meant` the gaps at x + u that are closed are what the step resolves, else nothing.
@@ -138,6 +141,10 @@ contains
       if (size(system%contact) > 0) call travel_to(self%travel, motion%u0)
       self%was_active = state%is_active
       self%lam0 = state%lam
+      if (self%friction%is_on) then
+         self%friction%way0 = state%sliding
+         self%friction%tau0 = state%drag
+      end if
       do pair = 1, size(system%contact)
          system%contact(pair)%contact%is_sharp = .false.
       end do
@@ -152,6 +159,7 @@ contains
       type(motion_t), intent(in) :: motion
 
       call begin_contact(self, system, motion)
+      call friction_begin(self%friction, system, motion, self%was_active)
       call holding_forget(self%holding)
       self%lam = self%lam0
       self%n_newton = 0
@@ -273,6 +281,8 @@ contains
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate
       end do
+      self%set%n_held = count(self%set%id <= system%first_constraint(1))
+      call friction_select(self%friction, self%set, self%n_tried)
       call softness_select(self%softness, system, self%set, self%masses_resist .and. &
          .not. motion%pose%pushes_at_end)
 

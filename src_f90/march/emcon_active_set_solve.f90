@@ -14,6 +14,7 @@ module emcon_active_set_solve
       step_not_held
    use emcon_active_set_update, only : active_set_advance, active_set_leave, most_early
    use emcon_errors, only : error_t
+   use emcon_friction, only : friction_idle, friction_keep
    use emcon_gaps, only : pair_search
    use emcon_holding, only : holding_complete, holding_find_free
    use emcon_kinds, only : wp
@@ -60,6 +61,7 @@ contains
          call solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
          call keep_multipliers(self)
+         call friction_keep(self%friction, self%set)
          if (status == newton_redundant) then
             call leave_out(self, newton%correction%redundant, newton%correction%is_near)
             cycle
@@ -101,14 +103,17 @@ contains
       end do
    end subroutine keep_multipliers
 
-   !> What follows from other constraints nearly waits, what does so clearly does not act.
-   pure subroutine leave_out(self, redundant, is_near)
+   !> Leave out constraints that follow from others, or of what sticks its slip.
+   subroutine leave_out(self, redundant, is_near)
       type(active_set_t), intent(inout) :: self
-      integer, intent(in) :: redundant(:)        !! (any) places in the set, from 1
-      logical, intent(in) :: is_near(:)          !! (of each) nearly
+      integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
+      logical, intent(in) :: is_near(:)          !! (as many) they nearly do
 
+      call friction_idle(self%friction, self%set, pack(redundant, redundant > self%set%n))
+      self%n_tried = self%n_tried - 1
+      if (all(redundant > self%set%n)) return
       call active_set_put_off(self, pack(redundant, is_near))
-      call active_set_drop(self, pack(redundant, .not. is_near))
+      call active_set_drop(self, pack(redundant, .not. is_near .and. redundant <= self%set%n))
    end subroutine leave_out
 
    !> Solve with the present set. Contacts that give way and are pushed back are solved again with

@@ -4,6 +4,7 @@ module emcon_active_set_update
    use emcon_active_set, only : active_set_look, active_set_pass, active_set_t, most_sets, &
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
+   use emcon_friction, only : friction_close, friction_let_slip, friction_turn
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -47,11 +48,24 @@ contains
          return
       end if
       if (self%is_stale .and. status == step_done) status = step_too_far
+      if (self%friction%is_on .and. status == step_done) call go_on_with_friction(self, has_changed)
       is_done = status /= step_done .or. .not. has_changed
       if (is_done) return
       if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)
       is_done = status /= step_done
    end subroutine active_set_advance
+
+   !> Another set has other slips for others to hold. Where the set stands its friction must not
+   !> push against leads.
+   pure subroutine go_on_with_friction(self, has_changed)
+      type(active_set_t), intent(inout) :: self
+      logical, intent(inout) :: has_changed
+
+      self%friction%is_idle = self%friction%is_idle .and. .not. has_changed
+      if (has_changed) return
+      call friction_let_slip(self%friction, self%set, has_changed)
+      if (has_changed) self%n_tried = 0
+   end subroutine go_on_with_friction
 
    !> The next set, where the present one was seen to change before the step was solved with it. It
    !> was not tried to the end, so that no cycle is told from it; where what follows is no set to
@@ -61,14 +75,16 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical :: before(size(self%is_active)), has_changed
-      integer :: status
+      integer :: way(size(self%friction%way)), status
 
       before = self%is_active
+      way = self%friction%way
       call update(self, system, motion, has_changed, status)
       self%n_tried = self%n_tried - 1
       self%n_early = self%n_early + 1
       if (status == step_done .and. has_changed) return
       self%is_active = before
+      self%friction%way = way
       self%n_early = most_early
    end subroutine active_set_leave
 
@@ -81,7 +97,7 @@ contains
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: has_changed
       integer, intent(out) :: status             !! one of the `step_` codes
-      logical :: changes
+      logical :: changes, turns
       type(choice_t) :: choice
       integer :: pair, i, id, k
 
@@ -103,11 +119,18 @@ contains
                   call look_at_active(self, contact, i, k, motion, status)
                   changes = is_let_go(self, system, contact, i, k)
                   if (changes .and. self%holding%is_needed) self%holding%has_pulled(id) = .true.
+                  if (self%friction%is_on .and. .not. changes) then
+                     call friction_turn(self%friction, system, self%set, k, turns)
+                     has_changed = has_changed .or. turns
+                  end if
                else
                   call look_at_open(self, contact, i, id, changes, status)
                   ! What the pairs take in may hold the bodies away from their guards.
                   if (contact%slack > 0.0_wp .and. has_changed) changes = .false.
                   if (changes .and. begins_unseen(self, contact, i, motion)) status = step_too_far
+                  if (changes .and. self%friction%is_on) call friction_close(self%friction, &
+                     system, pair, i, motion, contact%state(i)%gap1 - gap_to_hold(self, &
+                     contact%state(i), id))
                end if
                has_changed = has_changed .or. changes
                if (changes .and. self%one_by_one .and. .not. contact%state(i)%is_leaving) then
@@ -120,6 +143,16 @@ contains
       end do
       if (choice%id > 0) self%is_active(choice%id) = .not. self%is_active(choice%id)
    end subroutine update
+
+   !> The gap that contact `id` would hold.
+   pure real(wp) function gap_to_hold(self, gap, id)
+      type(active_set_t), intent(in) :: self
+      type(gap_state_t), intent(in) :: gap
+      integer, intent(in) :: id
+
+      gap_to_hold = self%left(1)*self%overclosure(id) + gap%closed
+      if (self%holds_gap) gap_to_hold = gap%gap0
+   end function gap_to_hold
 
    !> Is it contact `id` that is to change alone? What pulls most goes first, then what is deepest
    !> comes.
@@ -214,6 +247,8 @@ contains
             < -contact%deepest_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, contact%gives_way) &
                *gap%size
+            if (contact%friction > 0.0_wp .and. self%holds_gap .and. &
+               self%friction%is_candidate(id)) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
          end if
       end associate
    end subroutine look_at_open
@@ -245,7 +280,10 @@ contains
       type(active_set_t), intent(in) :: self
 
       do first_tried = 1, self%n_tried
-         if (all(self%tried(:, first_tried) .eqv. self%is_active)) return
+         if (.not. all(self%tried(:, first_tried) .eqv. self%is_active)) cycle
+         if (.not. self%friction%is_on) return
+         if (all(self%friction%tried(:, first_tried) == self%friction%way &
+            .or. .not. self%is_active)) return
       end do
       first_tried = 0
    end function first_tried
@@ -263,7 +301,7 @@ contains
          self%is_active = any(cycle, dim=2)
       end associate
       if (self%only_adds .or. (self%may_cut .and. (any(self%closes) &
-         .or. .not. self%holds_gap))) then
+         .or. .not. self%holds_gap .or. self%friction%is_on))) then
          status = step_cycling
       else
          self%only_adds = .true.

@@ -15,7 +15,7 @@ module emcon_ledger
    integer, parameter :: most_dim = 3
 
    !> total = kinetic + strain + potential + contact_energy - external_work stays constant up to the
-   !> work of contact, and what damping takes: docs/theory.md, eqs. (23) and (24).
+   !> work of contact, and what damping and friction take: docs/theory.md, eqs. (23) and (24).
    type :: ledger_t
       real(wp) :: kinetic = 0.0_wp               !! [M L^2/T^2]
       real(wp) :: strain = 0.0_wp
@@ -28,6 +28,7 @@ module emcon_ledger
       real(wp) :: restitution = 0.0_wp
       real(wp) :: decay = 0.0_wp                 !! taken by the scheme, since the start
       real(wp) :: damping = 0.0_wp               !! taken by damped materials, since the start
+      real(wp) :: friction = 0.0_wp              !! taken by friction, since the start, >= 0
       real(wp) :: contact_energy = 0.0_wp        !! that contact by penalty stores
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]

@@ -70,6 +70,8 @@ contains
       call turn_record_init(self%state%turns, scene%rigid, scene%x, self%state%u)
       call pair_sums_init(self%state%sums, self%system, scene%pair)
       call active_set_init(self%active, self%system)
+      allocate(self%state%sliding(size(self%active%friction%mu)), source=0)
+      allocate(self%state%drag(size(self%active%friction%mu)), source=0.0_wp)
       call ledger_init(self%ledger, scene%n_dim)
       call judge_init(self%judge, scene)
    end subroutine march_init

@@ -1,9 +1,11 @@
 !> What follows from a solved step: velocities, works, forces, and what the user is told.
 module emcon_march_commit
+   use emcon_constraint, only : condition_drag
    use emcon_constraints, only : constraints_force
    use emcon_correction, only : correction_reason
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
+   use emcon_friction, only : friction_grip, friction_missed, friction_work
    use emcon_holding, only : holding_t
    use emcon_keeping, only : keeping_commit
    use emcon_kinds, only : wp
@@ -122,7 +124,7 @@ contains
       end associate
    end subroutine record_pairs
 
-   !> What contacts stand off and give way by, and how often they were pushed again.
+   !> What contacts stand off and give way by, how often they were pushed again, how they rub.
    pure subroutine tell_gaps(self, h, increment)
       type(march_t), intent(in) :: self
       real(wp), intent(in) :: h                  !! > 0 [T]
@@ -135,6 +137,9 @@ contains
          softness_depth(self%active%softness, self%explicit%soft(self%explicit%i_start)))
       increment%n_augmentation = max(increment%n_augmentation, &
          self%active%softness%n_augmentation)
+      increment%law_missed = max(increment%law_missed, &
+         friction_missed(self%active%friction, self%system, self%active%set))
+      increment%grip = max(increment%grip, friction_grip(self%active%set))
    end subroutine tell_gaps
 
    !> The velocities at the end, and no reaction where they are unknown.
@@ -187,6 +192,8 @@ contains
             soft => self%explicit%soft(self%explicit%i_start))
          state%is_active = .false.
          state%lam = 0.0_wp
+         state%sliding = 0
+         state%drag = 0.0_wp
          if (self%active%softness%is_at_ends) then
             state%is_active(soft%id) = .true.
             state%lam(soft%id) = soft%lam
@@ -197,6 +204,9 @@ contains
             ! What has opened stores nothing that a later step could give back.
             if (set%is_stored .and. k > set%n_held) state%is_active(set%id(k)) = &
                set%item(k)%gap1 < 0.0_wp
+            if (.not. set%item(k)%rubs) cycle
+            state%sliding(set%id(k)) = self%active%friction%way(set%id(k))
+            state%drag(set%id(k)) = condition_drag(set%item(k), set%lam(k))
          end do
          if (.not. layer%is_settled) return
          state%is_active(layer%n_before + 1:) = layer%acts
@@ -304,12 +314,16 @@ contains
    !> taken as linear over the step.
    subroutine book_work(self)
       type(march_t), intent(inout) :: self
-      real(wp) :: contact_work, decay, damping
+      real(wp) :: contact_work, decay, damping, friction
       integer :: k
 
       associate (state => self%state, part => self%system%response%part, &
             set => self%active%set, motion => self%motion)
          contact_work = 0.0_wp
+         friction = 0.0_wp
+         do k = set%n_held + 1, set%n
+            friction = friction + friction_work(set, k)
+         end do
          if (motion%pose%pushes_at_end) then
             contact_work = sum((motion%pose%start_weight*state%contact + self%newton%contact) &
                *motion%du)/(1.0_wp + motion%pose%start_weight)
@@ -328,7 +342,9 @@ contains
             contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*motion%du)
             self%ledger%external_work = self%ledger%external_work - contact_work &
                + 0.5_wp*sum((state%internal + part(role_internal)%force)*motion%du)
+            contact_work = contact_work + friction
          end if
+         self%ledger%friction = self%ledger%friction + friction
          self%ledger%contact_work = self%ledger%contact_work + contact_work
          call book_stored(self)
          call terms_decay(self%system%term, decay, damping)

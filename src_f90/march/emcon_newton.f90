@@ -3,9 +3,9 @@
 !> Forces are measured against the sum of their contributions before these cancel, docs/theory.md,
 !> eq. (25), so that no unit and no absolute size enters.
 module emcon_newton
-   use emcon_constraint, only : condition_rate
+   use emcon_constraint, only : condition_rate, condition_slip_rate
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
-      constraints_rows
+      constraints_rows, constraints_take_hold
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
@@ -135,7 +135,7 @@ contains
       logical :: is_rounding, is_fit
       integer :: next
 
-      call begin(self, set%n)
+      call begin(self, set%n_row)
       self%convergence%is_kept = .true.
       call keeping_begin(self%keeping, size(self%residual) + merge(set%n, 0, set%is_under_way), &
          motion%du)
@@ -233,7 +233,7 @@ contains
       logical :: is_rounding, is_driven, goes_on, has_tangent
       integer :: next
 
-      call begin(self, set%n)
+      call begin(self, set%n_row)
       is_driven = any(abs(self%driven) > 0.0_wp) .and. size(self%residual) > 0
       if (is_driven) motion%du = motion%du - self%driven
       do
@@ -421,6 +421,10 @@ contains
       do k = 1, set%n
          set%defect(k) = set%defect(k) + condition_rate(set%item(k), self%driven)
       end do
+      do k = set%n + 1, set%n_row
+         set%defect(k) = set%defect(k) - condition_slip_rate(set%item(set%stuck(k - set%n)), &
+            self%driven)
+      end do
       call factorise(self, system, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return
       call correct(self, system, set, motion%du, error)
@@ -479,6 +483,7 @@ contains
       call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
       call phase_enter(system%phases, phase_eliminate, left)
       call correction_multipliers(self%correction, system, set, self%residual)
+      call constraints_take_hold(set)
       call phase_leave(system%phases, left)
       if (system%response%with_sizes) then
          call constraints_force(set, 1, self%contact, system%response%magnitude)
@@ -495,6 +500,9 @@ contains
       defect = 0.0_wp
       do k = 1, set%n
          defect = max(defect, abs(set%defect(k))/set%item(k)%size)
+      end do
+      do k = set%n + 1, set%n_row
+         defect = max(defect, abs(set%defect(k))/set%item(set%stuck(k - set%n))%size)
       end do
       is_rounding = relative_size(self%residual, self%rounding) <= round_off &
          .and. defect <= round_off

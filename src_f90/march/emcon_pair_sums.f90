@@ -3,7 +3,7 @@
 !> A pair that is held in both orders, or watched by guards, is one here. Forces are those on the
 !> surface that the deck names first.
 module emcon_pair_sums
-   use emcon_constraint, only : condition_force
+   use emcon_constraint, only : condition_drag, condition_force
    use emcon_constraints, only : constraint_set_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -16,6 +16,7 @@ module emcon_pair_sums
 
    type :: pair_sum_t
       real(wp) :: impulse(3) = 0.0_wp            !! on the first surface, in dynamic steps [M L/T]
+      real(wp) :: friction = 0.0_wp              !! work that it has taken, >= 0 [M L^2/T^2]
       real(wp) :: duration = 0.0_wp              !! of force between the surfaces, in these [T]
       ! of the increment, in statics of its last part:
       real(wp) :: push(3) = 0.0_wp               !! force by time [M L/T]
@@ -99,6 +100,8 @@ contains
                   motion%x(:, item%node(i)) + (motion%u0(:, item%node(i)) &
                   + part*motion%du(:, item%node(i))), self%of_pair(contact) > 0)
             end do
+            if (item%rubs) self%sum(p)%friction = self%sum(p)%friction &
+               + condition_drag(item, set%lam(k))*item%slip
          end associate
          self%sum(p)%is_pressed = self%sum(p)%is_pressed .or. abs(set%lam(k)) > 0.0_wp
       end do

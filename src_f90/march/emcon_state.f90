@@ -28,6 +28,9 @@ module emcon_state
       logical, allocatable :: has_mass(:)        !! (n_node) contact nodes: it has come back
       logical, allocatable :: is_active(:)       !! (n_constraint)
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
+      !> (n_constraint) 0: it sticks, else the sign of its slip; only with friction, as the next
+      integer, allocatable :: sliding(:)
+      real(wp), allocatable :: drag(:)           !! (n_constraint) friction against slip
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) nodal contact forces
       type(pair_record_t) :: pairs               !! what each contact pair transmits
       type(pair_sums_t) :: sums                  !! and has transmitted so far

@@ -59,6 +59,8 @@ module emcon_verdict
       type(stand_off_t) :: stand_off
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: stabilization = 0.0_wp         !! work of what STABILIZE bears
+      real(wp) :: law_missed = 0.0_wp            !! of contact and friction, by the largest push
+      real(wp) :: grip = 0.0_wp                  !! pushes where it rubs by edges, [M L^2/T^2]
       real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
       real(wp) :: give_time = 0.0_wp             !! [T]
       integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
@@ -134,6 +136,8 @@ contains
       self%most_held = max(self%most_held, increment%n_held)
       associate (state => march%state)
          self%stabilization = march%ledger%stabilization
+         self%law_missed = max(self%law_missed, increment%law_missed)
+         self%grip = max(self%grip, increment%grip)
          if (increment%give > self%give) then
             self%give = increment%give
             self%give_time = state%time
@@ -249,7 +253,7 @@ contains
    pure real(wp) function kept_by(ledger) result(kept)
       type(ledger_t), intent(in) :: ledger
 
-      kept = ledger%total - ledger%contact_work + ledger%decay + ledger%damping
+      kept = ledger%total - ledger%contact_work + ledger%decay + ledger%damping + ledger%friction
    end function kept_by
 
    !> Count a warning, and keep it if it is another one than those before.
@@ -278,7 +282,8 @@ contains
       if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
          "loads do work on motions that nothing holds: stabilization bears " // &
          to_text(self%stabilization, 3))
-      if (self%dynamic_drift > energy_bar*self%largest_energy) call note_add(self%reasons, &
+      if (self%dynamic_drift > energy_bar*self%largest_energy + 64.0_wp*epsilon(1.0_wp) &
+         *self%grip) call note_add(self%reasons, &
          "the energy balance does NOT close to " // trim(closing_digits(this_precision)) // &
          " digits (" // to_text(self%dynamic_drift/self%largest_energy, 3) // &
          " of the largest energy)")
@@ -433,6 +438,9 @@ contains
          "energy of " // to_text(ledger%decay, 9))
       if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "the damping of materials took " // &
          "an energy of " // to_text(ledger%damping, 9))
+      if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction took an energy of " // &
+         to_text(ledger%friction, 9) // "; its law is met to " // to_text(self%law_missed, 3) // &
+         " of the largest force")
       if (self%give > 0.0_wp) call note_add(lines, "contact gave way by " // &
          to_text(self%give, 3) // " of an edge at time " // to_text(self%give_time, 9) // &
          "; it stores an energy of " // to_text(ledger%contact_energy, 9))

@@ -84,6 +84,7 @@ contains
          call json_number(line, "restitution_loss", ledger%restitution)
          call json_number(line, "scheme_loss", ledger%decay)
          call json_number(line, "damping_loss", ledger%damping)
+         call json_number(line, "friction_loss", ledger%friction)
          call json_number(line, "contact_energy", ledger%contact_energy)
          call json_number(line, "total", ledger%total)
       end associate
@@ -97,6 +98,7 @@ contains
          call json_number(line, "give", self%give)
          call json_number(line, "give_time", self%give_time)
       end if
+      if (march%active%friction%is_on) call json_number(line, "law_violation", self%law_missed)
       if (self%most_augmentations > 0) call json_number(line, "augmentations", &
          real(self%most_augmentations, wp))
       call json_number(line, "stand_off", self%stand_off%largest)
@@ -162,6 +164,10 @@ contains
          call restart_exchange(restart, "give", self%give)
          call restart_exchange(restart, "give", self%give_time)
          call restart_exchange(restart, "augmentations", self%most_augmentations)
+      end if
+      if (restart_offers(restart, "law_missed", self%grip > 0.0_wp)) then
+         call restart_exchange(restart, "law_missed", self%law_missed)
+         call restart_exchange(restart, "law_missed", self%grip)
       end if
       call exchange_texts(self, restart)
    end subroutine verdict_exchange

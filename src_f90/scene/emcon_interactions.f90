@@ -43,6 +43,7 @@ module emcon_interactions
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
       real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
       real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
+      real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given

@@ -8,7 +8,8 @@ module emcon_constraint
    use emcon_numbering, only : numbering_t
    implicit none
    private
-   public :: condition_t, condition_force, condition_rate, constraint_t, constraint_box_t
+   public :: condition_t, condition_force, condition_push, condition_rate, condition_slip_rate, &
+      condition_drag, constraint_t, constraint_box_t
 
    !> One condition over a motion, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: condition_t
@@ -24,6 +25,16 @@ module emcon_constraint
       !> (i, j): derivative of g(i) by end coordinate j, coordinates node by node
       real(wp), allocatable :: h(:, :)
       logical :: leaves_second = .false.              !! nobody asks for `h`
+      ! Of friction, docs/theory.md, eqs. (14e) to (14h):
+      logical :: rubs = .false.                       !! the rest is known
+      real(wp) :: slip = 0.0_wp                       !! s over the step [L]
+      real(wp) :: lead = 0.0_wp                       !! a, from which the law counts slip [L]
+      real(wp) :: tilt = 0.0_wp                       !! mu sigma where it slides, 0 where it sticks
+      real(wp) :: hold = 0.0_wp                       !! tau where it sticks [M L/T^2]
+      real(wp), allocatable :: t(:, :)                !! (n_dim, >= n_node) T, by discrete gradient
+      real(wp), allocatable :: t1(:, :)               !! (n_dim, >= n_node) gradient at the end
+      !> (i, j): derivative of t(i) by end coordinate j, coordinates node by node
+      real(wp), allocatable :: ht(:, :)
    end type condition_t
 
    type, abstract :: constraint_t
@@ -77,7 +88,7 @@ contains
    end subroutine find_idle
 
    !> The force of the multiplier `lam` on node `i` of the condition: along the discrete gradient,
-   !> as there is no friction.
+   !> and of friction along that of slip.
    pure function condition_force(self, lam, i) result(force)
       type(condition_t), intent(in) :: self
       real(wp), intent(in) :: lam                     !! [M L/T^2]
@@ -85,7 +96,26 @@ contains
       real(wp) :: force(size(self%g, 1))              !! (n_dim) [M L/T^2]
 
       force = lam*self%g(:, i)
+      if (self%rubs) force = force - condition_drag(self, lam)*self%t(:, i)
    end function condition_force
+
+   !> The force of friction tau against slip.
+   pure real(wp) function condition_drag(self, lam) result(tau)
+      type(condition_t), intent(in) :: self
+      real(wp), intent(in) :: lam                     !! the multiplier [M L/T^2]
+
+      tau = self%tilt*lam + self%hold
+   end function condition_drag
+
+   !> The directions in which a unit of the multiplier pushes: where the condition slides, tilted
+   !> against slip.
+   pure function condition_push(self) result(push)
+      type(condition_t), intent(in) :: self
+      real(wp) :: push(size(self%g, 1), self%n_node)
+
+      push = self%g(:, :self%n_node)
+      if (self%rubs) push = push - self%tilt*self%t(:, :self%n_node)
+   end function condition_push
 
    !> By how much the condition's value at the end changes with the field `way`, to first order.
    pure real(wp) function condition_rate(self, way) result(rate)
@@ -98,5 +128,17 @@ contains
          rate = rate + dot_product(self%c(:, i), way(:, self%node(i)))
       end do
    end function condition_rate
+
+   !> The same of its slip.
+   pure real(wp) function condition_slip_rate(self, way) result(rate)
+      type(condition_t), intent(in) :: self      !! it rubs
+      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node of the scene)
+      integer :: i
+
+      rate = 0.0_wp
+      do i = 1, self%n_node
+         rate = rate + dot_product(self%t1(:, i), way(:, self%node(i)))
+      end do
+   end function condition_slip_rate
 
 end module emcon_constraint

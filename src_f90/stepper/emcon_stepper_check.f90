@@ -8,8 +8,8 @@ module emcon_stepper_check
    use emcon_text, only : to_text
    implicit none
    private
-   public :: stepper_check_open, check_that, check_field, check_list, check_size, check_choice, &
-      check_number
+   public :: stepper_check_open, stepper_check_smooth, check_that, check_field, check_list, &
+      check_size, check_choice, check_number
 
 contains
 
@@ -21,6 +21,15 @@ contains
       call check_that(allocated(self%march%scheme), &
          "there is no model: none was built, or building it failed", error)
    end subroutine stepper_check_open
+
+   !> Nothing rubs: what sticks and what slides is told by no query.
+   pure subroutine stepper_check_smooth(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+
+      call check_that(.not. any(self%scene%pair%friction > 0.0_wp), "contact with *FRICTION " // &
+         "is not evaluated from outside: advance the model by increments", error)
+   end subroutine stepper_check_smooth
 
    !> An input error of this text, unless something holds.
    pure subroutine check_that(holds, text, error)

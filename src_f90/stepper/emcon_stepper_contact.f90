@@ -22,7 +22,8 @@ module emcon_stepper_contact
    use emcon_kinds, only : wp
    use emcon_pose, only : pose_at_end, pose_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_choice, check_field, check_list, check_size, check_that
+   use emcon_stepper_check, only : check_choice, check_field, check_list, check_size, check_that, &
+      stepper_check_smooth
    use emcon_gaps, only : gaps_forget, gaps_measure
    use emcon_stepper_query, only : query_forget, query_place, query_sync, query_t
    use emcon_stepper_report, only : contact_report_t, report_check_list, report_evaluate
@@ -47,6 +48,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call query_sync(self, stepper, error)
+      if (.not. allocated(error)) call stepper_check_smooth(stepper, error)
       if (.not. allocated(error)) call take_options(self, stepper)
       call check_flags(self, "was_active", was_active, error)
       call query_place(self, stepper, u0, du, error)

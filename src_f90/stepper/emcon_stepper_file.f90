@@ -138,6 +138,10 @@ contains
          end if
          call restart_exchange(restart, "lam", state%lam)
          call restart_exchange(restart, "is_active", state%is_active)
+         if (restart_offers(restart, "sliding", size(state%sliding) > 0)) then
+            call restart_exchange(restart, "sliding", state%sliding)
+            call restart_exchange(restart, "drag", state%drag)
+         end if
          call exchange_past(state, restart)
          if (restart_offers(restart, "has_mass", any(state%has_mass))) call restart_exchange( &
             restart, "has_mass", state%has_mass)
@@ -291,6 +295,11 @@ contains
       else
          ledger%damping = 0.0_wp
       end if
+      if (restart_offers(restart, "friction", is_written=abs(ledger%friction) > 0.0_wp)) then
+         call restart_exchange(restart, "friction", ledger%friction)
+      else
+         ledger%friction = 0.0_wp
+      end if
       if (restart_offers(restart, "stored", is_written=ledger%contact_energy > 0.0_wp)) then
          call restart_exchange(restart, "stored", ledger%contact_energy)
       else
@@ -331,6 +340,10 @@ contains
          call restart_exchange(restart, "pair_sum", sums%sum(k)%span)
          call restart_exchange(restart, "pair_sum", sums%sum(k)%weight)
          call restart_exchange(restart, "pair_sum", sums%sum(k)%moment)
+      end do
+      if (.not. restart_offers(restart, "pair_friction", any(sums%sum%friction > 0.0_wp))) return
+      do k = 1, size(sums%sum)
+         call restart_exchange(restart, "pair_friction", sums%sum(k)%friction)
       end do
    end subroutine exchange_sums
 

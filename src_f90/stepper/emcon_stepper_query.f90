@@ -22,7 +22,7 @@ module emcon_stepper_query
    use emcon_pose, only : instant_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_size, check_that, &
-      stepper_check_open
+      stepper_check_open, stepper_check_smooth
    use emcon_gaps, only : gaps_search
    use emcon_system, only : system_check_response, system_renew, system_respond
    use emcon_term_registry, only : terms_mass
@@ -156,6 +156,7 @@ contains
 
       call query_forget(self)
       call query_sync(self, stepper, error)
+      if (.not. allocated(error)) call stepper_check_smooth(stepper, error)
       call check_field("u1", u1, stepper%scene, error)
       call check_duration(h, error)
       call take_contact(self, error, lam, is_active)

@@ -5,7 +5,8 @@
 !> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
 !> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_constraint, only : condition_force, condition_t, constraint_t
+   use emcon_constraint, only : condition_drag, condition_force, condition_push, condition_t, &
+      constraint_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
@@ -17,6 +18,7 @@ module emcon_constraints
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
    public :: constraints_add_curvature, constraints_force, constraints_merge_pattern
+   public :: constraints_stick, constraints_take_hold
    public :: constraint_place, constraint_dof
 
    !> Which constraints act, and the linearised set on the unknowns.
@@ -30,15 +32,19 @@ module emcon_constraints
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
       !> (n) it acts also where it says nearly what others say
       logical, allocatable :: is_firm(:)
-      real(wp), allocatable :: lam(:)            !! (n) multipliers [M L/T^2]
-      real(wp), allocatable :: defect(:)         !! (n) f(q1), what is left of the gap to the target
+      real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
+      real(wp), allocatable :: defect(:)         !! (n_row) f(q1), what is left to the target [L]
       !> (n) contacts that give way, whose multipliers follow from gaps; not there: none
       type(soft_t), allocatable :: soft(:)
       logical :: is_stored = .false.             !! by discrete gradients of what these store
       !> Their multipliers are on the way to what the gaps say, as unknowns of a solve
       logical :: is_under_way = .false.
-      type(csr_t) :: force_rows                  !! (n x n_unknown) discrete gradients
-      type(csr_t) :: gap_rows                    !! (n x n_unknown) gradients at the end
+      !> Conditions that stick have a second row, behind all others: of slip, whose multiplier is
+      !> their friction. `n_row` rows, multipliers and defects.
+      integer :: n_row = 0
+      integer, allocatable :: stuck(:)           !! (n_row - n) places in the set
+      type(csr_t) :: force_rows                  !! (n_row x n_unknown) directions of forces
+      type(csr_t) :: gap_rows                    !! (n_row x n_unknown) gradients at the end
    end type constraint_set_t
 
    !> One row while it is made.
@@ -57,11 +63,13 @@ contains
       integer, intent(in) :: id(:)               !! (n) ascending, from 1
 
       self%n = size(id)
+      self%n_row = self%n
       self%n_linear = 0
       self%n_held = 0
       self%id = id
       if (allocated(self%soft)) deallocate(self%soft)
       self%is_under_way = .false.
+      if (allocated(self%stuck)) deallocate(self%stuck)
       if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, &
          self%is_firm, self%lam, self%defect)
       allocate(self%item(self%n), self%is_kept(self%n), self%is_firm(self%n))
@@ -69,6 +77,26 @@ contains
       self%is_kept = .false.
       self%is_firm = .true.
    end subroutine constraints_select
+
+   !> Let the conditions at the places `stuck` stick, with the friction `tau` to start from.
+   pure subroutine constraints_stick(self, stuck, tau)
+      type(constraint_set_t), intent(inout) :: self      !! of `constraints_select`
+      integer, intent(in) :: stuck(:)            !! (any) ascending, from 1; these rub
+      real(wp), intent(in) :: tau(:)             !! (as many) [M L/T^2]
+
+      self%stuck = stuck
+      self%n_row = self%n + size(stuck)
+      self%lam = [self%lam(:self%n), tau]
+      self%defect = [self%defect(:self%n), 0.0_wp*tau]
+      call constraints_take_hold(self)
+   end subroutine constraints_stick
+
+   !> The friction of what sticks is its multiplier.
+   pure subroutine constraints_take_hold(self)
+      type(constraint_set_t), intent(inout) :: self
+
+      if (self%n_row > self%n) self%item(self%stuck)%hold = self%lam(self%n + 1:)
+   end subroutine constraints_take_hold
 
    !> Pair and number within the pair of constraint `id`; pair 0: it is not one of contact.
    pure subroutine constraint_place(system, id, pair, i)
@@ -106,6 +134,8 @@ contains
       do k = 1, self%n
          self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
       end do
+      if (self%n_row > self%n) self%defect(self%n + 1:) = self%item(self%stuck)%lead &
+         - self%item(self%stuck)%slip
       if (allocated(self%soft)) call give_way(self)
 
    contains
@@ -151,19 +181,34 @@ contains
       type(numbering_t), intent(in) :: numbering
       type(row_t) :: row
       integer, allocatable :: order(:)
-      integer :: room(self%n), k, n
+      integer :: room(self%n_row), k, n
 
       do k = 1, self%n
          room(k) = entries_of(self%item(k), numbering)
       end do
+      do k = self%n + 1, self%n_row
+         room(k) = room(self%stuck(k - self%n))
+      end do
       n = maxval([0, room])
       allocate(row%column(n), row%g(n), row%c(n), order(n))
-      call make_room(self%force_rows, self%n, numbering%n_unknown, sum(room))
-      call make_room(self%gap_rows, self%n, numbering%n_unknown, sum(room))
+      call make_room(self%force_rows, self%n_row, numbering%n_unknown, sum(room))
+      call make_room(self%gap_rows, self%n_row, numbering%n_unknown, sum(room))
       n = 0
-      do k = 1, self%n
+      do k = 1, self%n_row
          ! A linear constraint stands on single freedoms.
-         call fill_row(row, self%item(k), numbering, leaves_zeros=k > self%n_linear)
+         if (k > self%n) then
+            associate (item => self%item(self%stuck(k - self%n)))
+               call fill_row(row, item, -item%t, -item%t1, numbering, leaves_zeros=.true.)
+            end associate
+         else if (self%item(k)%rubs) then
+            associate (item => self%item(k))
+               call fill_row(row, item, condition_push(item), item%c, numbering, &
+                  leaves_zeros=.true.)
+            end associate
+         else
+            call fill_row(row, self%item(k), self%item(k)%g, self%item(k)%c, numbering, &
+               leaves_zeros=k > self%n_linear)
+         end if
          associate (m => row%n)
             order(:m) = insertion_order(row%column(:m))
             self%force_rows%column(n + 1:n + m) = row%column(order(:m))
@@ -208,10 +253,12 @@ contains
       allocate(rows%value(n_entry), source=0.0_dp)
    end subroutine make_room
 
-   !> The derivatives of a condition by the unknowns, in the order in which these are met.
-   pure subroutine fill_row(row, item, numbering, leaves_zeros)
+   !> The derivatives `g` and `c` of a condition by the unknowns, in the order in which these are
+   !> met.
+   pure subroutine fill_row(row, item, g, c, numbering, leaves_zeros)
       type(row_t), intent(inout) :: row
       type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: g(:, :), c(:, :)   !! (n_dim, >= n_node) of forces, at the end
       type(numbering_t), intent(in) :: numbering
       logical, intent(in) :: leaves_zeros        !! also freedoms that it does not depend on
       integer :: i, a
@@ -219,9 +266,8 @@ contains
       row%n = 0
       do i = 1, item%n_node
          do a = 1, size(item%g, 1)
-            if (.not. leaves_zeros .and. abs(item%g(a, i)) <= 0.0_wp) cycle
-            call share_out(row, numbering, size(item%g, 1)*(item%node(i) - 1) + a, &
-               item%g(a, i), item%c(a, i))
+            if (.not. leaves_zeros .and. abs(g(a, i)) <= 0.0_wp) cycle
+            call share_out(row, numbering, size(g, 1)*(item%node(i) - 1) + a, g(a, i), c(a, i))
          end do
       end do
    end subroutine fill_row
@@ -395,6 +441,7 @@ contains
       do k = self%n_linear + 1, self%n
          associate (item => self%item(k))
             n_dim = size(item%g, 1)
+            if (item%rubs) call subtract_friction(item, condition_drag(item, self%lam(k)))
             if (all(abs(item%h(:n_dim*item%n_node, :n_dim*item%n_node)) <= 0.0_wp)) cycle
             do j = 1, n_dim*item%n_node
                do i = 1, n_dim*item%n_node
@@ -406,6 +453,20 @@ contains
       end do
 
    contains
+
+      !> Friction pushes against slip: the same of -`tau` times it.
+      subroutine subtract_friction(item, tau)
+         type(condition_t), intent(in) :: item
+         real(wp), intent(in) :: tau
+         integer :: i, j
+
+         do j = 1, n_dim*item%n_node
+            do i = 1, n_dim*item%n_node
+               call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), &
+                  -tau*item%ht(i, j))
+            end do
+         end do
+      end subroutine subtract_friction
 
       !> Subtract `value` at the freedoms `row`, `column`, shared out over their terms.
       subroutine subtract_terms(row, column, value)

@@ -164,6 +164,18 @@ def test_null_space_that_is_not_there(tmp_path: Path) -> None:
             ring.null_space(ring.u, H, active=active)
 
 
+def test_friction_is_not_evaluated_from_outside(tmp_path: Path) -> None:
+    """What sticks is told by increments alone; these go on."""
+    deck = tmp_path/"rubs.inp"
+    deck.write_text(RING.read_text(encoding="utf-8").replace(
+        "*SURFACE BEHAVIOR", "*FRICTION\n0.3\n*SURFACE BEHAVIOR", 1))
+    with Stepper(deck, h=H) as ring:
+        with pytest.raises(InputError, match="FRICTION is not evaluated from outside"):
+            ring.residual(ring.u, H)
+        ring.run(until=1.0)
+        assert ring.ledger["friction_loss"] > 0
+
+
 # --- constraints -------------------------------------------------------------------------------
 
 def test_discrete_gradients_of_the_gaps(contact: Contact) -> None:

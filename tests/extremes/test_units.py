@@ -22,6 +22,7 @@ DIMENSION = {
     "restitution_loss": (2, 1, -2),
     "scheme_loss": (2, 1, -2),
     "damping_loss": (2, 1, -2),
+    "friction_loss": (2, 1, -2),
     "contact_energy": (2, 1, -2),
     "total": (2, 1, -2),
     "px": (1, 1, -1),

@@ -31,6 +31,7 @@ program main
    use test_element_kinds, only : collect_element_kinds
    use test_element_axial, only : collect_element_axial
    use test_element_space, only : collect_element_space
+   use test_friction, only : collect_friction
    use test_gauss, only : collect_gauss
    use test_host_check, only : collect_host_check
    use test_host_deck, only : collect_host_deck
@@ -130,6 +131,7 @@ program main
 #endif
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
+   call run("friction", collect_friction)
    call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)
    call run("dgrad_near", collect_dgrad_near)

@@ -1,0 +1,124 @@
+!> *FRICTION of surface interactions, and what it does not go with.
+module emcon_deck_friction
+   use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line
+   use emcon_deck_reader, only : card_error, card_t, reader_t
+   use emcon_diagnostics, only : add_error
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_nts, &
+      smoothing_hermite
+   use emcon_kinds, only : wp
+   use emcon_rigid_bodies, only : rigid_body_t
+   use emcon_steps, only : initiation_admissible, initiation_persistent, method_null_space, &
+      method_saddle_point, step_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: read_friction, check_friction
+
+contains
+
+   !> The coefficient of Coulomb's law. A second value is a limit of shear stress or a slope of
+   !> stick in other programs: here nothing but the coefficient bounds friction, and stick is exact.
+   subroutine read_friction(reader, card, coefficient)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      real(wp), intent(inout) :: coefficient
+      type(data_t) :: data
+      integer :: n
+
+      call data_open(data, card)
+      n = 0
+      do while (next_line(reader, data))
+         n = n + 1
+         call get_real(reader, data, 1, "friction coefficient", coefficient)
+         call drop_zeros(data, 1)
+         if (data%ok .and. coefficient < 0.0_wp) then
+            call data_error(reader, data, "the friction coefficient " // to_text(coefficient) &
+               // " is negative")
+            coefficient = 0.0_wp
+         end if
+         if (data%n > 1) call data_error(reader, data, "only the coefficient is read: what " // &
+            "sticks does not move, so that there is no slope of stick, and nothing else " // &
+            "bounds friction; leave out what stands behind it")
+         if (n == 2) call data_error(reader, data, "only one data line is read")
+      end do
+      if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
+   end subroutine read_friction
+
+   !> Friction is of nodes on polygons, in steps whose scheme has its forces along discrete
+   !> gradients, and which hold contact exactly; in statics of one side.
+   subroutine check_friction(reader, pair, step, rigid)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(step_t), intent(in) :: step(:)
+      type(rigid_body_t), intent(in) :: rigid(:)
+      integer :: i, k
+
+      do i = 1, size(pair)
+         if (.not. pair(i)%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
+         if (pair(i)%formulation /= formulation_nts .and. pair(i)%formulation > 0) then
+            call refuse(reader, pair(i), "TYPE=SEGMENT or MORTAR; use TYPE=NODE TO SURFACE")
+         end if
+         if (pair(i)%slave == pair(i)%master .and. pair(i)%slave > 0) then
+            call refuse(reader, pair(i), "a surface in contact with itself; name two surfaces")
+         end if
+         if (pair(i)%restitution < 1.0_wp) call refuse(reader, pair(i), &
+            "RESTITUTION below 1: velocities would " &
+            // "jump along the surface too; use RESTITUTION=1")
+         do k = 1, size(rigid)
+            if (.not. allocated(rigid(k)%element)) cycle
+            if (size(rigid(k)%element) > 0) call refuse(reader, pair(i), &
+            "rigid bodies made of elements: which of " &
+               // "their nodes bear is not determined; let them be elastic, or hold their nodes")
+         end do
+         do k = 1, size(step)
+            call check_step(reader, pair(i), step(k), k)
+         end do
+      end do
+   end subroutine check_friction
+
+   !> What a step of the deck does not go with.
+   subroutine check_step(reader, pair, step, k)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair
+      type(step_t), intent(in) :: step
+      integer, intent(in) :: k                   !! its number
+      type(contact_options_t) :: options
+
+      options = step%contact
+      if (pair%has_options) options = pair%options
+      if (options%smoothing == smoothing_hermite) call refuse(reader, pair, &
+            "*SURFACE SMOOTHING of " &
+         // "step " // to_text(k) // "; use SMOOTHING=NONE")
+      if (.not. step%scheme%masses_resist) then
+         if (pair%both_sides) call refuse(reader, pair, &
+            "nodes of both sides in static steps, as step " &
+            // to_text(k) // " is; use SIDES=ONE")
+      else if (.not. step%scheme%takes_damping) then
+         call refuse(reader, pair, "SCHEME=" // trim(step%scheme%word) // " of step " // &
+            to_text(k) // &
+            "; use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
+         if (step%scheme%is_explicit) return
+      end if
+      if (step%scheme%masses_resist .and. all(step%initiation /= [initiation_persistent, &
+         initiation_admissible])) then
+         call refuse(reader, pair, "*CONTACT INITIATION of step " // to_text(k) // &
+            " but TYPE=PERSISTENT or ADMISSIBLE: jumps of velocities and surfaces without " &
+            // "mass have no friction")
+      end if
+      if (.not. any(step%constraint_method == [method_null_space, method_saddle_point])) then
+         call refuse(reader, pair, "contact that gives way, in step " // to_text(k) // "; use " // &
+            "*CONSTRAINT METHOD, TYPE=NULL SPACE")
+      end if
+   end subroutine check_step
+
+   !> The error of a pair whose friction does not go with `what`.
+   subroutine refuse(reader, pair, what)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair
+      character(len=*), intent(in) :: what
+
+      call add_error(reader%log, pair%origin, "*CONTACT PAIR: its surface interaction has " &
+         // "*FRICTION, which does not go with " // what)
+   end subroutine refuse
+
+end module emcon_deck_friction

@@ -1,0 +1,288 @@
+!> Which contacts with friction stick in a step and which slide where to.
+!>
+!> All of them change at once, by the trial of emcon_friction_law: what closes begins in the way
+!> that its slip tells, and what slides may turn at once. Contacts that acted at the start or close
+!> within the step are its candidates: they hold their gaps as one complementarity, and never cease
+!> to be candidates within the step. Source: docs/theory.md, section 4.13.
+module emcon_friction
+   use emcon_constraint, only : condition_drag, condition_t
+   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
+   use emcon_csr, only : csr_find
+   use emcon_friction_law, only : friction_trial, friction_violation, touch_open, touch_sticks, &
+      touch_t
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_pose, only : pose_is_equilibrium, pose_way
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: friction_t, friction_init, friction_begin, friction_select, friction_idle, &
+      friction_keep, friction_turn, friction_close, friction_let_slip, friction_work, &
+      friction_missed, friction_grip
+
+   !> Forces that differ by less than this part of the largest push are one.
+   real(wp), parameter :: tied = 5.0e4_wp*epsilon(1.0_wp)
+
+   type :: friction_t
+      logical :: is_on = .false.                 !! some contact rubs; else nothing is allocated
+      real(wp), allocatable :: mu(:)             !! (n_constraint)
+      !> (n_constraint) of what acts: `touch_sticks`, or the sign of its slip
+      integer, allocatable :: way(:)
+      integer, allocatable :: way0(:)            !! (n_constraint) at the end of the step before
+      real(wp), allocatable :: tau(:), tau0(:)   !! (n_constraint) friction, to start from
+      real(wp), allocatable :: lead(:)           !! (n_constraint) a, from which slip counts [L]
+      logical, allocatable :: is_candidate(:)    !! (n_constraint)
+      logical, allocatable :: is_idle(:)         !! (n_constraint) others hold its slip
+      logical, allocatable :: has_turned(:)      !! (n_constraint) from one slide to the other
+      integer, allocatable :: tried(:, :)        !! (n_constraint, sets) ways of the sets tried
+   end type friction_t
+
+contains
+
+   !> Set up for the contacts of `system`; `n_set` sets at most are tried in a step.
+   subroutine friction_init(self, system, n_set)
+      type(friction_t), intent(out) :: self
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: n_set               !! > 0
+      integer :: i, n
+
+      do i = 1, size(system%contact)
+         if (.not. allocated(system%contact(i)%contact)) cycle    ! of a layer, given with the step
+         self%is_on = self%is_on .or. system%contact(i)%contact%friction > 0.0_wp
+      end do
+      n = merge(system%n_constraint, 0, self%is_on)
+      allocate(self%mu(n), self%tau(n), self%tau0(n), self%lead(n), source=0.0_wp)
+      allocate(self%way(n), self%way0(n), source=touch_sticks)
+      allocate(self%is_candidate(n), self%is_idle(n), self%has_turned(n), source=.false.)
+      allocate(self%tried(n, merge(n_set, 0, self%is_on)), source=0)
+      if (.not. self%is_on) return
+      do i = 1, size(system%contact)
+         self%mu(system%first_constraint(i) + 1:system%first_constraint(i + 1)) &
+            = system%contact(i)%contact%friction
+      end do
+   end subroutine friction_init
+
+   !> The step begins, or begins again, with stencils chosen: ways and friction of the step before,
+   !> and slips counted from those with which velocities end along the surface.
+   pure subroutine friction_begin(self, system, motion, was_active)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(in) :: was_active(:)       !! (n_constraint)
+
+      if (.not. self%is_on) return
+      self%way = self%way0
+      self%tau = self%tau0
+      self%is_candidate = was_active
+      self%is_idle = .false.
+      self%has_turned = .false.
+      self%lead = 0.0_wp
+      if (.not. pose_is_equilibrium(motion%pose)) call find_leads(self, system, motion, was_active)
+   end subroutine friction_begin
+
+   !> The slips of what acted, as `friction_begin` has it.
+   pure subroutine find_leads(self, system, motion, was_active)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(in) :: was_active(:)
+      real(wp) :: du(size(motion%du, 1), size(motion%du, 2))
+      integer :: i, pair
+
+      du = pose_way(motion%pose, motion%v0, 0.0_wp)
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact, first => system%first_constraint(pair))
+            if (.not. contact%friction > 0.0_wp) cycle
+            do i = 1, contact%n_constraint
+               if (was_active(first + i)) self%lead(first + i) = contact%slip(i, motion%x, &
+                  motion%u0, du)
+            end do
+         end associate
+      end do
+   end subroutine find_leads
+
+   !> Tell the conditions of `set`, just selected, how they rub.
+   pure subroutine friction_select(self, set, n_tried)
+      type(friction_t), intent(inout) :: self
+      type(constraint_set_t), intent(inout) :: set
+      integer, intent(in) :: n_tried             !! number of the set among those tried
+      logical :: sticks(set%n)
+      integer :: k
+
+      if (.not. self%is_on) return
+      self%tried(:, n_tried) = self%way
+      sticks = .false.
+      do k = set%n_held + 1, set%n
+         associate (item => set%item(k), id => set%id(k))
+            item%rubs = self%mu(id) > 0.0_wp
+            if (.not. item%rubs) cycle
+            item%lead = self%lead(id)
+            item%tilt = self%mu(id)*self%way(id)
+            sticks(k) = self%way(id) == touch_sticks .and. .not. self%is_idle(id)
+         end associate
+      end do
+      call constraints_stick(set, pack([(k, k = 1, set%n)], sticks), &
+         pack(self%tau(set%id), sticks))
+   end subroutine friction_select
+
+   !> What sticks by the rows `row` of the set, past its conditions, does so by what holds others.
+   pure subroutine friction_idle(self, set, row)
+      type(friction_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: row(:)              !! (any) from set%n + 1
+
+      if (size(row) > 0) self%is_idle(set%id(set%stuck(row - set%n))) = .true.
+   end subroutine friction_idle
+
+   !> Friction of what sticks, to start from with the next set.
+   pure subroutine friction_keep(self, set)
+      type(friction_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+
+      if (set%n_row > set%n) self%tau(set%id(set%stuck)) = set%lam(set%n + 1:)
+   end subroutine friction_keep
+
+   !> The way of contact `k` of the set, which acts and goes on to do so, from what solves the step.
+   pure subroutine friction_turn(self, system, set, k, turns)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k                   !! > set%n_held
+      logical, intent(out) :: turns              !! it is another one than before
+      type(touch_t) :: at
+      integer :: next
+
+      turns = .false.
+      if (.not. set%item(k)%rubs) return
+      associate (id => set%id(k), item => set%item(k), lam => set%lam)
+         at = touch_t(max(0.0_wp, lam(k)), condition_drag(item, lam(k)), 0.0_wp, &
+            item%slip - item%lead)
+         ! Where slip is held the solution has none, but for round-off.
+         if (self%way(id) == touch_sticks .and. .not. self%is_idle(id)) at%slip = 0.0_wp
+         next = friction_trial(self%way(id), at, self%mu(id), stiffness_at(system, item), &
+            tied*maxval(abs(lam(set%n_held + 1:set%n))))
+         if (next == touch_open) next = self%way(id)
+         ! What turns twice would turn again and again: it sticks in between.
+         if (next*self%way(id) == -1) then
+            if (self%has_turned(id)) next = touch_sticks
+            self%has_turned(id) = .true.
+         end if
+         turns = next /= self%way(id)
+         self%way(id) = next
+      end associate
+   end subroutine friction_turn
+
+   !> Contact `i` of a pair closes from the motion, by `gap` below the one that it will hold: it is
+   !> a candidate from here on, and begins in the way that its slip tells.
+   pure subroutine friction_close(self, system, pair, i, motion, gap)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: pair, i             !! number of the contact, and within it
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: gap                !! < 0 [L]
+      type(touch_t) :: at
+
+      associate (id => system%first_constraint(pair) + i, contact => system%contact(pair)%contact)
+         if (.not. self%mu(id) > 0.0_wp) return
+         if (.not. (self%is_candidate(id) .or. pose_is_equilibrium(motion%pose))) then
+            self%lead(id) = contact%slip(i, motion%x, motion%u0, &
+               pose_way(motion%pose, motion%v0, 0.0_wp))
+         end if
+         self%is_candidate(id) = .true.
+         at%gap = min(gap, -tiny(gap))
+         at%slip = contact%slip(i, motion%x, motion%u0, motion%du) - self%lead(id)
+         self%way(id) = friction_trial(touch_open, at, self%mu(id), 1.0_wp, 0.0_wp)
+         if (self%way(id) == touch_open) self%way(id) = touch_sticks
+      end associate
+   end subroutine friction_close
+
+   !> A lead against which friction pushes would make energy: such contacts have none from here on.
+   pure subroutine friction_let_slip(self, set, has_changed)
+      type(friction_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set  !! of a set that stands
+      logical, intent(out) :: has_changed        !! the step is to be solved again
+      real(wp) :: noise
+      integer :: k
+
+      has_changed = .false.
+      if (.not. self%is_on .or. set%n == set%n_held) return
+      noise = tied*maxval(abs(set%lam(set%n_held + 1:set%n)))
+      do k = set%n_held + 1, set%n
+         associate (item => set%item(k), lead => self%lead(set%id(k)))
+            if (.not. item%rubs) cycle
+            if (.not. condition_drag(item, set%lam(k))*sign(1.0_wp, lead) < -noise) cycle
+            if (.not. abs(lead) > 0.0_wp) cycle
+            lead = 0.0_wp
+            has_changed = .true.
+         end associate
+      end do
+   end subroutine friction_let_slip
+
+   !> The work that friction at condition `k` takes.
+   pure real(wp) function friction_work(set, k) result(work)
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k                   !! from 1
+
+      work = 0.0_wp
+      if (set%item(k)%rubs) work = condition_drag(set%item(k), set%lam(k))*set%item(k)%slip
+   end function friction_work
+
+   !> The pushes of conditions that rub times their edges: an energy also where nothing moves.
+   pure real(wp) function friction_grip(set) result(grip)
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      grip = 0.0_wp
+      do k = set%n_held + 1, set%n
+         if (set%item(k)%rubs) grip = grip + abs(set%lam(k))*set%item(k)%size
+      end do
+   end function friction_grip
+
+   !> How far the laws of contact and friction are missed at worst, relative to the largest push.
+   pure real(wp) function friction_missed(self, system, set) result(missed)
+      type(friction_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set  !! of the step, solved
+      type(touch_t) :: at
+      real(wp) :: largest
+      integer :: k
+
+      missed = 0.0_wp
+      if (.not. self%is_on .or. set%n == set%n_held) return
+      largest = maxval(abs(set%lam(set%n_held + 1:set%n)))
+      if (.not. largest > 0.0_wp) return
+      do k = set%n_held + 1, set%n
+         associate (item => set%item(k))
+            if (.not. item%rubs) cycle
+            at = touch_t(set%lam(k), condition_drag(item, set%lam(k)), set%defect(k), &
+               item%slip - item%lead)
+            missed = max(missed, friction_violation(at, self%mu(set%id(k)), &
+               stiffness_at(system, item))/largest)
+         end associate
+      end do
+   end function friction_missed
+
+   !> The mean stiffness of the system at the slave node of a condition: of its unknowns, or those
+   !> that it follows.
+   pure real(wp) function stiffness_at(system, item) result(stiffness)
+      type(system_t), intent(in) :: system
+      type(condition_t), intent(in) :: item
+      integer :: a, t, n, place
+
+      stiffness = 0.0_wp
+      n = 0
+      associate (numbering => system%space%numbering, n_dim => size(item%g, 1))
+         do a = n_dim*(item%node(1) - 1) + 1, n_dim*item%node(1)
+            do t = numbering%start(a) + 1, numbering%start(a + 1)
+               if (numbering%column(t) == 0) cycle
+               place = csr_find(system%matrix, numbering%column(t), numbering%column(t))
+               if (place == 0 .or. .not. abs(numbering%weight(t)) > 0.5_wp) cycle
+               stiffness = stiffness + real(abs(system%matrix%value(place)), wp)
+               n = n + 1
+            end do
+         end do
+      end associate
+      if (n > 0) stiffness = stiffness/n
+   end function stiffness_at
+
+end module emcon_friction

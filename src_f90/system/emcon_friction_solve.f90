@@ -1,0 +1,162 @@
+!> Contact with friction of few places whose slips and gaps are linear in the forces.
+!>
+!> [g; -s] = [d; -r] + W [lam; tau]: by trials of the law at all places at once, which is Newton's
+!> method for it, and where these go round in a circle by the method of Lemke for
+!> (lam, tau+, tau-, rest of the cone), whose matrix is copositive: where W is positive definite it
+!> ends in a solution for any coefficient. Source: docs/theory.md, eq. (14h).
+module emcon_friction_solve
+   use emcon_friction_law, only : friction_trial, touch_open, touch_sticks, touch_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_lemke, only : lemke_solve
+   implicit none
+   private
+   public :: friction_problem_t, friction_solve
+
+   !> Trials at most before the other method takes over.
+   integer, parameter :: most_trials = 30
+   !> Forces that differ by less than this part of the largest are one.
+   real(wp), parameter :: tied = 5.0e4_wp*epsilon(1.0_wp)
+
+   type :: friction_problem_t
+      real(wp), allocatable :: w(:, :)               !! (2 n, 2 n) W [T^2/M]
+      real(wp), allocatable :: gap(:), slip(:)       !! (n) d, r: without forces [L]
+      real(wp), allocatable :: mu(:)                 !! (n)
+   end type friction_problem_t
+
+contains
+
+   !> Forces and ways that obey the laws. `way` on entry is where trials start from.
+   subroutine friction_solve(problem, way, at, is_solved, fell_back)
+      type(friction_problem_t), intent(in) :: problem
+      integer, intent(inout) :: way(:)               !! (n) of `emcon_friction_law`
+      type(touch_t), intent(out) :: at(:)            !! (n)
+      logical, intent(out) :: is_solved              !! by the other method also not: jammed
+      logical, intent(out) :: fell_back              !! trials have not come to an end
+      integer :: i
+
+      fell_back = .false.
+      do i = 1, most_trials
+         call solve_in(problem, way, at, is_solved)
+         if (.not. is_solved) exit
+         call try(problem, way, at, is_solved)
+         if (is_solved) return
+      end do
+      fell_back = .true.
+      call solve_by_lemke(problem, way, at, is_solved)
+   end subroutine friction_solve
+
+   !> Forces, gaps and slips where the law holds in the given ways.
+   subroutine solve_in(problem, way, at, is_solved)
+      type(friction_problem_t), intent(in) :: problem
+      integer, intent(in) :: way(:)
+      type(touch_t), intent(out) :: at(:)
+      logical, intent(out) :: is_solved
+      real(dp), dimension(2*size(way), 2*size(way)) :: matrix
+      real(dp), dimension(2*size(way), 1) :: b, x
+      logical :: is_singular
+      integer :: i, n
+
+      n = size(way)
+      matrix = real(problem%w, dp)
+      b(:, 1) = real([-problem%gap, problem%slip], dp)
+      do i = 1, n
+         if (way(i) == touch_open) call put(i, 0.0_dp)
+         if (way(i) == touch_sticks) cycle
+         call put(n + i, 0.0_dp)
+         if (way(i) /= touch_open) matrix(n + i, i) = -real(problem%mu(i)*way(i), dp)
+      end do
+      call dense_solve(matrix, b, x, is_singular)
+      is_solved = .not. is_singular
+      if (is_solved) call take(problem, real(x(:n, 1), wp), real(x(n + 1:, 1), wp), at)
+
+   contains
+
+      !> Row `k` says that force `k` is `value`.
+      subroutine put(k, value)
+         integer, intent(in) :: k
+         real(dp), intent(in) :: value
+
+         matrix(k, :) = 0.0_dp
+         matrix(k, k) = 1.0_dp
+         b(k, 1) = value
+      end subroutine put
+
+   end subroutine solve_in
+
+   !> What forces lead to.
+   pure subroutine take(problem, lam, tau, at)
+      type(friction_problem_t), intent(in) :: problem
+      real(wp), intent(in) :: lam(:), tau(:)
+      type(touch_t), intent(out) :: at(:)
+      real(wp) :: moved(2*size(lam))
+
+      moved = matmul(problem%w, [lam, tau])
+      at%lam = lam
+      at%tau = tau
+      at%gap = problem%gap + moved(:size(lam))
+      at%slip = problem%slip - moved(size(lam) + 1:)
+   end subroutine take
+
+   !> The next ways by a trial at all places; `stands`: they are the same.
+   pure subroutine try(problem, way, at, stands)
+      type(friction_problem_t), intent(in) :: problem
+      integer, intent(inout) :: way(:)
+      type(touch_t), intent(in) :: at(:)
+      logical, intent(out) :: stands
+      type(touch_t) :: place
+      real(wp) :: stiffness, tie
+      integer :: i, n, next
+
+      n = size(way)
+      tie = tied*max(maxval(abs(at%lam)), maxval(abs(at%tau)))
+      stands = .true.
+      do i = 1, n
+         place = at(i)
+         stiffness = 2.0_wp/(problem%w(i, i) + problem%w(n + i, n + i))
+         if (way(i) /= touch_open) place%gap = 0.0_wp
+         if (way(i) == touch_sticks) place%slip = 0.0_wp
+         next = friction_trial(way(i), place, problem%mu(i), stiffness, tie)
+         stands = stands .and. next == way(i)
+         way(i) = next
+      end do
+   end subroutine try
+
+   !> By complementary pivoting over (lam, tau+, tau-, mu lam - |tau|).
+   subroutine solve_by_lemke(problem, way, at, is_solved)
+      type(friction_problem_t), intent(in) :: problem
+      integer, intent(out) :: way(:)
+      type(touch_t), intent(out) :: at(:)
+      logical, intent(out) :: is_solved
+      real(wp) :: m(4*size(way), 4*size(way)), z(4*size(way)), force, length
+      integer :: i, n, n_pivot
+
+      n = size(way)
+      ! Forces by the largest stiffness, so that all entries are of one size.
+      length = maxval(abs(problem%w))
+      force = max(maxval(abs(problem%gap)), maxval(abs(problem%slip)), tiny(force))
+      m = 0.0_wp
+      associate (w => problem%w/length)
+         m(:n, :3*n) = reshape([w(:n, :n), w(:n, n + 1:), -w(:n, n + 1:)], [n, 3*n])
+         m(n + 1:2*n, :3*n) = reshape([w(n + 1:, :n), w(n + 1:, n + 1:), -w(n + 1:, n + 1:)], &
+            [n, 3*n])
+      end associate
+      m(2*n + 1:3*n, :3*n) = -m(n + 1:2*n, :3*n)
+      do i = 1, n
+         m([n + i, 2*n + i], 3*n + i) = 1.0_wp
+         m(3*n + i, i) = problem%mu(i)
+         m(3*n + i, [n + i, 2*n + i]) = -1.0_wp
+      end do
+      call lemke_solve(m, [problem%gap, -problem%slip, problem%slip, 0.0_wp*problem%gap]/force, z, &
+         is_solved, n_pivot)
+      if (.not. is_solved) return
+      z = (force/length)*z
+      call take(problem, z(:n), z(n + 1:2*n) - z(2*n + 1:3*n), at)
+      do i = 1, n
+         way(i) = touch_sticks
+         if (z(3*n + i) > 0.0_wp) way(i) = merge(1, -1, at(i)%tau > 0.0_wp)
+         if (.not. z(i) > 0.0_wp) way(i) = touch_open
+      end do
+   end subroutine solve_by_lemke
+
+end module emcon_friction_solve

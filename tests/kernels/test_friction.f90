@@ -1,0 +1,221 @@
+!> Coulomb's law, its small problems, and the slip of a node over an edge.
+module test_friction
+   use, intrinsic :: iso_fortran_env, only : output_unit
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_drag, condition_force, condition_t
+   use emcon_errors, only : error_t
+   use emcon_friction_law, only : friction_trial, friction_violation, touch_open, touch_sticks, &
+      touch_t
+   use emcon_friction_solve, only : friction_problem_t, friction_solve
+   use emcon_kinds, only : wp
+   use emcon_lemke, only : lemke_solve
+   use emcon_nts_constraint, only : polygon_constraint
+   use emcon_nts_stencil, only : polygon_stencil_t
+   use emcon_text, only : to_text
+   use random_draws, only : draw_random
+   use small_scenes, only : shake
+   implicit none
+   private
+   public :: collect_friction
+
+   real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
+
+contains
+
+   subroutine collect_friction(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("trials: where the law holds next", test_trial), &
+         test_case_t("violation of the law", test_violation), &
+         test_case_t("slip: work, rigid motions, differences", test_slip), &
+         test_case_t("slip along an edge, and of the force", test_along), &
+         test_case_t("Lemke: a problem by hand, and one without solution", test_lemke), &
+         test_case_t("random small problems are always solved", test_random)]
+   end subroutine collect_friction
+
+   subroutine test_trial(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp
+      integer :: next(8)
+
+      next = [friction_trial(touch_open, touch_t(gap=1.0_wp), mu, c, 0.0_wp), &
+         friction_trial(touch_open, touch_t(gap=-1.0_wp, slip=0.4_wp), mu, c, 0.0_wp), &
+         friction_trial(touch_open, touch_t(gap=-1.0_wp, slip=-0.6_wp), mu, c, 0.0_wp), &
+         friction_trial(touch_sticks, touch_t(2.0_wp, 1.1_wp), mu, c, 0.0_wp), &
+         friction_trial(touch_sticks, touch_t(2.0_wp, 1.1_wp), mu, c, 0.2_wp), &
+         friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.4_wp), mu, c, 0.0_wp), &
+         friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.6_wp), mu, c, 0.0_wp), &
+         friction_trial(-1, touch_t(-0.1_wp, -0.05_wp, slip=-0.6_wp), mu, c, 0.0_wp)]
+      call check_equal(error, next, [touch_open, touch_sticks, -1, 1, touch_sticks, touch_sticks, &
+         -1, touch_open], "ways")
+   end subroutine test_trial
+
+   subroutine test_violation(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_near(error, [friction_violation(touch_t(2.0_wp, 1.0_wp, slip=3.0_wp), 0.5_wp, &
+         1.0_wp), friction_violation(touch_t(2.0_wp, 1.0_wp, slip=-3.0_wp), 0.5_wp, 1.0_wp), &
+         friction_violation(touch_t(2.0_wp, 1.5_wp), 0.5_wp, 1.0_wp), &
+         friction_violation(touch_t(gap=-0.25_wp), 0.5_wp, 2.0_wp)], &
+         [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp], tol, 1.0_wp, "missed")
+   end subroutine test_violation
+
+   !> A node over one polygon, and over the two of a corner, in random motions.
+   subroutine test_slip(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: small = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      type(polygon_stencil_t) :: stencil(2)
+      type(condition_t) :: item, other
+      real(wp), dimension(2, 4) :: x, u0, du, moved, mid
+      real(wp) :: worst, work
+      integer :: i, j, n, case
+
+      stencil(1)%n = 4
+      stencil(1)%node(:4) = [1, 2, 3, 4]
+      stencil(1)%after = 4
+      stencil(2)%n = 4
+      stencil(2)%node(:4) = [1, 3, 4, 2]
+      stencil(2)%before = 4
+      do case = 1, 40
+         n = 1 + mod(case, 2)
+         call shake(x, 0.1_wp)
+         x = x + reshape([0.9_wp, 0.1_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 2.0_wp, -0.1_wp], [2, 4])
+         call shake(u0, 0.1_wp)
+         call shake(du, 0.3_wp)
+         item%rubs = .true.
+         call polygon_constraint(stencil(:n), x, u0, du, 0.0_wp, item)
+         associate (place => item%node(:item%n_node))
+            work = sum(item%t(:, :item%n_node)*du(:, place))
+            call check_near(error, [work], [item%slip], tol, 1.0_wp, "T.D")
+            mid = x + u0 + 0.5_wp*du
+            call check_near(error, [sum(item%t(1, :item%n_node)), sum(item%t(2, :item%n_node)), &
+               sum(item%t(2, :item%n_node)*mid(1, place) &
+               - item%t(1, :item%n_node)*mid(2, place))], &
+               [0.0_wp, 0.0_wp, 0.0_wp], 4.0_wp*tol, 1.0_wp, "rigid motions of the middle")
+            worst = 0.0_wp
+            do j = 1, 2*item%n_node
+               associate (k => place(1 + (j - 1)/2), a => 1 + mod(j - 1, 2))
+                  other%rubs = .true.
+                  moved = du
+                  moved(a, k) = du(a, k) + small
+                  call polygon_constraint(stencil(:n), x, u0, moved, 0.0_wp, other)
+                  worst = max(worst, abs((other%slip - item%slip)/small &
+                     - item%t1(a, 1 + (j - 1)/2)))
+                  do i = 1, 2*item%n_node
+                     worst = max(worst, abs((other%t(1 + mod(i - 1, 2), 1 + (i - 1)/2) &
+                        - item%t(1 + mod(i - 1, 2), 1 + (i - 1)/2))/small - item%ht(i, j)))
+                  end do
+               end associate
+            end do
+            call check_true(error, worst < 100.0_wp*small, "differences: " // to_text(worst))
+         end associate
+         other%leaves_second = .true.
+         call polygon_constraint(stencil(:n), x, u0, du, 0.0_wp, other)
+         other%leaves_second = .false.
+         call check_true(error, all(abs(other%t - item%t) <= 0.0_wp) .and. &
+            all(abs(other%t1 - item%t1) <= 0.0_wp) .and. &
+            .not. abs(other%slip - item%slip) > 0.0_wp, "bits without second derivatives")
+         if (allocated(error)) return
+      end do
+   end subroutine test_slip
+
+   !> Along an edge that turns by a right angle meanwhile slip is what an observer on it sees, and
+   !> friction pushes against it, along the edge in the middle.
+   subroutine test_along(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(polygon_stencil_t) :: stencil(1)
+      type(condition_t) :: item
+      real(wp), dimension(2, 3) :: x, du
+      integer :: i
+
+      stencil(1)%n = 3
+      stencil(1)%node(:3) = [1, 2, 3]
+      x = reshape([0.5_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp], [2, 3])
+      du = reshape([0.0_wp, 1.25_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp], [2, 3]) - x
+      item%rubs = .true.
+      call polygon_constraint(stencil, x, 0.0_wp*x, du, 0.0_wp, item)
+      item%tilt = -0.25_wp
+      call check_near(error, [item%slip], [0.75_wp], tol, 1.0_wp, "seen from the edge")
+      call check_near(error, [condition_drag(item, 8.0_wp)], [-2.0_wp], tol, 1.0_wp, "friction")
+      call check_near(error, [(condition_force(item, 8.0_wp, 1) - 8.0_wp*item%g(:, 1))], &
+         2.0_wp*item%t(:, 1), tol, 1.0_wp, "force against slip")
+      call check_true(error, item%t(1, 1) > 0.0_wp .and. item%t(2, 1) > 0.0_wp, "along the edge")
+      x = x + spread([3.0_wp, 4.0_wp], 2, 3)
+      du = reshape([(0.25_wp, 0.0_wp, i = 1, 3)], [2, 3])
+      call polygon_constraint(stencil, x, 0.0_wp*x, du, 0.0_wp, item)
+      call check_near(error, [item%slip], [0.0_wp], tol, 1.0_wp, "all move")
+   end subroutine test_along
+
+   subroutine test_lemke(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: z(2)
+      logical :: is_solved
+      integer :: n
+
+      call lemke_solve(reshape([2.0_wp, 1.0_wp, 1.0_wp, 2.0_wp], [2, 2]), [-5.0_wp, -6.0_wp], z, &
+         is_solved, n)
+      call check_true(error, is_solved, "solved")
+      call check_near(error, z, [4.0_wp, 7.0_wp]/3.0_wp, tol, 1.0_wp, "by hand")
+      call lemke_solve(reshape([0.0_wp, -1.0_wp, 0.0_wp, -1.0_wp], [2, 2]), [-1.0_wp, -1.0_wp], z, &
+         is_solved, n)
+      call check_true(error, .not. is_solved, "no solution: a ray")
+   end subroutine test_lemke
+
+   !> W of random couplings with any coefficient: solved, and by the law of each place; so often not
+   !> by trials alone.
+   subroutine test_random(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_case = 10000
+      type(friction_problem_t) :: problem
+      type(touch_t) :: at(4)
+      integer :: way(4), i, k, n, n_back
+      logical :: is_solved, fell_back
+      real(wp) :: worst, scale, u(1)
+
+      n_back = 0
+      worst = 0.0_wp
+      do i = 1, n_case
+         n = 1 + mod(i, 4)
+         call make_problem(problem, n)
+         do k = 1, n
+            call draw_random(u)
+            way(k) = int(4.0_wp*u(1)) - 1
+         end do
+         call friction_solve(problem, way(:n), at(:n), is_solved, fell_back)
+         call check_true(error, is_solved, "solved: case " // to_text(i))
+         if (allocated(error)) return
+         if (fell_back) n_back = n_back + 1
+         scale = max(maxval(abs(at(:n)%lam)), maxval(abs(problem%gap)), maxval(abs(problem%slip)))
+         do k = 1, n
+            worst = max(worst, friction_violation(at(k), problem%mu(k), 1.0_wp)/scale)
+         end do
+      end do
+      write(output_unit, "(a)") "   " // to_text(n_case) // " problems, " // to_text(n_back) &
+         // " not by trials alone, law missed by " // to_text(worst, 3)
+      call check_true(error, worst < 1.0e6_wp*epsilon(1.0_wp), "law")
+   end subroutine test_random
+
+   !> W = B A^-1 B' with A definite, by independent random rows, and a skew part of A.
+   subroutine make_problem(problem, n)
+      type(friction_problem_t), intent(out) :: problem
+      integer, intent(in) :: n
+      real(wp) :: b(2*n, 2*n), skew(2*n, 2*n), u(n)
+      integer :: i
+
+      call shake(b, 1.0_wp)
+      call shake(skew, 0.5_wp)
+      problem%w = matmul(b, transpose(b)) + skew - transpose(skew)
+      do i = 1, 2*n
+         problem%w(i, i) = problem%w(i, i) + 0.05_wp
+      end do
+      allocate(problem%gap(n), problem%slip(n), problem%mu(n))
+      call draw_random(u)
+      problem%gap = 2.0_wp*u - 1.5_wp
+      call draw_random(u)
+      problem%slip = 2.0_wp*u - 1.0_wp
+      call draw_random(u)
+      problem%mu = 0.1_wp + 3.0_wp*u
+   end subroutine make_problem
+
+end module test_friction
