@@ -191,7 +191,8 @@ class Step(Cards):
         """Ask for output of the batch program, `emcon run`.
 
         request       NODE, EL or CONTACT with FILE (fields) or PRINT (history); ENERGY PRINT
-        variables     U, V, RF, UR, VR, RM; S, E, ENER, ELSE, ELKE, EVOL; CDIS, CSTR, CF, CNUM
+        variables     U, V, RF, UR, VR, RM; S, E, ENER, ELSE, ELKE, EVOL; CDIS, CSTR, CF, CSHEAR,
+                      CSLIP, CNUM
         set           of nodes or elements, for NODE and EL
         frequency     every so many increments; 0: never
         time_points   name of times, instead

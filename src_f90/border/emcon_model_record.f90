@@ -38,7 +38,7 @@ contains
          return
       end if
       call nearest_word(upper, known, near)
-      if (len(near) == 0) near = "U, V, RF, S, E, ENER, CDIS, CSTR or CF"
+      if (len(near) == 0) near = "U, V, RF, S, E, ENER, CDIS, CSTR, CF, CSHEAR or CSLIP"
       call raise(error, err_input, "there is no variable '" // name // "'; did you mean " // &
          near // "?")
    end subroutine model_field

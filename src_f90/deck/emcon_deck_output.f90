@@ -33,7 +33,7 @@ module emcon_deck_output
 
    character(len=*), parameter :: of_node = "U V RF UR VR RM", &
       longer_node = "U V RF UR3 VR3 RM3", of_element = "S E ENER ELSE ELKE EVOL", &
-      of_contact = "CDIS CSTR CF", longer_contact = "CDISP CSTRESS CFORCE", &
+      of_contact = "CDIS CSTR CF CSHEAR CSLIP", longer_contact = "CDISP CSTRESS CFORCE", &
       of_energy = "ALLKE ALLSE ALLWK ETOTAL"
 
    type(output_row_t), parameter :: output_rows(*) = [ &

@@ -72,6 +72,7 @@ contains
       call active_set_init(self%active, self%system)
       allocate(self%state%sliding(size(self%active%friction%mu)), source=0)
       allocate(self%state%drag(size(self%active%friction%mu)), source=0.0_wp)
+      allocate(self%state%slip, self%state%slip_path, source=self%state%drag)
       call ledger_init(self%ledger, scene%n_dim)
       call judge_init(self%judge, scene)
    end subroutine march_init

@@ -207,6 +207,8 @@ contains
             if (.not. set%item(k)%rubs) cycle
             state%sliding(set%id(k)) = self%active%friction%way(set%id(k))
             state%drag(set%id(k)) = condition_drag(set%item(k), set%lam(k))
+            state%slip(set%id(k)) = state%slip(set%id(k)) + set%item(k)%slip
+            state%slip_path(set%id(k)) = state%slip_path(set%id(k)) + abs(set%item(k)%slip)
          end do
          if (.not. layer%is_settled) return
          state%is_active(layer%n_before + 1:) = layer%acts

@@ -31,6 +31,8 @@ module emcon_state
       !> (n_constraint) 0: it sticks, else the sign of its slip; only with friction, as the next
       integer, allocatable :: sliding(:)
       real(wp), allocatable :: drag(:)           !! (n_constraint) friction against slip
+      real(wp), allocatable :: slip(:)           !! (n_constraint) so far, to and fro [L]
+      real(wp), allocatable :: slip_path(:)      !! (n_constraint) the same, all of it >= 0 [L]
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) nodal contact forces
       type(pair_record_t) :: pairs               !! what each contact pair transmits
       type(pair_sums_t) :: sums                  !! and has transmitted so far

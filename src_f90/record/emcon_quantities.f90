@@ -39,7 +39,7 @@ module emcon_quantities
       logical :: is_sparse = .false.             !! the same at most places
    end type row_t
 
-   type(row_t), parameter :: rows(20) = [ &
+   type(row_t), parameter :: rows(22) = [ &
       row_t("U", at_nodes, of_vector, "displacement"), &
       row_t("V", at_nodes, of_vector, "velocity"), &
       row_t("RF", at_nodes, of_vector, "reaction_force", is_sparse=.true.), &
@@ -56,6 +56,8 @@ module emcon_quantities
       row_t("CDIS", at_contacts, 1, "contact_gap", is_sparse=.true.), &
       row_t("CSTR", at_contacts, 2, "contact_pressure", "contact_active", .true.), &
       row_t("CF", at_contacts, of_vector, "contact_force", is_sparse=.true.), &
+      row_t("CSHEAR", at_contacts, 2, "contact_shear", "contact_status", .true.), &
+      row_t("CSLIP", at_contacts, 2, "contact_slip", "slip_path", .true.), &
       row_t("CF", at_pairs, 3), &
       row_t("CF_MASTER", at_pairs, 3), &
       row_t("CONTACT_LENGTH", at_pairs), &
@@ -264,7 +266,8 @@ contains
    end function is_large
 
    !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF force of
-   !> the pair on the slave node, or both at a joint (2); second index the possible constraint.
+   !> the pair on the slave node, or both at a joint (2); CSHEAR and CSLIP as `rubbing` has them;
+   !> second index the possible constraint.
    function contact_quantity(stepper, variable) result(values)
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
@@ -285,16 +288,39 @@ contains
             values(1, :) = 0.0_dp
             where (state%pairs%area > 0.0_wp) values(1, :) = real(state%lam/state%pairs%area, dp)
             values(2, :) = merge(1.0_dp, 0.0_dp, state%is_active)
+         case ("CSHEAR", "CSLIP")
+            values = rubbing(stepper, variable)
          case default
             values = real(state%pairs%force, dp)
          end select
       end associate
    end function contact_quantity
 
+   !> CSHEAR traction against slip, and 1 where a contact sticks, 2 where it slides, 0 where nothing
+   !> rubs; CSLIP slip along the surface so far, and the length of its path (2).
+   pure function rubbing(stepper, variable) result(values)
+      type(stepper_t), intent(in) :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :)
+
+      allocate(values(2, stepper%march%system%n_constraint), source=0.0_dp)
+      if (.not. stepper%march%active%friction%is_on) return
+      associate (state => stepper%march%state, mu => stepper%march%active%friction%mu)
+         if (variable == "CSLIP") then
+            values(1, :) = real(state%slip, dp)
+            values(2, :) = real(state%slip_path, dp)
+            return
+         end if
+         where (state%pairs%area > 0.0_wp) values(1, :) = real(state%drag/state%pairs%area, dp)
+         where (state%is_active .and. mu > 0.0_wp) values(2, :) = merge(1.0_dp, 2.0_dp, &
+            state%sliding == 0)
+      end associate
+   end function rubbing
+
    !> The same on all nodes: of a node that is slave in several pairs the smallest gap, the sum of
-   !> the pressures, and active if it is so in one; off the slave nodes NaN gap, and 0. Both nodes
-   !> at a joint of tied pieces have the values of their constraint. CF (2): the contact forces of
-   !> all pairs, on both sides.
+   !> the pressures, of the shears and slips, the largest status and path, and active if it is so in
+   !> one; off the slave nodes NaN gap, and 0. Both nodes at a joint of tied pieces have the values
+   !> of their constraint. CF (2): the contact forces of all pairs, on both sides.
    function contact_field(stepper, variable) result(values)
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
@@ -328,7 +354,7 @@ contains
       real(dp), intent(in) :: more(:)
       real(dp), intent(inout) :: value(:)
 
-      if (variable == "CSTR") then
+      if (variable == "CSTR" .or. variable == "CSHEAR" .or. variable == "CSLIP") then
          value(1) = value(1) + more(1)
          value(2) = max(value(2), more(2))
       else if (ieee_is_nan(value(1))) then

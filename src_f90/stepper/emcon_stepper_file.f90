@@ -141,6 +141,8 @@ contains
          if (restart_offers(restart, "sliding", size(state%sliding) > 0)) then
             call restart_exchange(restart, "sliding", state%sliding)
             call restart_exchange(restart, "drag", state%drag)
+            call restart_exchange(restart, "slip", state%slip)
+            call restart_exchange(restart, "slip_path", state%slip_path)
          end if
          call exchange_past(state, restart)
          if (restart_offers(restart, "has_mass", any(state%has_mass))) call restart_exchange( &
