@@ -381,11 +381,14 @@ class Model(Cards):
     # --- contact, ties, equations ----------------------------------------------------------
 
     def interaction(self, name: str, *, friction: Number | None = None,
+                    friction_restitution: Number | None = None,
                     pad_thickness: Number | None = None,
                     restitution: Number | None = None) -> Model:
         """`*SURFACE INTERACTION` with hard contact.
 
         friction        coefficient of Coulomb's law, 0 or more; default 0
+        friction_restitution   0 to 1: the part of the velocity along the surface of what sticks
+                        that goes back; default 0
         pad_thickness   of a layer that keeps the surfaces apart, 0 or more [L]; a node with a pad
                         as thick as a radius is a circle
         restitution     0 to 1: the part of the velocity at which nodes with mass meet that is
@@ -394,7 +397,9 @@ class Model(Cards):
         text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness,
                                             "RESTITUTION": restitution})
         text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})
-        self._add(text if friction is None else text + card("FRICTION", rows=[(friction,)]))
+        if friction is not None:
+            text += card("FRICTION", {"RESTITUTION": friction_restitution}, rows=[(friction,)])
+        self._add(text)
         return self
 
     def contact_pair(self, slave: str, master: str, *, interaction: str | None = None,

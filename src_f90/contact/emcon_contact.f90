@@ -47,6 +47,7 @@ module emcon_contact
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
       real(wp) :: restitution = 1.0_wp                !! of impacts, 0 to 1
       real(wp) :: friction = 0.0_wp                   !! mu >= 0 of Coulomb's law
+      real(wp) :: rebound = 0.0_wp                    !! along the surface, of what sticks, 0 to 1
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> No state changes before a node has moved farther from where the last step began [L].
       real(wp) :: clearance = 0.0_wp

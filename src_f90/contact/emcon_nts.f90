@@ -69,6 +69,7 @@ contains
       self%slack = pair%slack
       self%restitution = pair%restitution
       if (.not. pair%slack > 0.0_wp) self%friction = pair%friction
+      self%rebound = pair%rebound
    end subroutine nts_init
 
    pure subroutine nts_configure(self, x, options)

@@ -29,6 +29,7 @@ contains
 
       allocate(reader%interaction(size(reader%card)))
       allocate(reader%pad(size(reader%card)), reader%friction(size(reader%card)), source=0.0_wp)
+      allocate(reader%rebound(size(reader%card)), source=0.0_wp)
       allocate(reader%restitution(size(reader%card)), source=1.0_wp)
       n = 0
       do i = 1, size(reader%card)
@@ -48,6 +49,9 @@ contains
                   "there is no *SURFACE INTERACTION before")
                if (card%name == "FRICTION") then
                   call read_friction(reader, card, reader%friction(max(1, n)))
+                  call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
+                     // "left of the velocity along the surface of what sticks", &
+                     reader%rebound(max(1, n)))
                else
                   call check_behavior(reader, card)
                end if
@@ -57,6 +61,7 @@ contains
       reader%interaction = reader%interaction(:n)
       reader%pad = reader%pad(:n)
       reader%friction = reader%friction(:n)
+      reader%rebound = reader%rebound(:n)
       reader%restitution = reader%restitution(:n)
    end subroutine read_interactions
 
@@ -321,6 +326,7 @@ contains
          pair(i)%offset = of_card%offset
          pair(i)%restitution = of_card%restitution
          pair(i)%friction = of_card%friction
+         pair(i)%rebound = of_card%rebound
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
@@ -343,6 +349,7 @@ contains
          of_card%offset = reader%pad(i)
          of_card%restitution = reader%restitution(i)
          of_card%friction = reader%friction(i)
+         of_card%rebound = reader%rebound(i)
       end do
       if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))

@@ -60,6 +60,7 @@ module emcon_deck_reader
       real(wp), allocatable :: pad(:)                    !! PAD THICKNESS of each [L]
       real(wp), allocatable :: restitution(:)            !! RESTITUTION of each
       real(wp), allocatable :: friction(:)               !! coefficient of each
+      real(wp), allocatable :: rebound(:)                !! RESTITUTION of its *FRICTION
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
 

@@ -44,6 +44,7 @@ module emcon_interactions
       real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
       real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
       real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0
+      real(wp) :: rebound = 0.0_wp                   !! along the surface, of what sticks, 0 to 1
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
