@@ -6,7 +6,6 @@ module emcon_deck_friction
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_nts, &
       smoothing_hermite
    use emcon_kinds, only : wp
-   use emcon_rigid_bodies, only : rigid_body_t
    use emcon_steps, only : initiation_admissible, initiation_persistent, method_null_space, &
       method_saddle_point, step_t
    use emcon_text, only : to_text
@@ -46,11 +45,10 @@ contains
 
    !> Friction is of nodes on polygons, in steps whose scheme has its forces along discrete
    !> gradients, and which hold contact exactly; in statics of one side.
-   subroutine check_friction(reader, pair, step, rigid)
+   subroutine check_friction(reader, pair, step)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair(:)
       type(step_t), intent(in) :: step(:)
-      type(rigid_body_t), intent(in) :: rigid(:)
       integer :: i, k
 
       do i = 1, size(pair)
@@ -64,12 +62,6 @@ contains
          if (pair(i)%restitution < 1.0_wp) call refuse(reader, pair(i), &
             "RESTITUTION below 1: velocities would " &
             // "jump along the surface too; use RESTITUTION=1")
-         do k = 1, size(rigid)
-            if (.not. allocated(rigid(k)%element)) cycle
-            if (size(rigid(k)%element) > 0) call refuse(reader, pair(i), &
-            "rigid bodies made of elements: which of " &
-               // "their nodes bear is not determined; let them be elastic, or hold their nodes")
-         end do
          do k = 1, size(step)
             call check_step(reader, pair(i), step(k), k)
          end do

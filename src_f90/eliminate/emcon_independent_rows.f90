@@ -1,10 +1,10 @@
 !> Which constraints are independent, and for each an unknown that can be eliminated with it.
 !>
-!> The rows of discrete gradients and of gradients at the end are eliminated together, firm ones
-!> first, else in their order, or in one that fills them less. What comes out depends on the present
-!> gradients only, not on earlier choices. A row is round-off also where its terms cancel before any
-!> elimination, between nodes of which one follows the other by a tie. Source: docs/theory.md,
-!> section 5.
+!> The rows of discrete gradients and of gradients at the end are eliminated together, those of gaps
+!> before those of slips, of each the firm ones first, else in their order, or in one that fills them
+!> less. What comes out depends on the present gradients only, not on earlier choices. A row is
+!> round-off also where its terms cancel before any elimination, between nodes of which one follows
+!> the other by a tie. Source: docs/theory.md, section 5.
 module emcon_independent_rows
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
@@ -43,7 +43,6 @@ contains
       type(numbering_t), intent(in) :: numbering
       real(hp) :: largest(n_kind, set%n_row)
       integer :: own(size(numbering%unknown, 1), set%n_row), k
-      logical :: is_firm(set%n_row)
 
       do k = 1, set%n
          associate (item => set%item(k), n => set%item(k)%n_node)
@@ -58,30 +57,29 @@ contains
             largest(:, k) = real([maxval(abs(item%t(:, :n))), maxval(abs(item%t1(:, :n)))], hp)
          end associate
       end do
-      is_firm(:set%n) = set%is_firm
-      is_firm(set%n + 1:) = .true.
-      call eliminate(self, set%force_rows, set%gap_rows, own, largest, is_firm)
+      call eliminate(self, set, set%gap_rows, own, largest)
       ! Where no unknown serves both, only the forces tell what is redundant.
       if (.not. self%is_poor) return
-      call eliminate(self, set%force_rows, set%force_rows, own, largest([1, 1], :), is_firm)
+      call eliminate(self, set, set%force_rows, own, largest([1, 1], :))
       self%is_poor = .true.
    end subroutine independent_rows_find
 
-   !> Eliminate all rows of `force` and `gap`, two matrices of one pattern, or those before the
-   !> first without a good pivot; firm ones first.
-   subroutine eliminate(self, force, gap, own, largest, is_firm)
+   !> Eliminate all rows of forces and of `gap`, a matrix of the same pattern, or those before the
+   !> first without a good pivot; firm ones first, and gaps before slips: what slip leaves undone
+   !> is never a gap.
+   subroutine eliminate(self, set, gap, own, largest)
       type(independent_rows_t), intent(inout) :: self
-      type(csr_t), intent(in) :: force, gap
-      integer, intent(in) :: own(:, :)               !! (n_dim, n) unknowns of the slave nodes
-      real(hp), intent(in) :: largest(:, :)          !! (n_kind, n) of their terms, by all freedoms
-      logical, intent(in) :: is_firm(:)              !! (n)
-      integer :: order(size(is_firm)), k
+      type(constraint_set_t), intent(in) :: set
+      type(csr_t), intent(in) :: gap
+      integer, intent(in) :: own(:, :)               !! (n_dim, n_row) unknowns of the slave nodes
+      real(hp), intent(in) :: largest(:, :)          !! (n_kind, n_row) of terms, by all freedoms
+      integer :: order(set%n_row), k
       logical :: is_full
 
       order = [(k, k = 1, size(order))]
-      call eliminate_in_order(most_fill*force%row_start(size(order) + 1), nearness)
+      call eliminate_in_order(most_fill*set%force_rows%row_start(size(order) + 1), nearness)
       if (.not. is_full) return
-      call row_order_nested(force, order)
+      call row_order_nested(set%force_rows, order)
       ! Of the links of a chain the one that closes it from both sides keeps but its share.
       call eliminate_in_order(huge(most_fill), nearness/real(size(order), hp))
 
@@ -94,12 +92,13 @@ contains
          real(hp), intent(in) :: near
          integer :: i, fate
 
-         call begin(self, force)
-         order = [pack(order, is_firm(order)), pack(order, .not. is_firm(order))]
+         call begin(self, set%force_rows)
+         call put_gaps_first()
          do i = 1, size(order)
             k = order(i)
-            self%elimination%nearness = merge(0.0_hp, near, is_firm(k))
-            associate (from => force%row_start(k) + 1, to => force%row_start(k + 1))
+            self%elimination%nearness = merge(0.0_hp, near, set%is_firm(k))
+            associate (force => set%force_rows, from => set%force_rows%row_start(k) + 1, &
+                  to => set%force_rows%row_start(k + 1))
                call elimination_add(self%elimination, force%column(from:to) + 1, &
                   real(force%value(from:to), hp), real(gap%value(from:to), hp), own(:, k), fate, &
                   largest(:, k))
@@ -116,6 +115,17 @@ contains
             if (self%is_poor .or. is_full) exit
          end do
       end subroutine eliminate_in_order
+
+      !> Gaps before slips, of each the firm ones first, else as they are.
+      subroutine put_gaps_first()
+         logical :: is_gap(set%n_row), is_firm(set%n_row)
+
+         is_gap = order <= set%n
+         is_firm = set%is_firm(order)
+         order = [pack(order, is_gap .and. is_firm), pack(order, is_gap .and. .not. is_firm), &
+            pack(order, .not. is_gap .and. is_firm), &
+            pack(order, .not. (is_gap .or. is_firm))]
+      end subroutine put_gaps_first
 
    end subroutine eliminate
 

@@ -33,6 +33,7 @@ module emcon_friction
       real(wp), allocatable :: lead(:)           !! (n_constraint) a, from which slip counts [L]
       logical, allocatable :: is_candidate(:)    !! (n_constraint)
       logical, allocatable :: is_idle(:)         !! (n_constraint) others hold its slip
+      logical, allocatable :: is_needed(:)       !! (n_constraint) others hold its slip but nearly
       logical, allocatable :: has_turned(:)      !! (n_constraint) from one slide to the other
       integer, allocatable :: tried(:, :)        !! (n_constraint, sets) ways of the sets tried
    end type friction_t
@@ -53,7 +54,8 @@ contains
       n = merge(system%n_constraint, 0, self%is_on)
       allocate(self%mu(n), self%tau(n), self%tau0(n), self%lead(n), source=0.0_wp)
       allocate(self%way(n), self%way0(n), source=touch_sticks)
-      allocate(self%is_candidate(n), self%is_idle(n), self%has_turned(n), source=.false.)
+      allocate(self%is_candidate(n), self%is_idle(n), self%is_needed(n), self%has_turned(n), &
+         source=.false.)
       allocate(self%tried(n, merge(n_set, 0, self%is_on)), source=0)
       if (.not. self%is_on) return
       do i = 1, size(system%contact)
@@ -63,7 +65,8 @@ contains
    end subroutine friction_init
 
    !> The step begins, or begins again, with stencils chosen: ways and friction of the step before,
-   !> and slips counted from those with which velocities end along the surface.
+   !> and slips counted from those with which velocities along the surface end, or that part of them
+   !> which a restitution does not give back.
    pure subroutine friction_begin(self, system, motion, was_active)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -75,6 +78,7 @@ contains
       self%tau = self%tau0
       self%is_candidate = was_active
       self%is_idle = .false.
+      self%is_needed = .false.
       self%has_turned = .false.
       self%lead = 0.0_wp
       if (.not. pose_is_equilibrium(motion%pose)) call find_leads(self, system, motion, was_active)
@@ -94,8 +98,8 @@ contains
          associate (contact => system%contact(pair)%contact, first => system%first_constraint(pair))
             if (.not. contact%friction > 0.0_wp) cycle
             do i = 1, contact%n_constraint
-               if (was_active(first + i)) self%lead(first + i) = contact%slip(i, motion%x, &
-                  motion%u0, du)
+               if (was_active(first + i)) self%lead(first + i) = (1.0_wp - contact%rebound) &
+                  *contact%slip(i, motion%x, motion%u0, du)
             end do
          end associate
       end do
@@ -122,7 +126,7 @@ contains
          end associate
       end do
       call constraints_stick(set, pack([(k, k = 1, set%n)], sticks), &
-         pack(self%tau(set%id), sticks))
+         pack(self%tau(set%id), sticks), pack(self%is_needed(set%id), sticks))
    end subroutine friction_select
 
    !> What sticks by the rows `row` of the set, past its conditions, does so by what holds others.
@@ -150,17 +154,25 @@ contains
       integer, intent(in) :: k                   !! > set%n_held
       logical, intent(out) :: turns              !! it is another one than before
       type(touch_t) :: at
+      real(wp) :: stiffness, tie
       integer :: next
 
       turns = .false.
       if (.not. set%item(k)%rubs) return
+      stiffness = stiffness_at(system, set%item(k))
+      tie = tied*maxval(abs(set%lam(set%n_held + 1:set%n)))
       associate (id => set%id(k), item => set%item(k), lam => set%lam)
          at = touch_t(max(0.0_wp, lam(k)), condition_drag(item, lam(k)), 0.0_wp, &
             item%slip - item%lead)
          ! Where slip is held the solution has none, but for round-off.
          if (self%way(id) == touch_sticks .and. .not. self%is_idle(id)) at%slip = 0.0_wp
-         next = friction_trial(self%way(id), at, self%mu(id), stiffness_at(system, item), &
-            tied*maxval(abs(lam(set%n_held + 1:set%n))))
+         if (self%is_idle(id) .and. .not. self%is_needed(id)) then
+            ! Others do not hold it: it does so itself before it may slide.
+            turns = stiffness*abs(at%slip) > tie
+            self%is_needed(id) = turns
+            return
+         end if
+         next = friction_trial(self%way(id), at, self%mu(id), stiffness, tie)
          if (next == touch_open) next = self%way(id)
          ! What turns twice would turn again and again: it sticks in between.
          if (next*self%way(id) == -1) then
@@ -185,7 +197,7 @@ contains
       associate (id => system%first_constraint(pair) + i, contact => system%contact(pair)%contact)
          if (.not. self%mu(id) > 0.0_wp) return
          if (.not. (self%is_candidate(id) .or. pose_is_equilibrium(motion%pose))) then
-            self%lead(id) = contact%slip(i, motion%x, motion%u0, &
+            self%lead(id) = (1.0_wp - contact%rebound)*contact%slip(i, motion%x, motion%u0, &
                pose_way(motion%pose, motion%v0, 0.0_wp))
          end if
          self%is_candidate(id) = .true.

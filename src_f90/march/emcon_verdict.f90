@@ -28,6 +28,9 @@ module emcon_verdict
    character(len=*), parameter :: closing_digits(3) = [character(len=11) :: "four", "ten", &
       "twenty-five"]
    real(wp), parameter :: energy_bar = closing(this_precision)
+   !> Slip is made of a dozen products of lengths of an edge: what friction takes in an increment is
+   !> uncertain by so many roundings of push times edge, those of increments by themselves.
+   real(wp), parameter :: slip_rounding = 16.0_wp*epsilon(1.0_wp)
    !> Largest relative residual that is accepted where rounding ends Newton's method early: half of
    !> the digits are left.
    real(wp), parameter :: half_digits = sqrt(epsilon(1.0_wp))
@@ -60,7 +63,8 @@ module emcon_verdict
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: stabilization = 0.0_wp         !! work of what STABILIZE bears
       real(wp) :: law_missed = 0.0_wp            !! of contact and friction, by the largest push
-      real(wp) :: grip = 0.0_wp                  !! pushes where it rubs by edges, [M L^2/T^2]
+      !> Pushes where it rubs times their edges, root of the sum of squares of increments.
+      real(wp) :: grip = 0.0_wp                  !! [M L^2/T^2]
       real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
       real(wp) :: give_time = 0.0_wp             !! [T]
       integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
@@ -137,7 +141,7 @@ contains
       associate (state => march%state)
          self%stabilization = march%ledger%stabilization
          self%law_missed = max(self%law_missed, increment%law_missed)
-         self%grip = max(self%grip, increment%grip)
+         self%grip = hypot(self%grip, increment%grip)
          if (increment%give > self%give) then
             self%give = increment%give
             self%give_time = state%time
@@ -282,8 +286,8 @@ contains
       if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
          "loads do work on motions that nothing holds: stabilization bears " // &
          to_text(self%stabilization, 3))
-      if (self%dynamic_drift > energy_bar*self%largest_energy + 64.0_wp*epsilon(1.0_wp) &
-         *self%grip) call note_add(self%reasons, &
+      if (self%dynamic_drift > energy_bar*self%largest_energy + slip_rounding*self%grip) &
+         call note_add(self%reasons, &
          "the energy balance does NOT close to " // trim(closing_digits(this_precision)) // &
          " digits (" // to_text(self%dynamic_drift/self%largest_energy, 3) // &
          " of the largest energy)")

@@ -30,7 +30,7 @@ module emcon_constraints
       type(condition_t), allocatable :: item(:) !! (n) values and derivatives
       real(wp), allocatable :: target(:)         !! (n) mean gap to hold [L]
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
-      !> (n) it acts also where it says nearly what others say
+      !> (n_row) it acts also where it says nearly what others say
       logical, allocatable :: is_firm(:)
       real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
       real(wp), allocatable :: defect(:)         !! (n_row) f(q1), what is left to the target [L]
@@ -79,15 +79,17 @@ contains
    end subroutine constraints_select
 
    !> Let the conditions at the places `stuck` stick, with the friction `tau` to start from.
-   pure subroutine constraints_stick(self, stuck, tau)
+   pure subroutine constraints_stick(self, stuck, tau, is_firm)
       type(constraint_set_t), intent(inout) :: self      !! of `constraints_select`
       integer, intent(in) :: stuck(:)            !! (any) ascending, from 1; these rub
       real(wp), intent(in) :: tau(:)             !! (as many) [M L/T^2]
+      logical, intent(in) :: is_firm(:)          !! (as many) also where others nearly do
 
       self%stuck = stuck
       self%n_row = self%n + size(stuck)
       self%lam = [self%lam(:self%n), tau]
       self%defect = [self%defect(:self%n), 0.0_wp*tau]
+      self%is_firm = [self%is_firm(:self%n), is_firm]
       call constraints_take_hold(self)
    end subroutine constraints_stick
 

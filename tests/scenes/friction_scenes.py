@@ -1,13 +1,19 @@
 """Scenes of `*FRICTION`, for tests and the book."""
 
 import math
+import sys
 
 import numpy as np
 from plain_scenes import ONE, Scene
-from scene_tools import DECKS, Deck
+from scene_tools import DECKS, ROOT, Deck
+
+sys.path.insert(0, str(ROOT/"pywrap"))
+
+from emcon.model import Model  # noqa: E402
 
 G = 10.0
 WEIGHT = 2*G
+SIDES = 40
 NODES = {"formulation": "NODE TO SURFACE"}
 
 
@@ -21,6 +27,14 @@ def balance(history, scale=0.0):
     kept = history["total"] - history["contact_work"] + history["damping_loss"] \
         + history["friction_loss"]
     return np.abs(kept - kept[0]).max()/max(scale, (history["kinetic"] + history["strain"]).max())
+
+
+def make_rigid(scene, body, place, velocity=(0, 0)):
+    """Make a body of the scene rigid, with the node 9000 at `place`, where its mass centre is."""
+    (x, y), (vx, vy) = place, velocity
+    scene.cards += [f"*NODE\n9000, {x!r}, {y!r}", f"*RIGID BODY, ELSET={body}, REF NODE=9000",
+                    "*NSET, NSET=MIDDLE\n9000", "*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY",
+                    f"9000, 0., {vx!r}, {vy!r}\n{x!r}, {y!r}"]
 
 
 def block_on_floor(h, t_end, mu, *, v0=0.0, slope=0.0, push=0.0, rigid=False, stiffness=2e4,
@@ -37,12 +51,7 @@ def block_on_floor(h, t_end, mu, *, v0=0.0, slope=0.0, push=0.0, rigid=False, st
     scene.hold("FLOOR", lambda x, y: True)
     scene.pairs = [("BLOCK", "FLOOR")]
     if rigid:
-        x, y = turn(1, 0.5)
-        scene.cards += [f"*NODE\n9000, {x!r}, {y!r}", "*RIGID BODY, ELSET=BLOCK, REF NODE=9000",
-                        "*NSET, NSET=MIDDLE\n9000"]
-        vx, vy = turn(v0, 0)
-        scene.cards += ["*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY",
-                        f"9000, 0., {vx!r}, {vy!r}\n{x!r}, {y!r}"]
+        make_rigid(scene, "BLOCK", turn(1, 0.5), turn(v0, 0))
     else:
         scene.cards += ["*NSET, NSET=MIDDLE", ", ".join(
             str(k) for k in range(1, 1 + (cells[0] + 1)*(cells[1] + 1)))]
@@ -58,6 +67,70 @@ def way(run, n, slope=0.0):
     """Mean displacements of the first n nodes along the floor, of all frames."""
     u = run.fields()["displacement"][:, :n]
     return (u @ [math.cos(slope), math.sin(slope)]).mean(axis=1)
+
+
+def rolling(inner, h, t_end, mu, v0):
+    """A rigid ring of 40 sides, bored by `inner` of its radius 1, thrown along the floor."""
+    scene = Scene(h, t_end, gravity=G)
+
+    def place(angle, share):
+        r = 1.0 - share*(1.0 - inner)
+        return r*math.sin(angle), 1.0 - r*math.cos(angle)
+
+    scene.ring("RING", place, (SIDES, 4), stiffness=1e3, velocity=(v0, 0))
+    scene.block("FLOOR", (-2, -1), (4, 1), (4, 1), stiffness=1e3)
+    scene.hold("FLOOR", lambda x, y: True)
+    scene.pairs = [("RING", "FLOOR")]
+    make_rigid(scene, "RING", (0, 1), (v0, 0))
+    return rubbing(scene.deck(ONE), mu)
+
+
+def polygon(r):
+    """Area and second moment about the middle of SIDES sides on a circle of radius r."""
+    angle = 2*math.pi/SIDES
+    area = 0.5*SIDES*r**2*math.sin(angle)
+    return area, area*r**2*(2 + math.cos(angle))/6
+
+
+def on_spring(h, t_end, mu, folder, *, pull=0.0, stiffness=0.0, belt=0.0, rebound=None):
+    """Times and places of a rigid block between a spring and a floor that moves with `belt`; `pull`
+    and `stiffness` are by its mass. Also the ledger at the end, and Newton's iterations."""
+    scene = Scene(h, t_end, gravity=G)
+    scene.block("BLOCK", (0, 0), (2, 1), (1, 1), stiffness=1e3)
+    scene.block("FLOOR", (-30, -1), (60, 1), (1, 1), stiffness=1e3,
+                velocity=(belt, 0))
+    if belt:
+        scene.hold("FLOOR", lambda x, y: True, "2, 2")
+        scene.hold("FLOOR", lambda x, y: True, "1, 1", belt*t_end)
+    else:
+        scene.hold("FLOOR", lambda x, y: True)
+    scene.pairs = [("BLOCK", "FLOOR")]
+    make_rigid(scene, "BLOCK", (1, 0.5))
+    deck = rubbing(scene.deck(ONE), mu)
+    if rebound is not None:
+        deck.replace("*FRICTION", f"*FRICTION, RESTITUTION={rebound!r}")
+    if pull:
+        deck.insert(f"*DLOAD\nBLOCK, GRAV, {pull!r}, 1., 0.", before="*CONSTRAINT METHOD")
+    deck.set_parameter("formulation", "NODE TO SURFACE")
+    deck.write(folder/"spring.inp")
+    model = Model.from_deck(folder/"spring.inp")
+    corners = [0.0, 0.0, 2.0, 2.0]                # in the order of their labels
+
+    def spring(x):
+        k = 2.0*stiffness/4
+        way = x[:, 0] - np.resize(corners, len(x))     # at both ends of an increment
+        hessian = np.zeros((len(x), 2, 2))
+        hessian[:, 0, 0] = k
+        return 0.5*k*way**2, np.stack((k*way, 0*way), axis=1), hessian
+
+    model.potential(spring, [1, 2, 3, 4])
+    with model.stepper() as stepper:
+        time, way = [0.0], [0.0]
+        while not stepper.is_done:
+            stepper.step()
+            time.append(stepper.time)
+            way.append(stepper.u[0, 0])
+        return np.array(time), np.array(way), stepper.ledger
 
 
 def ring(mu):
@@ -80,3 +153,29 @@ def pressed(shift, mu, sides=ONE):
     deck = rubbing(scene.deck(sides), mu)
     deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
     return deck
+
+def pressed_sideways(n):
+    """code_aster's SSNV128: half of a plate, n by n elements, on a floor, pressed from above and more
+    from its side. The node at the floor in the symmetry plane is held. Also the places of nodes."""
+    side, young = 0.04, 1.3e11
+    scene = Scene(1.0, 1.0)
+    scene.block("PLATE", (0, 0), (side, side), (n, n), stiffness=young)
+    scene.block("FLOOR", (-side, -side), (3*side, side), (3, 1), stiffness=young)
+    scene.hold("FLOOR", lambda x, y: True)
+    scene.hold("PLATE", lambda x, y: x > 0.99*side, "1, 1")
+    scene.hold("PLATE", lambda x, y: x > 0.99*side and y < 1e-9, "2, 2")
+    scene.side("BOTTOM", "PLATE", lambda x, y: y < 1e-9 and x < side*(1 - 0.5/n))
+    scene.pairs = [("BOTTOM", "FLOOR")]
+    node = scene.part["PLATE"].node
+    load = []
+    for label, corner in scene.part["PLATE"].element.items():
+        for k in range(4):
+            ends = [node[corner[k]], node[corner[(k + 1) % 4]]]
+            if all(y > 0.99*side for _, y in ends):
+                load.append(f"{label}, P{k + 1}, 5e7")
+            if all(x < 1e-9 for x, _ in ends):
+                load.append(f"{label}, P{k + 1}, 15e7")
+    text = rubbing(scene.deck(ONE), 1.0).text().replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    deck = Deck(text.replace(f"{young!r}, 0.3", f"{young!r}, 0.2"))
+    deck.insert("*DLOAD\n" + "\n".join(load), before="*CONSTRAINT METHOD")
+    return deck, np.array([node[label] for label in sorted(node)])

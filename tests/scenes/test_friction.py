@@ -1,8 +1,22 @@
 """`*FRICTION`: Coulomb's law for nodes on edges, with what it takes in the ledger."""
 
+import math
+
 import numpy as np
 import pytest
-from friction_scenes import NODES, balance, block_on_floor, pressed, ring, way
+from friction_scenes import (
+    NODES,
+    WEIGHT,
+    balance,
+    block_on_floor,
+    on_spring,
+    polygon,
+    pressed,
+    pressed_sideways,
+    ring,
+    rolling,
+    way,
+)
 from scene_tools import run_deck
 from test_contact_output import restart
 
@@ -33,6 +47,21 @@ def test_a_damped_block_slides_to_rest(h, tmp_path):
     assert run.history["newton"].max() <= 6 and run.history["cuts"].sum() == 0
 
 
+@pytest.mark.parametrize("cells", [(1, 1), (4, 2)])
+@pytest.mark.parametrize("h", [0.02, 0.01, 0.005])
+def test_a_rigid_block_slides_to_rest(h, cells, tmp_path):
+    """Whole steps lose mu g h; in the last one the velocity ends, so that its mean is half. However
+    many nodes bear: what they say of each other is dropped."""
+    run = run_deck(block_on_floor(h, 0.72, 0.3, v0=2.0, rigid=True, cells=cells), tmp_path, **NODES)
+    obeys(run)
+    n = math.floor(2.0/(3.0*h) + 1e-9)
+    left = 2.0 - n*3.0*h
+    moved = way(run, (cells[0] + 1)*(cells[1] + 1))[-1]
+    assert moved == pytest.approx(n*h*(2.0 - 0.5*n*3.0*h) + 0.5*h*left, rel=1e-9)
+    assert abs(moved - 2/3) <= 3.0*h**2/8 + 1e-9
+    assert run.history["newton"].max() <= 8 and run.history["cuts"].sum() == 0
+
+
 # ---- stick and slip -----------------------------------------------------------------------------
 
 
@@ -41,6 +70,86 @@ def test_an_elastic_block_sticks(tmp_path):
     run = run_deck(block_on_floor(0.02, 1.0, 0.5, push=3.0, eta=5e-3), tmp_path, **NODES)
     obeys(run)
     assert np.abs(way(run, 5)).max() < 1e-3
+
+
+@pytest.mark.parametrize("cells", [(1, 1), (2, 1), (4, 2)])
+@pytest.mark.parametrize("push", [0.49, 0.499, 0.501, 0.51])
+def test_a_rigid_block_that_is_pushed(push, cells, tmp_path):
+    """Three conditions of a body of three freedoms: one node slides and the other one holds."""
+    run = run_deck(block_on_floor(0.01, 0.5, 0.5, push=10.0*push, rigid=True, cells=cells), tmp_path,
+                   **NODES)
+    obeys(run, scale=WEIGHT)
+    moved = way(run, (cells[0] + 1)*(cells[1] + 1))[-1]
+    assert moved == pytest.approx(0.5*0.5**2*10.0*max(0.0, push - 0.5), rel=1e-6, abs=1e-11)
+    assert run.history["cuts"].sum() == 0
+
+
+@pytest.mark.parametrize("mu", [0.49, 0.50, 0.51])
+def test_a_rigid_block_on_a_slope(mu, tmp_path):
+    slope = -math.atan(0.5)
+    run = run_deck(block_on_floor(0.01, 0.5, mu, slope=slope, rigid=True), tmp_path, **NODES)
+    obeys(run, scale=WEIGHT)
+    moved = way(run, 15, slope)[-1]
+    exact = 0.5*0.5**2*10.0*math.cos(slope)*max(0.0, 0.5 - mu)
+    assert moved == pytest.approx(exact, rel=1e-6, abs=1e-11)
+
+
+# ---- sliding and rolling ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("inner", [0.95, 0.05])
+def test_what_is_thrown_rolls(inner, tmp_path):
+    """A ring keeps half of its velocity, a disc two thirds: what it turns about is the node that it
+    slides on, so that its angular momentum about that node stays. The node is vertically below
+    the middle but for the way gone, v t = 1e-4, through which the weight turns the ring."""
+    v0, mu = 0.02, 0.3
+    run = run_deck(rolling(inner, 2.5e-4, 4e-3, mu, v0), tmp_path, **NODES)
+    obeys(run)
+    (outside, turning), (hole, lost) = polygon(1.0), polygon(inner)
+    mass, inertia = outside - hole, turning - lost
+    time, v = run.history["time"], run.history["px"]/mass
+    slides = time < v0*(1 - 1/(1 + inertia/mass))/(10.0*mu) - 1e-9
+    # In half a millimetre of turn the node stands off by so much: mu and the lever change by it.
+    turned = 1e-4
+    assert v[slides] == pytest.approx(v0 - 10.0*mu*time[slides], rel=4*turned)
+    assert v[-1]/v0 == pytest.approx(1/(1 + inertia/mass), rel=4*turned)
+
+
+# ---- stick-slip ---------------------------------------------------------------------------------
+
+
+def belt_way(time, mu, k, v):
+    """Closed form: slides until it is as fast as the belt, sticks until the spring pulls by mu g,
+    and swings about that place for ever."""
+    w, end = math.sqrt(k), 10.0*mu/k
+    t1 = math.asin(v*w/(10.0*mu))/w
+    x1 = end*(1 - math.cos(w*t1))
+    t2 = t1 + (end - x1)/v
+    return np.select([time < t1, time < t2], [end*(1 - np.cos(w*time)), x1 + v*(time - t1)],
+                     end + v/w*np.sin(w*(time - t2)))
+
+
+def test_stick_slip_on_a_belt(tmp_path):
+    """Second order, through slip, stick and slip."""
+    error = []
+    for h in (0.02, 0.01, 0.005):
+        time, x, _ = on_spring(h, 1.4, 0.3, tmp_path, stiffness=25.0, belt=0.3)
+        error.append(np.abs(x - belt_way(time, 0.3, 25.0, 0.3)).max())
+    order = np.log2(np.array(error[:-1])/error[1:])
+    assert (order > 1.7).all(), (error, order)
+    assert error[-1] < 1e-3*0.12
+
+
+def test_a_block_pulled_against_a_spring(tmp_path):
+    """code_aster's SDNV104: half a swing about (F - mu N)/k, and half a swing back about (F + mu N)/k:
+    14.917 at 1.70, 3.5 at 3.39."""
+    pull, k = 200.0/7.0, 24.0/7.0
+    time, x, energies = on_spring(0.01, 3.4, 0.3, tmp_path, pull=pull, stiffness=k)
+    half = math.pi/math.sqrt(k)
+    assert np.interp(half, time, x) == pytest.approx(2*(pull - 3)/k, rel=1e-3)
+    assert np.interp(2*half, time, x) == pytest.approx(3.5, rel=1e-2)
+    path = 2*(pull - 3)/k + (2*(pull - 3)/k - 3.5)
+    assert energies["friction_loss"] == pytest.approx(2*3*path, rel=1e-2)
 
 
 # ---- statics ------------------------------------------------------------------------------------
@@ -63,6 +172,24 @@ def test_statics_stick_and_slide(tmp_path):
     assert force[0.002][0] == pytest.approx(2*force[0.001][0], rel=1e-2)
     assert -force[0.05][0] == pytest.approx(0.5*force[0.05][1], rel=1e-10)
     assert run.history["friction_loss"][-1] > 0
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_a_plate_pressed_sideways(steps, tmp_path):
+    """code_aster's SSNV128, displacements at the floor: part of it sticks, part slides, and how many
+    increments there are is the same. At the fifth place 15.0 is given, 15.6 is what code_aster has."""
+    deck, place = pressed_sideways(32)
+    run = run_deck(deck, tmp_path, **NODES, h=1.0/steps)
+    history = run.history
+    assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+    assert history["cuts"].sum() == 0 and (np.diff(history["friction_loss"]) >= 0).all()
+    u = run.fields()["displacement"][-1, :len(place), 0]
+    seen = [u[(abs(place[:, 0] - x) < 1e-9) & (place[:, 1] < 1e-9)].item()*1e6
+            for x in (0, 0.00125, 0.005, 0.0075, 0.01125)]
+    assert seen[:4] == pytest.approx([28.6, 27.2, 22.8, 19.8], rel=0.01)
+    assert seen[4] == pytest.approx(15.0, rel=0.05)
+    # The top is pressed by 2e6, of which the node held in the corner bears 2.6 per cent.
+    assert history["pair1_force_y"][-1] == pytest.approx(2e6, rel=0.03)
 
 
 # ---- the ring -----------------------------------------------------------------------------------
