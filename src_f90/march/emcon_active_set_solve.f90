@@ -108,12 +108,14 @@ contains
       type(active_set_t), intent(inout) :: self
       integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
       logical, intent(in) :: is_near(:)          !! (as many) they nearly do
+      logical :: is_gap(size(redundant))
 
-      call friction_idle(self%friction, self%set, pack(redundant, redundant > self%set%n))
+      is_gap = redundant <= self%set%n
+      call friction_idle(self%friction, self%set, pack(redundant, .not. is_gap))
       self%n_tried = self%n_tried - 1
-      if (all(redundant > self%set%n)) return
-      call active_set_put_off(self, pack(redundant, is_near))
-      call active_set_drop(self, pack(redundant, .not. is_near .and. redundant <= self%set%n))
+      if (.not. any(is_gap)) return
+      call active_set_put_off(self, pack(redundant, is_gap .and. is_near))
+      call active_set_drop(self, pack(redundant, is_gap .and. .not. is_near))
    end subroutine leave_out
 
    !> Solve with the present set. Contacts that give way and are pushed back are solved again with
