@@ -44,7 +44,7 @@ contains
    end subroutine read_friction
 
    !> Friction is of nodes on polygons, in steps whose scheme has its forces along discrete
-   !> gradients, and which hold contact exactly; in statics of one side.
+   !> gradients or which are static, and which hold contact exactly.
    subroutine check_friction(reader, pair, step)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair(:)
@@ -81,11 +81,7 @@ contains
       if (options%smoothing == smoothing_hermite) call refuse(reader, pair, &
             "*SURFACE SMOOTHING of " &
          // "step " // to_text(k) // "; use SMOOTHING=NONE")
-      if (.not. step%scheme%masses_resist) then
-         if (pair%both_sides) call refuse(reader, pair, &
-            "nodes of both sides in static steps, as step " &
-            // to_text(k) // " is; use SIDES=ONE")
-      else if (.not. step%scheme%takes_damping) then
+      if (step%scheme%masses_resist .and. .not. step%scheme%takes_damping) then
          call refuse(reader, pair, "SCHEME=" // trim(step%scheme%word) // " of step " // &
             to_text(k) // &
             "; use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
