@@ -71,7 +71,8 @@ module emcon_deck_keywords
          has_data=.false.), &
       keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,DIRECT,!NOSEPARATION," &
          // "!PENALTY,!AUGMENTEDLAGRANGE"), &
-      keyword_t("FRICTION", in_model, "RESTITUTION=,~SLIPTOLERANCE,!ROUGH,!LAGRANGE,!DEPENDENCIES:0"), &
+      keyword_t("FRICTION", in_model, "RESTITUTION=,~SLIPTOLERANCE,!ROUGH,!LAGRANGE," &
+         // "!DEPENDENCIES:0"), &
       keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,SIDES=,GUARD=," &
          // "ADJUST=,INITIATION=,!SMALLSLIDING,!TIED"), &
       keyword_t("CONTACT", in_model, has_data=.false.), &

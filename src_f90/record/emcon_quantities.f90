@@ -302,17 +302,19 @@ contains
       type(stepper_t), intent(in) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
+      integer :: n
 
-      allocate(values(2, stepper%march%system%n_constraint), source=0.0_dp)
+      n = quantity_components(variable, at_contacts, stepper%scene%n_dim)
+      allocate(values(n, stepper%march%system%n_constraint), source=0.0_dp)
       if (.not. stepper%march%active%friction%is_on) return
       associate (state => stepper%march%state, mu => stepper%march%active%friction%mu)
          if (variable == "CSLIP") then
             values(1, :) = real(state%slip, dp)
-            values(2, :) = real(state%slip_path, dp)
+            values(n, :) = real(state%slip_path, dp)
             return
          end if
          where (state%pairs%area > 0.0_wp) values(1, :) = real(state%drag/state%pairs%area, dp)
-         where (state%is_active .and. mu > 0.0_wp) values(2, :) = merge(1.0_dp, 2.0_dp, &
+         where (state%is_active .and. mu > 0.0_wp) values(n, :) = merge(1.0_dp, 2.0_dp, &
             state%sliding == 0)
       end associate
    end function rubbing

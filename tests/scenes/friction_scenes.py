@@ -112,6 +112,7 @@ def on_spring(h, t_end, mu, folder, *, pull=0.0, stiffness=0.0, belt=0.0, reboun
     if pull:
         deck.insert(f"*DLOAD\nBLOCK, GRAV, {pull!r}, 1., 0.", before="*CONSTRAINT METHOD")
     deck.set_parameter("formulation", "NODE TO SURFACE")
+    folder.mkdir(exist_ok=True, parents=True)
     deck.write(folder/"spring.inp")
     model = Model.from_deck(folder/"spring.inp")
     corners = [0.0, 0.0, 2.0, 2.0]                # in the order of their labels
@@ -133,6 +134,17 @@ def on_spring(h, t_end, mu, folder, *, pull=0.0, stiffness=0.0, belt=0.0, reboun
         return np.array(time), np.array(way), stepper.ledger
 
 
+def belt_way(time, mu, k, v):
+    """Closed form: slides until it is as fast as the belt, sticks until the spring pulls by mu g,
+    and swings about that place for ever."""
+    w, end = math.sqrt(k), 10.0*mu/k
+    t1 = math.asin(v*w/(10.0*mu))/w
+    x1 = end*(1 - math.cos(w*t1))
+    t2 = t1 + (end - x1)/v
+    return np.select([time < t1, time < t2], [end*(1 - np.cos(w*time)), x1 + v*(time - t1)],
+                     end + v/w*np.sin(w*(time - t2)))
+
+
 def ring(mu):
     """That of the paper against its block, which is free."""
     deck = rubbing(Deck.read(DECKS / "ring.inp"), mu, "FRICTIONLESS")
@@ -140,23 +152,26 @@ def ring(mu):
     return deck
 
 
-def pressed(shift, mu, sides=ONE):
-    """A block whose top is pressed down and moved sideways, in ten static increments."""
+def pressed(shift, mu, sides=ONE, floor=None):
+    """A block whose top is pressed down and moved sideways, in ten static increments, on a floor
+    that is held, or that is elastic, of so many elements."""
     scene = Scene(0.1, 1.0)
     scene.block("BLOCK", (0, 0), (2, 1), (8, 4), stiffness=100.0)
-    scene.block("FLOOR", (-1, -1), (4, 1), (5, 1), stiffness=100.0)
-    scene.hold("FLOOR", lambda x, y: True)
+    scene.block("FLOOR", (-1, -1), (4, 1), (floor or 5, 4 if floor else 1), stiffness=100.0)
+    scene.hold("FLOOR", lambda x, y: y < -0.99 or not floor)
     scene.hold("BLOCK", lambda x, y: y > 0.99, "2, 2", -0.02)
     scene.hold("BLOCK", lambda x, y: y > 0.99, "1, 1", shift)
     scene.side("BOTTOM", "BLOCK", lambda x, y: y < 0.01)
-    scene.pairs = [("BOTTOM", "FLOOR")]
+    scene.side("TOP", "FLOOR", lambda x, y: y > -0.01)
+    scene.pairs = [("BOTTOM", "TOP" if floor else "FLOOR")]
     deck = rubbing(scene.deck(sides), mu)
     deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
     return deck
 
+
 def pressed_sideways(n):
-    """code_aster's SSNV128: half of a plate, n by n elements, on a floor, pressed from above and more
-    from its side. The node at the floor in the symmetry plane is held. Also the places of nodes."""
+    """code_aster's SSNV128: half of a plate, n by n elements, on a floor, pressed from above and
+    more from its side. The node at the floor in the symmetry plane is held. Also the places of nodes."""
     side, young = 0.04, 1.3e11
     scene = Scene(1.0, 1.0)
     scene.block("PLATE", (0, 0), (side, side), (n, n), stiffness=young)

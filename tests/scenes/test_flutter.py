@@ -58,7 +58,8 @@ def fluttering(h, t_end, eta):
     scene.pairs = [("BLOCK", "FLOOR")]
     part = np.linspace(0, 1, 65)
     rise = part**4*(35 - 84*part + 70*part**2 - 20*part**3)
-    rows = "\n".join(f"{RISE*a!r}, {b!r}" for a, b in zip(part.tolist(), rise.tolist(), strict=True))
+    rows = "\n".join(f"{RISE*a!r}, {b!r}"
+                     for a, b in zip(part.tolist(), rise.tolist(), strict=True))
     text = rubbing(scene.deck(ONE), 0.3).text()
     text = text.replace("*AMPLITUDE, NAME=RAMP", f"*AMPLITUDE, NAME=RISE\n{rows}\n9., 1.\n"
                         "*AMPLITUDE, NAME=RAMP").replace("*DLOAD\n", "*DLOAD, AMPLITUDE=RISE\n")

@@ -8,6 +8,7 @@ from friction_scenes import (
     NODES,
     WEIGHT,
     balance,
+    belt_way,
     block_on_floor,
     on_spring,
     polygon,
@@ -17,6 +18,7 @@ from friction_scenes import (
     rolling,
     way,
 )
+from plain_scenes import BOTH, ONE
 from scene_tools import run_deck
 from test_contact_output import restart
 
@@ -45,6 +47,18 @@ def test_a_damped_block_slides_to_rest(h, tmp_path):
     obeys(run)
     assert way(run, 15)[-1] == pytest.approx(2/3, abs=2e-4)
     assert run.history["newton"].max() <= 6 and run.history["cuts"].sum() == 0
+
+
+@pytest.mark.parametrize(("rebound", "exact"), [(0, 0.66670), (0.5, 0.66665), (1, 0.66665)])
+def test_restitution_of_friction(rebound, exact, tmp_path):
+    """With 0.02 left of the velocity for the last increment that slides it goes on by 1e-4 times
+    1 - RESTITUTION if it sticks; with 0.01 lost beyond zero friction is all that there may be."""
+    deck = block_on_floor(0.01, 0.68, 0.3, v0=2.0, rigid=True)
+    deck.replace("*FRICTION", f"*FRICTION, RESTITUTION={rebound}")
+    run = run_deck(deck, tmp_path, **NODES)
+    obeys(run)
+    at_rest = np.argmin(abs(run.history["time"] - 0.67))
+    assert way(run, 15)[at_rest] == pytest.approx(exact, rel=1e-9)
 
 
 @pytest.mark.parametrize("cells", [(1, 1), (4, 2)])
@@ -76,8 +90,8 @@ def test_an_elastic_block_sticks(tmp_path):
 @pytest.mark.parametrize("push", [0.49, 0.499, 0.501, 0.51])
 def test_a_rigid_block_that_is_pushed(push, cells, tmp_path):
     """Three conditions of a body of three freedoms: one node slides and the other one holds."""
-    run = run_deck(block_on_floor(0.01, 0.5, 0.5, push=10.0*push, rigid=True, cells=cells), tmp_path,
-                   **NODES)
+    deck = block_on_floor(0.01, 0.5, 0.5, push=10.0*push, rigid=True, cells=cells)
+    run = run_deck(deck, tmp_path, **NODES)
     obeys(run, scale=WEIGHT)
     moved = way(run, (cells[0] + 1)*(cells[1] + 1))[-1]
     assert moved == pytest.approx(0.5*0.5**2*10.0*max(0.0, push - 0.5), rel=1e-6, abs=1e-11)
@@ -118,17 +132,6 @@ def test_what_is_thrown_rolls(inner, tmp_path):
 # ---- stick-slip ---------------------------------------------------------------------------------
 
 
-def belt_way(time, mu, k, v):
-    """Closed form: slides until it is as fast as the belt, sticks until the spring pulls by mu g,
-    and swings about that place for ever."""
-    w, end = math.sqrt(k), 10.0*mu/k
-    t1 = math.asin(v*w/(10.0*mu))/w
-    x1 = end*(1 - math.cos(w*t1))
-    t2 = t1 + (end - x1)/v
-    return np.select([time < t1, time < t2], [end*(1 - np.cos(w*time)), x1 + v*(time - t1)],
-                     end + v/w*np.sin(w*(time - t2)))
-
-
 def test_stick_slip_on_a_belt(tmp_path):
     """Second order, through slip, stick and slip."""
     error = []
@@ -141,8 +144,8 @@ def test_stick_slip_on_a_belt(tmp_path):
 
 
 def test_a_block_pulled_against_a_spring(tmp_path):
-    """code_aster's SDNV104: half a swing about (F - mu N)/k, and half a swing back about (F + mu N)/k:
-    14.917 at 1.70, 3.5 at 3.39."""
+    """code_aster's SDNV104: half a swing about (F - mu N)/k, and half a swing back about
+    (F + mu N)/k: 14.917 at 1.70, 3.5 at 3.39."""
     pull, k = 200.0/7.0, 24.0/7.0
     time, x, energies = on_spring(0.01, 3.4, 0.3, tmp_path, pull=pull, stiffness=k)
     half = math.pi/math.sqrt(k)
@@ -160,8 +163,8 @@ def test_statics_stick_and_slide(tmp_path):
     slides, with mu times the pressure. Null space and saddle point to the same digits."""
     force = {}
     for shift in (0.001, 0.002, 0.05):
-        runs = [run_deck(pressed(shift, 0.5), tmp_path/f"{shift}{method[0]}", **NODES, method=method)
-                for method in ("NULL SPACE", "SADDLE POINT")]
+        runs = [run_deck(pressed(shift, 0.5), tmp_path/f"{shift}{method[0]}", **NODES,
+                         method=method) for method in ("NULL SPACE", "SADDLE POINT")]
         history = runs[0].history
         force[shift] = np.array([history["pair1_force_x"][-1], history["pair1_force_y"][-1]])
         for run in runs:
@@ -174,10 +177,53 @@ def test_statics_stick_and_slide(tmp_path):
     assert run.history["friction_loss"][-1] > 0
 
 
+def test_fields_of_what_rubs(tmp_path):
+    """On a floor that is held slip is how far nodes have gone; shear is mu times the pressure where
+    they slide and less where they stick; to and fro, the path is longer than the way."""
+    deck = pressed(0.02, 0.2)
+    deck.replace("CDIS, CSTR, CF", "CSTR, CSHEAR, CSLIP")
+    deck.replace("0., 0., 1.0, 1.", "0., 0., 0.6, 2.5, 1.0, 1.")
+    run = run_deck(deck, tmp_path, **NODES)
+    fields = run.fields()
+    bears = (fields["contact_status"] > 0).any(axis=0)
+    assert bears.sum() == 9
+    status = fields["contact_status"][1:, bears]
+    assert (status == 1).any() and (status == 2).any() and (status > 0).all()
+    shear, pressure = fields["contact_shear"][1:, bears], fields["contact_pressure"][1:, bears]
+    slides = status == 2
+    assert np.abs(shear[slides]) == pytest.approx(0.2*pressure[slides], rel=1e-9)
+    assert (np.abs(shear[~slides]) <= 0.2*pressure[~slides]*(1 + 1e-9)).all()
+    slip, path = fields["contact_slip"][:, bears], fields["slip_path"][:, bears]
+    way = fields["displacement"][:, bears, 0]
+    assert np.abs(np.abs(slip) - np.abs(way)).max() < 1e-12
+    assert np.allclose(path[1:], np.cumsum(np.abs(np.diff(way, axis=0)), axis=0), atol=1e-12)
+    assert (path[-1] > np.abs(slip[-1]) + 1e-6).any()
+
+
+@pytest.mark.parametrize("floor", [11, 16])
+def test_statics_of_both_sides(floor, tmp_path):
+    """Nodes of both sides, between each other or face to face, where half of them say nearly what
+    the others do: as of one side, but for the mesh; where all slide mu bounds the whole force, but
+    for the tilt of the surface, a part of the strain."""
+    for shift in (0.002, 0.05):
+        force = {}
+        for sides in (ONE, BOTH):
+            run = run_deck(pressed(shift, 0.5, sides, floor), tmp_path/f"{shift}{sides}", **NODES)
+            history = run.history
+            assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] < 1e-9
+            assert (np.diff(history["friction_loss"]) >= -1e-18).all()
+            assert history["cuts"].sum() == 0
+            force[sides] = np.array([history["pair1_force_x"][-1], history["pair1_force_y"][-1]])
+        assert force[BOTH] == pytest.approx(force[ONE], rel=0.02)
+        if shift == 0.05:
+            assert -force[BOTH][0] == pytest.approx(0.5*force[BOTH][1], rel=0.01)
+
+
 @pytest.mark.parametrize("steps", [1, 4])
 def test_a_plate_pressed_sideways(steps, tmp_path):
-    """code_aster's SSNV128, displacements at the floor: part of it sticks, part slides, and how many
-    increments there are is the same. At the fifth place 15.0 is given, 15.6 is what code_aster has."""
+    """code_aster's SSNV128, displacements at the floor: part of it sticks, part slides, and
+    how many increments there are is the same. At the fifth place 15.0 is given, where code_aster
+    has 15.6."""
     deck, place = pressed_sideways(32)
     run = run_deck(deck, tmp_path, **NODES, h=1.0/steps)
     history = run.history
