@@ -171,7 +171,7 @@ def pressed(shift, mu, sides=ONE, floor=None):
 
 def pressed_sideways(n):
     """code_aster's SSNV128: half of a plate, n by n elements, on a floor, pressed from above and
-    more from its side. The node at the floor in the symmetry plane is held. Also the places of nodes."""
+    more from its side; the node at the floor in the symmetry plane is held. Also where nodes are."""
     side, young = 0.04, 1.3e11
     scene = Scene(1.0, 1.0)
     scene.block("PLATE", (0, 0), (side, side), (n, n), stiffness=young)
@@ -194,3 +194,55 @@ def pressed_sideways(n):
     deck = Deck(text.replace(f"{young!r}, 0.3", f"{young!r}, 0.2"))
     deck.insert("*DLOAD\n" + "\n".join(load), before="*CONSTRAINT METHOD")
     return deck, np.array([node[label] for label in sorted(node)])
+
+
+def pressed_round(n, radius=50.0, mu=0.3):
+    """Two bodies of one material, the upper one round, pressed together and then moved sideways in
+    twenty static increments; meshes are finest in the middle. Also the places of its nodes."""
+    width = 10.0
+
+    def grade(t):
+        return width*math.sinh(4*t)/math.sinh(4)
+
+    def upper(x, y):
+        return grade(x), grade(y) + grade(x)**2/(2*radius)*(1 - y)
+
+    scene = Scene(0.05, 1.0)
+    scene.block("UPPER", (-1, 0), (2, 1), (n, 20), stiffness=100.0, shape=upper)
+    scene.block("LOWER", (-1, -1), (2, 1), (n + 6, 20), stiffness=100.0,
+                shape=lambda x, y: (grade(x), grade(y)))
+    scene.hold("LOWER", lambda x, y: y < -0.99*width)
+    scene.hold("UPPER", lambda x, y: y > 0.99*width, "2, 2", -0.12)
+    scene.hold("UPPER", lambda x, y: y > 0.99*width, "1, 1", 0.12)
+    scene.side("BOTTOM", "UPPER", lambda x, y: y < x*x/(2*radius) + 1e-6 and abs(x) < 4)
+    scene.side("TOP", "LOWER", lambda x, y: y > -1e-9 and abs(x) < 6)
+    scene.pairs = [("BOTTOM", "TOP")]
+    deck = rubbing(scene.deck(ONE), mu)
+    deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    deck.replace("CDIS, CSTR, CF", "CSTR, CSHEAR, CSLIP")
+    head, body = deck.text().split("*BOUNDARY, AMPLITUDE=RAMP\n")
+    motion, tail = body.split("*CONSTRAINT METHOD")
+    lines = motion.strip().splitlines()
+    text = head.replace("*AMPLITUDE, NAME=RAMP", "*AMPLITUDE, NAME=DOWN\n0., 0., 0.4, 1., 2., 1.\n"
+                        "*AMPLITUDE, NAME=SIDEWAYS\n0., 0., 0.4, 0., 1., 1.\n"
+                        "*AMPLITUDE, NAME=RAMP")
+    for name, axis in (("DOWN", "2, 2"), ("SIDEWAYS", "1, 1")):
+        text += "\n".join([f"*BOUNDARY, AMPLITUDE={name}",
+                           *(line for line in lines if f", {axis}, " in line), ""])
+    node = scene.part["UPPER"].node
+    place = np.array([node[label] for label in sorted(node)])
+    return Deck(f"{text}*CONSTRAINT METHOD{tail}"), place
+
+
+def partial_slip(run, place, mu=0.3):
+    """Of each increment that moves sideways: force along the surface by mu times that across, width
+    of what sticks by that in contact, and the least distance of nodes by it."""
+    status = run.fields()["contact_status"][:, :len(place)]
+    history, rows = run.history, []
+    for k in np.flatnonzero(history["time"] > 0.4 + 1e-9):
+        bears, sticks = (np.sort(place[kind, 0]) for kind in (status[k] > 0, status[k] == 1))
+        half = (bears[-1] - bears[0])/2
+        held = (sticks[-1] - sticks[0])/2 if len(sticks) else 0.0
+        rows.append((-history["pair1_force_x"][k]/(mu*history["pair1_force_y"][k]), held/half,
+                     np.diff(bears).max()/half))
+    return np.array(rows)

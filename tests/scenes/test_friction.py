@@ -11,8 +11,10 @@ from friction_scenes import (
     belt_way,
     block_on_floor,
     on_spring,
+    partial_slip,
     polygon,
     pressed,
+    pressed_round,
     pressed_sideways,
     ring,
     rolling,
@@ -236,6 +238,20 @@ def test_a_plate_pressed_sideways(steps, tmp_path):
     assert seen[4] == pytest.approx(15.0, rel=0.05)
     # The top is pressed by 2e6, of which the node held in the corner bears 2.6 per cent.
     assert history["pair1_force_y"][-1] == pytest.approx(2e6, rel=0.03)
+
+
+def test_partial_slip(tmp_path):
+    """Cattaneo and Mindlin: a strip sticks whose width by that in contact is sqrt(1 - Q/(mu P)), to
+    one distance of nodes, until all slides."""
+    deck, place = pressed_round(64)
+    run = run_deck(deck, tmp_path, **NODES)
+    assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+    assert run.history["cuts"].sum() == 0
+    force, width, strip = partial_slip(run, place).T
+    part = force < 0.98
+    assert part.sum() >= 7 and width[part].min() < 0.2
+    assert (np.abs(width - np.sqrt(1 - force))[part] < strip[part]).all()
+    assert (width[~part] == 0).all() and force[~part] == pytest.approx(1, abs=0.01)
 
 
 # ---- the ring -----------------------------------------------------------------------------------

@@ -9,7 +9,9 @@ from friction_scenes import (
     belt_way,
     block_on_floor,
     on_spring,
+    partial_slip,
     polygon,
+    pressed_round,
     pressed_sideways,
     ring,
     rolling,
@@ -72,6 +74,7 @@ def start_known(runs):
         **{("rolls", inner): runs.start(rolling(inner, 2.5e-4, 4e-3, 0.3, 0.02), **NODES)
            for inner in (0.95, 0.05)},
         "plate": runs.start(pressed_sideways(32)[0], **NODES),
+        "pressed_round": runs.start(pressed_round(96)[0], **NODES),
         **{("belt", h): runs.start(None, on_belt(h)) for h in (0.02, 0.01, 0.005)},
         "pulled": runs.start(None, pulled),
     }
@@ -114,6 +117,12 @@ def report_known(started, _):
     rows.append(("SSNV128, plate pressed sideways, 32 x 32: displacements at the floor, 1e-6",
                  "28.6, 27.2, 22.8, 19.8, 15.0",
                  ", ".join(f"{u:.2f}" for u in plate(done["plate"]))))
+    force, width, strip = partial_slip(done["pressed_round"], pressed_round(96)[1]).T
+    for k in np.flatnonzero(force < 0.98)[::2]:
+        rows.append((f"two like bodies, one round, Q = {force[k]:.3f} mu P: strip that sticks by "
+                     f"that in contact, nodes {strip[k]:.2f} apart",
+                     f"{math.sqrt(1 - force[k]):.3f}",
+                     f"{width[k]:.3f}"))
     return table(["scene", "known", "here"], rows)
 
 
