@@ -1,10 +1,10 @@
 !> Which constraints are independent, and for each an unknown that can be eliminated with it.
 !>
-!> The rows of discrete gradients and of gradients at the end are eliminated together, those of gaps
-!> before those of slips, of each the firm ones first, else in their order, or in one that fills them
-!> less. What comes out depends on the present gradients only, not on earlier choices. A row is
-!> round-off also where its terms cancel before any elimination, between nodes of which one follows
-!> the other by a tie. Source: docs/theory.md, section 5.
+!> The rows of discrete gradients and of gradients at the end are eliminated together, those of
+!> gaps before those of slips, of each the firm ones first, else in their order, or in one that
+!> fills them less. What comes out depends on the present gradients only, not on earlier choices. A
+!> row is round-off also where its terms cancel before any elimination, between nodes of which one
+!> follows the other by a tie. Source: docs/theory.md, section 5.
 module emcon_independent_rows
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
@@ -93,7 +93,7 @@ contains
          integer :: i, fate
 
          call begin(self, set%force_rows)
-         call put_gaps_first()
+         call put_gaps_first(set, order)
          do i = 1, size(order)
             k = order(i)
             self%elimination%nearness = merge(0.0_hp, near, set%is_firm(k))
@@ -116,18 +116,19 @@ contains
          end do
       end subroutine eliminate_in_order
 
-      !> Gaps before slips, of each the firm ones first, else as they are.
-      subroutine put_gaps_first()
-         logical :: is_gap(set%n_row), is_firm(set%n_row)
-
-         is_gap = order <= set%n
-         is_firm = set%is_firm(order)
-         order = [pack(order, is_gap .and. is_firm), pack(order, is_gap .and. .not. is_firm), &
-            pack(order, .not. is_gap .and. is_firm), &
-            pack(order, .not. (is_gap .or. is_firm))]
-      end subroutine put_gaps_first
-
    end subroutine eliminate
+
+   !> Gaps before slips, of each the firm ones first, else as they are.
+   pure subroutine put_gaps_first(set, order)
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(inout) :: order(:)         !! (n_row)
+      logical :: is_gap(size(order)), is_firm(size(order))
+
+      is_gap = order <= set%n
+      is_firm = set%is_firm(order)
+      order = [pack(order, is_gap .and. is_firm), pack(order, is_gap .and. .not. is_firm), &
+         pack(order, .not. is_gap .and. is_firm), pack(order, .not. (is_gap .or. is_firm))]
+   end subroutine put_gaps_first
 
    !> Nothing eliminated yet, with room for all rows of `force`.
    subroutine begin(self, force)

@@ -187,16 +187,26 @@ contains
       real(wp), intent(inout), contiguous :: dq(:)       !! (n_unknown) [L]
       real(wp), intent(inout), contiguous :: dlam(:)     !! (n) [M L/T^2]
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: reach(set%n)
 
       self%n_correction = self%n_correction + 1
+      call kept_factor_correct(correction%kept, set, residual, self%proposed(:size(dq)), error)
+      if (allocated(error)) return
+      if (set%is_under_way) then
+         call move_with_multipliers(self, correction, dq, dlam)
+      else
+         call mixing_move(self%mixing, self%proposed, dq)
+      end if
+   end subroutine keeping_correct
+
+   !> The next move of unknowns and multipliers together, these by how far they reach.
+   subroutine move_with_multipliers(self, correction, dq, dlam)
+      type(keeping_t), intent(inout) :: self
+      type(correction_t), intent(in) :: correction
+      real(wp), intent(inout) :: dq(:)           !! (n_unknown) [L]
+      real(wp), intent(inout) :: dlam(:)         !! (n) [M L/T^2]
+      real(wp) :: reach(size(dlam))
+
       associate (n => size(dq))
-         call kept_factor_correct(correction%kept, set, residual, self%proposed(:n), error)
-         if (allocated(error)) return
-         if (.not. set%is_under_way) then
-            call mixing_move(self%mixing, self%proposed, dq)
-            return
-         end if
          call kept_factor_reach(correction%kept, reach)
          call kept_factor_multipliers(correction%kept, self%proposed(n + 1:))
          self%proposed(n + 1:) = reach*self%proposed(n + 1:)
@@ -206,7 +216,7 @@ contains
          dq = self%made(:n)
          dlam = self%made(n + 1:)/reach
       end associate
-   end subroutine keeping_correct
+   end subroutine move_with_multipliers
 
    !> A solve ends before its end: it tells nothing of what the factor costs.
    pure subroutine keeping_break_off(self)

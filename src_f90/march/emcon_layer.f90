@@ -113,6 +113,7 @@ contains
             own%step)
          allocate(own%tie(0), own%equation(0), own%rigid(0), own%pair(0), own%surface(0), &
             own%element_set(0), own%step(1))
+         allocate(own%step(1)%load(0))
          if (allocated(own%guard)) deallocate(own%guard)
       end associate
    end subroutine cut_scene

@@ -394,8 +394,8 @@ contains
       end do
    end subroutine test_rank
 
-   !> The motion u = (x y, 0, 0) of a cube has div u = y, whose mean is 0: the deviator alone resists,
-   !> mu (e:e - y^2/3), and the mean of y^2 + x^2/2 - y^2/3 is 7/72.
+   !> The motion u = (x y, 0, 0) of a cube has div u = y, whose mean is 0: the deviator alone
+   !> resists, mu (e:e - y^2/3), and the mean of y^2 + x^2/2 - y^2/3 is 7/72.
    subroutine test_bending(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
@@ -416,7 +416,8 @@ contains
       u = 0.0_wp
       u(1, :sample%n) = small*place(1, :)*place(2, :)
       call respond(sample, u, zero, .false., step)
-      call check_near(error, step%energy, mu*7.0_wp/72.0_wp*small**2, tol, young*small**2, sample%what)
+      call check_near(error, step%energy, mu*7.0_wp/72.0_wp*small**2, tol, &
+         young*small**2, sample%what)
    end subroutine test_bending
 
    !> By elimination with the largest pivot; what is left below the root of epsilon is round-off.
