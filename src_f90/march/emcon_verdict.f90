@@ -286,11 +286,12 @@ contains
       if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
          "loads do work on motions that nothing holds: stabilization bears " // &
          to_text(self%stabilization, 3))
-      if (self%dynamic_drift > energy_bar*self%largest_energy + slip_rounding*self%grip) &
+      if (self%dynamic_drift > energy_bar*self%largest_energy + slip_rounding*self%grip) then
          call note_add(self%reasons, &
-         "the energy balance does NOT close to " // trim(closing_digits(this_precision)) // &
-         " digits (" // to_text(self%dynamic_drift/self%largest_energy, 3) // &
-         " of the largest energy)")
+            "the energy balance does NOT close to " // trim(closing_digits(this_precision)) // &
+            " digits (" // to_text(self%dynamic_drift/self%largest_energy, 3) // &
+            " of the largest energy)")
+      end if
       if (self%contact_made > half_digits*self%largest_energy) call note_add(self%reasons, &
          "contact has made an energy of " // to_text(self%contact_made, 3) // ", " // &
          to_text(self%contact_made/self%largest_energy, 3) // " of the largest, which bodies " // &
