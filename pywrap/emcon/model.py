@@ -394,6 +394,8 @@ class Model(Cards):
         restitution     0 to 1: the part of the velocity at which nodes with mass meet that is
                         left afterwards; default 1
         """
+        if friction is None and friction_restitution is not None:
+            raise InputError("friction_restitution is of what sticks: give friction too")
         text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness,
                                             "RESTITUTION": restitution})
         text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})

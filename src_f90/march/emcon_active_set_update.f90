@@ -247,8 +247,10 @@ contains
             < -contact%deepest_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, contact%gives_way) &
                *gap%size
-            if (contact%friction > 0.0_wp .and. self%holds_gap .and. &
-               self%friction%is_candidate(id)) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
+            if (contact%friction > 0.0_wp .and. self%holds_gap) then
+               if (self%friction%is_candidate(id)) closes = gap%gap1 - gap%gap0 &
+                  < -gap_noise*gap%size
+            end if
          end if
       end associate
    end subroutine look_at_open

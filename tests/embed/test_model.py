@@ -243,7 +243,8 @@ def everything() -> Model:
     model.rigid_body("E2", 3, profile="S5").rotating("N", 0.5, velocity=(1.0, 0.0), about=(0.5, 0.5))
     model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))
-    model.interaction("I", friction=0.0, pad_thickness=0.0, restitution=0.5)
+    model.interaction("I", friction=0.0, friction_restitution=0.5, pad_thickness=0.0,
+                      restitution=0.5)
     model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO",
                        initiation="PERSISTENT")
     model.contact(interaction="I").contact("S1", ("S1", "S2"))
@@ -326,6 +327,11 @@ def test_keywords_of_every_deck_have_a_method(path: Path) -> None:
              for line in path.read_text().splitlines() if re.match(r"\s*\*[^*]", line)}
     unknown = names - set(known)
     assert not unknown or path.stem == "good_lenient"
+
+
+def test_restitution_of_friction_goes_with_friction() -> None:
+    with pytest.raises(errors.InputError, match="give friction too"):
+        Model().interaction("I", friction_restitution=0.5)
 
 
 # --- messages ----------------------------------------------------------------------------------
