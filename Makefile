@@ -221,7 +221,7 @@ $(LANES:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd -fno-trappi
 # Loops over all unknowns in each correction, several at a time: the bits are the same here too.
 STREAMS := $(addprefix emcon_,inertia kept_factor lane_sums mixing motion newton numbering \
 	supernodal_factor supernodal_solve system term vectors)
-$(STREAMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 $(VECTOR)
+$(STREAMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd $(VECTOR)
 
 # Numbers with many derivatives, added and multiplied term by term: several terms at a time.
 # -Wno-zerotrip: those without second derivatives have loops over none.

@@ -65,7 +65,7 @@ contains
       end do
    end subroutine forward_triangle
 
-   !> t = B x
+   !> t = B x, side by side: the compiler makes one loop of each width.
    pure subroutine multiply(n_lanes, n, b, x, t)
       integer, intent(in) :: n_lanes, n
       real(sp), intent(in) :: b(*)
@@ -76,43 +76,36 @@ contains
       t = 0.0_dp
       k = 0
       do j = 1, n - n_side + 1, n_side
-         call add_side(n_lanes, b(k + 1), x(j), t)
+         call add_columns(n_lanes, n_side, b(k + 1), x(j), t)
          k = k + n_side*n_lane*n_lanes
       end do
-      j = modulo(n, n_side)
-      if (j > 0) call add_columns(n_lanes, j, b(k + 1), x(n - j + 1), t)
+      select case (n - j + 1)
+      case (1)
+         call add_columns(n_lanes, 1, b(k + 1), x(j), t)
+      case (2)
+         call add_columns(n_lanes, 2, b(k + 1), x(j), t)
+      case (3)
+         call add_columns(n_lanes, 3, b(k + 1), x(j), t)
+      end select
    end subroutine multiply
 
-   !> t = t + B x for `n_side` columns.
-   pure subroutine add_side(n_lanes, b, x, t)
-      integer, intent(in) :: n_lanes
-      real(sp), intent(in) :: b(n_lane, n_side, n_lanes)
-      real(dp), intent(in) :: x(n_side)
-      real(dp), intent(inout) :: t(n_lane, n_lanes)
-      integer :: i, j, k
-
-      do k = 1, n_lanes
-         do j = 1, n_side
-            do i = 1, n_lane
-               t(i, k) = t(i, k) + b(i, j, k)*x(j)
-            end do
-         end do
-      end do
-   end subroutine add_side
-
-   !> t = t + B x for the `n` columns that are left.
+   !> t = t + B x for `n` columns.
    pure subroutine add_columns(n_lanes, n, b, x, t)
       integer, intent(in) :: n_lanes, n
       real(sp), intent(in) :: b(n_lane, n, n_lanes)
       real(dp), intent(in) :: x(n)
       real(dp), intent(inout) :: t(n_lane, n_lanes)
+      real(dp) :: total
       integer :: i, j, k
 
       do k = 1, n_lanes
-         do j = 1, n
-            do i = 1, n_lane
-               t(i, k) = t(i, k) + b(i, j, k)*x(j)
+         !$omp simd private(total)
+         do i = 1, n_lane
+            total = t(i, k)
+            do j = 1, n
+               total = total + b(i, j, k)*x(j)
             end do
+            t(i, k) = total
          end do
       end do
    end subroutine add_columns
@@ -149,37 +142,43 @@ contains
 
       k = n*n_lane*n_lanes
       j = modulo(n, n_side)
-      if (j > 0) then
-         k = k - j*n_lane*n_lanes
-         call subtract_columns(n_lanes, j, b(k + 1), t, x(n - j + 1))
-      end if
+      k = k - j*n_lane*n_lanes
+      select case (j)
+      case (1)
+         call subtract_columns(n_lanes, 1, b(k + 1), t, x(n))
+      case (2)
+         call subtract_columns(n_lanes, 2, b(k + 1), t, x(n - 1))
+      case (3)
+         call subtract_columns(n_lanes, 3, b(k + 1), t, x(n - 2))
+      end select
       do j = n - j - n_side + 1, 1, -n_side
          k = k - n_side*n_lane*n_lanes
-         call subtract_side(n_lanes, b(k + 1), t, x(j))
+         call subtract_columns(n_lanes, n_side, b(k + 1), t, x(j))
       end do
    end subroutine subtract_products
 
-   !> x = x - B^T t for `n_side` columns.
-   pure subroutine subtract_side(n_lanes, b, t, x)
-      integer, intent(in) :: n_lanes
-      real(sp), intent(in) :: b(n_lane, n_side, n_lanes)
+   !> x = x - B^T t for `n` columns.
+   pure subroutine subtract_columns(n_lanes, n, b, t, x)
+      integer, intent(in) :: n_lanes, n
+      real(sp), intent(in) :: b(n_lane, n, n_lanes)
       real(dp), intent(in) :: t(n_lane, n_lanes)
-      real(dp), intent(inout) :: x(n_side)
+      real(dp), intent(inout) :: x(n)
       real(dp) :: part(n_lane, n_side)
       integer :: i, j, k
 
-      part = 0.0_dp
+      part(:, :n) = 0.0_dp
       do k = n_lanes, 1, -1
-         do j = 1, n_side
+         do j = 1, n
+            !$omp simd
             do i = 1, n_lane
                part(i, j) = part(i, j) + b(i, j, k)*t(i, k)
             end do
          end do
       end do
-      do j = 1, n_side
+      do j = 1, n
          x(j) = x(j) - sum_of(part(:, j))
       end do
-   end subroutine subtract_side
+   end subroutine subtract_columns
 
    !> The sum over lanes.
    pure real(dp) function sum_of(part)
@@ -187,26 +186,6 @@ contains
 
       sum_of = sum(part(:n_lane/2) + part(n_lane/2 + 1:))
    end function sum_of
-
-   !> x = x - B^T t for the `n` columns that are left.
-   pure subroutine subtract_columns(n_lanes, n, b, t, x)
-      integer, intent(in) :: n_lanes, n
-      real(sp), intent(in) :: b(n_lane, n, n_lanes)
-      real(dp), intent(in) :: t(n_lane, n_lanes)
-      real(dp), intent(inout) :: x(n)
-      real(dp) :: part(n_lane)
-      integer :: i, j, k
-
-      do j = 1, n
-         part = 0.0_dp
-         do k = n_lanes, 1, -1
-            do i = 1, n_lane
-               part(i) = part(i) + b(i, j, k)*t(i, k)
-            end do
-         end do
-         x(j) = x(j) - sum_of(part)
-      end do
-   end subroutine subtract_columns
 
    !> x = M^T x with a packed triangle.
    pure subroutine backward_triangle(n, m, x)

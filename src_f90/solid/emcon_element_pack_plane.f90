@@ -163,27 +163,11 @@ contains
 
       call displacement_gradient(self%n_node, self%gradient(:, :, :, k), motion%from, h)
       call displacement_gradient(self%n_node, self%gradient(:, :, :, k), motion%by, d)
-      point%f_mid = 0.0_wp
-      point%f_mid(:, 1, 1) = 1.0_wp
-      point%f_mid(:, 2, 2) = 1.0_wp
-      point%f_end = point%f_mid
-      point%geometric = merge(0.5_wp, 0.0_wp, motion%nlgeom)
-      associate (e => point%law%strain, f => point%f_mid)
-         e(:, 1) = h(:, 1, 1)
-         e(:, 2) = h(:, 2, 2)
-         e(:, 3) = h(:, 1, 2) + h(:, 2, 1)
-         if (motion%nlgeom) then
-            e(:, 1) = e(:, 1) + 0.5_wp*(h(:, 1, 1)*h(:, 1, 1) + h(:, 2, 1)*h(:, 2, 1))
-            e(:, 2) = e(:, 2) + 0.5_wp*(h(:, 1, 2)*h(:, 1, 2) + h(:, 2, 2)*h(:, 2, 2))
-            e(:, 3) = e(:, 3) + (h(:, 1, 1)*h(:, 1, 2) + h(:, 2, 1)*h(:, 2, 2))
-            f = f + (h + 0.5_wp*d)
-            point%f_end = point%f_end + (h + d)
-         end if
-         point%law%dstrain(:, 1) = f(:, 1, 1)*d(:, 1, 1) + f(:, 2, 1)*d(:, 2, 1)
-         point%law%dstrain(:, 2) = f(:, 1, 2)*d(:, 1, 2) + f(:, 2, 2)*d(:, 2, 2)
-         point%law%dstrain(:, 3) = (f(:, 1, 1)*d(:, 1, 2) + f(:, 2, 1)*d(:, 2, 2)) &
-            + (f(:, 1, 2)*d(:, 1, 1) + f(:, 2, 2)*d(:, 2, 1))
-      end associate
+      if (motion%nlgeom) then
+         call large_strains(h, d, point)
+      else
+         call small_strains(h, d, point)
+      end if
    end subroutine pack_point
 
    !> grad(lane, a, b) = d u_a / d X_b.
@@ -191,16 +175,81 @@ contains
       integer, intent(in) :: n
       real(wp), intent(in) :: gradient(n_lane, 2, n), u(n_lane, 2, n)
       real(wp), intent(out) :: grad(n_lane, 2, 2)
-      integer :: i
+      integer :: i, l
 
-      grad = 0.0_wp
-      do i = 2, n                                ! the first node is the origin
-         grad(:, 1, 1) = grad(:, 1, 1) + u(:, 1, i)*gradient(:, 1, i)
-         grad(:, 2, 1) = grad(:, 2, 1) + u(:, 2, i)*gradient(:, 1, i)
-         grad(:, 1, 2) = grad(:, 1, 2) + u(:, 1, i)*gradient(:, 2, i)
-         grad(:, 2, 2) = grad(:, 2, 2) + u(:, 2, i)*gradient(:, 2, i)
+      !$omp simd
+      do l = 1, n_lane                           ! the first node is the origin
+         grad(l, 1, 1) = u(l, 1, 2)*gradient(l, 1, 2)
+         grad(l, 2, 1) = u(l, 2, 2)*gradient(l, 1, 2)
+         grad(l, 1, 2) = u(l, 1, 2)*gradient(l, 2, 2)
+         grad(l, 2, 2) = u(l, 2, 2)*gradient(l, 2, 2)
+      end do
+      do i = 3, n
+         !$omp simd
+         do l = 1, n_lane
+            grad(l, 1, 1) = grad(l, 1, 1) + u(l, 1, i)*gradient(l, 1, i)
+            grad(l, 2, 1) = grad(l, 2, 1) + u(l, 2, i)*gradient(l, 1, i)
+            grad(l, 1, 2) = grad(l, 1, 2) + u(l, 1, i)*gradient(l, 2, i)
+            grad(l, 2, 2) = grad(l, 2, 2) + u(l, 2, i)*gradient(l, 2, i)
+         end do
       end do
    end subroutine displacement_gradient
+
+   !> Of the gradients of the displacement at the start, `h`, and over the step, `d`.
+   pure subroutine large_strains(h, d, point)
+      real(wp), intent(in) :: h(n_lane, 2, 2), d(n_lane, 2, 2)   !! (component, by X)
+      type(pack_point_t), intent(inout) :: point
+      integer :: l
+
+      point%geometric = 0.5_wp
+      associate (e => point%law%strain, de => point%law%dstrain, f => point%f_mid, &
+            f1 => point%f_end)
+         !$omp simd
+         do l = 1, n_lane
+            f(l, 1, 1) = 1.0_wp + (h(l, 1, 1) + 0.5_wp*d(l, 1, 1))
+            f(l, 2, 1) = h(l, 2, 1) + 0.5_wp*d(l, 2, 1)
+            f(l, 1, 2) = h(l, 1, 2) + 0.5_wp*d(l, 1, 2)
+            f(l, 2, 2) = 1.0_wp + (h(l, 2, 2) + 0.5_wp*d(l, 2, 2))
+            f1(l, 1, 1) = 1.0_wp + (h(l, 1, 1) + d(l, 1, 1))
+            f1(l, 2, 1) = h(l, 2, 1) + d(l, 2, 1)
+            f1(l, 1, 2) = h(l, 1, 2) + d(l, 1, 2)
+            f1(l, 2, 2) = 1.0_wp + (h(l, 2, 2) + d(l, 2, 2))
+            e(l, 1) = h(l, 1, 1) + 0.5_wp*(h(l, 1, 1)*h(l, 1, 1) + h(l, 2, 1)*h(l, 2, 1))
+            e(l, 2) = h(l, 2, 2) + 0.5_wp*(h(l, 1, 2)*h(l, 1, 2) + h(l, 2, 2)*h(l, 2, 2))
+            e(l, 3) = (h(l, 1, 2) + h(l, 2, 1)) &
+               + (h(l, 1, 1)*h(l, 1, 2) + h(l, 2, 1)*h(l, 2, 2))
+            de(l, 1) = f(l, 1, 1)*d(l, 1, 1) + f(l, 2, 1)*d(l, 2, 1)
+            de(l, 2) = f(l, 1, 2)*d(l, 1, 2) + f(l, 2, 2)*d(l, 2, 2)
+            de(l, 3) = (f(l, 1, 1)*d(l, 1, 2) + f(l, 2, 1)*d(l, 2, 2)) &
+               + (f(l, 1, 2)*d(l, 1, 1) + f(l, 2, 2)*d(l, 2, 1))
+         end do
+      end associate
+   end subroutine large_strains
+
+   !> The same without NLGEOM.
+   pure subroutine small_strains(h, d, point)
+      real(wp), intent(in) :: h(n_lane, 2, 2), d(n_lane, 2, 2)   !! (component, by X)
+      type(pack_point_t), intent(inout) :: point
+      integer :: a, l
+
+      point%geometric = 0.0_wp
+      point%f_mid = 0.0_wp
+      do a = 1, 2
+         point%f_mid(:, a, a) = 1.0_wp
+      end do
+      point%f_end = point%f_mid
+      associate (e => point%law%strain, de => point%law%dstrain)
+         !$omp simd
+         do l = 1, n_lane
+            e(l, 1) = h(l, 1, 1)
+            e(l, 2) = h(l, 2, 2)
+            e(l, 3) = h(l, 1, 2) + h(l, 2, 1)
+            de(l, 1) = d(l, 1, 1)
+            de(l, 2) = d(l, 2, 2)
+            de(l, 3) = d(l, 1, 2) + d(l, 2, 1)
+         end do
+      end associate
+   end subroutine small_strains
 
    !> Is the end of the motion one that the law can answer to? Newton's method tries all kinds of
    !> things. Where it is not, the element is inverted, and the law is asked for a point at rest.
@@ -209,31 +258,52 @@ contains
       type(pack_point_t), intent(inout) :: point
       type(pack_response_t), intent(inout) :: response
       real(wp), parameter :: largest = huge(1.0_wp)**0.2_wp   ! its powers in energies are finite
-      real(wp), parameter :: noise = 64.0_wp*epsilon(1.0_wp)
-      real(wp) :: e(n_lane, 3), extent(n_lane), det(n_lane), terms(n_lane)
-      integer :: a, l
+      real(wp) :: e(n_lane, 3), det(n_lane)
+      integer :: l, n_fit
 
-      e = point%law%strain + point%law%dstrain
-      extent = max(abs(e(:, 1)), abs(e(:, 2)), abs(e(:, 3)))
-      associate (f => point%f_end)
-         extent = max(extent, abs(f(:, 1, 1)), abs(f(:, 2, 1)), abs(f(:, 1, 2)), abs(f(:, 2, 2)))
-         do a = 1, 3
-            e(:, a) = merge(e(:, a), 0.0_wp, extent < largest)
+      associate (strain => point%law%strain, dstrain => point%law%dstrain, f => point%f_end)
+         !$omp simd
+         do l = 1, n_lane
+            e(l, 1) = strain(l, 1) + dstrain(l, 1)
+            e(l, 2) = strain(l, 2) + dstrain(l, 2)
+            e(l, 3) = strain(l, 3) + dstrain(l, 3)
+            det(l) = merge(f(l, 1, 1)*f(l, 2, 2) - f(l, 1, 2)*f(l, 2, 1), -1.0_wp, &
+               max(abs(e(l, 1)), abs(e(l, 2)), abs(e(l, 3)), abs(f(l, 1, 1)), abs(f(l, 2, 1)), &
+               abs(f(l, 1, 2)), abs(f(l, 2, 2))) < largest)
          end do
-         det = f(:, 1, 1)*f(:, 2, 2) - f(:, 1, 2)*f(:, 2, 1)
       end associate
-      if (has_volume) then                       ! det C, where it is more than round-off
-         terms = noise*((1.0_wp + 2.0_wp*abs(e(:, 1)))*(1.0_wp + 2.0_wp*abs(e(:, 2))) + e(:, 3)**2)
-         det = min(det, ((1.0_wp + 2.0_wp*e(:, 1))*(1.0_wp + 2.0_wp*e(:, 2)) - e(:, 3)**2) - terms)
-      end if
-      if (all(extent < largest .and. det > 0.0_wp)) return
+      if (has_volume) call compare_volume(e, det)
+      n_fit = 0
+      !$omp simd reduction(+: n_fit)
       do l = 1, n_lane
-         if (extent(l) < largest .and. det(l) > 0.0_wp) cycle
+         n_fit = n_fit + merge(1, 0, det(l) > 0.0_wp)
+      end do
+      if (n_fit == n_lane) return
+      do l = 1, n_lane
+         if (det(l) > 0.0_wp) cycle
          response%is_inverted(l) = .true.
          point%law%strain(l, :) = 0.0_wp
          point%law%dstrain(l, :) = 0.0_wp
       end do
    end subroutine pack_point_check
+
+   !> det C besides det F, where it is more than round-off.
+   pure subroutine compare_volume(strain, det)
+      real(wp), intent(in) :: strain(n_lane, 3)
+      real(wp), intent(inout) :: det(n_lane)     !! the smaller one; not above 0 where that is so
+      real(wp), parameter :: noise = 64.0_wp*epsilon(1.0_wp)
+      real(wp) :: e1, e2, e3
+      integer :: l
+
+      !$omp simd private(e1, e2, e3)
+      do l = 1, n_lane
+         e1 = merge(strain(l, 1), 0.0_wp, det(l) > 0.0_wp)
+         e2 = merge(strain(l, 2), 0.0_wp, det(l) > 0.0_wp)
+         e3 = merge(strain(l, 3), 0.0_wp, det(l) > 0.0_wp)
+         det(l) = min(det(l), ((1.0_wp + 2.0_wp*e1)*(1.0_wp + 2.0_wp*e2) - e3*e3) &
+            - noise*((1.0_wp + 2.0_wp*abs(e1))*(1.0_wp + 2.0_wp*abs(e2)) + e3*e3))
+      end do
+   end subroutine compare_volume
 
    !> Add what point `k` gives, whose law has answered.
    pure subroutine pack_add_point(self, k, point, with_tangent, response)
@@ -242,24 +312,33 @@ contains
       type(pack_point_t), intent(in) :: point
       logical, intent(in) :: with_tangent        !! else no tangent is added
       type(pack_response_t), intent(inout) :: response
-      real(wp) :: s(n_lane, 3), nominal(n_lane, 2, 2), part(n_lane)
-      integer :: a, i
+      real(wp) :: s(n_lane, 3), nominal(n_lane, 2, 2)
+      integer :: i, l
 
-      response%energy = response%energy + self%weight(:, k)*point%law%energy
-      do a = 1, 3
-         s(:, a) = self%weight(:, k)*point%law%stress(:, a)
-      end do
-      do a = 1, 2
-         nominal(:, a, 1) = point%f_mid(:, a, 1)*s(:, 1) + point%f_mid(:, a, 2)*s(:, 3)
-         nominal(:, a, 2) = point%f_mid(:, a, 1)*s(:, 3) + point%f_mid(:, a, 2)*s(:, 2)
-      end do
-      do i = 1, self%n_node
-         do a = 1, 2
-            part = nominal(:, a, 1)*self%gradient(:, 1, i, k) &
-               + nominal(:, a, 2)*self%gradient(:, 2, i, k)
-            response%force(:, a, i) = response%force(:, a, i) + part
+      associate (w => self%weight(:, k), stress => point%law%stress, f => point%f_mid)
+         !$omp simd
+         do l = 1, n_lane
+            response%energy(l) = response%energy(l) + w(l)*point%law%energy(l)
+            s(l, 1) = w(l)*stress(l, 1)
+            s(l, 2) = w(l)*stress(l, 2)
+            s(l, 3) = w(l)*stress(l, 3)
+            nominal(l, 1, 1) = f(l, 1, 1)*s(l, 1) + f(l, 1, 2)*s(l, 3)
+            nominal(l, 2, 1) = f(l, 2, 1)*s(l, 1) + f(l, 2, 2)*s(l, 3)
+            nominal(l, 1, 2) = f(l, 1, 1)*s(l, 3) + f(l, 1, 2)*s(l, 2)
+            nominal(l, 2, 2) = f(l, 2, 1)*s(l, 3) + f(l, 2, 2)*s(l, 2)
          end do
-      end do
+      end associate
+      associate (g => self%gradient(:, :, :, k), force => response%force)
+         do i = 1, self%n_node
+            !$omp simd
+            do l = 1, n_lane
+               force(l, 1, i) = force(l, 1, i) &
+                  + (nominal(l, 1, 1)*g(l, 1, i) + nominal(l, 1, 2)*g(l, 2, i))
+               force(l, 2, i) = force(l, 2, i) &
+                  + (nominal(l, 2, 1)*g(l, 1, i) + nominal(l, 2, 2)*g(l, 2, i))
+            end do
+         end do
+      end associate
       if (response%with_sizes) call add_sizes(self%n_node, nominal, self%gradient(:, :, :, k), &
          response%magnitude)
       if (with_tangent) call add_tangent(self%n_node, self%gradient(:, :, :, k), &
@@ -272,12 +351,15 @@ contains
       real(wp), intent(in) :: nominal(n_lane, 2, 2)        !! stress, weighted
       real(wp), intent(in) :: gradient(n_lane, 2, n)
       real(wp), intent(inout) :: magnitude(n_lane, 2, max_node)
-      integer :: a, i
+      integer :: i, l
 
       do i = 1, n
-         do a = 1, 2
-            magnitude(:, a, i) = magnitude(:, a, i) + abs(nominal(:, a, 1)*gradient(:, 1, i) &
-               + nominal(:, a, 2)*gradient(:, 2, i))
+         !$omp simd
+         do l = 1, n_lane
+            magnitude(l, 1, i) = magnitude(l, 1, i) + abs(nominal(l, 1, 1)*gradient(l, 1, i) &
+               + nominal(l, 1, 2)*gradient(l, 2, i))
+            magnitude(l, 2, i) = magnitude(l, 2, i) + abs(nominal(l, 2, 1)*gradient(l, 1, i) &
+               + nominal(l, 2, 2)*gradient(l, 2, i))
          end do
       end do
    end subroutine add_sizes
