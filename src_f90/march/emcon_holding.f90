@@ -14,7 +14,8 @@ module emcon_holding
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_place, motion_t
    use emcon_numbering, only : add_to_dofs
-   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, mechanism_field, mechanism_force
+   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, mechanism_field, mechanism_force, &
+      mechanism_places
    use emcon_mechanism_text, only : describe_motion
    use emcon_mechanism_rows, only : mechanism_rows_append, mechanism_rows_find, mechanism_rows_t
    use emcon_scene, only : scene_t
@@ -53,7 +54,7 @@ module emcon_holding
    !> An assembly of bodies and the motions that are left of it.
    type :: free_t
       integer, allocatable :: member(:)
-      real(dp), allocatable :: z(:, :)           !! (3*members, n) orthonormal columns
+      real(dp), allocatable :: z(:, :)           !! (n_motion*members, n) orthonormal
       real(dp) :: noise = 0.0_dp
       real(dp), allocatable :: along(:)          !! (n) load along each of them
       logical :: is_loaded = .false.             !! some load acts on these bodies
@@ -246,9 +247,9 @@ contains
       logical, intent(inout) :: is_active(:)
       type(constraint_set_t) :: set
       real(wp) :: way(size(motion%du, 1), size(motion%du, 2)), time, turn
-      real(dp) :: rigid(3*size(free%member)), share(size(free%along))
+      real(dp) :: rigid(bodies%n_motion*size(free%member)), share(size(free%along))
       logical :: is_next(size(is_active))
-      integer :: i
+      integer :: place(bodies%n_motion), i
 
       share = free%along/norm2(free%along)
       rigid = matmul(free%z, share)
@@ -266,8 +267,10 @@ contains
       self%is_pushed = .false.
       turn = 0.0_wp
       do i = 1, size(free%member)
+         place = mechanism_places(bodies, i)
          associate (size => bodies%size(free%member(i)))
-            if (size > 0.0_wp) turn = max(turn, real(abs(rigid(3*i)), wp)/size)
+            if (size > 0.0_wp) turn = max(turn, &
+               real(maxval(abs(rigid(place(bodies%n_dim + 1:)))), wp)/size)
          end associate
       end do
       if (time*turn > largest_turn) then
@@ -326,7 +329,7 @@ contains
       type(motion_t), intent(in) :: motion
       type(mechanisms_t), intent(in) :: bodies
       type(free_t), intent(inout) :: free
-      real(dp) :: total(3*size(free%member)), along(size(free%z, 2)), magnitude
+      real(dp) :: total(bodies%n_motion*size(free%member)), along(size(free%z, 2)), magnitude
       real(wp) :: force(size(motion%x, 1), size(motion%x, 2))
 
       call system_loads(system, motion, force)

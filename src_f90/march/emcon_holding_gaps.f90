@@ -101,7 +101,7 @@ contains
       type(constraint_set_t), intent(in) :: set
       type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)           !! bodies of an assembly
-      real(dp), intent(in) :: z(:, :)            !! (3*members, n) motions that are left of it
+      real(dp), intent(in) :: z(:, :)            !! (n_motion*members, n) motions left of it
       logical, intent(out) :: is_next(:)         !! (n_constraint)
       real(wp) :: way(size(bodies%x, 1), size(bodies%of_node)), rate(set%n), smallest
       integer :: j, k

@@ -9,7 +9,8 @@
 module emcon_free_motions
    use emcon_bodies, only : bodies_find
    use emcon_kinds, only : dp, wp
-   use emcon_mechanisms, only : mechanisms_t, mechanism_free, rigid_motions_at
+   use emcon_mechanisms, only : mechanisms_t, mechanism_free, mechanism_places, &
+      rigid_motions_at
    use emcon_mechanism_rows, only : mechanism_rows_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
    implicit none
@@ -72,20 +73,21 @@ contains
       type(mechanism_rows_t), intent(in) :: rows
       integer, intent(in) :: list(:)                     !! rows between the same bodies in a row
       integer, intent(in) :: member(:)                   !! bodies of the assembly, ascending
-      real(dp), allocatable, intent(out) :: z(:, :)      !! (3*members, n) orthonormal columns
+      real(dp), allocatable, intent(out) :: z(:, :)      !! (n_motion*members, n) orthonormal
       real(dp), intent(out) :: noise                     !! size of the round-off in `z`
       real(dp), allocatable :: a(:, :), basis(:, :)
       real(dp) :: own_noise, smallest
       integer, allocatable :: motion(:)
       integer :: i, j, n, first, last
 
-      allocate(basis(3*size(member), 3*size(member)), source=0.0_dp)
+      n = bodies%n_motion*size(member)
+      allocate(basis(n, n), source=0.0_dp)
       n = 0
       do i = 1, size(member)
-         do j = 1, 3
+         do j = 1, bodies%n_motion
             if (.not. bodies%is_free(j, member(i))) cycle
             n = n + 1
-            basis(3*(i - 1) + j, n) = 1.0_dp
+            basis(bodies%n_motion*(i - 1) + j, n) = 1.0_dp
          end do
       end do
       noise = max(rounding, rows%noise)
@@ -115,7 +117,7 @@ contains
       integer, allocatable, intent(out) :: motion(:)     !! (motions) places in those of all members
       real(dp), intent(out) :: noise                     !! bound of what round-off makes of `a`
       integer, allocatable :: joined_body(:)
-      integer :: i, k, s, b, n
+      integer :: place(bodies%n_motion), i, s, b, n
 
       n = 0
       allocate(joined_body(sum(rows%start(list + 1) - rows%start(list))))
@@ -128,17 +130,18 @@ contains
          end do
       end do
       joined_body = unique_sorted(joined_body(:n))
-      allocate(motion(3*size(joined_body)))
+      allocate(motion(bodies%n_motion*size(joined_body)))
       do i = 1, size(joined_body)
-         motion(3*i - 2:3*i) = 3*find_sorted(member, joined_body(i)) + [-2, -1, 0]
+         motion(mechanism_places(bodies, i)) &
+            = mechanism_places(bodies, find_sorted(member, joined_body(i)))
       end do
       allocate(a(size(list), size(motion)), source=0.0_dp)
       do i = 1, size(list)
          do s = rows%start(list(i)) + 1, rows%start(list(i) + 1)
             b = mechanism_free(bodies, rows%dof(s))
             if (b == 0) cycle
-            k = 3*find_sorted(joined_body, b)
-            a(i, k - 2:k) = a(i, k - 2:k) &
+            place = mechanism_places(bodies, find_sorted(joined_body, b))
+            a(i, place) = a(i, place) &
                + real(rows%weight(s)*rigid_motions_at(bodies, b, rows%dof(s)), dp)
          end do
       end do

@@ -32,9 +32,10 @@ contains
       type(prescribed_t), intent(in) :: prescribed(:)
       type(mechanism_rows_t), intent(out) :: rows
       real(wp) :: total
-      integer :: k, m, n, n_linear
+      integer :: k, m, n, n_dim, n_linear
 
       m = size(prescribed)
+      n_dim = size(system%space%is_alive, 1)
       n_linear = 0
       if (allocated(system%space%linear%start)) n_linear = system%space%linear%n
       n = m
@@ -43,7 +44,7 @@ contains
       allocate(rows%start(rows%n + 1), rows%dof(n), rows%weight(n))
       rows%start(:m + 1) = [(k, k = 0, m)]
       do k = 1, m
-         rows%dof(k) = 2*(prescribed(k)%node - 1) + prescribed(k)%dof
+         rows%dof(k) = n_dim*(prescribed(k)%node - 1) + prescribed(k)%dof
          rows%weight(k) = 1.0_wp
       end do
       do k = 1, n_linear
@@ -62,23 +63,24 @@ contains
    subroutine mechanism_rows_append(rows, item)
       type(mechanism_rows_t), intent(inout) :: rows
       type(condition_t), intent(in) :: item(:)
-      integer :: k, i, a, n
+      integer :: k, i, a, n, n_dim
       real(wp) :: total
 
       if (size(item) == 0) return
+      n_dim = size(item(1)%c, 1)
       rows%noise = contact_noise
       n = rows%start(rows%n + 1)
-      rows%start = [rows%start, (n + 2*sum(item(:k)%n_node), k = 1, size(item))]
-      rows%dof = [rows%dof, spread(0, 1, 2*sum(item%n_node))]
-      rows%weight = [rows%weight, spread(0.0_wp, 1, 2*sum(item%n_node))]
+      rows%start = [rows%start, (n + n_dim*sum(item(:k)%n_node), k = 1, size(item))]
+      rows%dof = [rows%dof, spread(0, 1, n_dim*sum(item%n_node))]
+      rows%weight = [rows%weight, spread(0.0_wp, 1, n_dim*sum(item%n_node))]
       rows%n = rows%n + size(item)
       do k = 1, size(item)
          total = sum(abs(item(k)%c(:, :item(k)%n_node)))
          if (.not. total > 0.0_wp) total = 1.0_wp
          do i = 1, item(k)%n_node
-            do a = 1, 2
+            do a = 1, n_dim
                n = n + 1
-               rows%dof(n) = 2*(item(k)%node(i) - 1) + a
+               rows%dof(n) = n_dim*(item(k)%node(i) - 1) + a
                rows%weight(n) = item(k)%c(a, i)/total
             end do
          end do

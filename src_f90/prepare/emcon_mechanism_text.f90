@@ -5,7 +5,8 @@ module emcon_mechanism_text
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_null_space
-   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, rigid_motions_as_one
+   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, mechanism_places, &
+      rigid_motions_as_one
    use emcon_mechanism_rows, only : mechanism_rows_find, mechanism_rows_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_t
@@ -39,7 +40,6 @@ contains
       integer :: n_assembly, i, n, first, last
 
       text = ""
-      if (scene%n_dim > 2) return
       contact_holds = .true.
       if (present(with_contact)) contact_holds = .not. with_contact
       call mechanism_rows_find(system, prescribed, rows)
@@ -76,11 +76,11 @@ contains
       type(scene_t), intent(in) :: scene
       real(dp), intent(in) :: noise                      !! size of the round-off in `z`
       integer, allocatable, intent(inout) :: member(:)   !! bodies; on return those named
-      real(dp), allocatable, intent(inout) :: z(:, :)    !! (3*members, n) free motions, likewise
+      real(dp), allocatable, intent(inout) :: z(:, :)    !! (n_motion*members, n) likewise
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: name, motion
 
-      call keep_moving_together(member, z, sqrt(noise))
+      call keep_moving_together(bodies, member, z, sqrt(noise))
       call name_text(bodies, system, scene, member, name)
       call motion_text(bodies, member, z, sqrt(noise), motion)
       text = name // " free to " // motion
@@ -88,16 +88,17 @@ contains
 
    !> Of an assembly keep the first body that moves and those that move with it: whose motions
    !> are correlated over the null space.
-   subroutine keep_moving_together(member, z, tol)
+   subroutine keep_moving_together(bodies, member, z, tol)
+      type(mechanisms_t), intent(in) :: bodies
       integer, allocatable, intent(inout) :: member(:)
-      real(dp), allocatable, intent(inout) :: z(:, :)    !! (3*members, n) orthonormal columns
+      real(dp), allocatable, intent(inout) :: z(:, :)    !! (n_motion*members, n) orthonormal
       real(dp), intent(in) :: tol                        !! what counts as motion
-      real(dp) :: size_of(size(member)), block(3, 3)
+      real(dp) :: size_of(size(member)), block(bodies%n_motion, bodies%n_motion)
       integer, allocatable :: link(:, :), group(:)
       integer :: i, j, n, n_group, pass
 
       do i = 1, size(member)
-         size_of(i) = norm2(z(3*i - 2:3*i, :))
+         size_of(i) = norm2(z(mechanism_places(bodies, i), :))
       end do
       if (maxval(size_of) <= tol) return         ! coordinates that are mostly round-off
       do pass = 1, 2                             ! count, then list
@@ -106,7 +107,8 @@ contains
             if (size_of(i) <= tol) cycle
             do j = i, size(member)
                if (size_of(j) <= tol) cycle
-               block = matmul(z(3*i - 2:3*i, :), transpose(z(3*j - 2:3*j, :)))
+               block = matmul(z(mechanism_places(bodies, i), :), &
+                  transpose(z(mechanism_places(bodies, j), :)))
                if (maxval(abs(block)) <= tol*size_of(i)*size_of(j)) cycle
                n = n + 1
                if (pass == 2) link(:, n) = [i, j]
@@ -115,7 +117,8 @@ contains
          if (pass == 1) allocate(link(2, n))
       end do
       call bodies_find(link, size(member), group, n_group)
-      z = z(pack([(i, i = 1, size(z, 1))], [((group(j) == 1, i = 1, 3), j = 1, size(group))]), :)
+      z = z(pack([(i, i = 1, size(z, 1))], [((group(j) == 1, i = 1, bodies%n_motion), &
+         j = 1, size(group))]), :)
       member = pack(member, group == 1)
    end subroutine keep_moving_together
 
@@ -182,43 +185,74 @@ contains
       if (size(label) > 1) text = more // joined(word, ", ", most_named)
    end subroutine list_text
 
-   !> How bodies that move together can move: as one, which are combinations g of two translations
-   !> and a rotation, or against each other. Nodes follow.
+   !> How bodies that move together can move: as one, which are combinations g of translations and
+   !> rotations, or against each other. Nodes follow.
    subroutine motion_text(bodies, member, z, tol, text)
       type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
-      real(dp), intent(in) :: z(:, :)                    !! (3*members, n) their motions
+      real(dp), intent(in) :: z(:, :)                    !! (n_motion*members, n) their motions
       real(dp), intent(in) :: tol
       character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable :: error
-      real(dp), allocatable :: a(:, :), both(:, :), held(:, :), g(:, :), shift(:, :)
-      integer :: n
-      logical :: along(2)
+      real(dp), allocatable :: a(:, :), both(:, :), held(:, :), g(:, :), shift(:, :), &
+         way(:, :), turn(:, :)
+      integer :: m, n
 
+      m = bodies%n_motion
       n = count(member <= bodies%n_mesh)
       if (n == 0) n = size(member)
-      allocate(a(3*n, 3 + size(z, 2)))
-      a(:, :3) = rigid_motions_as_one(bodies, member(:n))/sqrt(real(n, dp))
-      a(:, 4:) = -z(:3*n, :)
+      allocate(a(m*n, m + size(z, 2)))
+      a(:, :m) = rigid_motions_as_one(bodies, member(:n))/sqrt(real(n, dp))
+      a(:, m + 1:) = -z(:m*n, :)
       text = "move"
       call find_null_space(a, tol, both, error)
       if (allocated(error)) return
-      call find_null_space(transpose(both(:3, :)), tol, held, error)     ! g^T held = 0
+      call find_null_space(transpose(both(:m, :)), tol, held, error)     ! g^T held = 0
       if (allocated(error)) return
       call find_null_space(transpose(held), tol, g, error)
       if (allocated(error)) return
-      call find_null_space(g(3:3, :), tol, shift, error)
+      call find_null_space(g(bodies%n_dim + 1:, :), tol, shift, error)
       if (allocated(error)) return
       text = ""
-      along = [norm2(held(1, :)) <= tol, norm2(held(2, :)) <= tol]
-      if (along(1)) text = "move in x"
-      if (along(2)) call join(text, "move in y")
-      if (size(shift, 2) == 1 .and. .not. any(along)) then
-         text = trim(direction_text(matmul(g(:2, :), shift(:, 1))))
-      end if
-      if (size(shift, 2) < size(g, 2)) call join(text, "rotate")
+      way = matmul(g(:bodies%n_dim, :), shift)
+      call directions_text(way, size(way, 2), tol, "move in ", "move along ", text)
+      turn = g(bodies%n_dim + 1:, :)
+      n = size(g, 2) - size(shift, 2)
+      if (n > 0 .and. size(turn, 1) == 1) call join(text, "rotate")
+      if (n > 0 .and. size(turn, 1) > 1) call directions_text(turn, n, tol, "rotate about ", &
+         "rotate about an axis along ", text)
       if (size(both, 2) < size(z, 2)) call join(text, "move against each other")
    end subroutine motion_text
+
+   !> Add the axes that lie in the space of some directions, and what is left of it: one direction,
+   !> or a plane.
+   subroutine directions_text(direction, n, tol, axis_word, other_word, text)
+      real(dp), intent(in) :: direction(:, :)            !! (n_dim, >= n) that span it
+      integer, intent(in) :: n                           !! dimension of that space
+      real(dp), intent(in) :: tol
+      character(len=*), intent(in) :: axis_word, other_word    !! before the name
+      character(len=:), allocatable, intent(inout) :: text
+      character(len=*), parameter :: axes = "xyz"
+      type(error_t), allocatable :: error
+      real(dp), allocatable :: across(:, :), left(:, :)
+      integer :: a, m
+
+      if (n == 0) return
+      call find_null_space(transpose(direction), tol, across, error)
+      if (allocated(error)) return
+      left = direction
+      m = n
+      do a = 1, size(direction, 1)
+         if (norm2(across(a, :)) > tol) cycle
+         call join(text, axis_word // axes(a:a))
+         left(a, :) = 0.0_dp
+         m = m - 1
+      end do
+      if (m == 1) call join(text, other_word &
+         // trim(direction_text(left(:, maxloc(sum(left**2, dim=1), 1)), tol)))
+      if (m > 1) call join(text, other_word // "any direction across " // &
+         trim(direction_text(across(:, 1), tol)))
+   end subroutine directions_text
 
    !> Columns z with a z = 0 up to singular values of `tol`, for a matrix of order one or of noise.
    subroutine find_null_space(a, tol, z, error)
@@ -230,16 +264,23 @@ contains
       call dense_null_space(a, tol/max(norm2(a), tol), z, error)
    end subroutine find_null_space
 
-   !> "move along (1, -0.5)": one of the entries is 1.
-   pure function direction_text(shift) result(text)
-      real(dp), intent(in) :: shift(2)
+   !> "(1, -0.5)": one of the entries is 1.
+   pure function direction_text(shift, tol) result(text)
+      real(dp), intent(in) :: shift(:)                   !! (n_dim)
+      real(dp), intent(in) :: tol                        !! what is less, of the largest, is none
       character(len=64) :: text
-      real(wp) :: along(2)
-      integer :: i
+      type(string_t) :: word(size(shift))
+      integer :: i, k
 
-      i = merge(1, 2, abs(shift(1)) > 0.5_dp*abs(shift(2)))
-      along = real(shift/shift(i), wp)
-      text = "move along (" // to_text(along(1), 3) // ", " // to_text(along(2), 3) // ")"
+      i = size(shift)
+      do k = size(shift) - 1, 1, -1
+         if (abs(shift(k)) > 0.5_dp*abs(shift(i))) i = k
+      end do
+      do k = 1, size(shift)
+         word(k)%text = to_text(real(merge(shift(k)/shift(i), 0.0_dp, &
+            abs(shift(k)) > tol*abs(shift(i))), wp), 3)
+      end do
+      text = "(" // joined(word, ", ", size(word)) // ")"
    end function direction_text
 
    !> Add `more` to a list of motions.

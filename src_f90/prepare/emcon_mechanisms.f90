@@ -1,31 +1,34 @@
 !> Bodies as rigid ones, and their motions.
 !>
-!> Every body has three motions: along x, along y, and a rotation about its centre in which its
-!> farthest node moves by one, so that what they do to a degree of freedom is of order one. A solid
-!> of revolution has that along y alone. A node
-!> without element that stands in an equation is a body that does not rotate.
+!> Every body has n_motion motions: along each axis, and rotations about its centre, in the plane
+!> one, in space three, in which its farthest node moves by one, so that what they do to a degree
+!> of freedom is of order one. A solid of revolution has that along y alone. A node without element
+!> that stands in an equation does not rotate.
 module emcon_mechanisms
    use emcon_kinds, only : dp, wp
    use emcon_mechanism_rows, only : mechanism_rows_t
+   use emcon_rotation, only : cross_product, n_turn
    use emcon_scene, only : scene_t
    use emcon_surface_edges, only : surface_edges
    use emcon_system, only : system_may_hold, system_t
    implicit none
    private
-   public :: mechanisms_t, mechanisms_find, mechanism_free, rigid_motions_at
+   public :: mechanisms_t, mechanisms_find, mechanism_free, mechanism_places, rigid_motions_at
    public :: rigid_motions_as_one, mechanism_force, mechanism_field
 
    !> The bodies: first those of elements and given forces, as numbered in `system_t`, then single
    !> nodes of equations.
    type :: mechanisms_t
+      integer :: n_dim = 0
+      integer :: n_motion = 0                        !! of each body
       integer :: n = 0
       integer :: n_mesh = 0                          !! those of `system_t`
       integer, allocatable :: of_node(:)             !! (n_node) 0: none
-      real(wp), allocatable :: x(:, :)               !! (2, n_node) [L]
-      real(wp), allocatable :: center(:, :)          !! (2, n) [L]
+      real(wp), allocatable :: x(:, :)               !! (n_dim, n_node) [L]
+      real(wp), allocatable :: center(:, :)          !! (n_dim, n) [L]
       real(wp), allocatable :: size(:)               !! (n) largest distance from there, 0: a node
       real(wp), allocatable :: reach(:)              !! (n) largest coordinate over `size`
-      logical, allocatable :: is_free(:, :)          !! (3, n) motions that rows may prevent
+      logical, allocatable :: is_free(:, :)          !! (n_motion, n) motions that rows may prevent
    end type mechanisms_t
 
 contains
@@ -35,17 +38,19 @@ contains
    subroutine mechanisms_find(system, scene, x, rows, contact_holds, host_holds, bodies)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: x(:, :)                !! (2, n_node) [L]
+      real(wp), intent(in) :: x(:, :)                !! (n_dim, n_node) [L]
       type(mechanism_rows_t), intent(in) :: rows
       logical, intent(in) :: contact_holds, host_holds
       type(mechanisms_t), intent(out) :: bodies
-      logical :: is_in_row(2, size(scene%x, 2)), touches(system%space%n_body)
+      logical :: is_in_row(size(x, 1), size(x, 2)), touches(system%space%n_body)
       logical, dimension(size(scene%x, 2)) :: by_forces, by_constraints
       integer :: i, k, b
 
+      bodies%n_dim = size(x, 1)
+      bodies%n_motion = bodies%n_dim + n_turn(bodies%n_dim)
       is_in_row = .false.
       do k = 1, size(rows%dof)
-         is_in_row(2 - mod(rows%dof(k), 2), (rows%dof(k) + 1)/2) = .true.
+         is_in_row(axis_of(bodies, rows%dof(k)), node_of(bodies, rows%dof(k))) = .true.
       end do
       allocate(bodies%of_node, source=system%space%body)
       allocate(bodies%x, source=x)
@@ -67,17 +72,19 @@ contains
          touches(pack(system%space%body, (by_forces .or. by_constraints) &
             .and. system%space%body > 0)) = .true.
       end if
-      allocate(bodies%is_free(3, bodies%n), source=.false.)
+      allocate(bodies%is_free(bodies%n_motion, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh
          bodies%is_free(:, b) = .not. touches(b)
          if (scene%is_axial) bodies%is_free([1, 3], b) = .false.
       end do
       do i = 1, size(bodies%of_node)
          b = bodies%of_node(i)
-         if (b > bodies%n_mesh) bodies%is_free(:2, b) = is_in_row(:, i)
+         if (b > bodies%n_mesh) bodies%is_free(:bodies%n_dim, b) = is_in_row(:, i)
       end do
       call measure_bodies(bodies)
-      bodies%is_free(3, :) = bodies%is_free(3, :) .and. bodies%size > 0.0_wp
+      do b = 1, bodies%n
+         if (.not. bodies%size(b) > 0.0_wp) bodies%is_free(bodies%n_dim + 1:, b) = .false.
+      end do
    end subroutine mechanisms_find
 
    subroutine mark_contact_bodies(system, scene, pair, touches)
@@ -108,7 +115,7 @@ contains
       integer :: n_node(bodies%n), i, b
 
       n_node = 0
-      allocate(bodies%center(2, bodies%n), source=0.0_wp)
+      allocate(bodies%center(bodies%n_dim, bodies%n), source=0.0_wp)
       allocate(bodies%size(bodies%n), bodies%reach(bodies%n), source=0.0_wp)
       do i = 1, size(bodies%of_node)
          b = bodies%of_node(i)
@@ -138,33 +145,75 @@ contains
       type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: dof
 
-      mechanism_free = bodies%of_node((dof + 1)/2)
+      mechanism_free = bodies%of_node(node_of(bodies, dof))
       if (mechanism_free == 0) return
       if (.not. any(bodies%is_free(:, mechanism_free))) mechanism_free = 0
    end function mechanism_free
 
-   !> What the three motions of body `b` do to a degree of freedom.
+   !> Places of the motions of the k-th of some bodies among those of all of them.
+   pure function mechanism_places(bodies, k) result(place)
+      type(mechanisms_t), intent(in) :: bodies
+      integer, intent(in) :: k                       !! > 0
+      integer :: place(bodies%n_motion), j
+
+      place = [(bodies%n_motion*(k - 1) + j, j = 1, bodies%n_motion)]
+   end function mechanism_places
+
+   !> The node of a degree of freedom, and its axis.
+   pure integer function node_of(bodies, dof)
+      type(mechanisms_t), intent(in) :: bodies
+      integer, intent(in) :: dof
+
+      node_of = (dof - 1)/bodies%n_dim + 1
+   end function node_of
+
+   pure integer function axis_of(bodies, dof)
+      type(mechanisms_t), intent(in) :: bodies
+      integer, intent(in) :: dof
+
+      axis_of = dof - bodies%n_dim*(node_of(bodies, dof) - 1)
+   end function axis_of
+
+   !> The motion at an arm from the centre in a turn of one about each axis, in the plane z.
+   pure function turn_field(arm) result(field)
+      real(wp), intent(in) :: arm(:)                 !! (n_dim) [L]
+      real(wp) :: field(size(arm), n_turn(size(arm)))
+      integer, parameter :: n_axis = 3
+      real(wp) :: axis(n_axis), at(n_axis), way(n_axis)
+      integer :: k
+
+      at = 0.0_wp
+      at(:size(arm)) = arm
+      do k = 1, size(field, 2)
+         axis = 0.0_wp
+         axis(k + n_axis - size(field, 2)) = 1.0_wp
+         way = cross_product(axis, at)
+         field(:, k) = way(:size(arm))
+      end do
+   end function turn_field
+
+   !> What the motions of body `b` do to a degree of freedom.
    pure function rigid_motions_at(bodies, b, dof) result(motion)
       type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: b, dof
-      real(wp) :: motion(3), arm(2)
+      real(wp) :: motion(bodies%n_motion), turn(bodies%n_dim, bodies%n_motion - bodies%n_dim)
       integer :: a
 
-      a = 2 - mod(dof, 2)
+      a = axis_of(bodies, dof)
       motion = 0.0_wp
       motion(a) = 1.0_wp
       if (.not. bodies%size(b) > 0.0_wp) return
-      arm = (bodies%x(:, (dof + 1)/2) - bodies%center(:, b))/bodies%size(b)
-      motion(3) = merge(-arm(2), arm(1), a == 1)
+      turn = turn_field((bodies%x(:, node_of(bodies, dof)) - bodies%center(:, b))/bodies%size(b))
+      motion(bodies%n_dim + 1:) = turn(a, :)
    end function rigid_motions_at
 
-   !> Motions of all bodies as one: along x, along y, and a rotation. A node does not rotate.
+   !> Motions of all bodies as one: along the axes, and rotations. A node does not rotate.
    pure function rigid_motions_as_one(bodies, member) result(g)
       type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
-      real(dp) :: g(3*size(member), 3)
-      real(wp) :: center(2), extent
-      integer :: i
+      real(dp) :: g(bodies%n_motion*size(member), bodies%n_motion)
+      real(wp) :: center(bodies%n_dim), extent
+      integer :: place(bodies%n_motion), i, j
 
       center = sum(bodies%center(:, member), dim=2)/real(max(1, size(member)), wp)
       extent = 0.0_wp
@@ -174,12 +223,17 @@ contains
       end do
       g = 0.0_dp
       do i = 1, size(member)
-         g(3*i - 2, 1) = 1.0_dp
-         g(3*i - 1, 2) = 1.0_dp
-         g(3*i, 3) = 1.0_dp
+         place = mechanism_places(bodies, i)
+         do j = 1, bodies%n_motion
+            g(place(j), j) = 1.0_dp
+         end do
          if (.not. bodies%size(member(i)) > 0.0_wp) cycle
-         associate (arm => (bodies%center(:, member(i)) - center)/extent)
-            g(3*i - 2:3*i, 3) = real([-arm(2), arm(1), bodies%size(member(i))/extent], dp)
+         associate (n_dim => bodies%n_dim)
+            g(place(:n_dim), n_dim + 1:) = real(turn_field((bodies%center(:, member(i)) &
+               - center)/extent), dp)
+            do j = n_dim + 1, bodies%n_motion
+               g(place(j), j) = real(bodies%size(member(i))/extent, dp)
+            end do
          end associate
       end do
    end function rigid_motions_as_one
@@ -188,10 +242,10 @@ contains
    pure subroutine mechanism_force(bodies, member, force, total, magnitude)
       type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
-      real(wp), intent(in) :: force(:, :)                !! (2, n_node)
-      real(dp), intent(out) :: total(:)                  !! (3*members)
+      real(wp), intent(in) :: force(:, :)                !! (n_dim, n_node)
+      real(dp), intent(out) :: total(:)                  !! (n_motion*members)
       real(dp), intent(out) :: magnitude
-      integer :: i, a, m
+      integer :: place(bodies%n_motion), i, a, m
 
       total = 0.0_dp
       magnitude = 0.0_dp
@@ -199,9 +253,10 @@ contains
          if (bodies%of_node(i) == 0) cycle
          m = findloc(member, bodies%of_node(i), 1)
          if (m == 0) cycle
-         do a = 1, 2
-            total(3*m - 2:3*m) = total(3*m - 2:3*m) &
-               + real(rigid_motions_at(bodies, member(m), 2*(i - 1) + a)*force(a, i), dp)
+         place = mechanism_places(bodies, m)
+         do a = 1, bodies%n_dim
+            total(place) = total(place) + real(rigid_motions_at(bodies, member(m), &
+               bodies%n_dim*(i - 1) + a)*force(a, i), dp)
          end do
          magnitude = magnitude + real(sum(abs(force(:, i))), dp)
       end do
@@ -211,8 +266,8 @@ contains
    pure subroutine mechanism_field(bodies, member, z, field)
       type(mechanisms_t), intent(in) :: bodies
       integer, intent(in) :: member(:)
-      real(dp), intent(in) :: z(:)                       !! (3*members)
-      real(wp), intent(out) :: field(:, :)               !! (2, n_node)
+      real(dp), intent(in) :: z(:)                       !! (n_motion*members)
+      real(wp), intent(out) :: field(:, :)               !! (n_dim, n_node)
       integer :: i, a, m
 
       field = 0.0_wp
@@ -220,9 +275,9 @@ contains
          if (bodies%of_node(i) == 0) cycle
          m = findloc(member, bodies%of_node(i), 1)
          if (m == 0) cycle
-         do a = 1, 2
-            field(a, i) = dot_product(rigid_motions_at(bodies, member(m), 2*(i - 1) + a), &
-               real(z(3*m - 2:3*m), wp))
+         do a = 1, bodies%n_dim
+            field(a, i) = dot_product(rigid_motions_at(bodies, member(m), &
+               bodies%n_dim*(i - 1) + a), real(z(mechanism_places(bodies, m)), wp))
          end do
       end do
    end subroutine mechanism_field

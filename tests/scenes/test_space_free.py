@@ -1,0 +1,58 @@
+"""Bodies of three dimensions that supports do not hold in a static step: said by name."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT/"pywrap")]
+
+from emcon import AnalysisError, InputError  # noqa: E402
+from emcon.mesh import block  # noqa: E402
+from emcon.model import Model  # noqa: E402
+
+TURNS = "rotate about x, rotate about y, rotate about z"
+
+
+def solve(kind: str, supports: list[tuple[tuple[int, ...], tuple[int, ...]]],
+          equations: list[tuple[int, ...]] = []) -> None:
+    """A unit cube turned by nothing, 2 x 2 x 2; supports and equations at corners 000 to 111."""
+    mesh = block(cells=(2, 2, 2), kind=kind)
+    model = Model.from_mesh(mesh)
+    model.material("M", elastic=(100.0, 0.3)).section("M", "BLOCK")
+    corner = {tuple(x): int(label) for x, label in zip(mesh.nodes.tolist(), mesh.node_labels)}
+    for place, dofs in supports:
+        model.boundary(corner[place], dofs)
+    for place in equations:
+        model.equation([(corner[place], 1, 1.0), (corner[place], 2, 1.0)])
+    step = model.step("STATIC", 1.0, 1.0)
+    step.load(corner[1, 1, 1], 3, 0.1)
+    with model.stepper() as stepper:
+        stepper.run()
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D10"])
+@pytest.mark.parametrize(("supports", "equations", "text"), [
+    ([], [], f"move in x, move in y, move in z, {TURNS}"),
+    ([((0, 0, 0), (1, 2, 3))], [], TURNS),
+    ([((0, 0, 0), (1, 2, 3)), ((1, 0, 0), (2, 3))], [], "rotate about x"),
+    ([((0, 0, 0), (1, 2, 3)), ((1, 1, 0), (1, 2, 3))], [],
+     r"rotate about an axis along \(1, 1, 0\)"),
+    ([((0, 0, 0), (3,)), ((1, 0, 0), (3,)), ((0, 1, 0), (3,))], [],
+     "move in x, move in y, rotate about z"),
+    ([((0, 0, 0), (1, 2)), ((0, 0, 1), (1, 2))], [], "move in z, rotate about z"),
+    ([((0, 0, 0), (3,)), ((1, 0, 0), (3,)), ((0, 1, 0), (3,))], [(0, 0, 0), (1, 0, 0)],
+     r"move along \(1, -1, 0\)"),
+])
+def test_what_is_free_is_named(kind: str, supports: list, equations: list, text: str) -> None:
+    with pytest.raises((AnalysisError, InputError),
+                       match=f"the body of element 1 is free to {text}; add"):
+        solve(kind, supports, equations)
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D10"])
+def test_a_body_that_just_stands_is_solved(kind: str) -> None:
+    solve(kind, [((0, 0, 0), (1, 2, 3)), ((1, 0, 0), (2, 3)), ((0, 1, 0), (3,))])
