@@ -1,6 +1,6 @@
 """Seeded fuzzers: bad decks, damaged files, calls in any order, killed runs, scenes by chance.
 
-    .venv/bin/python tests/soak/soak.py [--seconds 600] [--seed 1] [decks restart calls kill scenes]
+    .venv/bin/python tests/soak/soak.py [--seconds 600] [--seed 1] [decks restart calls kill scenes space]
 
 Every case has a seed of its own, which is printed where the case fails: `--seed N --cases 1` and
 the name of the fuzzer repeat it. `make soak` runs all; a few cases of each are in the tests.
@@ -20,6 +20,7 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
 from random_scenes import fuzz_scenes
+from random_space import fuzz_space
 from scene_tools import DECKS, PROGRAM, ROOT, Deck, Run, assert_no_crash, emcon, run_deck, start
 
 #: No more text than this is mutated: long decks are long because of their nodes.
@@ -262,7 +263,7 @@ def fuzz_kill(chance, folder):
 # ---- driver -------------------------------------------------------------------------------------
 
 FUZZERS = {"decks": fuzz_decks, "restart": fuzz_restart, "calls": fuzz_calls, "kill": fuzz_kill,
-           "scenes": fuzz_scenes}
+           "scenes": fuzz_scenes, "space": fuzz_space}
 
 
 def soak(name, seed, folder, cases=None, seconds=None):

@@ -1,19 +1,27 @@
 """A few cases of each fuzzer, `make soak` runs more; the comparison of two programs."""
 
 import json
+import random
 
 import pytest
 import same_bits
 from random_scenes import SCENES, UNGUARDED, Outcome, judge
+from random_space import FAULTS, fuzz_space
 from scene_tools import DECKS, PROGRAM, Run
 from soak import FUZZERS, soak
 
-CASES = {"decks": 25, "restart": 12, "calls": 4, "kill": 1, "scenes": 12}
+CASES = {"decks": 25, "restart": 12, "calls": 4, "kill": 1, "scenes": 12, "space": 10}
 
 
 @pytest.mark.parametrize("name", FUZZERS)
 def test_a_few_cases(name, tmp_path):
     assert soak(name, 1, tmp_path, cases=CASES[name]) == CASES[name]
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
+def test_each_fault_in_space(fault, tmp_path):
+    for seed in range(6):
+        fuzz_space(random.Random(seed), tmp_path, fault)
 
 
 def test_the_judge_of_scenes_sees_what_is_told_wrong(tmp_path):
