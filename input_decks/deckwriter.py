@@ -10,9 +10,11 @@ import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 
-Point = tuple[float, float]
+Point = tuple[float, ...]
+#: Kinds of elements by how many nodes they have.
+KINDS = {3: "CPE3", 4: "CPE4", 8: "C3D8"}
 
 
 def number(value: float) -> str:
@@ -32,16 +34,16 @@ class Part:
     def node_lines(self) -> list[str]:
         """`*NODE` with the part's name as node set."""
         lines = [f"*NODE, NSET={self.name}"]
-        lines += [f"{label}, {number(x)}, {number(y)}" for label, (x, y) in self.node.items()]
+        lines += [f"{label}, {', '.join(map(number, place))}" for label, place in self.node.items()]
         return lines
 
     def element_lines(self) -> list[str]:
-        """`*ELEMENT`, one card per kind (CPE3, CPE4), with the part's name as element set."""
+        """`*ELEMENT`, one card per kind, with the part's name as element set."""
         lines: list[str] = []
-        for count in (3, 4):
+        for count, kind in KINDS.items():
             chosen = {k: n for k, n in self.element.items() if len(n) == count}
             if chosen:
-                lines.append(f"*ELEMENT, TYPE=CPE{count}, ELSET={self.name}")
+                lines.append(f"*ELEMENT, TYPE={kind}, ELSET={self.name}")
                 lines += [f"{k}, {', '.join(map(str, n))}" for k, n in chosen.items()]
         return lines
 
@@ -81,6 +83,24 @@ def add_grid(part: Part, cells: tuple[int, int], position: Callable[[int, int], 
             part.element[element[i][j]] = (node[i][j], node[i + 1][j],
                                            node[i + 1][j + 1], node[i][j + 1])
     return Grid(node, element)
+
+
+def add_bricks(part: Part, cells: tuple[int, int, int], size: Point) -> None:
+    """Add a box of eight-node elements to `part`, its middle at the origin.
+
+    cells     n_i, n_j, n_k
+    size      lengths of its edges
+    """
+    def label(i: int, j: int, k: int) -> int:
+        return 1 + k + (cells[2] + 1)*(j + (cells[1] + 1)*i)
+
+    for i, j, k in product(*(range(n + 1) for n in cells)):
+        part.node[label(i, j, k)] = tuple(a*(at/n - 0.5)
+                                          for a, at, n in zip(size, (i, j, k), cells))
+    for number_of, (i, j, k) in enumerate(product(*map(range, cells)), start=1):
+        part.element[number_of] = tuple(
+            label(i + di, j + dj, k + dk)
+            for dk in (0, 1) for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1)))
 
 
 def box(corner: Point, size: Point, cells: tuple[int, int]) -> Callable[[int, int], Point]:

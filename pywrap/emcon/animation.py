@@ -106,7 +106,7 @@ def _write(writer: AbstractMovieWriter, scene: Scene, output: Path) -> None:
     axes = figure.add_axes((LEFT/WIDTH, BOTTOM/total, width/WIDTH, height/total))
     scale = colour_scale(scene)
     elements = draw_bodies(axes, scene, 0, views[0], width, scale)
-    frame_view(axes, views[0], width, height, is_first=True)
+    frame_view(axes, scene, views[0], width, height, is_first=True)
     if scene.values is not None:
         draw_colour_bar(figure, ((LEFT + width + 0.14)/WIDTH, BOTTOM/total, 0.11/WIDTH,
                                  height/total), scene, scale)
@@ -114,7 +114,7 @@ def _write(writer: AbstractMovieWriter, scene: Scene, output: Path) -> None:
         for k, view in enumerate(views):
             elements.set_verts(scene.polygons(k))
             if scene.values is not None:
-                elements.set_array(scene.values[k])
+                elements.set_array(scene.colours(k))
             set_view(axes, view, width, height)
             axes.set_title(f"$t = {scene.times[k]:.4g}$", fontsize=10, pad=4)
             writer.grab_frame()

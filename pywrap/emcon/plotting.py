@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from .results import (Array, FieldFile, ResultError, ResultPaths, energy_drift, locate,
-                      read_contact_force, read_history)
+from .results import (Array, FieldFile, ResultError, ResultPaths, asked_losses, energy_drift,
+                      locate, read_contact_force, read_history)
 from .scene import (BLACK, BLUE, GREY, LABEL_OFFSET, ORANGE, STYLE, Scene, colour_scale,
                     draw_bodies, draw_colour_bar, fixed_scale, frame_view, read_scene)
 
@@ -100,7 +100,7 @@ def _draw_scene(figure: Figure, scene: Scene, clim: tuple[float, float] | None) 
         x = LEFT + k*(width + SCENE_GAP)
         axes = figure.add_axes((x/WIDTH, base/total, width/WIDTH, height/total))
         draw_bodies(axes, scene, k, view, width, scale)
-        frame_view(axes, view, width, height, is_first=k == 0)
+        frame_view(axes, scene, view, width, height, is_first=k == 0)
         axes.set_title(f"$t = {scene.times[k]:.4g}$", fontsize=10, pad=4)
     if scene.values is not None:
         draw_colour_bar(figure, ((LEFT + n*width + (n - 1)*SCENE_GAP + 0.14)/WIDTH, base/total,
@@ -112,13 +112,16 @@ def _draw_energies(axes: Axes, history: NDArray[np.void]) -> None:
             ("total", "total", BLACK, "-"), ("kinetic", "kinetic", BLUE, "-"),
             ("strain", "strain", ORANGE, "-"), ("external_work", "external work", GREY, "--")):
         axes.plot(history["time"], history[name], style, color=colour, label=label)
+    taken = asked_losses(history)
+    if np.any(taken > 0.0):
+        axes.plot(history["time"], taken, ":", color=BLACK, label="losses")
     axes.set_ylabel("energy")
     _legend(axes)
 
 
 def _legend(axes: Axes) -> None:
     """Above the axes, where no curve is."""
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=4, handlelength=1.3,
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=5, handlelength=1.3,
                 columnspacing=1.0, handletextpad=0.4, borderaxespad=0.1)
 
 

@@ -28,8 +28,9 @@ from .hdf5 import Array, ResultError, opened, read
 from .series import HistoryFile, Series
 
 __all__ = ["Array", "Bodies", "FieldFile", "FieldSeries", "HistoryFile", "Pairs", "ResultError",
-           "ResultPaths", "Results", "Series", "cpu_seconds", "energy_drift", "locate",
-           "read_bodies", "read_contact_force", "read_history", "read_pairs", "read_wall_seconds"]
+           "ResultPaths", "Results", "Series", "asked_losses", "cpu_seconds", "energy_drift",
+           "locate", "read_bodies", "read_contact_force", "read_history", "read_pairs",
+           "read_wall_seconds"]
 
 #: Columns of the history that count; all others are real numbers.
 COUNTS = ("increment", "active", "newton", "cuts")
@@ -177,13 +178,24 @@ def cpu_seconds(history: NDArray[np.void]) -> float | None:
     return float(cpu[:-1][cpu[1:] < cpu[:-1]].sum() + cpu[-1])
 
 
+def asked_losses(history: NDArray[np.void]) -> Array:
+    """Energy that friction, damping and restitution took so far (n_row) [M L^2/T^2]."""
+    columns = history.dtype.names or ()
+    taken: Array = np.zeros(len(history))
+    for name in ("friction_loss", "damping_loss", "restitution_loss"):
+        if name in columns:
+            taken = taken + history[name]
+    return taken
+
+
 def energy_drift(history: NDArray[np.void]) -> tuple[Array, float]:
     """Drift |total - total0|/scale (n_row), and the scale [M L^2/T^2].
 
-    The scale is |total0|; where that is zero (a static run, a start from rest) it is the largest
-    single energy of the run.
+    What friction, damping and restitution took (`asked_losses`) is no drift: it counts as still
+    there. The scale is |total0|; where that is zero (a static run, a start from rest) it is the
+    largest single energy of the run.
     """
-    total = history["total"]
+    total = history["total"] + asked_losses(history)
     largest = max(float(np.nanmax(np.abs(history[name]), initial=0.0))
                   for name in ("kinetic", "strain", "external_work"))
     scale = abs(float(total[0]))

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from .projection import basis, far_first, outer_faces, project
 from .results import Array, FieldFile, ResultError
 
 #: A body that moves less than this fraction of the largest displacement counts as support.
@@ -27,6 +28,8 @@ FOLLOW_RATIO = 1.25
 COLOUR_CUT = 0.01
 #: Distance of the y labels from the axes at the left [inch].
 LABEL_OFFSET = 0.36
+#: Length of the axes that tell directions [inch].
+DIRECTION_LENGTH = 0.16
 
 STYLE: dict[Any, Any] = {"font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 10,
          "axes.linewidth": 0.6, "axes.spines.top": False, "axes.spines.right": False,
@@ -42,14 +45,20 @@ View = tuple[float, float, float, float]
 
 @dataclass
 class Scene:
-    """Some frames: positions (n_node, 2) and colour values per element, and the views."""
+    """Some frames: positions (n_node, 2) and colour values per polygon, and the views.
+
+    In the plane polygons are the elements, in three dimensions the outer faces, which lie in front
+    of each other.
+    """
 
     times: list[float]
     position: list[Array]
-    values: list[Array] | None      #: each (n_element), units of the field
+    values: list[Array] | None      #: each (n_polygon), units of the field
     label: str                      #: what they are
-    cells: list[NDArray[np.int64]]
+    cells: list[NDArray[np.int64]]  #: nodes of the polygons
     is_support: NDArray[np.bool_]   #: per node
+    #: Of three dimensions: numbers of the polygons, the farthest first, per frame.
+    order: list[NDArray[np.int64]] | None = None
     notes: list[str] = field(default_factory=list)
 
     def views(self) -> list[View]:
@@ -69,12 +78,19 @@ class Scene:
         return [(x0, x1, y_low, y_high) for x0, x1 in _windows(boxes[:, 0], boxes[:, 1])]
 
     def moves(self) -> NDArray[np.bool_]:
-        """Per element: part of a body that moves."""
+        """Per polygon: part of a body that moves."""
         return np.array([not self.is_support[cell[0]] for cell in self.cells])
 
     def polygons(self, frame: int) -> list[Array]:
-        """Corners (3 or 4, 2) of each element [L]."""
-        return [self.position[frame][cell] for cell in self.cells]
+        """Corners (3 or more, 2) of each polygon [L], as they are drawn one over the other."""
+        order = range(len(self.cells)) if self.order is None else self.order[frame]
+        return [self.position[frame][self.cells[k]] for k in order]
+
+    def colours(self, frame: int) -> Array | None:
+        """Values of `polygons` (n_polygon), units of the field; None: there are none."""
+        if self.values is None or self.order is None:
+            return None if self.values is None else self.values[frame]
+        return self.values[frame][self.order[frame]]
 
 
 def _extent(points: Array) -> View:
@@ -129,32 +145,41 @@ def _colour_values(file: FieldFile, name: str, frame: int) -> Array | None:
 def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") -> Scene:
     """The bodies at some frames, coloured by the point or cell field `name`.
 
-    Raises `ResultError` for a result in three dimensions and for a field that is not there; a
-    missing stress or displacement is a note.
+    Raises `ResultError` for a field that is not there; a missing stress or displacement is a note.
     """
-    if np.ptp(file.points[:, 2]) > 0.0:
-        raise ResultError(f"{file.path} is three-dimensional; open it in ParaView")
     notes = []
     if "displacement" in file.point_fields:
-        shift = [file.point("displacement", k)[:, :2] for k in frames]
+        place = [file.points + file.point("displacement", k) for k in frames]
     else:
         notes.append("no displacement in the result (asked for by *NODE FILE, U): bodies shown "
                      "undeformed")
         frames = frames[:1]
-        shift = [np.zeros((len(file.points), 2))]
+        place = [file.points]
     values = [v for v in (_colour_values(file, name, k) for k in frames) if v is not None]
     if not values:
         notes.append("no stress in the result (asked for by *EL FILE, S): bodies shown in grey")
 
     body = file.bodies()
-    travel = np.max([np.hypot(u[:, 0], u[:, 1]) for u in shift], axis=0)
+    travel = np.max([np.linalg.norm(p - file.points, axis=1) for p in place], axis=0)
     most = np.array([np.max(travel[body == b], initial=0.0) for b in range(body.max() + 1)])
     support = most < SUPPORT_FRACTION*most.max()
     label = "von Mises stress" if name == "von_mises" else name.replace("_", " ")
-    return Scene(times=[float(file.times[k]) for k in frames],
-                 position=[file.points[:, :2] + u for u in shift],
-                 values=values or None, label=label, cells=file.cells,
-                 is_support=(body < 0) | support[body], notes=notes)
+    scene = Scene(times=[float(file.times[k]) for k in frames], position=[p[:, :2] for p in place],
+                  values=values or None, label=label, cells=file.cells,
+                  is_support=(body < 0) | support[body], notes=notes)
+    if np.ptp(file.points[:, 2]) > 0.0:
+        _see(scene, place)
+    return scene
+
+
+def _see(scene: Scene, place: Sequence[Array]) -> None:
+    """Put a scene of three dimensions on paper; `place` has the nodes (n_node, 3) per frame [L]."""
+    scene.cells, cell_of = outer_faces(scene.cells)
+    if scene.values is not None:
+        scene.values = [values[cell_of] for values in scene.values]
+    seen = [project(points) for points in place]
+    scene.position = [on_paper for on_paper, _ in seen]
+    scene.order = [far_first(scene.cells, near) for _, near in seen]
 
 
 # --- drawing -----------------------------------------------------------------------------------
@@ -213,7 +238,7 @@ def draw_bodies(axes: Axes, scene: Scene, frame: int, view: View, width: float,
     elements = PolyCollection(scene.polygons(frame), edgecolors=(0.1, 0.1, 0.1, 0.55),
                               linewidths=_edge_width(scene, view, width))
     if scene.values is not None:
-        elements.set(array=scene.values[frame], norm=scale.norm, cmap=scale.colours)
+        elements.set(array=scene.colours(frame), norm=scale.norm, cmap=scale.colours)
     else:
         elements.set_facecolor("#dddddd")
     axes.add_collection(elements)
@@ -247,12 +272,19 @@ def set_view(axes: Axes, view: View, width: float, height: float) -> None:
     axes.set_ylim(y_min - y_pad, y_max + y_pad)
 
 
-def frame_view(axes: Axes, view: View, width: float, height: float, is_first: bool) -> None:
-    """A frame with ticks around a view; the first of a row has labels at its left."""
+def frame_view(axes: Axes, scene: Scene, view: View, width: float, height: float,
+               is_first: bool) -> None:
+    """A frame with ticks around a view; the first of a row has labels at its left. In three
+    dimensions it has the directions of the axes instead."""
     set_view(axes, view, width, height)
     axes.set_aspect("equal", adjustable="box")
     for spine in axes.spines.values():
         spine.set(visible=True, linewidth=0.4, color=GREY)
+    if scene.order is not None:
+        axes.set(xticks=[], yticks=[])
+        if is_first:
+            _draw_directions(axes, width, height)
+        return
     axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.tick_params(width=0.4, length=2.5)
@@ -262,3 +294,17 @@ def frame_view(axes: Axes, view: View, width: float, height: float, is_first: bo
         axes.yaxis.set_label_coords(-LABEL_OFFSET/width, 0.5)
     else:
         axes.tick_params(labelleft=False)
+
+
+def _draw_directions(axes: Axes, width: float, height: float) -> None:
+    """Where x, y and z go, in the lower left corner of a panel [inch]."""
+    middle = 1.3*DIRECTION_LENGTH
+    for name, way in zip("xyz", basis()[:2].T):
+        for part, text in ((1.0, ""), (1.3, f"${name}$")):
+            x, y = (middle + part*DIRECTION_LENGTH*way[k] for k in (0, 1))
+            if text:
+                axes.text(x/width, y/height, text, transform=axes.transAxes, ha="center",
+                          va="center", fontsize=8, color=GREY)
+            else:
+                axes.plot([middle/width, x/width], [middle/height, y/height], color=GREY,
+                          linewidth=0.8, transform=axes.transAxes)

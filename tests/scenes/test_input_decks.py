@@ -22,6 +22,7 @@ SHORT = {
     "self_contact": {"h": 0.02, "t_end": 0.4},
     "tied_ring": {"h": 0.05, "t_end": 0.5},
     "tied_spin": {"t_end": 1},
+    "tumbling_block": {"t_end": 1},
 }
 
 
@@ -76,6 +77,58 @@ def test_spinning_ring(tmp_path):
     for name, value in (("total", energy), ("px", px), ("py", py), ("lz", lz)):
         np.testing.assert_allclose(run.history[name], value, rtol=1e-11)
     assert run.series("BODIES", "MASS")[1][0, 0] == pytest.approx(mass, rel=1e-11)
+
+
+def test_sliding_block(tmp_path):
+    """The way of a rigid block, but for what the block gives way under its weight."""
+    deck = DECKS / "sliding_block.inp"
+    (way,) = figures(deck, r"way v\^2/\(2 mu g\) = (\S+), at rest")
+    run = run_deck(deck, tmp_path)
+    fields, history = run.fields(), run.history
+    block = fields.x[:, 1] >= 0
+    block[np.flatnonzero(fields.x[:, 1] == 0)[9:]] = False
+    u = fields["displacement"][:, block]
+    assert u[-1, :, 0].mean() == pytest.approx(way, abs=10/2e4)
+    foot = fields.x[block, 1] == 0
+    assert (u[-1, foot] == u[-2, foot]).all(), "what sticks does not move at all"
+    kept = history["total"] + history["damping_loss"] + history["friction_loss"]
+    np.testing.assert_allclose(kept, kept[0], rtol=1e-13)
+    assert (np.diff(history["friction_loss"]) >= 0).all()
+    status = fields["contact_status"][:, block]
+    assert set(np.unique(status[5])) == {0, 2} and set(np.unique(status[-1])) == {0, 1}
+
+
+def test_tumbling_block(tmp_path):
+    """Against Euler's equations of a rigid body; the heading says what stretch may do."""
+    deck = DECKS / "tumbling_block.inp"
+    (first,) = figures(deck, r"momentum at t = (\S+) and")
+    inertia = np.array(figures(deck, r"moments of inertia (\S+), (\S+) and (\S+)"))
+    assert euler_turns_over(inertia, np.array([0.05, 2.0, 0.0])) == pytest.approx(first, abs=1e-3)
+    run = run_deck(deck, tmp_path, t_end=4.4)
+    for name in ("total", "px", "py", "pz", "lx", "ly", "lz"):
+        size = inertia @ [0.05, 2.0, 0.0] if name != "total" else run.history["total"][0]
+        assert np.ptp(run.history[name]) < 1e-12*size
+    fields = run.fields()
+    ends = [np.isclose(fields.x[:, 1], y) for y in (-0.3, 0.3)]
+    place = fields.x + fields["displacement"]
+    axis = place[:, ends[1]].mean(axis=1) - place[:, ends[0]].mean(axis=1)
+    along = axis @ (inertia*[0.05, 2.0, 0.0])
+    assert np.interp(0.0, -along, fields.time) == pytest.approx(first, rel=3e-3)
+
+
+def euler_turns_over(inertia, spin):
+    """When the middle component of the spin of a rigid body is 0 for the first time."""
+    def rate(w):
+        return (np.roll(inertia, -1) - np.roll(inertia, 1))*np.roll(w, -1)*np.roll(w, 1)/inertia
+
+    t, h = 0.0, 1e-3
+    while spin[1] > 0:
+        k1 = rate(spin)
+        k2 = rate(spin + h/2*k1)
+        k3 = rate(spin + h/2*k2)
+        last, spin = spin, spin + h/6*(k1 + 2*k2 + 2*k3 + rate(spin + h*k3))
+        t += h
+    return t - h*spin[1]/(spin[1] - last[1])
 
 
 def test_patch_pressure(tmp_path):
