@@ -21,9 +21,9 @@ module emcon_deck_mesh
 
    !> Element types of Abaqus and CalculiX that are not read.
    character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
-      "CPE4R", "CPE4RH", "CPE4I", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
-      "CPS4R", "CPS4I", "CAX4R", "CAX4I", "CAX4H", "CAX8H", "CAX8RH", &
-      "C3D4H", "C3D6", "C3D8R", "C3D8I", "C3D10M", &
+      "CPE4R", "CPE4RH", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
+      "CPS4R", "CAX4R", "CAX4I", "CAX4H", "CAX8H", "CAX8RH", &
+      "C3D4H", "C3D6", "C3D8R", "C3D10M", &
       "C3D15", "C3D20RH", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
       "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &

@@ -27,6 +27,7 @@ module emcon_element_kind
       logical :: has_mean_volume = .false.       !! volume resists in the mean over the element
       logical :: is_thin = .false.               !! plane stress, not plane strain
       logical :: is_axial = .false.              !! of solids of revolution
+      logical :: has_modes = .false.             !! incompatible ones
    contains
       procedure :: face
       procedure :: may_lock
@@ -49,11 +50,11 @@ contains
    end function face
 
    !> Does it resist a change of volume at more points than its shape can follow? So do elements
-   !> with nodes at their corners alone, but those where the mean resists.
+   !> with nodes at their corners alone, but those where the mean resists or modes give way.
    pure logical function may_lock(self)
       class(element_row_t), intent(in) :: self
 
-      may_lock = self%n_node == self%n_corner .and. .not. self%has_mean_volume
+      may_lock = self%n_node == self%n_corner .and. .not. (self%has_mean_volume .or. self%has_modes)
    end function may_lock
 
    !> Index of the kind called `name` (upper case) in `kind`, 0 if there is none.

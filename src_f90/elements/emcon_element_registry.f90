@@ -23,6 +23,8 @@ module emcon_element_registry
          reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4), &
       element_row_t("CPE4H", 2, 4, 4, 4, 2, &
          reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, .true.), &
+      element_row_t("CPE4I", 2, 4, 4, 4, 2, &
+         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, has_modes=.true.), &
       element_row_t("CPE6", 2, 6, 3, 3, 3, &
          reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6), &
       element_row_t("CPE8", 2, 8, 4, 4, 3, &
@@ -33,6 +35,9 @@ module emcon_element_registry
          is_thin=.true.), &
       element_row_t("CPS4", 2, 4, 4, 4, 2, &
          reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_thin=.true.), &
+      element_row_t("CPS4I", 2, 4, 4, 4, 2, &
+         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_thin=.true., &
+         has_modes=.true.), &
       element_row_t("CPS6", 2, 6, 3, 3, 3, &
          reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6, is_thin=.true.), &
       element_row_t("CPS8", 2, 8, 4, 4, 3, &
@@ -69,6 +74,7 @@ module emcon_element_registry
          reshape([1, 2, 3, 1, 4, 2, 2, 4, 3, 3, 4, 1], face_room, pad=[0]), 10, 4), &
       element_row_t("C3D8", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8), &
       element_row_t("C3D8H", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8, .true.), &
+      element_row_t("C3D8I", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8, has_modes=.true.), &
       element_row_t("C3D10", 3, 10, 4, 4, 6, &
          reshape([1, 2, 3, 5, 6, 7, 1, 4, 2, 8, 9, 5, 2, 4, 3, 9, 10, 6, 3, 4, 1, 10, 8, 7], &
             face_room, pad=[0]), 24, 10), &
@@ -94,7 +100,7 @@ contains
             allocate(shape_triangle_t :: kind(k)%shape)
          case ("CAX3")
             allocate(kind(k)%shape, source=shape_triangle_t(is_fine=.true.))
-         case ("CPE4", "CPE4H", "CPS4", "CAX4")
+         case ("CPE4", "CPE4H", "CPE4I", "CPS4", "CPS4I", "CAX4")
             allocate(shape_quadrilateral_t :: kind(k)%shape)
          case ("CPE6", "CPS6", "CAX6")
             allocate(shape_quadratic_triangle_t :: kind(k)%shape)
@@ -104,7 +110,7 @@ contains
             allocate(kind(k)%shape, source=shape_serendipity_t(n_side=2))
          case ("C3D4")
             allocate(shape_tetrahedron_t :: kind(k)%shape)
-         case ("C3D8", "C3D8H")
+         case ("C3D8", "C3D8H", "C3D8I")
             allocate(shape_hexahedron_t :: kind(k)%shape)
          case ("C3D10")
             allocate(shape_quadratic_tetrahedron_t :: kind(k)%shape)

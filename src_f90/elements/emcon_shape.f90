@@ -24,6 +24,7 @@ module emcon_shape
    type :: shape_table_t
       integer :: n_node = 0
       integer :: n_gp = 0
+      real(wp), allocatable :: place(:, :)       !! (n_dim, n_node) natural coordinates
       real(wp), allocatable :: point(:, :)       !! (n_dim, n_gp) natural coordinates
       real(wp), allocatable :: weight(:)         !! (n_gp)
       real(wp), allocatable :: value(:, :)       !! (n_node, n_gp)
@@ -64,15 +65,14 @@ contains
       class(shape_t), intent(in) :: shape
       logical, intent(in) :: is_mass
       type(shape_table_t), intent(out) :: table
-      real(wp), allocatable :: place(:, :)
       integer :: k
 
-      call shape%places(place)
+      call shape%places(table%place)
       call shape%rule(is_mass, table%point, table%weight)
-      table%n_node = size(place, 2)
+      table%n_node = size(table%place, 2)
       table%n_gp = size(table%weight)
       allocate(table%value(table%n_node, table%n_gp), &
-         table%slope(size(place, 1), table%n_node, table%n_gp))
+         table%slope(size(table%place, 1), table%n_node, table%n_gp))
       do k = 1, table%n_gp
          call shape%values(table%point(:, k), table%value(:, k), table%slope(:, :, k))
       end do

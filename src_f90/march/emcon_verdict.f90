@@ -109,7 +109,7 @@ contains
 
       call locking_element(solid, e, ratio)
       if (e > 0) call add_warning(self, "element " // to_text(solid%label(e)) // " at nu = " &
-         // to_text(ratio) // " locks: " // trim(locking_advice(solid%n_dim)))
+         // to_text(ratio) // " locks: " // trim(locking_advice(solid)))
    end subroutine warn_of_locking
 
    !> The state was set from outside, which turned `before` into `after`: what came in or went out

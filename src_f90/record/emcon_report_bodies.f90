@@ -4,7 +4,7 @@ module emcon_report_bodies
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_law_registry, only : law_given, law_rows
-   use emcon_locking, only : poisson_ratio
+   use emcon_locking, only : locking_ratio
    use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
    use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
@@ -30,7 +30,7 @@ module emcon_report_bodies
       !> (1 or 3) about the axes through the centre: z in the plane, x, y and z [M L^2]
       real(wp), allocatable :: inertia(:)
       real(wp) :: modulus = 0.0_wp               !! of pressure waves, the largest [M/(L T^2)]
-      real(wp) :: ratio = 0.0_wp                 !! Poisson's, the largest of what may lock
+      real(wp) :: ratio = 0.0_wp                 !! Poisson's, the largest of what locks
       real(wp) :: speed = 0.0_wp                 !! of pressure waves, the largest [L/T]
       real(wp) :: transit = huge(1.0_wp)         !! of a wave between two nodes, the shortest [T]
    end type body_t
@@ -83,7 +83,7 @@ contains
          associate (law => solid%law(solid%law_of(e))%law)
             call law_response_plane(law, rest, rest, response)
             modulus = 2.0_wp*response%tangent(1, 1)   ! by the end of a step of no size: a half
-            if (solid%may_lock(e)) body%ratio = max(body%ratio, poisson_ratio(law))
+            body%ratio = max(body%ratio, locking_ratio(solid, e))
             if (.not. (modulus > 0.0_wp .and. material%density > 0.0_wp)) return
             body%modulus = max(body%modulus, modulus)
          end associate

@@ -5,16 +5,18 @@ module emcon_scene_report
    use emcon_gaps, only : gaps_forget, gaps_search
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_locking, only : locking_advice, locking_limit
+   use emcon_locking, only : locking_advice
    use emcon_motion, only : at_rest, motion_of
    use emcon_options, only : option_text
    use emcon_pose, only : pose_at_end
    use emcon_report_bodies, only : bodies_find, bodies_rows, body_t
    use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
    use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update
    use emcon_stepper, only : stepper_t
    use emcon_surface_edges, only : surface_edges
+   use emcon_term_registry, only : terms_solid
    use emcon_text, only : to_text
    implicit none
    private
@@ -42,7 +44,7 @@ contains
       call add_sizes(stepper, rows)
       call add_increment(stepper, body, rows)
       call advise_rigid(body, rows)
-      call advise_locking(body, rows)
+      call advise_locking(terms_solid(stepper%march%system%term), body, rows)
       call advise_massless(stepper%scene, body, rows)
    end subroutine scene_report
 
@@ -255,19 +257,19 @@ contains
    end subroutine advise_rigid
 
    !> Bodies that hardly change their volume.
-   subroutine advise_locking(body, rows)
+   subroutine advise_locking(solid, body, rows)
+      type(solid_t), intent(in) :: solid
       type(body_t), intent(in) :: body(:)
       type(report_row_t), allocatable, intent(inout) :: rows(:)
       type(report_row_t) :: row
       integer :: i
 
       do i = 1, size(body)
-         if (.not. body(i)%ratio > locking_limit .or. &
-            body(i)%n_rigid == body(i)%n_element) cycle
+         if (.not. body(i)%ratio > 0.0_wp) cycle
          call row_begin(row, "advice", "body")
          call row_put(row, "body", i, " #")
          call row_put(row, "poisson", body(i)%ratio, " at nu = # locks: " &
-            // trim(locking_advice(size(body(i)%center))))
+            // trim(locking_advice(solid)))
          call rows_add(rows, row)
       end do
    end subroutine advise_locking

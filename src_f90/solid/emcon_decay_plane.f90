@@ -5,8 +5,9 @@
 !> Source: docs/theory.md, eqs. (4e) to (4g), (11a) and (11b).
 module emcon_decay_plane
    use emcon_csr, only : csr_t
-   use emcon_element, only : element_motion_t, element_point, point_motion_t
+   use emcon_element, only : element_geometry_t, element_motion_t, element_point, point_motion_t
    use emcon_element_lists, only : element_lists
+   use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_motion, only : motion_t
@@ -151,25 +152,27 @@ contains
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
       type(element_motion_t) :: now, before
-      type(point_motion_t) :: point, last
+      type(point_motion_t) :: point
       real(wp), dimension(n_strain, n_strain) :: c, viscous
+      real(wp), dimension(n_strain, self%solid%geometry(e)%n_gp) :: strain, last
       real(wp) :: s(n_strain), rate(n_strain), f(size(motion%du, 1))
       integer :: g, i
 
       if (.not. (motion%pose%dissipation > 0.0_wp .or. self%beta(e) > 0.0_wp)) return
       call gather(self, e, motion, now, before)
+      call find_increments(self%solid%geometry(e), now, strain)
+      call find_increments(self%solid%geometry(e), before, last)
       associate (geometry => self%solid%geometry(e), total => response%part(self%role))
          do g = 1, geometry%n_gp
             call element_point(geometry, g, now, point)
-            call element_point(geometry, g, before, last)
             c = 0.5_wp*motion%pose%dissipation*geometry%weight(g) &
                *self%moduli(:, :, self%moduli_of(e))
             viscous = (self%beta(e)*motion%pose%mass_scale)*geometry%weight(g) &
                *self%moduli(:, :, self%moduli_of(e))
-            s = matmul(c, point%dstrain - motion%pose%recalled*last%dstrain)
-            rate = matmul(viscous, point%dstrain)
-            self%work = self%work + dot_product(s, point%dstrain)
-            self%damping = self%damping + dot_product(rate, point%dstrain)
+            s = matmul(c, strain(:, g) - motion%pose%recalled*last(:, g))
+            rate = matmul(viscous, strain(:, g))
+            self%work = self%work + dot_product(s, strain(:, g))
+            self%damping = self%damping + dot_product(rate, strain(:, g))
             s = s + rate
             do i = 1, geometry%n_node
                f = matmul(point%f_mid, traction(s, geometry%gradient(:, i, g)))
@@ -179,11 +182,27 @@ contains
                      + abs(f)
                end associate
             end do
-            if (present(value)) call add_tangent(self%slot(first + 1:), &
-               geometry%gradient(:, :geometry%n_node, g), c + viscous, point, value, side)
+            if (present(value)) call add_tangent(self%slot(first + 1:), geometry, g, c + viscous, &
+               now, value, side)
          end do
       end associate
    end subroutine add_element
+
+   !> Increments of the strains at the points. Incompatible modes are taken out, by the same moduli
+   !> that make stress of them here: such a stress has no part to be returned.
+   pure subroutine find_increments(geometry, motion, strain)
+      type(element_geometry_t), intent(in) :: geometry
+      type(element_motion_t), intent(in) :: motion
+      real(wp), intent(out) :: strain(:, :)      !! (n_strain, n_gp)
+      type(point_motion_t) :: point
+      integer :: g
+
+      do g = 1, geometry%n_gp
+         call element_point(geometry, g, motion, point)
+         strain(:, g) = point%dstrain
+      end do
+      if (allocated(geometry%mode)) call modes_relax(geometry, strain)
+   end subroutine find_increments
 
    !> Add the drag of the mass of element `e`, and its derivatives to the places from `first` on.
    pure subroutine add_drag(self, e, first, motion, response, value, side)
@@ -228,23 +247,30 @@ contains
 
    !> Add the derivatives of the forces of a point by the end of the step, but for that of the place
    !> where the stress acts: a factor can then be made again without the step before.
-   subroutine add_tangent(slot, gradient, c, point, value, side)
+   subroutine add_tangent(slot, geometry, at, c, motion, value, side)
       integer, intent(in) :: slot(:)             !! of the element, by columns
-      real(wp), intent(in) :: gradient(:, :)     !! (n_dim, n_node)
+      type(element_geometry_t), intent(in) :: geometry
+      integer, intent(in) :: at                  !! the point: 1 to n_gp
       real(wp), intent(in) :: c(n_strain, n_strain)          !! with the weight of the point
-      type(point_motion_t), intent(in) :: point
+      type(element_motion_t), intent(in) :: motion
       real(dp), intent(inout), contiguous :: value(:), side(:)
-      real(wp) :: k(size(gradient, 1)), change(n_strain)
-      integer :: i, j, a, b, n
+      type(point_motion_t) :: point(geometry%n_gp)
+      real(wp) :: k(size(geometry%gradient, 1)), by(n_strain, geometry%n_gp), change(n_strain)
+      integer :: i, j, a, b, g, n
 
+      do g = 1, geometry%n_gp
+         call element_point(geometry, g, motion, point(g))
+      end do
       n = 0
-      do j = 1, size(gradient, 2)
-         do b = 1, size(gradient, 1)
-            associate (g => gradient(:, j), f => point%f_end)
-               change = matmul(c, [f(b, 1)*g(1), f(b, 2)*g(2), f(b, 1)*g(2) + f(b, 2)*g(1)])
-            end associate
-            do i = 1, size(gradient, 2)
-               k = matmul(point%f_mid, traction(change, gradient(:, i)))
+      do j = 1, geometry%n_node
+         do b = 1, size(k)
+            do g = 1, geometry%n_gp
+               by(:, g) = strain_by(point(g)%f_end(b, :), geometry%gradient(:, j, g))
+            end do
+            if (allocated(geometry%mode)) call modes_relax(geometry, by)
+            change = matmul(c, by(:, at))
+            do i = 1, geometry%n_node
+               k = matmul(point(at)%f_mid, traction(change, geometry%gradient(:, i, at)))
                do a = 1, size(k)
                   n = n + 1
                   if (slot(n) > 0) value(slot(n)) = value(slot(n)) + real(k(a), dp)
@@ -254,6 +280,15 @@ contains
          end do
       end do
    end subroutine add_tangent
+
+   !> Derivative of the strain by a component of a node's displacement.
+   pure function strain_by(f, gradient) result(by)
+      real(wp), intent(in) :: f(:)               !! (n_dim) that component of dx/dX
+      real(wp), intent(in) :: gradient(:)        !! (n_dim) of the node's function by X [1/L]
+      real(wp) :: by(n_strain)
+
+      by = [f(1)*gradient(1), f(2)*gradient(2), f(1)*gradient(2) + f(2)*gradient(1)]
+   end function strain_by
 
    !> The strain increment has its derivative by the end, its forces act at the middle.
    pure logical function is_symmetric(self, motion)

@@ -19,6 +19,8 @@ module emcon_element
       real(wp), allocatable :: weight(:)                   !! (n_gp) reference volume [L^3]
       !> (n_node, n_gp) of solids of revolution: the shape functions over the radius [1/L]
       real(wp), allocatable :: circle(:, :)
+      !> (n_strain, n_mode, n_gp) of incompatible modes: their strains, and what measures them
+      real(wp), allocatable :: mode(:, :, :), dual(:, :, :)
    end type element_geometry_t
 
    !> Motion of the nodes of an element, from `from` by `by`.

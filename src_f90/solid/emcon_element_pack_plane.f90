@@ -26,6 +26,8 @@ module emcon_element_pack_plane
       integer, allocatable :: node(:, :)         !! (n_lane, n_node)
       real(wp), allocatable :: gradient(:, :, :, :)   !! (n_lane, 2, n_node, n_gp) [1/L]
       real(wp), allocatable :: weight(:, :)      !! (n_lane, n_gp) reference volume [L^3]
+      !> (n_lane, 3, n_mode, n_gp) as in element_geometry_t
+      real(wp), allocatable :: mode(:, :, :, :), dual(:, :, :, :)
    end type element_pack_t
 
    !> Motion of the nodes, from `from` by `by`, relative to the first node of each element, which
@@ -79,6 +81,14 @@ contains
          self%node(l, :) = node(:self%n_node, e)
          self%gradient(l, :, :, :) = geometry(e)%gradient
          self%weight(l, :) = geometry(e)%weight
+         if (.not. allocated(geometry(e)%mode)) cycle
+         if (l == 1) then
+            allocate(self%mode(n_lane, size(geometry(e)%mode, 1), size(geometry(e)%mode, 2), &
+               self%n_gp), source=0.0_wp)
+            self%dual = self%mode
+         end if
+         self%mode(l, :, :, :) = geometry(e)%mode
+         self%dual(l, :, :, :) = geometry(e)%dual
       end do
    end subroutine pack_fill
 

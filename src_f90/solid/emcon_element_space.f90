@@ -4,6 +4,7 @@
 !> mid-configuration, as in the plane: docs/theory.md, eqs. (6), (10a) and (11).
 module emcon_element_space
    use emcon_element, only : space_element_t => element_geometry_t
+   use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
    use emcon_law_space, only : law_response_space, n_strain, space_response_t
@@ -173,15 +174,18 @@ contains
       type(space_motion_t), intent(in) :: motion       !! of no size
       real(wp), intent(out) :: stress(:, :)      !! (6, >= n_gp) [M/(L T^2)]
       real(wp), intent(out) :: strain(:, :)      !! (6, >= n_gp) E11, E22, E33, 2 E12, ...
-      type(space_point_t) :: point
+      type(space_point_t) :: point(self%n_gp)
       type(space_response_t) :: response
       integer :: k
 
       do k = 1, self%n_gp
-         call space_point(self, k, motion, point)
-         call law_response_space(law, point%strain, point%dstrain, response)
-         stress(:, k) = space_point_cauchy(point, response%stress)
-         strain(:, k) = point%strain
+         call space_point(self, k, motion, point(k))
+         strain(:, k) = point(k)%strain
+      end do
+      if (allocated(self%mode)) call modes_relax(self, strain(:, :self%n_gp))
+      do k = 1, self%n_gp
+         call law_response_space(law, strain(:, k), point(k)%dstrain, response)
+         stress(:, k) = space_point_cauchy(point(k), response%stress)
       end do
    end subroutine space_element_hold
 

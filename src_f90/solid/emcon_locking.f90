@@ -5,16 +5,41 @@ module emcon_locking
    use emcon_solid, only : solid_t
    implicit none
    private
-   public :: poisson_ratio, locking_element, locking_limit, locking_advice
+   public :: locking_ratio, locking_element, locking_advice
 
-   !> Elements with nodes at their corners alone lock above this ratio of Poisson.
-   real(wp), parameter :: locking_limit = 0.45_wp
-   !> By the number of dimensions.
-   character(len=*), parameter :: locking_advice(2:3) = [character(len=66) :: &
-      "it is too stiff in bending and contact; take CPE4H, CPE6 or CPE8R", &
-      "it is too stiff in bending; take C3D8H, C3D10 or C3D20R"]
+   !> Elements with nodes at their corners alone lock above this ratio of Poisson; with incompatible
+   !> modes they do at large strains, above the other.
+   real(wp), parameter :: locking_limit = 0.45_wp, modes_limit = 0.495_wp
+   character(len=*), parameter :: &
+      in_plane = "it is too stiff in bending and contact; take CPE4H, CPE6 or CPE8R", &
+      in_space = "it is too stiff in bending; take C3D8H, C3D10 or C3D20R", &
+      of_rings = "it is too stiff in bending; take CAX6 or CAX8R"
 
 contains
+
+   !> What to take in place of elements of `solid` that lock.
+   pure function locking_advice(solid) result(text)
+      type(solid_t), intent(in) :: solid
+      character(len=len(in_plane)) :: text
+
+      text = in_plane
+      if (solid%is_single) text = in_space
+      if (solid%is_axial) text = of_rings
+   end function locking_advice
+
+   !> The ratio of Poisson of element `e` if it locks, else 0.
+   pure real(wp) function locking_ratio(solid, e) result(ratio)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+      real(wp) :: limit
+
+      ratio = 0.0_wp
+      if (.not. solid%may_lock(e) .or. solid%is_rigid(e)) return
+      if (.not. allocated(solid%law(solid%law_of(e))%law)) return
+      ratio = poisson_ratio(solid%law(solid%law_of(e))%law)
+      limit = merge(modes_limit, locking_limit, allocated(solid%geometry(e)%mode))
+      if (.not. ratio > limit) ratio = 0.0_wp
+   end function locking_ratio
 
    !> Of a law at rest: lambda/(2 lambda + 2 mu).
    pure real(wp) function poisson_ratio(law) result(ratio)
@@ -29,25 +54,21 @@ contains
       if (modulus > law%shear) ratio = 0.5_wp*(modulus - 2.0_wp*law%shear)/(modulus - law%shear)
    end function poisson_ratio
 
-   !> The element with the largest ratio above the limit that may lock, 0: none.
+   !> The element that locks with the largest ratio, 0: none does.
    pure subroutine locking_element(solid, element, ratio)
       type(solid_t), intent(in) :: solid
       integer, intent(out) :: element            !! 0..n_element
       real(wp), intent(out) :: ratio             !! of Poisson, of its law
-      real(wp) :: of_law(size(solid%law))
-      integer :: e, k
+      real(wp) :: found
+      integer :: e
 
-      of_law = 0.0_wp
-      do k = 1, size(solid%law)
-         if (allocated(solid%law(k)%law)) of_law(k) = poisson_ratio(solid%law(k)%law)
-      end do
       element = 0
-      ratio = locking_limit
+      ratio = 0.0_wp
       do e = 1, solid%n_element
-         if (.not. solid%may_lock(e) .or. solid%is_rigid(e)) cycle
-         if (.not. of_law(solid%law_of(e)) > ratio) cycle
+         found = locking_ratio(solid, e)
+         if (.not. found > ratio) cycle
          element = e
-         ratio = of_law(solid%law_of(e))
+         ratio = found
       end do
    end subroutine locking_element
 

@@ -8,8 +8,11 @@ module emcon_solid
    use emcon_errors, only : err_input, error_t, raise
    use emcon_host_law, only : host_answer, host_law_t, host_law_take, host_points_make_room, &
       host_response_t, host_rest_stiffness
+   use emcon_incompatible_modes, only : modes_init
+   use emcon_incompatible_plane, only : incompatible_respond
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t, law_t, n_lane
+   use emcon_law_space, only : law_response_space, n_strain, space_response_t
    use emcon_law_registry, only : law_create, law_given, law_linearise, law_make_thin
    use emcon_mean_volume_plane, only : mean_volume_respond
    use emcon_materials, only : kinematics_corotated, kinematics_linear
@@ -115,6 +118,9 @@ contains
          if (self%is_small(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
          call check_law(self, scene, e, error)
          if (allocated(error)) return
+         if (scene%kind(self%kind(e))%has_modes) call make_modes(self, e, stiffness(self%kind(e)), &
+            error)
+         if (allocated(error)) return
          if (any(self%geometry(e)%weight <= 0.0_wp)) then
             call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
                " is inverted or has no " // trim(merge("volume", "area  ", size(scene%x, 1) &
@@ -156,6 +162,33 @@ contains
          // "MOONEY-RIVLIN or YEOH, or plane strain, CPE")
    end subroutine check_law
 
+   !> The incompatible modes of element `e`, by the moduli of its law at rest.
+   subroutine make_modes(self, e, table, error)
+      type(solid_t), intent(inout) :: self
+      integer, intent(in) :: e                   !! 1..n_element
+      type(shape_table_t), intent(in) :: table   !! for stiffness
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: rest(n_strain) = 0.0_wp
+      type(law_response_t) :: plane
+      type(space_response_t) :: space
+
+      if (self%is_rigid(e)) return
+      associate (law => self%law(self%law_of(e)))
+         if (.not. allocated(law%law)) then
+            call raise(error, err_input, "element " // to_text(self%label(e)) // " has " &
+               // "incompatible modes, for which the law given for material " &
+               // self%material(1 + mod(self%law_of(e) - 1, size(self%material)))%text &
+               // " tells no moduli; take CPE4 or CPE8")
+         else if (self%n_dim == n_space) then
+            call law_response_space(law%law, rest, rest, space)
+            call modes_init(self%geometry(e), table, space%tangent)
+         else
+            call law_response_plane(law%law, rest(:3), rest(:3), plane)
+            call modes_init(self%geometry(e), table, plane%tangent)
+         end if
+      end associate
+   end subroutine make_modes
+
    !> What laws are without their resistance to a change of volume, where elements ask for it.
    subroutine divide_laws(self, error)
       type(solid_t), intent(inout) :: self
@@ -196,7 +229,8 @@ contains
                is_free => .not. self%is_rigid(e))
             self%is_thin(e) = kind%is_thin
             self%has_mean(e) = kind%has_mean_volume
-            self%may_lock(e) = kind%may_lock()
+            ! Modes give way to a change of volume that is linear in the displacements.
+            self%may_lock(e) = kind%may_lock() .or. (kind%has_modes .and. any(scene%step%nlgeom))
             self%has_inertia(e) = .not. section%is_massless
             self%is_linear(e) = section%kinematics == kinematics_linear .and. is_free
             self%is_corotated(e) = section%kinematics == kinematics_corotated .and. is_free
@@ -450,7 +484,10 @@ contains
       type(pack_response_t), intent(inout) :: part
       integer :: k
 
-      if (self%has_mean(pack%element(1))) then
+      if (allocated(pack%mode)) then
+         call incompatible_respond(pack, self%law(pack%law)%law, motion, with_tangent, part)
+         return
+      else if (self%has_mean(pack%element(1))) then
          call mean_volume_respond(pack, self%law(pack%law)%law, self%rest(pack%law)%law, motion, &
             with_tangent, part)
          return

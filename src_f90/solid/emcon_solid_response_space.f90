@@ -6,6 +6,7 @@ module emcon_solid_response_space
    use emcon_element_axial_plane, only : axial_element_respond
    use emcon_element_space, only : space_element_respond, space_motion_t, space_part_t
    use emcon_element_frequency, only : element_frequency
+   use emcon_incompatible_space, only : incompatible_space_respond
    use emcon_kinds, only : dp, wp
    use emcon_lumped_mass, only : lumped_mass
    use emcon_mean_volume_space, only : mean_volume_space_respond
@@ -81,6 +82,8 @@ contains
          if (solid%has_mean(e)) then
             call mean_volume_space_respond(solid%geometry(e), law%law, rest%law, local, &
                with_tangent, part)
+         else if (allocated(solid%geometry(e)%mode)) then
+            call incompatible_space_respond(solid%geometry(e), law%law, local, with_tangent, part)
          else
             call space_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
          end if

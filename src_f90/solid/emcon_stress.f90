@@ -12,6 +12,7 @@ module emcon_stress
    use emcon_element_axial_plane, only : axial_element_hold
    use emcon_element_space, only : space_element_hold, space_motion_t
    use emcon_host_law, only : host_response_t, host_state
+   use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, law_response_t, n_lane
    use emcon_mean_volume_plane, only : mean_volume_hold
@@ -179,10 +180,11 @@ contains
          points%strain = 0.0_wp
          do l = 1, n
             call element_point(solid%geometry(e), before + l, motion, point)
-            points%strain(l, :) = point%strain
             strain(:3, before + l) = point%strain
             f(:, :, l) = point%f_end
          end do
+         if (allocated(solid%geometry(e)%mode)) call modes_relax(solid%geometry(e), strain(:3, :n))
+         points%strain(:n, :) = transpose(strain(:3, before + 1:before + n))
          if (solid%has_mean(e)) then
             call mean_volume_hold(solid%law(solid%law_of(e))%law, solid%rest(solid%law_of(e))%law, &
                solid%geometry(e)%weight, points)

@@ -296,7 +296,7 @@ def test_nothing_is_ignored_without_a_word(plain, other, tmp_path):
 
 
 @pytest.mark.parametrize("edits", [
-    [("TYPE=CPE4", "TYPE=CPE4I")],
+    [("TYPE=CPE4", "TYPE=CPE4R")],
     [("TYPE=CPE4, ELSET=FOUNDATION", "TYPE=B21, ELSET=FOUNDATION"),
      ("TOP, 2, -1.\n", "TOP, 2, -1.\n*DLOAD\n1, P1, 1.\n*EL PRINT, ELSET=FOUNDATION\nS\n")],
     [("TYPE=CPE4, ELSET=BLOCK", "TYPE=C3D8, ELSET=BLOCK"), ("BLOCK, S1", "11, S1\n12, S1")],

@@ -4,13 +4,16 @@ module test_element_space
    use emcon_element_space, only : space_element_init, space_element_mass, space_element_respond, &
       space_element_t, space_motion_t, space_part_t
    use emcon_errors, only : error_t
+   use emcon_incompatible_modes, only : modes_init
+   use emcon_incompatible_space, only : incompatible_space_respond
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_registry, only : law_coupled_neo_hooke, law_create, law_linear, &
       law_mooney_rivlin, law_neo_hooke, law_yeoh
    use emcon_law_space, only : law_response_space, space_response_t
    use emcon_mean_volume_space, only : mean_volume_space_respond
-   use emcon_shape, only : m => max_element_nodes, shape_fault, shape_t
+   use emcon_shape, only : m => max_element_nodes, shape_fault, shape_t, shape_table_t, &
+      shape_tabulate
    use emcon_shape_hexahedron_space, only : shape_hexahedron_t
    use emcon_shape_quadratic_tetrahedron_space, only : shape_quadratic_tetrahedron_t
    use emcon_shape_serendipity_space, only : shape_serendipity_space_t
@@ -24,9 +27,9 @@ module test_element_space
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Sums over up to 27 points and 20 nodes, each term of some dozen roundings.
    real(wp), parameter :: tol = 1024.0_wp*eps
-   integer, parameter :: n_law = 5, n_kind = 6
+   integer, parameter :: n_law = 5, n_kind = 7
    character(len=6), parameter :: name(n_kind) = [character(len=6) :: "C3D4", "C3D8", "C3D10", &
-      "C3D20", "C3D20R", "C3D8H"]
+      "C3D20", "C3D20R", "C3D8I", "C3D8H"]
 
    type :: sample_t
       character(len=:), allocatable :: what
@@ -106,9 +109,22 @@ contains
       end select
       call law_create(codes(law), constant, sample%law, error)
       if (trim(name(kind)) == "C3D8H") call sample%law%divide(sample%rest)
-      call space_element_init(sample%element, sample%shape, place)
+      call place_element(sample)
       call check_true(error, all(sample%element%weight > 0.0_wp), sample%what // ": volume")
    end subroutine make_sample
+
+   !> The element of the sample at its places, and its modes if it has some.
+   subroutine place_element(sample)
+      type(sample_t), intent(inout) :: sample
+      type(shape_table_t) :: table
+      type(space_response_t) :: rest
+
+      call space_element_init(sample%element, sample%shape, sample%x(:, :sample%n))
+      if (index(sample%what, "C3D8I") == 0) return
+      call shape_tabulate(sample%shape, .false., table)
+      call law_response_space(sample%law, spread(0.0_wp, 1, 6), spread(0.0_wp, 1, 6), rest)
+      call modes_init(sample%element, table, rest%tangent)
+   end subroutine place_element
 
    subroutine make_shape(kind, shape)
       integer, intent(in) :: kind
@@ -117,7 +133,7 @@ contains
       select case (kind)
       case (1)
          allocate(shape_tetrahedron_t :: shape)
-      case (2, 6)
+      case (2, 6, 7)
          allocate(shape_hexahedron_t :: shape)
       case (3)
          allocate(shape_quadratic_tetrahedron_t :: shape)
@@ -140,6 +156,8 @@ contains
       if (allocated(sample%rest)) then
          call mean_volume_space_respond(sample%element, sample%law, sample%rest, motion, &
             with_tangent, part)
+      else if (allocated(sample%element%mode)) then
+         call incompatible_space_respond(sample%element, sample%law, motion, with_tangent, part)
       else
          call space_element_respond(sample%element, sample%law, motion, with_tangent, part)
       end if
@@ -324,7 +342,7 @@ contains
          call respond(sample, u0, du, .false., step)
          other = sample
          other%x = matmul(r, sample%x)
-         call space_element_init(other%element, other%shape, other%x(:, :other%n))
+         call place_element(other)
          call respond(other, matmul(r, u0), matmul(r, du), .false., turned)
          call check_near(error, turned%energy, step%energy, tol, young, sample%what // ": energy")
          call check_near(error, turned%force, matmul(r, step%force), tol, young, &

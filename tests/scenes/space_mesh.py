@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-KINDS = ["C3D4", "C3D8", "C3D8H", "C3D10", "C3D20", "C3D20R"]
+KINDS = ["C3D4", "C3D8", "C3D8H", "C3D8I", "C3D10", "C3D20", "C3D20R"]
 QUADRATIC = {"C3D10", "C3D20", "C3D20R"}
 TETRAHEDRA = {"C3D4", "C3D10"}
 
@@ -35,7 +35,7 @@ class Block:
     """n by m by l cells in a box, which `place` maps to where it is."""
 
     def __init__(self, kind, cells, size=(1, 1, 1), shake=0.0, place=None):
-        self.kind = kind.removesuffix("H")
+        self.kind = kind.rstrip("HI")
         self.type, self.cells = kind, cells
         self.step = 2 if self.kind in QUADRATIC else 1
         self.last = tuple(self.step*n for n in cells)

@@ -11,7 +11,7 @@ sys.path.insert(0, str(ROOT/"tests"/"bench"))
 from book import elements  # noqa: E402
 from book.common import Runs  # noqa: E402
 
-QUADRATIC = ("CPS6", "CPS8", "CPS8R")
+BENDS = ("CPS4I", "CPE4I", "CPS6", "CPS8", "CPS8R")
 CELLS = (50, 1)
 
 
@@ -22,7 +22,7 @@ def runs(tmp_path):
     made.pool.shutdown(cancel_futures=True)
 
 
-@pytest.mark.parametrize("kind", QUADRATIC)
+@pytest.mark.parametrize("kind", BENDS)
 def test_elastica(kind, runs, monkeypatch):
     monkeypatch.setattr(elements, "KINDS", (kind,))
     monkeypatch.setattr(elements, "BEAMS", (CELLS,))
@@ -30,7 +30,7 @@ def test_elastica(kind, runs, monkeypatch):
     assert np.abs(np.abs(tip)/elements.LENGTH/elements.ELASTICA - 1).max() <= 0.01
 
 
-@pytest.mark.parametrize("kind", QUADRATIC)
+@pytest.mark.parametrize("kind", BENDS)
 def test_first_frequency(kind, runs, monkeypatch):
     pytest.importorskip("scipy")
     monkeypatch.setattr(elements, "KINDS", (kind,))
@@ -40,17 +40,19 @@ def test_first_frequency(kind, runs, monkeypatch):
 
 
 def test_beams_of_macneal_and_harder(runs, monkeypatch):
-    """CPS4 as published for four nodes and full integration, CPS8R for eight with reduced."""
-    monkeypatch.setattr(elements, "KINDS", ("CPS4", "CPS8R"))
+    """As published: CPS4 for four nodes and full integration, CPS8R for eight with reduced, CPS4I for
+    four with incompatible modes."""
+    monkeypatch.setattr(elements, "KINDS", ("CPS4", "CPS8R", "CPS4I"))
     rows = [[float(cell) for cell in line.split("|")[2:6]]
             for line in elements.beams(elements.start_beams(runs), None)[2:]]
     assert rows[0] == [0.093, 0.027, 0.034, 0.073]
     assert np.abs(np.array(rows[1]) - 1).max() <= 0.04
+    assert rows[2] == [0.993, 0.052, 0.632, 0.888]
 
 
 def test_warned_where_it_locks(runs):
     """Of nearly incompressible kinds those with corners alone; not in plane stress."""
-    for kind, locks in [("CPE3", True), ("CPE4", True), ("CPE4H", False), ("CPE8R", False),
+    for kind, locks in [("CPE3", True), ("CPE4", True), ("CPE4H", False), ("CPE4I", False), ("CPE8R", False),
                         ("CPS3", False), ("CPS4", False)]:
         mesh = elements.Mesh(kind, 2, 2, [(0, 0), (1, 0), (1, 1), (0, 1)])
         path = runs.folder/f"{kind}.inp"

@@ -53,7 +53,7 @@ def corner(stepper: Stepper) -> float:
 
 
 @pytest.mark.parametrize("nlgeom", [False, True])
-@pytest.mark.parametrize(("solid", "plane"), [("C3D8H", "CPE4H"), ("C3D8", "CPE4")])
+@pytest.mark.parametrize(("solid", "plane"), [("C3D8H", "CPE4H"), ("C3D8I", "CPE4I"), ("C3D8", "CPE4")])
 def test_a_layer_held_across_is_plane_strain(solid: str, plane: str, nlgeom: bool) -> None:
     """Node by node and in energy: another program, of other invariants, for the same element."""
     law, constants = ("neo_hooke", CONSTANTS) if nlgeom else ("elastic", (3*MU, NU))

@@ -22,7 +22,7 @@ _PLANE = re.compile(r"(?:CPE|CPS|CPEG|CAX|CGAX|M3D|STRI|S|R3D|SFM3D)(\d+)[A-Z]*\
 _LINE = re.compile(r"(?:T2D|T3D|B2|B3|R2D|RB2D|RB3D|RAX|SAX|F2D)(\d+)[A-Z]*")
 _SOLID = re.compile(r"C3D(4|8|10|20)[A-Z]*")
 #: Kinds in space that keep their name.
-_OWN = ("C3D4", "C3D8", "C3D8H", "C3D10", "C3D20", "C3D20R")
+_OWN = ("C3D4", "C3D8", "C3D8H", "C3D8I", "C3D10", "C3D20", "C3D20R")
 _MAX_DEPTH = 20
 
 

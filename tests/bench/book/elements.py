@@ -6,8 +6,8 @@ from scene_tools import run_deck
 
 from .common import Chapter, table
 
-COOK = ("CPE3", "CPE4", "CPE4H", "CPE6", "CPE8", "CPE8R")
-KINDS = ("CPS3", "CPS4", "CPE4H", "CPS6", "CPS8", "CPS8R")
+COOK = ("CPE3", "CPE4", "CPE4H", "CPE4I", "CPE6", "CPE8", "CPE8R")
+KINDS = ("CPS3", "CPS4", "CPE4H", "CPE4I", "CPS4I", "CPS6", "CPS8", "CPS8R")
 CELLS = (4, 8, 16, 32)
 
 
