@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from numpy.lib.recfunctions import append_fields
 
 PACKAGE = Path(__file__).parents[2]/"pywrap"
 sys.path.insert(0, str(PACKAGE))
@@ -164,6 +165,18 @@ def test_drift_of_a_start_from_rest_is_relative_to_the_largest_energy(run: Path)
     for name in ("kinetic", "strain", "total"):
         history[name] = 0.0
     assert energy_drift(history)[1] == 0.0 and not energy_drift(history)[0].any()
+
+
+@pytest.mark.parametrize("name", ["friction_loss", "damping_loss", "restitution_loss"])
+def test_what_is_asked_for_is_no_drift(run: Path, name: str) -> None:
+    history = read_history(locate(run))
+    before = energy_drift(history)
+    taken = np.linspace(0.0, 3.0, len(history))
+    history["total"] -= taken
+    assert energy_drift(history)[0].max() > 0.1
+    drift, scale = energy_drift(append_fields(history, name, taken, usemask=False))
+    assert scale == before[1]
+    np.testing.assert_allclose(drift, before[0], rtol=0, atol=1e-15)
 
 
 def test_cpu_time_survives_a_restart(run: Path) -> None:
