@@ -1,4 +1,4 @@
-"""Loads and boundary values, changed between steps."""
+"""Loads and boundary values, changed and added between steps."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ class Conditions:
     """
 
     _handle: Handle
+    n_dim: int
 
     def set_point_load(self, node: ArrayLike, dof: ArrayLike, value: ArrayLike) -> None:
         """Give the force on degree of freedom `dof` (1 to n_dim) of `node` a new value [M L/T^2].
@@ -44,20 +45,37 @@ class Conditions:
         """
         self._set_loads(_core.EMCON_LOAD_GRAVITY, element, 0, value)
 
+    def add_point_load(self, node: ArrayLike, dof: ArrayLike, value: ArrayLike) -> None:
+        """Let a force [M L/T^2] act on degree of freedom `dof` (1 to n_dim) of `node` from now on.
+
+        The arguments are numbers or lists. The present step of the deck has no such load so far;
+        in a static step it runs from 0 to `value` at the end of the step.
+        """
+        self._add_loads(_core.EMCON_LOAD_POINT, node, dof, value)
+
+    def add_pressure(self, element: ArrayLike, face: ArrayLike, value: ArrayLike) -> None:
+        """Let a pressure [M/(L T^2)], > 0 inwards, act on `face` of `element` from now on.
+
+        As `add_point_load`.
+        """
+        self._add_loads(_core.EMCON_LOAD_PRESSURE, element, face, value)
+
+    def add_gravity(self, element: ArrayLike, value: ArrayLike, direction: ArrayLike) -> None:
+        """Let gravity [L/T^2] act on `element` from now on, along `direction`, n_dim numbers.
+
+        As `add_point_load`.
+        """
+        direction = real_array(direction, "the direction", (self.n_dim,))
+        self._add_loads(_core.EMCON_LOAD_GRAVITY, element, 0, value,
+                        np.concatenate([direction, np.zeros(3 - self.n_dim)]))
+
+    def _add_loads(self, kind: int, label: ArrayLike, place: ArrayLike, value: ArrayLike,
+                   direction: ArrayLike = ()) -> None:
+        self._handle.change(_core.emcon_add_loads, kind, *_places(label, place, value), direction)
+
     def _set_loads(self, kind: int, label: ArrayLike, place: ArrayLike, value: ArrayLike) -> None:
-        label = labels(label, "the label")
-        place = labels(place, "the place")
-        shape = np.shape(value)
-        if len(shape) > 1:
-            raise InputError(f"the value is to be a number or a list of such, not {shape}")
-        value = real_array(value, "the value", shape)
-        try:
-            label, place, value = np.broadcast_arrays(label, place, value)
-        except ValueError as error:
-            raise InputError("labels, places and values are to be of the same number") from error
-        if not label.size:
-            raise InputError("no node or element is named")
-        self._handle.change(_set_loads, kind, label.tolist(), place.tolist(), value.tolist())
+        self._handle.change(_set_loads, kind, *(part.tolist() for part in
+                                                _places(label, place, value)))
 
     def prescribe(self, node: int, dof: int, value: float) -> None:
         """Prescribe displacement `dof` (1 to n_dim) of `node` [L], whether it was free before or not.
@@ -70,6 +88,24 @@ class Conditions:
     def release(self, node: int, dof: int) -> None:
         """Set displacement `dof` (1 to n_dim) of `node` free, which was prescribed."""
         self._handle.change(_core.emcon_remove_prescribed, *_freedom(node, dof))
+
+
+def _places(label: ArrayLike, place: ArrayLike,
+            value: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Labels, places and values of loads, of the same number."""
+    label = labels(label, "the label")
+    place = labels(place, "the place")
+    shape = np.shape(value)
+    if len(shape) > 1:
+        raise InputError(f"the value is to be a number or a list of such, not {shape}")
+    value = real_array(value, "the value", shape)
+    try:
+        label, place, value = np.broadcast_arrays(label, place, value)
+    except ValueError as error:
+        raise InputError("labels, places and values are to be of the same number") from error
+    if not label.size:
+        raise InputError("no node or element is named")
+    return label.ravel(), place.ravel(), value.ravel()
 
 
 def _set_loads(address: int, kind: int, labels: list[int], places: list[int],

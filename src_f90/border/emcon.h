@@ -460,6 +460,13 @@ int emcon_find_load(emcon_model *model, int kind, int label, int place, int *loa
 /* Give load 0 <= `load` < n_load of the present step a value. */
 int emcon_set_load(emcon_model *model, int load, double value);
 
+/* Add `n` loads of one kind, where the present step has none of it: places as above, gravity along
+ * `direction`, of any length. In a static step they run from 0 to their values at its end. All are
+ * added, or none. */
+int emcon_add_loads(emcon_model *model, int kind, int n, const int *label /* n */,
+                    const int *place /* n */, const double *value /* n */,
+                    const double *direction /* 3, or NULL */);
+
 /* Give the boundary condition on degree of freedom `dof` of node `label` a value; prescribe a free
  * one; the one or the other, as it is; set one free. Where the unknowns become more or less they
  * are numbered anew, and the state stays. */

@@ -293,6 +293,13 @@ public:
    }
 
    void set_load(int load, double value) { call(emcon_set_load, load, value); }
+
+   // One load; several at once are faster by emcon_add_loads.
+   void add_load(int kind, int label, int place, double value, const double *direction = nullptr)
+   {
+      call(emcon_add_loads, kind, 1, &label, &place, &value, direction);
+   }
+
    void prescribe(int label, int dof, double value) { call(emcon_prescribe, label, dof, value); }
    void set_free(int label, int dof) { call(emcon_remove_prescribed, label, dof); }
 

@@ -25,8 +25,9 @@
 !> 3. Between steps read `stepper%march%state` (`state_t`) and `stepper%march%ledger` (`ledger_t`),
 !>    `node_quantity`, `element_quantity`, `contact_quantity`, `pair_quantity`; put a state in by
 !>    `stepper_set_state`; go back by `stepper_snapshot` and `stepper_restore`; change loads by
-!>    `stepper_find_load`, `stepper_set_load`, and boundary values by `stepper_set_prescribed`,
-!>    `stepper_add_prescribed`, `stepper_prescribe`, `stepper_remove_prescribed`.
+!>    `stepper_find_load`, `stepper_set_load`, `stepper_add_loads`, and boundary values by
+!>    `stepper_set_prescribed`, `stepper_add_prescribed`, `stepper_prescribe`,
+!>    `stepper_remove_prescribed`.
 !> 4. To a file: `stepper_save`, `conditions_exchange`, `restart_write`; back into a new stepper:
 !>    `restart_read`, `stepper_load`, `conditions_exchange`.
 !> 5. `stepper_close`, also after an error, before the stepper goes.
@@ -78,7 +79,7 @@ module emcon_api
       stepper_fraction, stepper_is_done, stepper_open, stepper_read, &
       stepper_read_text, stepper_set_threads, stepper_t
    use emcon_stepper_conditions, only : conditions_exchange, stepper_add_prescribed, &
-      stepper_find_load, stepper_prescribe, stepper_remove_prescribed, stepper_set_load, &
+      stepper_prescribe, stepper_remove_prescribed, &
       stepper_set_prescribed
    use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &
       query_contact, query_drop, query_gaps, query_overlap, query_select, query_update_active, &

@@ -1,89 +1,27 @@
-!> Loads and boundary conditions changed between steps.
+!> Boundary conditions changed between steps, and conditions in restart files.
 !>
-!> Changes hold for the present step of the deck. With an amplitude a value is what the amplitude is
-!> multiplied by. Without one, the linear runs of a static step go on from where they are to the new
-!> value at the end of the step; in a dynamic step it holds from the next step on.
+!> Changes hold for the present step of the deck, as `emcon_stepper_loads` has it.
 module emcon_stepper_conditions
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : error_t
    use emcon_factor_base, only : factor_base_t
-   use emcon_keeping, only : keeping_forget
    use emcon_kinds, only : wp
-   use emcon_prescribed, only : prescribed_motion, ramp_at, ramp_turn
+   use emcon_prescribed, only : prescribed_motion, ramp_turn
    use emcon_march, only : march_renumber
    use emcon_pose, only : instant_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_offers, restart_size, &
       restart_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_number, check_that, stepper_check_open
-   use emcon_steps, only : load_gravity, load_point, prescribed_t
-   use emcon_system, only : system_renew
+   use emcon_stepper_loads, only : loads_exchange
+   use emcon_steps, only : load_t, prescribed_t
    use emcon_text, only : to_text
    implicit none
    private
-   public :: stepper_find_load, stepper_set_load
    public :: stepper_set_prescribed, stepper_add_prescribed, stepper_prescribe, &
       stepper_remove_prescribed
    public :: conditions_exchange
 
 contains
-
-   !> Number of the load of this kind in the present step: on degree of freedom `place` of node
-   !> `label` (`load_point`), on face `place` of element `label` (`load_pressure`), or on element
-   !> `label` (`load_gravity`). Of several the first.
-   subroutine stepper_find_load(self, kind, label, place, load, error)
-      type(stepper_t), intent(in) :: self
-      integer, intent(in) :: kind                    !! one of `load_`
-      integer, intent(in) :: label                   !! as in the deck
-      integer, intent(in) :: place                   !! not looked at for gravity
-      integer, intent(out) :: load                   !! 1..number of loads of the step
-      type(error_t), allocatable, intent(out) :: error
-      integer :: target
-
-      load = 0
-      call stepper_check_open(self, error)
-      if (allocated(error)) return
-      if (kind == load_point) then
-         target = findloc(self%scene%node_label, label, 1)
-      else
-         target = findloc(self%scene%element_label, label, 1)
-      end if
-      associate (list => self%scene%step(self%march%state%i_step)%load)
-         if (target > 0) load = findloc(list%kind == kind .and. list%target == target &
-            .and. (list%place == place .or. kind == load_gravity), .true., 1)
-      end associate
-      if (load > 0) return
-      call raise(error, err_input, "there is no load of this kind on " // &
-         trim(merge("node   ", "element", kind == load_point)) // " " // to_text(label) // &
-         " in step " // to_text(self%march%state%i_step) // " of the deck; what is to be " // &
-         "changed has to stand there, if only with the value 0")
-   end subroutine stepper_find_load
-
-   !> Give load `load` of the present step the value `value`.
-   subroutine stepper_set_load(self, load, value, error)
-      type(stepper_t), intent(inout) :: self
-      integer, intent(in) :: load                    !! 1..number of loads of the step
-      real(wp), intent(in) :: value                  !! force | pressure | acceleration
-      type(error_t), allocatable, intent(out) :: error
-      real(wp) :: now
-
-      call stepper_check_open(self, error)
-      call check_number("the value", value, error)
-      if (allocated(error)) return
-      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
-         call check_that(load >= 1 .and. load <= size(step%load), "there is no load " // &
-            to_text(load) // ": step " // to_text(state%i_step) // " of the deck has " // &
-            to_text(size(step%load)), error)
-         if (allocated(error)) return
-         associate (own => step%load(load))
-            now = ramp_at(step, state%step_time, own%value_start, own%value)
-            call ramp_turn(step, state%step_time, now, value, own%value_start)
-            own%value = value
-         end associate
-      end associate
-      call system_renew(self%march%system, self%scene)
-      self%march%state%base%is_set = .false.
-      call keeping_forget(self%march%newton%keeping, self%march%newton%correction)
-   end subroutine stepper_set_load
 
    !> Give the boundary condition on degree of freedom `dof` of node `label` the value `value`.
    !> One that is FIXED runs to it from where it is.
@@ -209,6 +147,7 @@ contains
       type(restart_t), intent(inout) :: restart
       type(error_t), allocatable, intent(out) :: error
       type(prescribed_t), allocatable :: list(:)
+      type(load_t), allocatable :: load(:), before(:)
       type(factor_base_t) :: base
 
       if (.not. restart_offers(restart, "step_time", .true.)) return
@@ -222,8 +161,8 @@ contains
          end if
          call restart_exchange(restart, "step_time", state%step_time)
          call restart_exchange(restart, "is_off_grid", state%is_off_grid)
-         call restart_exchange(restart, "load_value", step%load%value)
-         call restart_exchange(restart, "load_value", step%load%value_start)
+         call loads_exchange(restart, self%scene, state%i_step, load, error)
+         if (allocated(error)) return
       end associate
       call restart_exchange(restart, "prescribed_place", list%node)
       call restart_exchange(restart, "prescribed_place", list%dof)
@@ -234,7 +173,12 @@ contains
       call restart_check(restart, error)
       if (.not. restart%is_reading .or. allocated(error)) return
       base = self%march%state%base
-      call renumber(self, list, error)
+      associate (step => self%scene%step(self%march%state%i_step))
+         call move_alloc(step%load, before)
+         call move_alloc(load, step%load)
+         call renumber(self, list, error)
+         if (allocated(error)) call move_alloc(before, step%load)
+      end associate
       self%march%state%base = base
    end subroutine conditions_exchange
 

@@ -80,6 +80,7 @@ static void without_model(void)
    TELL(emcon_get_momenta(m, 1, x));
    TELL(emcon_find_load(m, EMCON_LOAD_POINT, 1, 1, i));
    TELL(emcon_set_load(m, 0, 1));
+   TELL(emcon_add_loads(m, EMCON_LOAD_POINT, 1, i, i, x, NULL));
    TELL(emcon_set_prescribed(m, 1, 1, 0));
    TELL(emcon_add_prescribed(m, 1, 1, 0));
    TELL(emcon_prescribe(m, 1, 1, 0));
@@ -174,6 +175,9 @@ static void with_rubbish(double *x, const emcon_sizes *sizes)
    TELL(emcon_set_state(m, n, NULL, NULL, 0, NULL, NULL, &early));
    TELL(emcon_set_load(m, sizes->n_load, 1));
    TELL(emcon_set_load(m, -1, 1));
+   TELL(emcon_add_loads(m, EMCON_LOAD_POINT, -1, i, i, x, NULL));
+   TELL(emcon_add_loads(m, EMCON_LOAD_POINT, 1, NULL, i, x, NULL));
+   TELL(emcon_add_loads(m, 99, 1, i, i, x, NULL));
    TELL(emcon_set_load(m, 0, NAN));
    TELL(emcon_find_load(m, 99, 1, 1, NULL));
    TELL(emcon_set_prescribed(m, 0, 1, 0));

@@ -142,6 +142,7 @@ def test_conditions(tmp_path: Path) -> None:
         block.set_point_load(1, 3, 0.5)
         block.set_pressure(1, 6, 0.4)
         block.set_gravity(2, 1.0)
+        block.add_pressure(2, 6, 0.1)
         block.step()
         for call in (lambda: block.prescribe(2, 4, 0.0), lambda: block.set_pressure(1, 7, 1.0)):
             with pytest.raises(InputError):

@@ -353,6 +353,64 @@ def test_changed_conditions_are_those_of_a_deck_with_them(block: Path, parameter
         assert np.abs(deck.u - plain.u).max() > 1e-4*np.abs(deck.u).max()
 
 
+def without(text: str, *lines: str) -> str:
+    """The deck without these lines."""
+    for line in lines:
+        assert line in text
+        text = text.replace(line, "")
+    return text
+
+
+ADDED = {
+    "*CLOAD\n6, 1, <force>\n": lambda s: s.add_point_load(6, 1, 0.5),
+    "2, P3, <pressure>\n": lambda s: s.add_pressure([2], [3], 0.25),
+    "1, GRAV, <gravity>, 0., -1.\n": lambda s: s.add_gravity(1, 2.0, (0.0, -3.0)),
+}
+
+
+@pytest.mark.parametrize("kind", ["*DYNAMIC, DIRECT", "*STATIC, DIRECT"])
+@pytest.mark.parametrize("line", ADDED)
+def test_added_loads_are_those_of_a_deck_with_them(tmp_path: Path, line: str, kind: str) -> None:
+    text = BLOCK.replace("*DYNAMIC, DIRECT", kind)
+    (tmp_path/"with.inp").write_text(text)
+    (tmp_path/"without.inp").write_text(without(text, line))
+    with Stepper(tmp_path/"with.inp") as deck, Stepper(tmp_path/"without.inp") as added:
+        assert added.n_step == 2
+        ADDED[line](added)
+        for stepper in (deck, added):
+            stepper.run(until=0.5)
+        # loads are summed in another order
+        assert np.abs(deck.u - added.u).max() <= 1e-10*np.abs(deck.u).max()
+        with Stepper(tmp_path/"without.inp") as plain:
+            plain.run(until=0.5)
+            assert np.abs(deck.u - plain.u).max() > 1e-3*np.abs(deck.u).max()
+
+
+def test_loads_added_later_are_those_of_the_next_step(tmp_path: Path) -> None:
+    """The loads of a second step, added where it begins, to the last bit."""
+    one = without(BLOCK, "*CLOAD\n6, 1, <force>\n").split("*END STEP")[0]
+    two = (one + "*END STEP\n*STEP, NLGEOM\n*DYNAMIC, DIRECT\n0.125, 0.5\n*CLOAD\n6, 1, 0.5\n"
+           "5, 2, -0.25\n*END STEP\n")
+    (tmp_path/"one.inp").write_text(one.replace("0.125, 0.5", "0.125, 1.0") + "*END STEP\n")
+    (tmp_path/"two.inp").write_text(two)
+    with Stepper(tmp_path/"two.inp") as deck, Stepper(tmp_path/"one.inp") as added:
+        deck.run(until=0.5)
+        added.run(until=0.5)
+        assert np.array_equal(deck.u, added.u)
+        added.add_point_load([6, 5], [1, 2], [0.5, -0.25])
+        added.write_restart(tmp_path/"added.rst.h5")
+        deck.run()
+        added.run()
+        assert np.array_equal(deck.u, added.u) and np.array_equal(deck.v, added.v)
+        with Stepper.from_restart(tmp_path/"added.rst.h5") as again:
+            again.set_point_load(5, 2, -0.25)      # it is there
+            again.run()
+            assert same(bits(again), bits(added))
+        names = ("kinetic", "strain", "external_work")
+        kinetic, strain, work = (added.energies()[name] for name in names)
+        assert abs(kinetic + strain - work) <= 1e-12*abs(strain)
+
+
 def test_freedoms_prescribed_and_released(block: Path) -> None:
     with Stepper(block) as a:
         n, unknown = a.n_unknown, a.unknowns
@@ -374,6 +432,12 @@ def test_conditions_that_are_not_there(block: Path) -> None:
                 (lambda: a.set_point_load([6, 77], 1, 1.0), "no load of this kind on node 77"),
                 (lambda: a.set_pressure(2, 1, 1.0), "no load of this kind on element 2"),
                 (lambda: a.set_gravity(2, 1.0), "no load of this kind on element 2"),
+                (lambda: a.add_point_load([6, 6], [2, 1], 1.0), "such a load on node 6 already"),
+                (lambda: a.add_point_load(6, 3, 1.0), "not in 1..2"),
+                (lambda: a.add_pressure(2, 3, 1.0), "such a load on element 2 already"),
+                (lambda: a.add_gravity(2, 1.0, (0, 0)), "direction of gravity is 0"),
+                (lambda: a.add_gravity(2, 1.0, (0, 0, 1)), "direction"),
+                (lambda: a.add_gravity(7, 1.0, (0, 1)), "no element 7"),
                 (lambda: a.prescribe(77, 1, 0.0), "no node 77"),
                 (lambda: a.prescribe(3, 3, 0.0), "1 to 2, not 3"),
                 (lambda: a.release(6, 1), "not prescribed"),

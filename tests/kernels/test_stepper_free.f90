@@ -10,11 +10,11 @@ module test_stepper_free
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_is_done, stepper_t
    use emcon_stepper_conditions, only : conditions_exchange, &
-      stepper_add_prescribed, stepper_find_load, stepper_remove_prescribed, &
-      stepper_set_load, stepper_set_prescribed
+      stepper_add_prescribed, stepper_remove_prescribed, stepper_set_prescribed
+   use emcon_stepper_loads, only : stepper_add_loads, stepper_find_load, stepper_set_load
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
-   use emcon_steps, only : load_point, load_t, newton_full
+   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, newton_full
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, prescribe, shake, young
    use stepper_scenes, only : check_same_state, drop_h, make_drop, make_tied_drop, open_scene
@@ -42,6 +42,7 @@ contains
          test_case_t("ties follow a state that is set", test_links), &
          test_case_t("bad states", test_bad_state), &
          test_case_t("a load from the start", test_load), &
+         test_case_t("a load that is added", test_load_added), &
          test_case_t("a load within a static step", test_load_later), &
          test_case_t("a boundary value within a static step", test_prescribed), &
          test_case_t("boundary conditions come and go", test_renumber), &
@@ -469,6 +470,46 @@ contains
       end do
    end subroutine test_load
 
+   !> A load that is added is one of the deck, to the last bit, and runs from 0 if added half way.
+   subroutine test_load_added(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(stepper_t) :: deck, changed
+      type(increment_t) :: increment
+      real(wp) :: total(2)
+      integer :: k, n, late
+
+      do n = 1, 3
+         late = merge(5, 0, n == 3)
+         call make_loaded(scene, n /= 2, 3.0_wp)
+         call open_scene(deck, scene, error)
+         deallocate(scene%step(1)%load)
+         allocate(scene%step(1)%load(0))
+         if (.not. allocated(error)) call open_scene(changed, scene, error)
+         do k = 1, 10
+            if (k == late + 1 .and. .not. allocated(error)) call stepper_add_loads(changed, &
+               load_point, [9], [1], [3.0_wp], error=error)
+            if (.not. allocated(error)) call stepper_advance(deck, increment, error)
+            if (.not. allocated(error)) call stepper_advance(changed, increment, error)
+            if (allocated(error)) return
+            total = sum(changed%march%state%reaction, dim=2)
+            if (n == 3) call check_near(error, -total(1), 0.6_wp*max(0, k - late), &
+               max(scene%step(1)%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), young, &
+               "force " // to_text(k))
+            if (allocated(error)) return
+         end do
+         call check_true(error, maxval(deck%march%state%u) > 0.05_wp, "it moves")
+         if (n < 3) call check_same_state(error, changed, deck, "static, dynamic " // to_text(n))
+         if (n == 3) call check_near(error, changed%march%state%u, deck%march%state%u, &
+            max(scene%step(1)%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), 10.0_wp, "end")
+         call stepper_close(deck)
+         call stepper_close(changed)
+         if (allocated(error)) return
+         deck = stepper_t()
+         changed = stepper_t()
+      end do
+   end subroutine test_load_added
+
    !> Changed half way the force goes on from where it is, and the end is that of the other deck.
    subroutine test_load_later(error)
       type(error_t), allocatable, intent(out) :: error
@@ -630,6 +671,24 @@ contains
       call check_error(error, failed, err_input, "there is no load 2", "refused")
       call stepper_set_load(stepper, 1, ieee_value(1.0_wp, ieee_quiet_nan), failed)
       call check_error(error, failed, err_input, "not finite", "refused")
+      call stepper_add_loads(stepper, load_point, [8, 9], [1, 1], [1.0_wp, 1.0_wp], error=failed)
+      call check_error(error, failed, err_input, "such a load on node 9 already", "refused")
+      call stepper_add_loads(stepper, load_point, [8, 8], [2, 2], [1.0_wp, 1.0_wp], error=failed)
+      call check_error(error, failed, err_input, "such a load on node 8 already", "refused")
+      call stepper_add_loads(stepper, load_point, [77], [1], [1.0_wp], error=failed)
+      call check_error(error, failed, err_input, "no node 77", "refused")
+      call stepper_add_loads(stepper, load_point, [8], [3], [1.0_wp], error=failed)
+      call check_error(error, failed, err_input, "not in 1..2", "refused")
+      call stepper_add_loads(stepper, load_pressure, [1], [5], [1.0_wp], error=failed)
+      call check_error(error, failed, err_input, "not in 1..4", "refused")
+      call stepper_add_loads(stepper, load_gravity, [1], [0], [1.0_wp], error=failed)
+      call check_error(error, failed, err_input, "needs a direction", "refused")
+      call stepper_add_loads(stepper, load_gravity, [1], [0], [1.0_wp], &
+         spread(0.0_wp, 1, 3), failed)
+      call check_error(error, failed, err_input, "direction of gravity is 0", "refused")
+      call stepper_add_loads(stepper, 99, [1], [0], [1.0_wp], error=failed)
+      call check_error(error, failed, err_input, "kind 99", "refused")
+      call check_equal(error, size(stepper%scene%step(1)%load), 1, "nothing was added")
       call stepper_set_prescribed(stepper, 77, 1, 1.0_wp, failed)
       call check_error(error, failed, err_input, "no node 77", "refused")
       call stepper_set_prescribed(stepper, 1, 3, 1.0_wp, failed)
