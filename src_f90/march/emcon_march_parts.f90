@@ -5,14 +5,17 @@ module emcon_march_parts
       step_stands_off, step_strikes, step_too_far, step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
+   use emcon_locking, only : strainless_element
    use emcon_march_begin, only : march_renumber
    use emcon_march_step, only : cycling_text, march_step
    use emcon_march_types, only : increment_t, march_t, part_t, start_t
    use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
+   use emcon_solid, only : solid_t
    use emcon_softness, only : most_augmentations
    use emcon_system, only : system_may_hold, system_t
+   use emcon_term_registry, only : terms_solid
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
    implicit none
    private
@@ -170,6 +173,26 @@ contains
          (self%active%n_newton == 0 .or. .not. self%active%holding%is_pushed)
    end function is_hopeless
 
+   !> A singular system; elements with few points keep motions without strain that neighbours on
+   !> two sides would stop.
+   pure subroutine singular_text(solid, scene, text)
+      type(solid_t), intent(in) :: solid
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable, intent(out) :: text
+      integer :: e
+
+      text = "the system is singular"
+      e = strainless_element(solid)
+      if (e == 0) return
+      associate (name => scene%kind(solid%kind(e))%name)
+         text = text // "; elements of type " // trim(name) // ", as " // to_text(solid%label(e)) &
+            // ", have motions without strain, which a single one or a single row of them keeps: " &
+            // "take two across"
+         if (name(len_trim(name):len_trim(name)) == "R") text = text // ", or " &
+            // name(:len_trim(name) - 1)
+      end associate
+   end subroutine singular_text
+
    !> Why a step failed.
    subroutine reason_text(self, scene, status, text)
       type(march_t), intent(in) :: self
@@ -187,7 +210,7 @@ contains
                to_text(reached%n_iteration) // " iterations)"
          end associate
       case (step_singular)
-         text = "the system is singular"
+         call singular_text(terms_solid(self%system%term), scene, text)
       case (step_cycling)
          call cycling_text(self, scene, text)
       case (step_too_far)

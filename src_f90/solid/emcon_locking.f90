@@ -1,11 +1,12 @@
-!> Where elements resist a change of volume at more points than their shape can follow.
+!> Where elements resist a change of volume at more points than their shape can follow, and where
+!> they have points too few to resist all motions.
 module emcon_locking
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_solid, only : solid_t
    implicit none
    private
-   public :: locking_ratio, locking_element, locking_advice
+   public :: locking_ratio, locking_element, locking_advice, strainless_element
 
    !> Elements with nodes at their corners alone lock above this ratio of Poisson; with incompatible
    !> modes they do at large strains, above the other.
@@ -71,5 +72,18 @@ contains
          ratio = found
       end do
    end subroutine locking_element
+
+   !> An element with fewer strains at its points than motions that are not rigid, 0: none. Rigid
+   !> ones are as many as components of a strain.
+   pure integer function strainless_element(solid) result(e)
+      type(solid_t), intent(in) :: solid
+      integer :: a, n_component
+
+      n_component = sum([(a, a = 1, solid%n_dim)])
+      do e = solid%n_element, 1, -1
+         if (solid%is_axial .or. solid%is_rigid(e)) cycle
+         if (n_component*(solid%geometry(e)%n_gp + 1) < solid%n_dim*solid%geometry(e)%n_node) return
+      end do
+   end function strainless_element
 
 end module emcon_locking

@@ -16,8 +16,8 @@ module emcon_solid_term
    use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_evaluate_given, solid_init, solid_pack_respond, solid_t
-   use emcon_solid_response_space, only : compare_frequency, element_slots_t, space_find_fastest, &
-      space_respond, space_tangent_times
+   use emcon_single_elements, only : compare_frequency, element_slots_t, single_find_fastest, &
+      single_respond, single_tangent_times
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_term, only : fastest_t, response_t, role_internal, term_t
    use emcon_text, only : to_text
@@ -107,7 +107,7 @@ contains
       integer :: t
 
       if (self%solid%is_single) then
-         call space_respond(self%solid, self%nlgeom, self%to, motion, response, value, side)
+         call single_respond(self%solid, self%nlgeom, self%to, motion, response, value, side)
          return
       end if
       if (self%solid%has_given) then
@@ -316,7 +316,7 @@ contains
       integer :: k
 
       if (self%solid%is_single) then
-         call space_tangent_times(self%solid, self%nlgeom, motion, direction, product)
+         call single_tangent_times(self%solid, self%nlgeom, motion, direction, product)
          return
       end if
       if (self%solid%has_given) then
@@ -413,7 +413,7 @@ contains
       integer :: k, l
 
       if (self%solid%is_single) then
-         call space_find_fastest(self%solid, self%nlgeom, motion, fastest)
+         call single_find_fastest(self%solid, self%nlgeom, motion, fastest)
          return
       end if
       if (self%solid%has_given) then

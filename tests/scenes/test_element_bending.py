@@ -50,6 +50,19 @@ def test_beams_of_macneal_and_harder(runs, monkeypatch):
     assert rows[2] == [0.993, 0.052, 0.632, 0.888]
 
 
+def test_beams_in_space(runs, monkeypatch):
+    """The twisted beam by all that bend; the quarter of a circle out of its plane, where six elements
+    are few, and two that lock."""
+    monkeypatch.setattr(elements, "SOLIDS", ("C3D8", "C3D8I", "C3D10", "C3D20", "C3D20R"))
+    rows = {line.split("|")[1].strip(): [float(cell) for cell in line.split("|")[2:6]]
+            for line in elements.space_beams(elements.start_space_beams(runs), None)[2:]}
+    assert max(rows.pop("C3D8")) < 0.4
+    part = np.array(list(rows.values()))
+    assert np.abs(part[:, 2:] - 1).max() <= 0.02
+    assert 0.8 < part.min()
+    assert part.max() < 1.01
+
+
 def test_warned_where_it_locks(runs):
     """Of nearly incompressible kinds those with corners alone; not in plane stress."""
     for kind, locks in [("CPE3", True), ("CPE4", True), ("CPE4H", False), ("CPE4I", False), ("CPE8R", False),

@@ -3,6 +3,8 @@
 import numpy as np
 from element_meshes import Mesh
 from scene_tools import run_deck
+from space_mesh import KINDS as SOLIDS
+from space_mesh import Block
 
 from .common import Chapter, table
 
@@ -106,6 +108,80 @@ def beams(started, _):
                   for kind in KINDS])
 
 
+# ---- the same in three dimensions ----------------------------------------------------------------
+
+
+def ring_place(s):
+    """The quarter of a circle, of width 0.1; the free end, at the angle 0, is the last one."""
+    angle, radius = 0.5*np.pi*(1 - s[:, 0]), 4.12 + 0.2*s[:, 1]
+    return np.stack([radius*np.cos(angle), radius*np.sin(angle), 0.1*s[:, 2]], 1)
+
+
+def twisted_place(s):
+    """12 by 1.1 by 0.32, turned by a right angle from end to end; wide along y where it is held."""
+    angle, y, z = 0.5*np.pi*s[:, 0], 1.1*(s[:, 1] - 0.5), 0.32*(s[:, 2] - 0.5)
+    return np.stack([12*s[:, 0], np.cos(angle)*y - np.sin(angle)*z,
+                     np.sin(angle)*y + np.cos(angle)*z], 1)
+
+
+#: Cells, place, law, then each axis of a unit load at the tip with the displacement by beam theory.
+SPACE_BEAMS = {
+    "curved, in its plane": ((6, 1, 1), ring_place, "1e7, 0.25", 1, 0.08734),
+    "curved, out of it": ((6, 1, 1), ring_place, "1e7, 0.25", 3, 0.5022),
+    "twisted, flat at the tip": ((12, 2, 1), twisted_place, "29e6, 0.22", 2, 0.001754),
+    "twisted, upright at the tip": ((12, 2, 1), twisted_place, "29e6, 0.22", 3, 0.005424),
+}
+
+
+def end_shares(mesh):
+    """Part of a uniform load on each node of the free end, and that end's corners."""
+    share, corners, grid = {}, set(), mesh.grid
+    is_triangle = mesh.kind in ("C3D4", "C3D10")
+    for nodes in mesh.element:
+        end = [k for k in nodes if grid[k - 1][0] == mesh.last[0]]
+        if len(end) < (3 if is_triangle else 4):
+            continue
+        ends = [k for k in end if k in nodes[:4 if is_triangle else 8]]
+        for k in end:
+            if mesh.step == 1:
+                part = 1/len(ends)
+            elif is_triangle:
+                part = 0.0 if k in ends else 1/3
+            else:
+                part = -1/12 if k in ends else 1/3
+            share[k] = share.get(k, 0.0) + part
+        corners.update(ends)
+    total = sum(share.values())
+    return {k: part/total for k, part in share.items()}, np.array(sorted(corners)) - 1
+
+
+def start_space_beams(runs):
+    started = {}
+    for kind in SOLIDS:
+        for name, (cells, place, law, axis, _) in SPACE_BEAMS.items():
+            mesh = Block(kind, cells)
+            mesh.x = place(mesh.grid/np.array(mesh.last))
+            share, corners = end_shares(mesh)
+            runs.count += 1
+            path = runs.folder/f"elements{runs.count}.inp"
+            held = "".join(f"{k}, 1, 3\n" for k in mesh.on(0, 0))
+            rows = "".join(f"{k}, {axis}, {part!r}\n" for k, part in share.items() if part)
+            path.write_text(mesh.deck(f"*ELASTIC\n{law}\n", f"*BOUNDARY\n{held}*STEP\n*STATIC\n1., 1.\n"
+                                      f"*CLOAD\n{rows}*NODE FILE\nU\n*END STEP\n"))
+
+            def tip(deck, folder, corners=corners, axis=axis):
+                return run_deck(deck, folder).fields()["displacement"][-1][corners, axis - 1].mean()
+
+            started[kind, name] = runs.start(path, tip)
+    return started
+
+
+def space_beams(started, _):
+    return table(["kind", *SPACE_BEAMS],
+                 [(kind, *(f"{abs(started[kind, name].result())/beam[-1]:.3f}"
+                           for name, beam in SPACE_BEAMS.items())) for kind in SOLIDS])
+
+
 # ---- elastica -----------------------------------------------------------------------------------
 
 LENGTH, STIFF = 50.0, 1e4
@@ -178,6 +254,7 @@ def frequencies(started, _):
 CHAPTERS = [
     Chapter("elements_cook", start_cook, cook),
     Chapter("elements_beams", start_beams, beams),
+    Chapter("elements_space_beams", start_space_beams, space_beams),
     Chapter("elements_elastica", start_elastica, elastica),
     Chapter("elements_frequencies", start_frequencies, frequencies),
 ]

@@ -1,8 +1,8 @@
-!> All elements of a scene of three dimensions or of solids of revolution: forces and tangents,
-!> element by element in the order of the scene.
+!> Elements that respond one by one, those of three dimensions and of revolution: forces and
+!> tangents in the order of the scene.
 !>
 !> Source: docs/theory.md, section 3.
-module emcon_solid_response_space
+module emcon_single_elements
    use emcon_element_axial_plane, only : axial_element_respond
    use emcon_element_space, only : space_element_respond, space_motion_t, space_part_t
    use emcon_element_frequency, only : element_frequency
@@ -16,7 +16,7 @@ module emcon_solid_response_space
    use emcon_text, only : to_text
    implicit none
    private
-   public :: element_slots_t, space_respond, space_tangent_times, space_find_fastest
+   public :: element_slots_t, single_respond, single_tangent_times, single_find_fastest
    public :: compare_frequency
 
    !> Where element matrices go.
@@ -28,7 +28,7 @@ module emcon_solid_response_space
 contains
 
    !> Forces of a motion. What displacements are rounded by, forces are too.
-   subroutine space_respond(solid, nlgeom, slots, motion, response, value, side)
+   subroutine single_respond(solid, nlgeom, slots, motion, response, value, side)
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: nlgeom              !! .false.: small strains
       type(element_slots_t), intent(in) :: slots
@@ -50,9 +50,9 @@ contains
          response%energy(e) = part%energy
          call add_forces(solid, e, motion, local, part, response)
          if (present(value)) call add_tangent(slots%slot(slots%first(e):), motion%weight, &
-            [solid%n_dim, solid%geometry(e)%n_node], part, value, side)
+            solid%n_dim, solid%geometry(e)%n_node, part, value, side)
       end do
-   end subroutine space_respond
+   end subroutine single_respond
 
    !> The response of element `e`, in space its motion from that of its first node.
    subroutine respond_at(solid, e, motion, with_tangent, local, part)
@@ -124,19 +124,19 @@ contains
    end subroutine add_forces
 
    !> Add the tangent of an element to its places; its slots run down the columns.
-   pure subroutine add_tangent(slot, factor, sizes, part, value, side)
+   pure subroutine add_tangent(slot, factor, n_dim, n, part, value, side)
       integer, intent(in) :: slot(:)             !! from that of the element on
       real(wp), intent(in) :: factor             !! of the tangent
-      integer, intent(in) :: sizes(2)            !! directions, nodes of the element
+      integer, intent(in) :: n_dim, n            !! directions, nodes of the element
       type(space_part_t), intent(in) :: part
       real(dp), intent(inout) :: value(:), side(:)             !! slots > 0, slots < 0
       integer :: a, c, i, j, k, place
 
       k = 0
-      do j = 1, sizes(2)
-         do c = 1, sizes(1)
-            do i = 1, sizes(2)
-               do a = 1, sizes(1)
+      do j = 1, n
+         do c = 1, n_dim
+            do i = 1, n
+               do a = 1, n_dim
                   k = k + 1
                   place = slot(k)
                   if (place > 0) then
@@ -152,7 +152,7 @@ contains
 
    !> Add the tangent of a motion times `direction` to `product`. Elements that `direction` does not
    !> touch are passed over.
-   subroutine space_tangent_times(solid, nlgeom, motion, direction, product)
+   subroutine single_tangent_times(solid, nlgeom, motion, direction, product)
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: nlgeom              !! .false.: small strains
       type(motion_t), intent(in) :: motion                             !! placed
@@ -178,10 +178,10 @@ contains
             end do
          end associate
       end do
-   end subroutine space_tangent_times
+   end subroutine single_tangent_times
 
    !> The fastest of the elements.
-   subroutine space_find_fastest(solid, nlgeom, motion, fastest)
+   subroutine single_find_fastest(solid, nlgeom, motion, fastest)
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: nlgeom              !! .false.: small strains
       type(motion_t), intent(in) :: motion       !! placed at its end
@@ -200,7 +200,7 @@ contains
                fastest)
          end associate
       end do
-   end subroutine space_find_fastest
+   end subroutine single_find_fastest
 
    !> Is element `e` faster than the fastest so far?
    pure subroutine compare_frequency(solid, e, factor, tangent, fastest)
@@ -218,4 +218,4 @@ contains
       if (square > fastest%square) fastest = fastest_t(e, square)
    end subroutine compare_frequency
 
-end module emcon_solid_response_space
+end module emcon_single_elements
