@@ -6,6 +6,7 @@
 module emcon_look_plane
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp
+   use emcon_outline_curves_plane, only : outline_curves_behind, outline_curves_t
    use emcon_outline_plane, only : outline_init, outline_t
    use emcon_overlap_plane, only : crossing_find, length_of, nearest_depth, nearest_t, &
       nearest_update
@@ -27,6 +28,8 @@ module emcon_look_plane
       real(wp) :: depth = 0.0_wp                 !! per length of the edge; 0: none
       integer :: node = 0                        !! that is behind, or the nearest on its edge
       integer :: edge(2) = 0                     !! the nodes of the edge that it is behind
+      !> The deepest one of edges as they are, where they stand for curves.
+      real(wp) :: of_edges = 0.0_wp
    end type overlap_t
 
    !> Where an edge crosses others, in order: at parts `share` of it, from 0 before the first to 1
@@ -40,6 +43,7 @@ module emcon_look_plane
 
    type :: look_t
       type(outline_t) :: outline
+      type(outline_curves_t) :: curves           !! that edges stand for
       real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement at the look [L]
       real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges there [L]
       logical :: is_passing = .false.            !! it is on the way, not at the end of a step
@@ -189,7 +193,7 @@ contains
             call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
                between(x, self%u, edge(1, other(k)), edge(2, other(k))))
          end do
-         if (nearest%square <= reach**2) call take_deeper(self, x, nearest, node, overlap)
+         if (nearest%square <= reach**2) call take_deeper(self, x, nearest, node, 0.0_wp, overlap)
       end associate
    end subroutine try_node
 
@@ -332,17 +336,20 @@ contains
                   + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
             end associate
          end do
-         call take_deeper(self, x, nearest, a(merge(1, 2, share < 0.5_wp)), overlap)
+         call take_deeper(self, x, nearest, a(merge(1, 2, share < 0.5_wp)), &
+            outline_curves_behind(self%curves, e, share, x, self%u), overlap)
       end associate
    end subroutine try_place
 
    !> Keep what is behind the edge `nearest` if it is the deepest so far. At the end of an outline
-   !> that is open there is no behind.
-   pure subroutine take_deeper(self, x, nearest, node, overlap)
+   !> that is open there is no behind. Where edges stand for curves behind them, what is between an
+   !> edge and its curve is no overlap.
+   pure subroutine take_deeper(self, x, nearest, node, behind, overlap)
       type(look_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       type(nearest_t), intent(in) :: nearest
       integer, intent(in) :: node
+      real(wp), intent(in) :: behind             !! so far what is judged stands for a curve [L]
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: depth, length, next_along(2)
       integer :: next
@@ -357,10 +364,17 @@ contains
          end if
          depth = nearest_depth(nearest, next_along)
          length = length_of(nearest%along)
+         if (self%curves%is_on) then
+            overlap%of_edges = max(overlap%of_edges, depth/length)
+            depth = depth - behind - outline_curves_behind(self%curves, nearest%edge, &
+               nearest%share, x, self%u)
+         end if
          if (.not. depth > overlap%depth*length) return
          if (self%is_passing .and. depth < min(passing*length, &
             passing_thin*self%outline%thickness(nearest%edge))) return
-         overlap = overlap_t(depth/length, node, edge(:, nearest%edge))
+         overlap%depth = depth/length
+         overlap%node = node
+         overlap%edge = edge(:, nearest%edge)
       end associate
    end subroutine take_deeper
 

@@ -14,6 +14,7 @@ module emcon_overlap_plane
       real(wp) :: square = huge(1.0_wp)          !! square of the distance [L^2]
       real(wp) :: to_point(2) = 0.0_wp           !! from the place to the point [L]
       real(wp) :: along(2) = 0.0_wp              !! from the first to the last node of the edge [L]
+      real(wp) :: share = 0.0_wp                 !! of the edge before the place
    end type nearest_t
 
 contains
@@ -42,7 +43,7 @@ contains
       end if
       square = dot_product(way, way)
       if (.not. square < self%square) return
-      self = nearest_t(edge, side, square, way, along)
+      self = nearest_t(edge, side, square, way, along, max(0.0_wp, min(1.0_wp, share)))
    end subroutine nearest_update
 
    !> How deep the point is behind the nearest place, < 0 in front of it. At a node `along_next`

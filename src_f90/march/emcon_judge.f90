@@ -6,13 +6,15 @@
 !> section 4.11.
 module emcon_judge
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
+   use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_look_plane, only : look_init, look_longest, look_one_way, look_place, look_t, overlap_t
+   use emcon_outline_curves_plane, only : outline_curves_init
    use emcon_outline_plane, only : outline_meets
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: judge_t, overlap_t, judge_init, judge_excuse, judge_step
+   public :: judge_t, overlap_t, judge_init, judge_smooth, judge_excuse, judge_step
 
    !> Between two looks pieces move against each other by less than this part of the thinnest
    !> element: one look at what goes through it is then at least half as deep.
@@ -56,6 +58,15 @@ contains
          allocate(self%thinnest(n), self%longest(n), self%other(n), self%excused(0))
       end associate
    end subroutine judge_init
+
+   !> Begin a step of `scene` with the options `options` of contact: what edges stand for.
+   subroutine judge_smooth(self, scene, options)
+      type(judge_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_options_t), intent(in) :: options
+
+      call outline_curves_init(self%look%curves, self%look%outline, scene, options)
+   end subroutine judge_smooth
 
    !> What overlaps at `u`, and no pair brings together, is meant to.
    subroutine judge_excuse(self, x, u)

@@ -10,7 +10,7 @@ module emcon_march_begin
    use emcon_host, only : host_find_solver
    use emcon_host_scheme, only : host_scheme_find
    use emcon_interactions, only : contact_options_t
-   use emcon_judge, only : judge_excuse, judge_step, overlap_t
+   use emcon_judge, only : judge_excuse, judge_smooth, judge_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
@@ -230,6 +230,7 @@ contains
       call active_set_overclosure(self%active, self%system, scene%x, self%state%u_start, &
          step%resolves_overclosure)
       self%meant_overlap = 0.0_wp
+      call judge_smooth(self%judge, scene, step%contact)
       call judge_excuse(self%judge, scene%x, self%state%u_start)
       if (.not. step%resolves_overclosure) return
       call judge_step(self%judge, scene%x, self%state%u_start, at_rest(self%state%u), overlap)

@@ -253,9 +253,10 @@ contains
          if (goes_in(self, scene, overlap)) status = step_overlaps
       end if
       call phase_leave(self%system%phases, left)
-      if (status == step_done .and. overlap%depth > increment%overlap%depth) then
-         increment%overlap = overlap
-      end if
+      if (status /= step_done) return
+      overlap%of_edges = max(overlap%of_edges, increment%overlap%of_edges)
+      if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
+      increment%overlap%of_edges = overlap%of_edges
    end subroutine judge
 
    !> Has the step brought bodies deeper into each other than guards allow, at nodes that contact of

@@ -56,6 +56,7 @@ module emcon_verdict
       real(wp) :: contact_made = 0.0_wp          !! from there, where it is most
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
       real(wp) :: deepest_time = 0.0_wp          !! [T]
+      real(wp) :: of_edges = 0.0_wp              !! of edges that stand for curves, per edge
       character(len=:), allocatable :: place     !! of the deepest one: bodies and nodes
       real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
       real(wp) :: unconverged_time = 0.0_wp      !! [T]
@@ -179,6 +180,7 @@ contains
 
       associate (body => march%system%space%body, overlap => increment%overlap, &
             stray => increment%stray, time => march%state%time)
+         self%of_edges = max(self%of_edges, overlap%of_edges)
          if (overlap%depth > self%deepest) then
             self%deepest = overlap%depth
             self%deepest_time = time
@@ -400,7 +402,7 @@ contains
                to_text(self%largest_drift/scale, 3) // &
                " of the largest energy, deepest penetration " // to_text(self%deepest, 3) // &
                " of an element")
-            call add_checked(march, lines)
+            call add_checked(self, march, lines)
             if (abs(self%stabilization) > 0.0_wp) call note_add(lines, &
                "work of what stabilization bears " // to_text(self%stabilization/scale, 3) // &
                " of the largest energy")
@@ -511,7 +513,8 @@ contains
    end subroutine guard_advice
 
    !> What the judge looks at.
-   subroutine add_checked(march, lines)
+   subroutine add_checked(self, march, lines)
+      type(verdict_t), intent(in) :: self
       type(march_t), intent(in) :: march
       type(notes_t), intent(inout) :: lines
 
@@ -520,6 +523,9 @@ contains
          call note_add(lines, "penetration was looked for after every step, both ways, nodes and " &
             // "edges: " // to_text(outline%n_piece) // " bodies with " // &
             to_text(size(outline%edge, 2)) // " edges")
+         if (self%of_edges > touching) call note_add(lines, "edges stand for curves, by " // &
+            "*SURFACE SMOOTHING; as they are they overlap by up to " // &
+            to_text(self%of_edges, 3) // " of an edge")
       end associate
    end subroutine add_checked
 

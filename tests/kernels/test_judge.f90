@@ -3,8 +3,9 @@ module test_judge
    use check, only : check_equal, check_near, check_true, test_case_t
    use cut_scenes, only : add_tie
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_pair_t
-   use emcon_judge, only : judge_init, judge_step, judge_t, overlap_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_segment, &
+      smoothing_hermite
+   use emcon_judge, only : judge_init, judge_smooth, judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_t
@@ -32,6 +33,7 @@ contains
          test_case_t("a piece that goes into itself", test_self), &
          test_case_t("a piece in itself past a crossing", test_self_past), &
          test_case_t("where a tie ends, pieces meet", test_joint), &
+         test_case_t("what is between an edge and its curve", test_curve), &
          test_case_t("bodies without a pair are not looked at", test_no_pair)]
    end subroutine collect_judge
 
@@ -254,6 +256,64 @@ contains
          "a corner that is folded over")
       call check_equal(error, overlap%node, 14, "node")
    end subroutine test_joint
+
+   !> The top of the base as a parabola of curvature 2 `bend`, a corner of the slider `depth` below
+   !> the middle of an edge: below the curve by `bend` times share times 1 - share less. Only a hollow
+   !> master stands for a curve that is behind its edges.
+   subroutine test_curve(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: bend(4) = [0.25_wp, 0.25_wp, 0.25_wp, -0.25_wp]
+      real(wp), parameter :: depth(4) = [0.125_wp, 0.03125_wp, 0.125_wp, 0.125_wp]
+      logical, parameter :: is_reversed(4) = [.false., .false., .true., .false.]
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      real(wp) :: share, of_edges, of_curve
+      integer :: k
+
+      do k = 1, size(bend)
+         call make_hollow(scene, bend(k), depth(k), is_reversed(k))
+         associate (square => 1.0_wp + bend(k)**2)
+            share = 0.5_wp + depth(k)*bend(k)/square
+            of_edges = depth(k)/square
+            of_curve = of_edges - max(0.0_wp, bend(k))*share*(1.0_wp - share)/square
+         end associate
+         if (is_reversed(k)) of_curve = of_edges
+         call judged_smoothly(scene, overlap)
+         call check_near(error, overlap%of_edges, of_edges, 16.0_wp*eps, 1.0_wp, "of edges")
+         call check_near(error, overlap%depth, max(0.0_wp, of_curve), 16.0_wp*eps, 1.0_wp, "curve")
+         scene%pair%formulation = formulation_segment
+         call judged_smoothly(scene, overlap)
+         call check_near(error, overlap%depth, of_edges, 16.0_wp*eps, 1.0_wp, "segments")
+      end do
+   end subroutine test_curve
+
+   !> The base bent, and in it a corner of the slider.
+   subroutine make_hollow(scene, bend, depth, is_reversed)
+      type(scene_t), intent(out) :: scene
+      real(wp), intent(in) :: bend, depth
+      logical, intent(in) :: is_reversed
+      integer :: i
+
+      call make_scene(scene, [1.5_wp, 1.0_wp + 0.5_wp*bend - depth], [0.5_wp, 1.0_wp], [1, 1], &
+         is_reversed)
+      do i = 1, 10
+         scene%u0(2, i) = bend*(scene%x(1, i) - 2.0_wp)**2
+      end do
+      do i = 11, size(scene%x, 2)
+         if (scene%x(1, i) > 1.75_wp .and. scene%x(2, i) < 1.5_wp) scene%u0(2, i) = 0.5_wp
+      end do
+   end subroutine make_hollow
+
+   !> What the judge finds at rest in a smoothed step.
+   subroutine judged_smoothly(scene, overlap)
+      type(scene_t), intent(in) :: scene
+      type(overlap_t), intent(out) :: overlap
+      type(judge_t) :: judge
+
+      call judge_init(judge, scene)
+      call judge_smooth(judge, scene, contact_options_t(smoothing=smoothing_hermite))
+      call judge_step(judge, scene%x, scene%u0, 0.0_wp*scene%u0, overlap)
+   end subroutine judged_smoothly
 
    subroutine test_no_pair(error)
       type(error_t), allocatable, intent(out) :: error
