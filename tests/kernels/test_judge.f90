@@ -258,8 +258,8 @@ contains
    end subroutine test_joint
 
    !> The top of the base as a parabola of curvature 2 `bend`, a corner of the slider `depth` below
-   !> the middle of an edge: below the curve by `bend` times share times 1 - share less. Only a hollow
-   !> master stands for a curve that is behind its edges.
+   !> the middle of an edge: of the curve, that is `bend` times share times 1 - share less. A hollow
+   !> master alone stands for a curve that is behind its edges.
    subroutine test_curve(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: bend(4) = [0.25_wp, 0.25_wp, 0.25_wp, -0.25_wp]
