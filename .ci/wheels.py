@@ -2,9 +2,10 @@
 
 One for each Python from 3.11 on that this machine has, or that is named, with every library in it
 but those of any Linux (manylinux): first the source archive, from that the wheels, so that both are
-known to build. For Debian and Ubuntu. HDF5 is made lean, as a part of the library: that of the system
-brings libraries of web and directory servers along. Its source is HDF5_SOURCE, or what apt has. One
-OpenBLAS serves all that call BLAS and LAPACK.
+known to build. For Debian and Ubuntu. HDF5 is made lean, as a part of the library: that of the
+system brings libraries of web and directory servers along. Its source is HDF5_SOURCE, or what apt has.
+One OpenBLAS serves all that call BLAS and LAPACK: of the archive of the system
+(libopenblas-openmp-dev) what they call, for the processors of KERNELS.
 
 What a wheel holds of others is under their licences: their texts are put in, and the metadata name
 them. Everything stays in build/wheels, and is made once.
@@ -40,6 +41,10 @@ LICENSES = {
     "libquadmath": "LGPL-2.1-or-later", "libhdf5": "BSD-3-Clause",
     "liblzma": "0BSD", "libbz2": "bzip2-1.0.6",
 }
+#: Kernels of OpenBLAS that a wheel holds, and processors of other names that use them.
+#: All others use the first, which needs SSE3 alone.
+KERNELS = {"PRESCOTT": (), "HASWELL": ("EXCAVATOR", "ZEN"),
+           "SKYLAKEX": ("COOPERLAKE", "SAPPHIRERAPIDS")}
 
 
 def say(text: str) -> None:
@@ -48,8 +53,9 @@ def say(text: str) -> None:
 
 def run(*command: object, log: str = "", **more: object) -> str:
     """What the command prints; with `log`, its output goes to that file of build/wheels."""
-    done = subprocess.run([str(part) for part in command], text=True, stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT if log else None, **more)
+    more = {"stderr": subprocess.STDOUT if log else None} | more
+    done = subprocess.run([str(part) for part in command], text=True,
+                          stdout=subprocess.PIPE, **more)
     if log:
         (WORK/log).write_text(done.stdout)
     if done.returncode:
@@ -88,13 +94,16 @@ def source(package: str, variable: str) -> Path:
         apt = folder/"apt"
         for name in ("lists/partial", "cache/archives/partial"):
             (apt/name).mkdir(parents=True, exist_ok=True)
-        system = dict(line.split("=", 1) for line in Path("/etc/os-release").read_text().split("\n")
-                      if "=" in line)
-        places = {"debian": "deb.debian.org/debian", "ubuntu": "archive.ubuntu.com/ubuntu"}
+        release = Path("/etc/os-release").read_text()
+        system = dict(line.split("=", 1) for line in release.split("\n") if "=" in line)
+        place = run("apt-get", "indextargets", "--format", "$(REPO_URI)",
+                    "Created-By: Packages").split()[0]
         (apt/"sources.list").write_text(
-            f"deb-src http://{places[system['ID']]} {system['VERSION_CODENAME']} main universe\n")
-        options = [f"-oDir::Etc::sourcelist={apt/'sources.list'}", "-oDir::Etc::sourceparts=/dev/null",
-                   f"-oDir::State::lists={apt/'lists'}", f"-oDir::Cache={apt/'cache'}"]
+            f"deb-src {place} {system['VERSION_CODENAME']} main"
+            f"{' universe' if system['ID'] == 'ubuntu' else ''}\n")
+        options = [f"-oDir::Etc::sourcelist={apt/'sources.list'}",
+                   "-oDir::Etc::sourceparts=/dev/null", f"-oDir::State::lists={apt/'lists'}",
+                   f"-oDir::Cache={apt/'cache'}"]
         run("apt-get", *options, "update", log=f"{package}_update.log")
         run("apt-get", *options, "source", "--download-only", package, cwd=folder,
             log=f"{package}_source.log")
@@ -162,7 +171,36 @@ def copy_libraries(wheel: Path) -> None:
             for old in (name for name in needed if blas.match(name)):
                 run("patchelf", "--replace-needed", old, "libopenblas.so.0", libs/name,
                     env=PATCHELF)
-    shutil.copy(dict(found)["libopenblas.so.0"], libs)
+    link_blas(libs/"libopenblas.so.0", [own, *libs.iterdir()])
+
+
+def symbols(*options: str, file: Path) -> set[str]:
+    """Names of symbols that nm lists, without versions."""
+    lines = run("nm", *options, file, stderr=subprocess.DEVNULL).splitlines()
+    return {line.split()[-1].split("@")[0] for line in lines if len(line.split()) > 1}
+
+
+def link_blas(library: Path, callers: list[Path]) -> None:
+    """An OpenBLAS of what `callers` call, with the kernels of KERNELS for all processors."""
+    archives = glob.glob("/usr/lib/*/openblas-openmp/libopenblas.a")
+    if not archives:
+        sys.exit("error: there is no OpenBLAS to take parts of: "
+                 "apt-get install libopenblas-openmp-dev")
+    offered = symbols("--defined-only", "--extern-only", file=Path(archives[0]))
+    called = set().union(*(symbols("--dynamic", "--undefined-only", file=file) for file in callers))
+    # The library looks these up at run time.
+    asked = sorted(called & offered | {"openblas_get_config", "openblas_set_num_threads"})
+    script = library.with_suffix(".map")
+    script.write_text(f"{{ global: {' '.join(f'{name};' for name in asked)} local: *; }};")
+    user = {name: kernel for kernel, names in KERNELS.items() for name in names}
+    tables = {name.removeprefix("gotoblas_") for name in offered
+              if re.fullmatch("gotoblas_[A-Z0-9_]+", name)}
+    others = [f"-Wl,--defsym=gotoblas_{name}=gotoblas_{user.get(name, next(iter(KERNELS)))}"
+              for name in sorted(tables - {*KERNELS}) if tables >= {*KERNELS}]
+    run("gcc", "-shared", "-o", library, f"-Wl,-soname,{library.name},--gc-sections,-s",
+        f"-Wl,--version-script={script}", *(f"-Wl,--undefined={name}" for name in asked), *others,
+        archives[0], "-lgfortran", "-lgomp", "-lpthread", "-lm")
+    script.unlink()
 
 
 #: The tools on the path.
