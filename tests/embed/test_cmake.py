@@ -6,6 +6,7 @@ import ctypes
 import os
 import re
 import shlex
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -43,6 +44,36 @@ def test_a_host_in_cpp_by_cmake(prefix: Path, tmp_path: Path) -> None:
     shared, static = (run(tmp_path/name, RING, env=PLAIN) for name in ("host", "host_static"))
     assert shared == static and len(shared.split()) == 2
     assert "libemcon" not in run("ldd", tmp_path/"host_static")
+
+
+def block_of(language: str) -> str:
+    """The only block of docs/embedding.md in a language."""
+    text = (ROOT/"docs"/"embedding.md").read_text(encoding="utf-8")
+    (block,) = re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return block
+
+
+def test_the_blocks_of_the_docs(prefix: Path, tmp_path: Path) -> None:
+    """Those for CMake, C++ and a shell, as they stand there, about the deck beside them."""
+    need("cmake")
+    find, link = block_of("cmake").splitlines()
+    (tmp_path/"CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(page LANGUAGES CXX)\n"
+        f"set(CMAKE_CXX_STANDARD 11)\n{find}\nadd_executable(host host.cpp)\n{link}\n")
+    (tmp_path/"host.cpp").write_text("#include <emcon.hpp>\nint main()\n{\n" + block_of("cpp")
+                                     + "return u.size() > 100 ? 0 : 1;\n}\n")
+    shutil.copy(RING, tmp_path)
+    run("cmake", "-S", tmp_path, "-B", tmp_path/"made", f"-DCMAKE_PREFIX_PATH={prefix}")
+    run("cmake", "--build", tmp_path/"made")
+    run(tmp_path/"made"/"host", cwd=tmp_path, env=PLAIN)
+    (line,) = re.findall(r"^cc host\.c .*", (ROOT/"docs"/"embedding.md").read_text(), re.MULTILINE)
+    shutil.copy(HERE/"impact.c", tmp_path/"host.c")
+    (tmp_path/"prefix").symlink_to(prefix)         # a shell takes words apart at blanks
+    run("sh", "-c", line, cwd=tmp_path,
+        env=PLAIN | {"PKG_CONFIG_PATH": str(tmp_path/"prefix"/"lib"/"pkgconfig")})
+    found = run(tmp_path/"a.out", RING, "h=0.05\nt_end=0.1",
+                env=PLAIN | {"LD_LIBRARY_PATH": str(prefix/"lib")})
+    assert found.startswith("1 ")
 
 
 @pytest.mark.parametrize(("asked", "fits"), [("0.4", True), ("0.4.0", True), ("0.4.99", False),
