@@ -27,7 +27,7 @@ LIMIT = 120.0
 SCENES = ("bumper", "oring", "press_fit")
 #: Libraries of the desktop that gmsh and VTK ask for, even where nothing is shown.
 SHOWN = ["libglu1-mesa", "libgl1", "libxrender1", "libxcursor1", "libxft2", "libxinerama1",
-         "libxfixes3"]
+         "libxfixes3", "libgomp1"]
 #: Of an installed prefix, by the names of Debian 12.
 LIBRARIES = ["libhdf5-103-1", "libhdf5-fortran-102", "libumfpack5", "libcholmod3",
              "libmumps-seq-5.5", "libopenblas0", "libgfortran5", "libgomp1"]
@@ -107,6 +107,8 @@ def scenes(bare: Bare, wheel: Path) -> None:
     shutil.copytree(ROOT/"input_decks", bare.folder/"trial"/"input_decks")
     bare.run("apt-get install, to show", "apt-get update -q && apt-get install -qy "
              f"--no-install-recommends {' '.join(SHOWN)}")
+    bare.run("apt-get purge, of a trial before",
+             "apt-get autoremove --purge -qy cmake g++ make || apt-get check")
     bare.run("no compiler", "! command -v cc gcc g++ gfortran make cmake")
     bare.run("python3 -m venv", "python3 -m venv venv")
     readme = (ROOT/"README.md").read_text()
