@@ -92,7 +92,8 @@ def main():
     folder = folder_of_program()
     lines, ill_lines, grid, n_silent = [], [], None, 0
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = [[pool.submit(run_case, row, value, folder, True) for value in row.values] for row in rows]
+        futures = [[pool.submit(run_case, row, value, folder, True) for value in row.values]
+                   for row in rows]
         for row, future in zip(rows, futures, strict=True):
             start = time.monotonic()
             outcomes = [f.result() for f in future]

@@ -96,9 +96,12 @@ def attained(run, verdict):
 
 
 def run_case(row, value, folder, with_conditions=False):
-    """Run a value of a row; an earlier outcome of the same deck and program is taken as it is."""
+    """Run a value of a row; an earlier outcome of the same deck and program is taken as it is.
+
+    Rows that share a deck each have their own folder: they may run at the same time."""
     deck = row.deck(value)
-    key = hashlib.sha256(json.dumps([deck.text(), str(row.parameters)]).encode()).hexdigest()[:16]
+    said = json.dumps([row.name, deck.text(), str(row.parameters)])
+    key = hashlib.sha256(said.encode()).hexdigest()[:16]
     kept = folder / f"{key}.json"
     if kept.exists():
         return Outcome(**json.loads(kept.read_text()))
