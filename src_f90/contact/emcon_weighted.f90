@@ -138,7 +138,7 @@ contains
             if (self%gives_way) least = tiny(least)
             state%is_near = maxval(area) > 0.0_wp
             state%is_covered = .true.
-            state%is_over = area(1) >= least
+            state%is_over = area(1) >= least .or. (self%gives_way .and. area(0) >= least)
             state%is_leaving = .not. state%is_over
             state%is_arriving = area(0) < least
             state%gap0 = 0.0_wp
@@ -146,7 +146,7 @@ contains
             state%was_open = .true.
             if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset
             if (state%is_arriving) state%was_open = is_open(self, i)
-            if (state%is_over) state%gap1 = gap(1)/area(1) - self%offset
+            if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset
             self%cover(i) = area(1)
          end associate
       end do

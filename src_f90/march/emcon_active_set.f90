@@ -1,7 +1,8 @@
 !> The constraints that act in a step: how the set begins, what it hands to the constraints, and
 !> what is let go, put off and dropped. How it goes on: emcon_active_set_update.
 module emcon_active_set
-   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_select
+   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_gives_back, &
+      constraints_select
    use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
    use emcon_gaps, only : pair_measure, pair_search
    use emcon_holding, only : holding_forget, holding_t
@@ -141,6 +142,7 @@ contains
       if (size(system%contact) > 0) call travel_to(self%travel, motion%u0)
       self%was_active = state%is_active
       self%lam0 = state%lam
+      self%softness%closure = state%closure
       if (self%friction%is_on) then
          self%friction%way0 = state%sliding
          self%friction%tau0 = state%drag
@@ -322,6 +324,7 @@ contains
       do k = self%set%n_held + 1, self%set%n
          associate (id => self%set%id(k))
             if (self%is_let_go(id) .or. .not. self%set%lam(k) < 0.0_wp) cycle
+            if (constraints_gives_back(self%set, k)) cycle
             self%is_let_go(id) = .true.
             self%is_active(id) = .false.
             is_done = .false.

@@ -3,6 +3,7 @@
 module emcon_active_set_update
    use emcon_active_set, only : active_set_look, active_set_pass, active_set_t, most_sets, &
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
+   use emcon_constraints, only : constraints_gives_back
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
    use emcon_friction, only : friction_close, friction_let_slip, friction_turn
    use emcon_kinds, only : wp
@@ -211,6 +212,8 @@ contains
       integer, intent(in) :: i, k
       real(wp) :: noise
 
+      is_let_go = .false.
+      if (constraints_gives_back(self%set, k)) return
       noise = force_noise*sum(system%response%magnitude(:, contact%node(i)))
       if (.not. self%masses_resist) noise = noise + force_noise &
          *sum(system%response%rounding(:, contact%node(i)))

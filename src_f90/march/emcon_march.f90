@@ -64,6 +64,7 @@ contains
          allocate(state%has_mass(size(scene%x, 2)), source=.false.)
          allocate(state%is_active(self%system%n_constraint), source=.false.)
          allocate(state%lam(self%system%n_constraint), source=0.0_wp)
+         allocate(state%closure, source=state%lam)
          allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)

@@ -20,7 +20,7 @@ module emcon_march_commit
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
-   use emcon_softness, only : softness_depth, softness_stored
+   use emcon_softness, only : softness_depth, softness_keep, softness_stored
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update
    use emcon_term, only : role_external, role_inertia, role_internal
@@ -192,18 +192,21 @@ contains
             soft => self%explicit%soft(self%explicit%i_start))
          state%is_active = .false.
          state%lam = 0.0_wp
+         state%closure = 0.0_wp
          state%sliding = 0
          state%drag = 0.0_wp
+         call softness_keep(self%active%softness, set, state%closure)
          if (self%active%softness%is_at_ends) then
             state%is_active(soft%id) = .true.
             state%lam(soft%id) = soft%lam
+            call softness_keep(self%active%softness, soft, state%closure)
          end if
          do k = 1, set%n
             state%is_active(set%id(k)) = .true.
             state%lam(set%id(k)) = set%lam(k)
             ! What has opened stores nothing that a later step could give back.
             if (set%is_stored .and. k > set%n_held) state%is_active(set%id(k)) = &
-               set%item(k)%gap1 < 0.0_wp
+               set%soft(k)%now < 0.0_wp
             if (.not. set%item(k)%rubs) cycle
             state%sliding(set%id(k)) = self%active%friction%way(set%id(k))
             state%drag(set%id(k)) = condition_drag(set%item(k), set%lam(k))

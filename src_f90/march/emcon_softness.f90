@@ -13,7 +13,7 @@ module emcon_softness
    implicit none
    private
    public :: softness_state_t, softness_begin_step, softness_select, softness_augment, &
-      softness_stored, softness_depth, softness_pulls
+      softness_stored, softness_depth, softness_pulls, softness_keep
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
@@ -30,6 +30,7 @@ module emcon_softness
       integer :: n_augmentation = 0              !! in the last increment
       real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
       real(wp), allocatable :: edge(:)           !! (n_constraint) of the slave surface [L]
+      real(wp), allocatable :: closure(:)        !! (n_constraint) that of `state_t` [L]
    end type softness_state_t
 
 contains
@@ -53,6 +54,7 @@ contains
       end do
       if (.not. self%is_on) return
       self%tolerance = step%softness%tolerance
+      allocate(self%closure(system%n_constraint), source=1.0_wp)
       allocate(self%stiffness(system%n_constraint), self%edge(system%n_constraint), source=0.0_wp)
       inner = 0.0_wp
       do k = 1, size(system%term)
@@ -139,8 +141,9 @@ contains
       do k = 1, set%n
          call constraint_place(system, set%id(k), pair, i)
          if (pair == 0) cycle
-         set%soft(k)%stiffness = self%stiffness(set%id(k)) &
-            *system%contact(pair)%contact%share(i)**2
+         set%soft(k)%share = system%contact(pair)%contact%share(i)
+         set%soft(k)%stiffness = self%stiffness(set%id(k))*set%soft(k)%share**2
+         if (.not. self%is_at_ends) set%soft(k)%before = self%closure(set%id(k))/set%soft(k)%share
          if (self%augments) set%soft(k)%base = set%lam(k)
       end do
    end subroutine softness_select
@@ -183,9 +186,23 @@ contains
       energy = 0.0_wp
       if (self%augments .or. .not. allocated(set%soft)) return
       do k = set%n_held + 1, set%n
-         energy = energy + soft_energy(set%soft(k), set%item(k)%gap1)
+         energy = energy + soft_energy(set%soft(k), set%soft(k)%now)
       end do
    end function softness_stored
+
+   !> What the contacts of `set` leave to the next step: how far they are closed, times the part of
+   !> their area that is covered, as that may be another one then.
+   pure subroutine softness_keep(self, set, closure)
+      type(softness_state_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
+      integer :: k
+
+      if (self%augments .or. .not. allocated(set%soft)) return
+      do k = set%n_held + 1, set%n
+         closure(set%id(k)) = min(set%soft(k)%now, 0.0_wp)*set%soft(k)%share
+      end do
+   end subroutine softness_keep
 
    !> How deep the contacts of `set` have given way: the largest, by the edge of the slave or of the
    !> master, whichever is shorter; of an augmented Lagrangian by that of its tolerance.

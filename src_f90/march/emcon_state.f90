@@ -28,6 +28,8 @@ module emcon_state
       logical, allocatable :: has_mass(:)        !! (n_node) contact nodes: it has come back
       logical, allocatable :: is_active(:)       !! (n_constraint)
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
+      !> (n_constraint) how far contact by penalty is closed as it stores, <= 0; > 0: as its gap [L]
+      real(wp), allocatable :: closure(:)
       !> (n_constraint) 0: it sticks, else the sign of its slip; only with friction, as the next
       integer, allocatable :: sliding(:)
       real(wp), allocatable :: drag(:)           !! (n_constraint) friction against slip

@@ -54,6 +54,7 @@ module emcon_verdict
       real(wp) :: shown_drift = 0.0_wp           !! from there, in these
       real(wp) :: contact_reference = 0.0_wp     !! work of contact before such steps
       real(wp) :: contact_made = 0.0_wp          !! from there, where it is most
+      real(wp) :: contact_kept = 0.0_wp          !! the same of penalties, made or taken
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
       real(wp) :: deepest_time = 0.0_wp          !! [T]
       real(wp) :: of_edges = 0.0_wp              !! of edges that stand for curves, per edge
@@ -237,8 +238,8 @@ contains
          self%dynamic_drift = max(self%dynamic_drift, abs(kept - self%reference))
          self%shown_reference = kept
          if (march%active%set%is_stored) then
-            self%contact_made = max(self%contact_made, &
-               march%ledger%contact_work - self%contact_reference)
+            self%contact_kept = max(self%contact_kept, abs(march%ledger%contact_work &
+               - self%contact_reference))
          else
             self%contact_reference = march%ledger%contact_work
          end if
@@ -297,10 +298,14 @@ contains
       if (self%contact_made > half_digits*self%largest_energy) call note_add(self%reasons, &
          "contact has made an energy of " // to_text(self%contact_made, 3) // ", " // &
          to_text(self%contact_made/self%largest_energy, 3) // " of the largest, which bodies " // &
-         "that touch cannot do; SCHEME=ENERGY MOMENTUM makes none" // trim(merge( &
-         ", but where a penalty meets other edges than before", repeat(" ", 51), &
-         self%give > 0.0_wp)))
-      if (self%deepest > touching + most_give*self%give) call note_add(self%reasons, &
+         "that touch cannot do; SCHEME=ENERGY MOMENTUM makes none")
+      if (self%contact_kept > energy_bar*self%largest_energy + slip_rounding*self%grip) then
+         call note_add(self%reasons, "contact that gives way has made or taken an energy of " // &
+            to_text(self%contact_kept, 3) // ", " // &
+            to_text(self%contact_kept/self%largest_energy, 3) // " of the largest, which it " // &
+            "should have stored: surfaces that were in each other have parted otherwise")
+      end if
+      if (self%deepest > most_overlap(self)) call note_add(self%reasons, &
          "bodies overlap by " // &
          to_text(self%deepest, 3) // " of an edge at time " // to_text(self%deepest_time, 9) // &
          ", " // self%place)
@@ -311,6 +316,14 @@ contains
          to_text(self%unconverged, 3) // " was accepted at time " // &
          to_text(self%unconverged_time, 9))
    end subroutine verdict_end
+
+   !> What bodies may be in each other by, per edge. What contact gives way by is told by itself.
+   pure real(wp) function most_overlap(self)
+      type(verdict_t), intent(in) :: self
+
+      most_overlap = touching + most_give*self%give
+      if (self%give <= far_behind) most_overlap = min(most_overlap, far_behind)
+   end function most_overlap
 
    !> Has the run come to its end with nothing found wrong?
    pure logical function verdict_is_good(self)

@@ -165,6 +165,12 @@ contains
          call restart_exchange(restart, "give", self%give_time)
          call restart_exchange(restart, "augmentations", self%most_augmentations)
       end if
+      if (restart_offers(restart, "contact_made", max(self%contact_made, self%contact_kept, &
+         abs(self%contact_reference)) > 0.0_wp)) then
+         call restart_exchange(restart, "contact_made", self%contact_reference)
+         call restart_exchange(restart, "contact_made", self%contact_made)
+         call restart_exchange(restart, "contact_made", self%contact_kept)
+      end if
       if (restart_offers(restart, "law_missed", self%grip > 0.0_wp)) then
          call restart_exchange(restart, "law_missed", self%law_missed)
          call restart_exchange(restart, "law_missed", self%grip)

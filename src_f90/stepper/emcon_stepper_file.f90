@@ -138,6 +138,11 @@ contains
          end if
          call restart_exchange(restart, "lam", state%lam)
          call restart_exchange(restart, "is_active", state%is_active)
+         if (restart_offers(restart, "closure", any(abs(state%closure) > 0.0_wp))) then
+            call restart_exchange(restart, "closure", state%closure)
+         else
+            state%closure = 0.0_wp
+         end if
          if (restart_offers(restart, "sliding", size(state%sliding) > 0)) then
             call restart_exchange(restart, "sliding", state%sliding)
             call restart_exchange(restart, "drag", state%drag)

@@ -120,6 +120,7 @@ contains
       call check_motion(self, next%v, error, time)
       if (present(u)) call measure_rest(self, next, error)
       if (allocated(error)) return
+      if (present(u)) next%closure = 1.0_wp
       next%base%is_set = .false.
       call control_forget(next%control)
       call march_go_back(self%march, next, self%march%ledger)

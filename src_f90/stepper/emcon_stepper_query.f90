@@ -239,6 +239,7 @@ contains
          active%is_active = state%is_active .and. gap%is_near
          active%is_active(:system%first_constraint(1)) = system%acts
          active%lam = state%lam
+         active%softness%closure = state%closure
          active%n_tried = 0
       end associate
    end subroutine begin_contact

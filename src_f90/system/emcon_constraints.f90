@@ -11,14 +11,14 @@ module emcon_constraints
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
-   use emcon_soft_law, only : soft_augmented, soft_penalty, soft_t
+   use emcon_soft_law, only : soft_augmented, soft_follow, soft_penalty, soft_t
    use emcon_system, only : system_t
    use emcon_vectors, only : vector_zero
    implicit none
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
    public :: constraints_add_curvature, constraints_force, constraints_merge_pattern
-   public :: constraints_stick, constraints_take_hold
+   public :: constraints_stick, constraints_take_hold, constraints_gives_back
    public :: constraint_place, constraint_dof
 
    !> Which constraints act, and the linearised set on the unknowns.
@@ -100,6 +100,15 @@ contains
       if (self%n_row > self%n) self%item(self%stuck)%hold = self%lam(self%n + 1:)
    end subroutine constraints_take_hold
 
+   !> Has condition `k` stored energy in steps before, which it gives back in this one?
+   pure logical function constraints_gives_back(self, k) result(gives_back)
+      type(constraint_set_t), intent(in) :: self
+      integer, intent(in) :: k                   !! place in the set, from 1
+
+      gives_back = self%is_stored .and. allocated(self%soft)
+      if (gives_back) gives_back = self%soft(k)%before < 0.0_wp
+   end function constraints_gives_back
+
    !> Pair and number within the pair of constraint `id`; pair 0: it is not one of contact.
    pure subroutine constraint_place(system, id, pair, i)
       type(system_t), intent(in) :: system
@@ -159,15 +168,17 @@ contains
    !> The multipliers of contacts that give way, or what those under way lack; they have no defect.
    pure subroutine give_way(self)
       type(constraint_set_t), intent(inout) :: self
-      real(wp) :: lam
+      real(wp) :: lam, start
       integer :: k
 
       do k = self%n_held + 1, self%n
          associate (soft => self%soft(k), item => self%item(k))
             soft%left = self%defect(k)
             if (self%is_stored) then
-               call soft_penalty(soft, item%gap0, item%gap1, lam)
+               call soft_follow(soft, item%gap0, item%gap1, item%dgap, start)
+               call soft_penalty(soft, start, soft%now, lam)
             else
+               soft%now = item%gap1
                call soft_augmented(soft, lam)
             end if
             soft%lack = merge(lam - self%lam(k), 0.0_wp, self%is_under_way)

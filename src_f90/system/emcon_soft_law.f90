@@ -8,7 +8,7 @@ module emcon_soft_law
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: soft_t, soft_penalty, soft_augmented, soft_energy
+   public :: soft_t, soft_follow, soft_penalty, soft_augmented, soft_energy
 
    !> One condition that gives way.
    type :: soft_t
@@ -17,9 +17,30 @@ module emcon_soft_law
       real(wp) :: slope = 0.0_wp                 !! -d multiplier / d gap at the end, >= 0 [M/T^2]
       real(wp) :: left = 0.0_wp                  !! of the gap to the target, at the end [L]
       real(wp) :: lack = 0.0_wp                  !! what a multiplier on its way lacks [M L/T^2]
+      real(wp) :: share = 1.0_wp                 !! that gaps are means over, of its area
+      !> Where the step before has left it, <= 0, 0 if it did not push; > 0: where its gap is [L]
+      real(wp) :: before = 1.0_wp
+      real(wp) :: now = 0.0_wp                   !! where it is at the end [L]
    end type soft_t
 
 contains
+
+   !> Where a penalty begins over a step whose gap goes from `gap0` to `gap1`, by `dgap`, and where
+   !> it ends: what is stored goes on from what the step before has left, whatever the gap at its
+   !> start is found to be now. What begins closed stores nothing yet. Source: docs/theory.md,
+   !> eq. (20f).
+   pure subroutine soft_follow(self, gap0, gap1, dgap, start)
+      type(soft_t), intent(inout) :: self
+      real(wp), intent(in) :: gap0, gap1, dgap   !! counted from the target [L]
+      real(wp), intent(out) :: start             !! in place of `gap0` [L]
+
+      start = gap0
+      self%now = gap1
+      if (self%before > 0.0_wp) return
+      if (.not. self%before < 0.0_wp .and. gap0 >= 0.0_wp) return
+      start = self%before
+      self%now = start + dgap
+   end subroutine soft_follow
 
    !> Multiplier and slope of a penalty over a step whose gap goes from `gap0` to `gap1`, counted
    !> from the target: k times the mean of min(d, 0) times the part of the way that is closed.

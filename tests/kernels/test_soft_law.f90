@@ -4,7 +4,7 @@ module test_soft_law
    use check, only : check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_soft_law, only : soft_augmented, soft_energy, soft_penalty, soft_t
+   use emcon_soft_law, only : soft_augmented, soft_energy, soft_follow, soft_penalty, soft_t
    implicit none
    private
    public :: collect_soft_law
@@ -22,6 +22,7 @@ contains
 
       tests = [ &
          test_case_t("what a penalty takes is what it stores", test_work), &
+         test_case_t("and goes on with it where gaps are found anew", test_follow), &
          test_case_t("its slope is its derivative", test_slope), &
          test_case_t("it never pulls, and has one slope at a gap of 0", test_sign), &
          test_case_t("an augmented Lagrangian is linear", test_augmented)]
@@ -42,6 +43,38 @@ contains
          end associate
       end do
    end subroutine test_work
+
+   !> Steps each of which finds the gap elsewhere than the one before has left it: what was taken so
+   !> far is what is stored, and no step begins with another push than the last one ended with.
+   subroutine test_follow(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: moved(2, 6) = reshape([0.3_wp, -0.2_wp, -0.35_wp, -0.3_wp, 0.05_wp, &
+         -0.1_wp, -0.4_wp, 0.2_wp, -0.1_wp, -0.15_wp, 0.5_wp, 0.4_wp], [2, 6])
+      real(wp), parameter :: ends(6) = [-0.2_wp, -0.15_wp, -0.3_wp, 0.3_wp, -0.05_wp, -0.15_wp]
+      type(soft_t) :: soft
+      real(wp) :: lam, start, taken
+      integer :: k
+
+      soft%stiffness = stiffness
+      call soft_follow(soft, -0.5_wp, -0.25_wp, 0.25_wp, start)
+      call check_near(error, [start, soft%now], [-0.5_wp, -0.25_wp], epsilon(1.0_wp), 1.0_wp, &
+         "nothing is known of a step before")
+      taken = 0.0_wp
+      soft%before = 0.0_wp
+      do k = 1, size(ends)
+         associate (g => moved(:, k))
+            call soft_follow(soft, g(1), g(2), g(2) - g(1), start)
+            call check_near(error, min(start, 0.0_wp), soft%before, epsilon(1.0_wp), 1.0_wp, &
+               "start")
+            call check_near(error, soft%now, ends(k), 4.0_wp*epsilon(1.0_wp), 1.0_wp, "end")
+            call soft_penalty(soft, start, soft%now, lam)
+            taken = taken - lam*(soft%now - start)
+            call check_near(error, soft_energy(soft, soft%now), taken, 16.0_wp*epsilon(1.0_wp), &
+               stiffness, "stored")
+            soft%before = min(soft%now, 0.0_wp)
+         end associate
+      end do
+   end subroutine test_follow
 
    !> Central differences, exact but for their square and for rounding over it; the law has one
    !> slope but no second one where a gap is 0.
