@@ -27,7 +27,7 @@ LIMIT = 120.0
 SCENES = ("bumper", "oring", "press_fit")
 #: Libraries of the desktop that gmsh and VTK ask for, even where nothing is shown.
 SHOWN = ["libglu1-mesa", "libgl1", "libxrender1", "libxcursor1", "libxft2", "libxinerama1",
-         "libxfixes3", "libgomp1"]
+         "libxfixes3", "libgomp1", "libegl1"]
 #: Of an installed prefix, by the names of Debian 12.
 LIBRARIES = ["libhdf5-103-1", "libhdf5-fortran-102", "libumfpack5", "libcholmod3",
              "libmumps-seq-5.5", "libopenblas0", "libgfortran5", "libgomp1"]
@@ -89,8 +89,8 @@ class Bare:
         done = subprocess.run(["chroot", str(self.folder), "sh", "-ec", f"cd /trial; {command}"],
                               env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         seconds, after = time.monotonic() - start, os.times()
-        busy = (after.children_user + after.children_system
-                - before.children_user - before.children_system)
+        busy = max(0.0, after.children_user + after.children_system
+                   - before.children_user - before.children_system)
         is_good = done.returncode == 0 and (not limit or seconds < limit)
         last = (done.stdout.strip().splitlines() or [""])[-1]
         print(f"{self.system.name:8}{what:34}{seconds:7.1f} s, busy {busy:5.1f} s  "
