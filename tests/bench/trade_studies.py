@@ -1,9 +1,9 @@
 """Studies for docs/trade.md: what three goals cost at least, and errors against time and step.
 
-    .venv/bin/python tests/bench/trade_studies.py [--update] [--jobs N] [goals] [orders] [adaptive]
+    .venv/bin/python tests/bench/trade_studies.py [--update] [--jobs N] [goals] [fifths] [orders] [adaptive]
 
 Each is a `python -m emcon study` of decks that are made here, in build/trade/PROGRAM; what was
-interrupted goes on. Writes between the marks `goals`, `orders` and `adaptive`, and the figure.
+interrupted goes on. Writes between the marks `goals`, `fifths`, `orders` and `adaptive`, and the figure.
 Needs the program, for single precision the one of `make app PRECISION=single`.
 """
 
@@ -24,6 +24,7 @@ from trade_knobs import SINGLE, knobbed
 
 from book.common import COLOURS, axes, save, table  # isort: skip, `trade` says where
 from scene_tools import DECKS, Deck
+from timing import usage
 from verification import update
 
 #: By both programs: a study does not go on with another one.
@@ -168,7 +169,7 @@ def goal_of_ring(folder, jobs):
 
 def goal_of_ball(folder, jobs):
     write_decks(folder, {"ball": ball_deck("elastic")})
-    steps = (0.01, 0.005, 0.0025, 0.00125, 0.000625, 0.0003125)
+    steps = (0.01, 0.005, 0.0025, 0.00125, 0.000625)
     return study(folder, "ball", [
         *vary(mesh=(1, 2), initiation=("MASSLESS", "PERSISTENT"), **precisions(), h=steps,
               formulation="NODE TO SURFACE"), "--goal", "position:1e-3"], jobs)
@@ -197,6 +198,41 @@ def goals(jobs, names=GOALS):
                                    command).splitlines(), "```", "", "```text"]
         lines += [line.replace("; ", ";\n    ") for line in told] + ["```", ""]
     return [part for line in lines for part in line.split("\n")]
+
+
+# ---- what a fifth pays for ----------------------------------------------------------------------
+
+#: Decks of the goals as they are: name, deck, parameters, h, end.
+OWN = (("ring", lambda: ring("elastic"), {"t_end": 4, "frame": 4}, 0.01, 4.0),
+       ("ball", lambda: ball_deck("elastic"), {}, 0.01, 1.0),
+       ("bar", lambda: bar("elastic"), {}, 0.005, 5.5))
+
+
+def least(deck, parameters, rounds):
+    """The least processor time of some runs."""
+    folder = FOLDER / "fifths"
+    options = [f"--set={name}={value}" for name, value in parameters.items()]
+    runs = [usage([PROGRAM, folder / f"{deck}.inp", "--quiet", "--output", folder / "out",
+                   *options]) for _ in range(rounds)]
+    assert all(run.code in (0, 3) for run in runs), runs[0].errors
+    return min(run.cpu for run in runs)
+
+
+def fifths(_, names=tuple(case[0] for case in OWN), rounds=9):
+    """How many increments of the deck's own a fifth of its time pays for, beside its start."""
+    lines = []
+    for name, make, fixed, h, end in OWN:
+        if name not in names:
+            continue
+        deck = make()
+        write_decks(FOLDER / "fifths", {name: deck})
+        output = {"frame": h} if "<frame>" in deck.text() else {}
+        own = least(name, {**fixed, "h": h}, rounds)
+        start = least(name, {**fixed, "h": h, "t_end": h, **output}, rounds)
+        paid = max(0, int((own/5 - start)/(own - start)*(end/h - 1)))
+        lines.append((name, f"{end/h:.0f}", f"{own:.3f}", f"{own/5:.3f}", f"{start:.3f}", f"{paid}"))
+    return table(["deck", "increments", "CPU s", "a fifth", "one increment", "a fifth pays for"],
+                 lines)
 
 
 # ---- orders through an impact -------------------------------------------------------------------
@@ -341,10 +377,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--update", action="store_true", help="write into docs/")
     parser.add_argument("--jobs", type=int, default=1, help="runs at a time (1)")
-    parser.add_argument("only", nargs="*", choices=["goals", "orders", "adaptive", []])
+    parser.add_argument("only", nargs="*", choices=["goals", "fifths", "orders", "adaptive",
+                                                      []])
     options = parser.parse_args()
     figure = PAGE.parent / "trade_steps.png" if options.update else None
-    for name, make in (("goals", goals), ("orders", orders),
+    for name, make in (("goals", goals), ("fifths", fifths), ("orders", orders),
                        ("adaptive", lambda jobs: adaptive_lines(jobs, figure))):
         if options.only and name not in options.only:
             continue

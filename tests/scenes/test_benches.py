@@ -156,6 +156,16 @@ def test_goal_of_the_bar(tmp_path, monkeypatch):
     assert command.startswith("python -m emcon study bar.inp --vary deck=bar.inp")
 
 
+def test_what_a_fifth_of_the_bar_pays_for(tmp_path, monkeypatch):
+    """Its start is no less than a hundredth of the run, and no more than all of it."""
+    monkeypatch.setattr(trade_studies, "FOLDER", tmp_path)
+    line = trade_studies.fifths(1, ["bar"], rounds=1)[-1]
+    name, increments, own, fifth, start, paid = (word.strip() for word in line.strip("| ").split("|"))
+    assert (name, increments) == ("bar", "1100")
+    assert 0.01*float(own) < float(start) < float(own) == pytest.approx(5*float(fifth), rel=0.02)
+    assert 0 <= int(paid) < 220
+
+
 @pytest.mark.parametrize("generator", sorted(p.name for p in DECKS.glob("make_*.py")))
 def test_generator_of_decks(generator, tmp_path):
     """What it makes by default is the deck of its name, one that the program accepts."""
