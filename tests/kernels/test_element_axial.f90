@@ -315,7 +315,7 @@ contains
       rank_of = 0
       do j = 1, size(a, 1)
          at = maxloc(abs(a))
-         if (abs(a(at(1), at(2))) <= sqrt(eps)*maxval(abs(matrix))) return
+         if (abs(a(at(1), at(2))) <= tol*maxval(abs(matrix))) return
          rank_of = rank_of + 1
          row = a(at(1), :)/a(at(1), at(2))
          a = a - spread(a(:, at(2)), 2, size(row))*spread(row, 1, size(a, 1))
