@@ -10,7 +10,8 @@ module emcon_contact
    use emcon_pose, only : pose_is_equilibrium
    implicit none
    private
-   public :: contact_t, contact_box_t, condition_resize, condition_resize_slip, gap_state_t
+   public :: contact_t, contact_box_t, condition_resize, condition_resize_slip, &
+      condition_include, gap_state_t
    public :: deepest_arrival
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
@@ -273,6 +274,36 @@ contains
       allocate(self%node(n), source=0)
       allocate(self%g(2, n), self%c(2, n), self%h(2*n, 2*n), source=0.0_wp)
    end subroutine condition_resize
+
+   !> Let a condition depend on the nodes `node` too, so far by nothing.
+   pure subroutine condition_include(self, node)
+      type(condition_t), intent(inout) :: self   !! with its values and derivatives
+      integer, intent(in) :: node(:)             !! of the scene; not of the slave side if new
+      type(condition_t) :: old
+      integer :: i, n, list(self%n_node + size(node)), n_dim
+
+      n = self%n_node
+      list(:n) = self%node(:n)
+      do i = 1, size(node)
+         if (any(list(:n) == node(i))) cycle
+         n = n + 1
+         list(n) = node(i)
+      end do
+      if (n == self%n_node) return
+      old = self
+      n_dim = size(self%g, 1)
+      call condition_resize(self, n)
+      self%node(:n) = list(:n)
+      self%g = 0.0_wp
+      self%c = 0.0_wp
+      self%h = 0.0_wp
+      associate (m => old%n_node)
+         self%g(:, :m) = old%g(:, :m)
+         self%c(:, :m) = old%c(:, :m)
+         if (self%leaves_second) return
+         self%h(:n_dim*m, :n_dim*m) = old%h(:n_dim*m, :n_dim*m)
+      end associate
+   end subroutine condition_include
 
    !> Make room for the derivatives of slip, and set them to 0.
    pure subroutine condition_resize_slip(self)

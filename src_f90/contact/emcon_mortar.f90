@@ -13,9 +13,9 @@ module emcon_mortar
    use emcon_kinds, only : wp
    use emcon_mortar_choice, only : pair_append, pair_comes_near, pair_cut_corners, pair_is_meant, &
       pairs_drop_far, pairs_seen
-   use emcon_mortar_frame, only : frame_hit, frame_init, frame_moments, frame_point, frame_t, &
-      moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, n_place, &
-      pair_stencil_t, place_after, place_before, place_master
+   use emcon_mortar_frame, only : frame_cover, frame_hit, frame_init, frame_moments, frame_point, &
+      frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, &
+      n_place, pair_stencil_t, place_after, place_before, place_master
    use emcon_mortar_pair2, only : segment_add2 => segment_add
    use emcon_mortar_pair2_first, only : segment_add2_first => segment_add
    use emcon_mortar_pair4, only : point_add, segment_add4 => segment_add
@@ -24,7 +24,8 @@ module emcon_mortar
    use emcon_mortar_stencil, only : stencil_gather, stencil_master, stencil_slave
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_scene, only : scene_t
-   use emcon_weighted, only : weighted_init, weighted_t
+   use emcon_slip_point, only : slip_list_t, slip_point, slip_point_t
+   use emcon_weighted, only : weighted_init, weighted_slips, weighted_t
    implicit none
    private
    public :: mortar_t, mortar_init
@@ -48,6 +49,7 @@ module emcon_mortar
    contains
       procedure :: configure => mortar_configure
       procedure :: begin_step => mortar_begin_step
+      procedure :: choose_slip => mortar_choose_slip
       procedure :: measure_edges => mortar_measure_edges
       procedure :: form_edge => mortar_form_edge
    end type mortar_t
@@ -110,7 +112,74 @@ contains
             self%pair(self%start(e):n), self%master, self%point, x, u0, du, self%seen(:, :, e))
       end do
       self%start(e) = n + 1
+      call weighted_slips(self, x, u0, du)
    end subroutine mortar_begin_step
+
+   !> The points of quadrature of its gap, where they are as the step begins, or if it covers
+   !> nothing there as it is expected to end, with the weights that they have in the gap.
+   pure subroutine mortar_choose_slip(self, i, x, u0, du, list)
+      class(mortar_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      type(slip_list_t), intent(inout) :: list
+      integer :: k, at_end, e
+
+      do at_end = 0, 1
+         do k = 1, 2
+            e = self%node_edge(k, i)
+            if (e > 0) list%point = [list%point, edge_slips(self, e, 3 - k, x, u0, du, at_end)]
+         end do
+         if (size(list%point) > 0) return
+      end do
+      do k = 1, 2
+         e = self%node_edge(k, i)
+         if (e == 0 .or. size(list%point) > 0) cycle
+         if (self%start(e + 1) == self%start(e)) cycle
+         list%point = [slip_point(self%pair(self%start(e))%node(:place_master(1) + 1), &
+            merge(1.0_wp, 0.0_wp, k == 1), 1.0_wp)]
+      end do
+   end subroutine mortar_choose_slip
+
+   !> What slave edge `e` gives to the slip of its node `side`, 1 or 2: docs/theory.md, eq. (14j).
+   pure function edge_slips(self, e, side, x, u0, du, at_end) result(point)
+      type(mortar_t), intent(in) :: self
+      integer, intent(in) :: e, side
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      integer, intent(in) :: at_end              !! 0: as the step begins, 1: as it ends
+      type(slip_point_t), allocatable :: point(:)
+      type(slip_point_t) :: list(size(self%point)*(self%start(e + 1) - self%start(e)))
+      type(frame_t) :: frame
+      real(wp) :: xi(size(list)), local(size(x, 1), n_place), dlocal(size(x, 1), n_place)
+      real(wp) :: low, high, part, theta
+      integer :: k, i, n
+
+      n = 0
+      do k = self%start(e), self%start(e + 1) - 1
+         associate (pair => self%pair(k))
+            call stencil_gather(pair, x, u0, du, local, dlocal)
+            call frame_init(frame, pair, local + at_end*dlocal)
+            low = 0.0_wp
+            high = 1.0_wp
+            if (self%options%integration /= integration_elements) call frame_cover(frame, low, high)
+            do i = 1, size(self%point)
+               part = (high - low)*self%weight(i)
+               if (self%options%integration == integration_elements) part = share(self, i, e, k)
+               if (.not. part > 0.0_wp) cycle
+               n = n + 1
+               xi(n) = low + (high - low)*self%point(i)
+               list(n) = slip_point(pair%node(:place_master(1) + 1), xi(n), part)
+            end do
+         end associate
+      end do
+      theta = 0.0_wp
+      if (self%is_dual) theta = sum(list(:n)%weight)**2
+      do i = 1, n
+         part = merge(1.0_wp - xi(i), xi(i), side == 1) &
+            + merge(1.0_wp, -1.0_wp, side == 1)*theta*(1.0_wp - 2.0_wp*xi(i))
+         list(i)%weight = self%slave%length(e)*list(i)%weight*part
+      end do
+      point = list(:n)
+   end function edge_slips
 
    !> The master edges that slave edge `e` faces within the step, appended to the `n` pairs so far.
    pure subroutine choose_pairs(self, e, x, u0, du, n)

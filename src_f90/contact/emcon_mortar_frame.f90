@@ -9,7 +9,7 @@ module emcon_mortar_frame
    implicit none
    private
    public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_meet, frame_hit, &
-      frame_point, frame_moments
+      frame_point, frame_moments, frame_cover
    public :: place_first, place_last, place_before, place_after, place_master
    public :: moment_gap, moment_gap_xi, moment_area, moment_area_xi, moment_cover, n_moment
    public :: n_place, end_rounding
@@ -232,6 +232,15 @@ contains
       smooth_slope = c(1) + x*(2.0_wp*c(2) + x*3.0_wp*c(3))
    end function smooth_slope
 
+   !> From where to where on the slave edge the master edge covers it; turned round: nowhere.
+   pure subroutine frame_cover(self, low, high)
+      type(frame_t), intent(in) :: self
+      real(wp), intent(out) :: low, high         !! 0 to 1
+
+      low = rounded_clip(frame_meet(self, 2), end_rounding)
+      high = rounded_clip(frame_meet(self, 1), end_rounding)
+   end subroutine frame_cover
+
    !> Moments over the segment that the master edge covers: docs/theory.md, eq. (15).
    pure function frame_moments(self, stencil, point, weight) result(moment)
       type(frame_t), intent(in) :: self
@@ -242,8 +251,7 @@ contains
       integer :: i
 
       moment = 0.0_wp
-      low = rounded_clip(frame_meet(self, 2), end_rounding)
-      high = rounded_clip(frame_meet(self, 1), end_rounding)
+      call frame_cover(self, low, high)
       if (.not. high > low) return
       area = (high - low)*self%length
       do i = 1, size(point)

@@ -17,6 +17,7 @@ module emcon_nts
    use emcon_nts_gap_value, only : nts_gap_value
    use emcon_nts_stencil, only : most_nodes, polygon_slip, stencil_gather, stencil_length
    use emcon_scene, only : scene_t
+   use emcon_slip_point, only : slip_list_t, slip_over
    use emcon_stance, only : stance_holds, stance_t, stance_take
    implicit none
    private
@@ -49,6 +50,8 @@ module emcon_nts
       procedure :: covers => nts_covers
       procedure :: area => nts_area
       procedure :: slip => nts_slip
+      procedure :: stands_over
+      procedure :: slips_by
    end type nts_t
 
 contains
@@ -340,9 +343,34 @@ contains
       n = 1
       if (self%other(i) > 0) n = size(self%polygon, 1)
       do k = 1, n
-         slip = slip + polygon_slip(self%polygon(k, i), x, u0, du)/n
+         slip = slip + slip_over(polygon_slip(self%polygon(k, i), 1.0_wp/n), x, u0, du)
       end do
    end function nts_slip
+
+   !> Is the node of constraint `i` over the polygon as the step begins?
+   pure logical function stands_over(self, i)
+      class(nts_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      type(gap_state_t) :: state
+
+      state = state_at_rest(self, i)
+      stands_over = state%is_near .and. state%is_over
+   end function stands_over
+
+   !> Append what constraint `i` slides by, if it is near the surface.
+   pure subroutine slips_by(self, i, list)
+      class(nts_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      type(slip_list_t), intent(inout) :: list
+      integer :: k, n
+
+      if (self%edge(i) == 0) return
+      n = 1
+      if (self%other(i) > 0) n = size(self%polygon, 1)
+      do k = 1, n
+         list%point = [list%point, polygon_slip(self%polygon(k, i), 1.0_wp/n)]
+      end do
+   end subroutine slips_by
 
    pure subroutine nts_area(self, x, u, area, length)
       class(nts_t), intent(in) :: self

@@ -15,10 +15,9 @@ module emcon_nts_constraint
    use emcon_kinds, only : wp
    use emcon_nts_gap, only : nts_gap
    use emcon_nts_gap_first, only : nts_gap_first => nts_gap
-   use emcon_nts_slip, only : nts_slip
-   use emcon_nts_slip_first, only : nts_slip_first => nts_slip
-   use emcon_nts_stencil, only : most_nodes, polygon_stencil_t, smooth_stencil_t, stencil_gather, &
-      stencil_length
+   use emcon_nts_stencil, only : most_nodes, polygon_slip, polygon_stencil_t, smooth_stencil_t, &
+      stencil_gather, stencil_length
+   use emcon_slip_point, only : slip_add
    implicit none
    private
    public :: polygon_constraint, smooth_constraint
@@ -52,7 +51,8 @@ contains
       if (item%rubs) call condition_resize_slip(item)
       do i = 1, size(stencil)
          call add_polygon(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
-         if (item%rubs) call add_slip(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
+         if (item%rubs) call slip_add(polygon_slip(stencil(i), 1.0_wp/size(stencil)), &
+            x, u0, du, item)
       end do
    end subroutine polygon_constraint
 
@@ -110,48 +110,6 @@ contains
          end do
       end do
    end subroutine add_gap
-
-   !> Add `share` of the slip along the edge of a polygon to a constraint.
-   pure subroutine add_slip(stencil, share, x, u0, du, item)
-      type(polygon_stencil_t), intent(in) :: stencil
-      real(wp), intent(in) :: share
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      type(condition_t), intent(inout) :: item
-      real(wp), dimension(size(x, 1), size(stencil%node)) :: local, dlocal
-      type(dg10_t) :: slip
-      type(dg10_first_t) :: first
-      integer :: a, b, j, k, at, to, n_dim
-
-      n_dim = size(x, 1)
-      call stencil_gather(x, u0, du, stencil%n, stencil%node, local, dlocal)
-      if (item%leaves_second) then
-         first = nts_slip_first(local, dlocal)
-         item%slip = item%slip + share*first%df
-      else
-         slip = nts_slip(local, dlocal)
-         item%slip = item%slip + share*slip%df
-      end if
-      do k = 1, 3                                ! slave node and edge: all that it depends on
-         at = findloc(item%node(:item%n_node), stencil%node(k), 1)
-         do a = 1, n_dim
-            if (item%leaves_second) then
-               item%t(a, at) = item%t(a, at) + share*first%g(n_dim*(k - 1) + a)
-               item%t1(a, at) = item%t1(a, at) + share*first%c(n_dim*(k - 1) + a)
-               cycle
-            end if
-            item%t(a, at) = item%t(a, at) + share*slip%g(n_dim*(k - 1) + a)
-            item%t1(a, at) = item%t1(a, at) + share*slip%c(n_dim*(k - 1) + a)
-            do j = 1, 3
-               to = findloc(item%node(:item%n_node), stencil%node(j), 1)
-               do b = 1, n_dim
-                  associate (entry => item%ht(n_dim*(at - 1) + a, n_dim*(to - 1) + b))
-                     entry = entry + share*slip%h(n_dim*(k - 1) + a, n_dim*(j - 1) + b)
-                  end associate
-               end do
-            end do
-         end do
-      end do
-   end subroutine add_slip
 
    !> The gap over a smoothed surface; `is_found`: there is a unique closest point.
    pure subroutine smooth_constraint(smooth, x, u0, du, target, item, is_found)

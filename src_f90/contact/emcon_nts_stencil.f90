@@ -5,6 +5,7 @@ module emcon_nts_stencil
    use emcon_hermite_gap_value, only : hermite_begin
    use emcon_kinds, only : wp
    use emcon_nts_gap_value, only : first, last, slave
+   use emcon_slip_point, only : slip_point, slip_point_t
    implicit none
    private
    public :: polygon_stencil_t, polygon_stencil, smooth_stencil_t, smooth_stencil, edge_of_sector
@@ -203,23 +204,12 @@ contains
       end do
    end subroutine stencil_gather
 
-   !> How far the slave node slides along the edge: docs/theory.md, eq. (14e).
-   pure real(wp) function polygon_slip(self, x, u0, du) result(slip)
+   !> What the slave node slides by, along the edge, with a weight.
+   pure type(slip_point_t) function polygon_slip(self, weight)
       type(polygon_stencil_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      real(wp), dimension(size(x, 1), size(self%node)) :: local, dlocal
-      real(wp), dimension(size(x, 1)) :: a, b, da, db
-      real(wp) :: xi
+      real(wp), intent(in) :: weight             !! in the slip of a constraint
 
-      call stencil_gather(x, u0, du, self%n, self%node, local, dlocal)
-      a = local(:, last) - local(:, first)
-      b = local(:, slave) - local(:, first)
-      da = dlocal(:, last) - dlocal(:, first)
-      db = dlocal(:, slave) - dlocal(:, first)
-      xi = dot_product(b, a)/dot_product(a, a)
-      ! (b + db).(a + da) - xi |a + da|^2, without what cancels
-      slip = sqrt(dot_product(a, a))*(dot_product(db, a + da) + dot_product(b, da) &
-         - xi*dot_product(da, a + a + da))/dot_product(a + da, a + da)
+      polygon_slip = slip_point(self%node([slave, slave, first, last]), 0.0_wp, weight)
    end function polygon_slip
 
    !> Reference length of the stencil's edge: what gaps are measured against.

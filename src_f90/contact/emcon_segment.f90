@@ -15,7 +15,8 @@ module emcon_segment
       moment_gap_xi, n_moment
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : scene_t
-   use emcon_weighted, only : weighted_init, weighted_t
+   use emcon_slip_point, only : slip_list_t
+   use emcon_weighted, only : weighted_init, weighted_slips, weighted_t
    implicit none
    private
    public :: segment_t, segment_init
@@ -28,6 +29,7 @@ module emcon_segment
       procedure :: configure => segment_configure
       procedure :: begin_step => segment_begin_step
       procedure :: covers => segment_covers
+      procedure :: choose_slip => segment_choose_slip
       procedure :: measure_edges => segment_measure_edges
       procedure :: form_edge => segment_form_edge
    end type segment_t
@@ -74,6 +76,7 @@ contains
       self%nts%rounding = self%rounding
       self%nts%is_sharp = self%is_sharp
       call self%nts%begin_step(x, u0, du)
+      call weighted_slips(self, x, u0, du)
       self%reach = self%nts%reach
       ! Searched anew, the list stays empty: its reach grows with the motion and with the edges.
       associate (near => self%nts%near)
@@ -81,6 +84,45 @@ contains
             0.5_wp*near%clearance - 0.25_wp*near%edge_reach)))
       end associate
    end subroutine segment_begin_step
+
+   !> The slip of its own node where that is over the surface, else of the other ends of its edges
+   !> which are.
+   pure subroutine segment_choose_slip(self, i, x, u0, du, list)
+      class(segment_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      type(slip_list_t), intent(inout) :: list
+      integer, dimension(size(self%node_edge, 1)) :: own, other
+      integer :: k
+
+      own = 0
+      other = 0
+      do k = 1, 2
+         if (self%node_edge(k, i) == 0) cycle
+         own(k) = self%end_node(3 - k, self%node_edge(k, i))
+         other(k) = self%end_node(k, self%node_edge(k, i))
+      end do
+      call take(self%nts, [maxval(own)], .true., list)
+      if (size(list%point) == 0) call take(self%nts, other, .true., list)
+      if (size(list%point) == 0) call take(self%nts, [maxval(own), other], .false., list)
+   end subroutine segment_choose_slip
+
+   !> Nodes that are over the surface, or near it at least.
+   pure subroutine take(nts, node, is_over, list)
+      type(nts_t), intent(in) :: nts
+      integer, intent(in) :: node(:)             !! numbers in `nts`; 0: none
+      logical, intent(in) :: is_over             !! else all that are near
+      type(slip_list_t), intent(inout) :: list
+      integer :: k
+
+      do k = 1, size(node)
+         if (node(k) == 0) cycle
+         if (is_over) then
+            if (.not. nts%stands_over(node(k))) cycle
+         end if
+         call nts%slips_by(node(k), list)
+      end do
+   end subroutine take
 
    !> The weights of an edge's nodal gaps in the moments, in units of its length: docs/theory.md,
    !> eq. (15i).

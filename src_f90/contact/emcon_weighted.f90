@@ -6,7 +6,7 @@
 module emcon_weighted
    use emcon_chain, only : chain_init, chain_t, chain_thickness
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, deepest_arrival
+   use emcon_contact, only : condition_include, condition_resize_slip, contact_t, deepest_arrival
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_form, only : edge_form_t, form_constraint, form_share, weighted_gap_t
    use emcon_errors, only : error_t
@@ -14,9 +14,10 @@ module emcon_weighted
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
+   use emcon_slip_point, only : slip_add, slip_list_t, slip_over, slip_point_t
    implicit none
    private
-   public :: weighted_t, weighted_init
+   public :: weighted_t, weighted_init, weighted_slips
 
    !> A slave node is let go where less than this fraction of its surface is covered: a smaller part
    !> says hardly more than the constraint of its neighbour.
@@ -36,6 +37,7 @@ module emcon_weighted
       type(edge_form_t), allocatable :: form(:)       !! (n_edge)
       logical, allocatable :: is_formed(:)            !! (n_edge)
       logical :: leaves_second = .false.              !! of `form`: no second derivatives
+      type(slip_list_t), allocatable :: slide(:)      !! (n_constraint) with friction: of the step
       type(wide_t) :: work(3)
    contains
       procedure :: measure => weighted_measure
@@ -44,11 +46,23 @@ module emcon_weighted
       procedure :: own_area => weighted_own_area
       procedure :: share => weighted_share
       procedure :: mean_gap => weighted_mean_gap
+      procedure :: slip => weighted_slip
+      procedure(slip_interface), deferred :: choose_slip
       procedure(measure_interface), deferred :: measure_edges
       procedure(form_interface), deferred :: form_edge
    end type weighted_t
 
    abstract interface
+
+      !> What constraint `i` slides by in the step that begins, with weights of any sum > 0; of no
+      !> points where it cannot act.
+      pure subroutine slip_interface(self, i, x, u0, du, list)
+         import :: slip_list_t, weighted_t, wp
+         class(weighted_t), intent(in) :: self
+         integer, intent(in) :: i                !! 1..n_constraint
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+         type(slip_list_t), intent(inout) :: list     !! empty
+      end subroutine slip_interface
 
       !> Fill `form%value`: the moments of all slave edges at both ends of the step.
       pure subroutine measure_interface(self, x, u0, du)
@@ -93,8 +107,10 @@ contains
       self%deepest_start = deepest_mean
       self%offset = pair%offset
       self%restitution = pair%restitution
+      self%friction = pair%friction
+      self%rebound = pair%rebound
       self%node_edge = self%slave%node_edge
-      allocate(self%state(n), self%form(self%slave%n_edge))
+      allocate(self%state(n), self%form(self%slave%n_edge), self%slide(n))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
       allocate(self%whole(n), self%scale(n), self%cover(n), &
@@ -112,6 +128,37 @@ contains
       end do
       self%scale = self%whole
    end subroutine weighted_init
+
+   !> Choose what the constraints slide by, for a formulation that has chosen its stencils. The
+   !> weights are kept over the step, with the sum 1: docs/theory.md, eq. (14j).
+   pure subroutine weighted_slips(self, x, u0, du)
+      class(weighted_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      type(slip_point_t), parameter :: nothing(0) = slip_point_t()
+      integer :: i
+
+      if (.not. self%friction > 0.0_wp) return
+      do i = 1, self%n_constraint
+         self%slide(i)%point = nothing
+         call self%choose_slip(i, x, u0, du, self%slide(i))
+         associate (weight => self%slide(i)%point%weight)
+            if (size(weight) > 0) weight = weight/sum(weight)
+         end associate
+      end do
+   end subroutine weighted_slips
+
+   pure real(wp) function weighted_slip(self, i, x, u0, du) result(slip)
+      class(weighted_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      integer :: k
+
+      slip = 0.0_wp
+      if (.not. allocated(self%slide(i)%point)) return
+      do k = 1, size(self%slide(i)%point)
+         slip = slip + slip_over(self%slide(i)%point(k), x, u0, du)
+      end do
+   end function weighted_slip
 
    !> Mean gaps at both ends of the step; 0 where nothing is covered.
    pure subroutine weighted_measure(self, x, u0, du)
@@ -189,8 +236,25 @@ contains
          call form_constraint(self%form, weighted_gap_t(self%node(i), self%node_edge(:, i), &
             self%is_dual, target(n) + self%offset, self%scale(i)), self%work, item(n))
          item(n)%size = self%state(i)%size
+         if (item(n)%rubs) call add_slip(self%slide(i)%point, x, u0, du, item(n))
       end do
    end subroutine weighted_evaluate
+
+   !> Slip and its derivatives of a condition whose gap is there.
+   pure subroutine add_slip(point, x, u0, du, item)
+      type(slip_point_t), intent(in) :: point(:)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      type(condition_t), intent(inout) :: item
+      integer :: k
+
+      do k = 1, size(point)
+         call condition_include(item, point(k)%node)
+      end do
+      call condition_resize_slip(item)
+      do k = 1, size(point)
+         call slip_add(point(k), x, u0, du, item)
+      end do
+   end subroutine add_slip
 
    !> The multipliers are forces by the scale of their constraints: docs/theory.md, eq. (15a).
    pure subroutine weighted_area(self, x, u, area, length)

@@ -3,8 +3,7 @@ module emcon_deck_friction
    use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line
    use emcon_deck_reader, only : card_error, card_t, reader_t
    use emcon_diagnostics, only : add_error
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_nts, &
-      smoothing_hermite
+   use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_steps, only : initiation_admissible, initiation_persistent, method_null_space, &
       method_saddle_point, step_t
@@ -43,7 +42,7 @@ contains
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
    end subroutine read_friction
 
-   !> Friction is of nodes on polygons, in steps whose scheme has its forces along discrete
+   !> Friction is along the edges of polygons, in steps whose scheme has its forces along discrete
    !> gradients or which are static, and which hold contact exactly.
    subroutine check_friction(reader, pair, step)
       type(reader_t), intent(inout) :: reader
@@ -53,9 +52,6 @@ contains
 
       do i = 1, size(pair)
          if (.not. pair(i)%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-         if (pair(i)%formulation /= formulation_nts .and. pair(i)%formulation > 0) then
-            call refuse(reader, pair(i), "TYPE=SEGMENT or MORTAR; use TYPE=NODE TO SURFACE")
-         end if
          if (pair(i)%slave == pair(i)%master .and. pair(i)%slave > 0) then
             call refuse(reader, pair(i), "a surface in contact with itself; name two surfaces")
          end if

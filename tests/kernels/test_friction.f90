@@ -3,6 +3,7 @@ module test_friction
    use, intrinsic :: iso_fortran_env, only : output_unit
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_drag, condition_force, condition_t
+   use emcon_contact, only : condition_include, condition_resize, condition_resize_slip
    use emcon_errors, only : error_t
    use emcon_friction_law, only : friction_trial, friction_violation, touch_open, touch_sticks, &
       touch_t
@@ -11,6 +12,7 @@ module test_friction
    use emcon_lemke, only : lemke_solve
    use emcon_nts_constraint, only : polygon_constraint
    use emcon_nts_stencil, only : polygon_stencil_t
+   use emcon_slip_point, only : slip_add, slip_over, slip_point, slip_point_t
    use emcon_text, only : to_text
    use random_draws, only : draw_random
    use small_scenes, only : shake
@@ -29,6 +31,7 @@ contains
          test_case_t("trials: where the law holds next", test_trial), &
          test_case_t("violation of the law", test_violation), &
          test_case_t("slip: work, rigid motions, differences", test_slip), &
+         test_case_t("mean slip of points of an edge", test_points), &
          test_case_t("slip along an edge, and of the force", test_along), &
          test_case_t("Lemke: a problem by hand, and one without solution", test_lemke), &
          test_case_t("random small problems are always solved", test_random)]
@@ -119,6 +122,76 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_slip
+
+   !> Points of a slave edge over two master edges: work, rigid motions, differences, and the
+   !> middle of an edge that slides as one body.
+   subroutine test_points(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: small = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      type(slip_point_t) :: point(3)
+      type(condition_t) :: item, other
+      real(wp), dimension(2, 5) :: x, u0, du, moved, mid
+      real(wp) :: worst
+      integer :: i, j, case
+
+      point = [slip_point([1, 2, 3, 4], 0.1_wp, 0.7_wp), slip_point([1, 2, 3, 4], 0.6_wp, 0.4_wp), &
+         slip_point([1, 2, 4, 5], 0.9_wp, -0.1_wp)]
+      do case = 1, 20
+         call shake(x, 0.1_wp)
+         x = x + reshape([1.5_wp, 0.1_wp, 0.5_wp, 0.1_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 2.0_wp, &
+            -0.1_wp], [2, 5])
+         call shake(u0, 0.1_wp)
+         call shake(du, 0.3_wp)
+         call slide(du, item)
+         mid = x + u0 + 0.5_wp*du
+         associate (t => item%t(:, :5), at => mid(:, item%node(:5)))
+            call check_near(error, [sum(t*du(:, item%node(:5))), sum([(slip_over(point(i), x, u0, &
+               du), i = 1, 3)])], [item%slip, item%slip], 4.0_wp*tol, 1.0_wp, "T.D, and its value")
+            call check_near(error, [sum(t(1, :)), sum(t(2, :)), &
+               sum(t(2, :)*at(1, :) - t(1, :)*at(2, :))], [0.0_wp, 0.0_wp, 0.0_wp], 8.0_wp*tol, &
+               1.0_wp, "rigid motions of the middle")
+         end associate
+         worst = 0.0_wp
+         do j = 1, 10
+            associate (a => 1 + mod(j - 1, 2), k => 1 + (j - 1)/2)
+               moved = du
+               moved(a, item%node(k)) = du(a, item%node(k)) + small
+               call slide(moved, other)
+               worst = max(worst, abs((other%slip - item%slip)/small - item%t1(a, k)), &
+                  maxval(abs(reshape((other%t(:, :5) - item%t(:, :5))/small, [10]) &
+                  - item%ht(:10, j))))
+            end associate
+         end do
+         call check_true(error, worst < 100.0_wp*small, "differences: " // to_text(worst))
+         if (allocated(error)) return
+      end do
+      du = 0.0_wp
+      x(:, 3:) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 2.0_wp, 0.0_wp], [2, 3])
+      u0 = 0.0_wp
+      du(1, :2) = 0.25_wp
+      call slide(du, item)
+      call check_near(error, [item%slip], [0.25_wp*sum(point%weight)], tol, 1.0_wp, "as one body")
+
+   contains
+
+      !> The condition of all three, which so far is of the first node alone.
+      subroutine slide(way, item)
+         real(wp), intent(in) :: way(:, :)
+         type(condition_t), intent(inout) :: item
+         integer :: i
+
+         call condition_resize(item, 1)
+         item%node(1) = 1
+         do i = 1, 3
+            call condition_include(item, point(i)%node)
+         end do
+         call condition_resize_slip(item)
+         do i = 1, 3
+            call slip_add(point(i), x, u0, way, item)
+         end do
+      end subroutine slide
+
+   end subroutine test_points
 
    !> Along an edge that turns by a right angle meanwhile slip is what an observer on it sees, and
    !> friction pushes against it, along the edge in the middle.

@@ -18,11 +18,13 @@ from friction_scenes import (
     pressed_sideways,
     ring,
     rolling,
+    rubbing,
     way,
 )
-from plain_scenes import BOTH, ONE
+from plain_scenes import BOTH, ONE, Scene
 from scene_tools import run_deck
 from test_contact_output import restart
+from test_segments import with_profile
 
 
 def obeys(run, scale=0.0, law=1e-9):
@@ -76,6 +78,29 @@ def test_a_rigid_block_slides_to_rest(h, cells, tmp_path):
     assert moved == pytest.approx(n*h*(2.0 - 0.5*n*3.0*h) + 0.5*h*left, rel=1e-9)
     assert abs(moved - 2/3) <= 3.0*h**2/8 + 1e-9
     assert run.history["newton"].max() <= 8 and run.history["cuts"].sum() == 0
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_a_block_slides_to_rest_on_a_profile(formulation, tmp_path):
+    """A rigid surface of lines; three of them, so that nodes pass from one to the next."""
+    scene = Scene(0.01, 0.72, gravity=10.0)
+    scene.block("BODY", (0, 0), (2, 1), (4, 2), stiffness=2e4, velocity=(2.0, 0))
+    deck = with_profile(scene, "START, -3., 0.\nLINE, 0.7, 0.\nLINE, 2.2, 0.\nLINE, 6., 0.")
+    rubbing(deck, 0.3).replace("*MATERIAL, NAME=BODY", "*MATERIAL, NAME=BODY\n*DAMPING, BETA=2e-3")
+    run = run_deck(deck, tmp_path, formulation=formulation)
+    obeys(run)
+    assert way(run, 15)[-1] == pytest.approx(2/3, abs=2e-4)
+    assert run.history["newton"].max() <= 6 and run.history["cuts"].sum() == 0
+
+
+@pytest.mark.parametrize("kinematics", ["LINEAR", "COROTATED"])
+def test_a_block_of_small_strains_slides_to_rest(kinematics, tmp_path):
+    deck = block_on_floor(0.01, 0.72, 0.3, v0=2.0, eta=2e-3)
+    deck.replace("*SOLID SECTION, ELSET=FLOOR, MATERIAL=FLOOR",
+                 f"*SOLID SECTION, ELSET=FLOOR, MATERIAL=FLOOR, KINEMATICS={kinematics}")
+    run = run_deck(deck, tmp_path, **NODES)
+    obeys(run)
+    assert way(run, 15)[-1] == pytest.approx(2/3, abs=2e-4)
 
 
 # ---- stick and slip -----------------------------------------------------------------------------
@@ -160,13 +185,14 @@ def test_a_block_pulled_against_a_spring(tmp_path):
 # ---- statics ------------------------------------------------------------------------------------
 
 
-def test_statics_stick_and_slide(tmp_path):
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_statics_stick_and_slide(formulation, tmp_path):
     """A block moved by little sticks, and its force is linear in the way; moved by much all of it
     slides, with mu times the pressure. Null space and saddle point to the same digits."""
     force = {}
     for shift in (0.001, 0.002, 0.05):
-        runs = [run_deck(pressed(shift, 0.5), tmp_path/f"{shift}{method[0]}", **NODES,
-                         method=method) for method in ("NULL SPACE", "SADDLE POINT")]
+        runs = [run_deck(pressed(shift, 0.5), tmp_path/f"{shift}{method[0]}", method=method,
+                         formulation=formulation) for method in ("NULL SPACE", "SADDLE POINT")]
         history = runs[0].history
         force[shift] = np.array([history["pair1_force_x"][-1], history["pair1_force_y"][-1]])
         for run in runs:
@@ -277,6 +303,71 @@ def test_a_ring_keeps_momenta_and_pays_for_friction(mu, tmp_path):
 def test_a_ring_held_in_other_ways(more, tmp_path):
     run = run_deck(ring(0.8), tmp_path, **NODES, h=0.01, t_end=0.3, **more)
     obeys(run)
+
+
+@pytest.mark.parametrize("more", [{"formulation": "SEGMENT"}, {"formulation": "MORTAR"},
+                                  {"formulation": "MORTAR", "integration": "ELEMENTS"},
+                                  {"formulation": "MORTAR", "multiplier": "STANDARD"}])
+@pytest.mark.parametrize("mu", [0.2, 0.8])
+def test_a_ring_by_integrated_gaps(mu, more, tmp_path):
+    """Slips of points on edges, in their means: momenta, energy and law as of nodes."""
+    runs = [run_deck(ring(mu), tmp_path/method, h=0.02, t_end=0.6, method=method, **more)
+            for method in ("NULL SPACE", "SADDLE POINT")]
+    for run in runs:
+        obeys(run)
+        assert run.history["friction_loss"][-1] > 0.05*run.history["kinetic"][0]
+        for name in ("px", "py", "lz"):
+            change = np.abs(run.history[name] - run.history[name][0]).max()
+            assert change < 1e-13*np.abs(run.history["lz"][0])
+    for name in ("kinetic", "friction_loss", "strain"):
+        assert np.allclose(runs[0].history[name], runs[1].history[name], rtol=1e-9, atol=1e-11)
+
+
+# ---- integrated gaps ----------------------------------------------------------------------------
+
+
+INTEGRATED = [{"formulation": "SEGMENT"}, {"formulation": "MORTAR"},
+              {"formulation": "MORTAR", "normal": "EDGE"},
+              {"formulation": "MORTAR", "integration": "ELEMENTS"}]
+
+
+@pytest.mark.parametrize("more", INTEGRATED)
+def test_a_rigid_block_slides_to_rest_by_integrated_gaps(more, tmp_path):
+    """The way of nodes, to round-off: on a flat floor all points slide as their nodes."""
+    h = 0.02
+    run = run_deck(block_on_floor(h, 0.72, 0.3, v0=2.0, rigid=True), tmp_path, **more)
+    obeys(run)
+    n = math.floor(2.0/(3.0*h) + 1e-9)
+    left = 2.0 - n*3.0*h
+    assert way(run, 15)[-1] == pytest.approx(n*h*(2.0 - 0.5*n*3.0*h) + 0.5*h*left, rel=1e-9)
+
+
+@pytest.mark.parametrize("more", INTEGRATED)
+@pytest.mark.parametrize("push", [0.499, 0.501])
+def test_a_rigid_block_pushed_by_integrated_gaps(push, more, tmp_path):
+    run = run_deck(block_on_floor(0.01, 0.5, 0.5, push=10.0*push, rigid=True), tmp_path, **more)
+    obeys(run, scale=WEIGHT)
+    moved = way(run, 15)[-1]
+    assert moved == pytest.approx(0.5*0.5**2*10.0*max(0.0, push - 0.5), rel=1e-6, abs=1e-11)
+
+
+@pytest.mark.parametrize("more", INTEGRATED)
+def test_a_rigid_block_on_a_slope_by_integrated_gaps(more, tmp_path):
+    slope = -math.atan(0.5)
+    for mu in (0.49, 0.51):
+        run = run_deck(block_on_floor(0.01, 0.5, mu, slope=slope, rigid=True), tmp_path/f"{mu}",
+                       **more)
+        obeys(run, scale=WEIGHT)
+        exact = 0.5*0.5**2*10.0*math.cos(slope)*max(0.0, 0.5 - mu)
+        assert way(run, 15, slope)[-1] == pytest.approx(exact, rel=1e-6, abs=1e-11)
+
+
+@pytest.mark.parametrize("more", INTEGRATED)
+def test_a_damped_block_slides_to_rest_by_integrated_gaps(more, tmp_path):
+    run = run_deck(block_on_floor(0.01, 0.72, 0.3, v0=2.0, eta=2e-3), tmp_path, **more)
+    obeys(run)
+    assert way(run, 15)[-1] == pytest.approx(2/3, abs=2e-4)
+    assert run.history["newton"].max() <= 6 and run.history["cuts"].sum() == 0
 
 
 def test_a_restart_has_the_same_bits(tmp_path):
