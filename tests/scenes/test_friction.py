@@ -198,10 +198,13 @@ def test_statics_stick_and_slide(formulation, tmp_path):
         for run in runs:
             assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] < 1e-9
             assert run.history["newton"].max() <= 8 and run.history["cuts"].sum() == 0
-            assert (np.diff(run.history["friction_loss"]) >= 0).all()
+            lost = np.diff(run.history["friction_loss"])
+            assert (lost >= (0 if formulation == "NODE TO SURFACE" else -1e-18)).all()
             assert run.history["pair1_force_x"][-1] == pytest.approx(force[shift][0], rel=1e-10)
     assert force[0.002][0] == pytest.approx(2*force[0.001][0], rel=1e-2)
-    assert -force[0.05][0] == pytest.approx(0.5*force[0.05][1], rel=1e-10)
+    # Where nodes hold the floor is straight; mean gaps leave edges tilted by a part of the strain.
+    rel = 1e-10 if formulation == "NODE TO SURFACE" else 0.01
+    assert -force[0.05][0] == pytest.approx(0.5*force[0.05][1], rel=rel)
     assert run.history["friction_loss"][-1] > 0
 
 
