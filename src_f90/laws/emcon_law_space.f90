@@ -9,7 +9,8 @@ module emcon_law_space
    use emcon_law, only : law_t
    implicit none
    private
-   public :: n_strain, space_response_t, law_response_space, space_change_t, law_change_space
+   public :: n_strain, space_response_t, law_response_space, law_stress_space, space_change_t, &
+      law_change_space
 
    integer, parameter :: n_strain = 6, n_shear = 3
    !> Components 11, 22, 33, 12, 23, 13; a strain has twice the last three.
@@ -47,9 +48,23 @@ contains
       type(space_response_t), intent(out) :: response
       type(path_t) :: path
 
-      call find_path(strain, dstrain, path)
-      call chain(path, law%energy(path%e1, path%e2, path%e3), response)
+      call law_stress_space(law, strain, dstrain, response, .true.)
    end subroutine law_response_space
+
+   !> The same without the tangent, unless it is asked for.
+   pure subroutine law_stress_space(law, strain, dstrain, response, with_tangent)
+      class(law_t), intent(in) :: law
+      real(wp), intent(in) :: strain(n_strain), dstrain(n_strain)   !! E11, E22, E33, 2 E12, ...
+      type(space_response_t), intent(out) :: response
+      logical, intent(in) :: with_tangent        !! else the tangent is 0
+      type(path_t) :: path
+      type(dg_t) :: w
+
+      call find_path(strain, dstrain, path)
+      w = law%energy(path%e1, path%e2, path%e3)
+      call chain(path, w, response)
+      if (with_tangent) call add_tangent(path, w, response)
+   end subroutine law_stress_space
 
    !> Change of volume over the same step, with its gradients.
    pure subroutine law_change_space(law, strain, dstrain, change)
@@ -64,6 +79,7 @@ contains
       change%start = v%f0
       change%by = v%df
       call chain(path, v, change%space_response_t)
+      call add_tangent(path, v, change%space_response_t)
       change%at_end = matmul(path%at_end, v%c)
    end subroutine law_change_space
 
@@ -95,26 +111,36 @@ contains
    pure subroutine chain(path, w, response)
       type(path_t), intent(in) :: path
       type(dg_t), intent(in) :: w                !! of e1, e2, e3
-      type(space_response_t), intent(out) :: response
-      real(wp) :: d(n_strain)
-      integer :: i, j
+      type(space_response_t), intent(inout) :: response
 
       response%energy = w%f1
       response%stress = matmul(path%n, w%g)
+   end subroutine chain
+
+   !> Its second derivatives.
+   pure subroutine add_tangent(path, w, response)
+      type(path_t), intent(in) :: path
+      type(dg_t), intent(in) :: w                !! of e1, e2, e3
+      type(space_response_t), intent(inout) :: response
+      real(wp) :: d(n_strain), curved(n_strain)
+      integer :: i, j, k
+
       do j = 1, size(w%g)
          do i = 1, size(w%g)
-            response%tangent = response%tangent &
-               + w%h(i, j)*outer(path%n(:, i), path%at_end(:, j))
+            do k = 1, n_strain
+               response%tangent(:, k) = response%tangent(:, k) &
+                  + w%h(i, j)*(path%n(:, i)*path%at_end(k, j))
+            end do
          end do
       end do
+      curved = 0.5_wp*path%mean + path%by/12.0_wp
       do j = 1, n_strain
          d = 0.0_wp
          d(j) = entry_of(j)
          response%tangent(:, j) = response%tangent(:, j) &
-            + (0.5_wp*w%g(2))*(trace(d)*unit - d) &
-            + w%g(3)*cross(0.5_wp*path%mean + path%by/12.0_wp, d)
+            + (0.5_wp*w%g(2))*(trace(d)*unit - d) + w%g(3)*cross(curved, d)
       end do
-   end subroutine chain
+   end subroutine add_tangent
 
    pure real(wp) function trace(a)
       real(wp), intent(in) :: a(n_strain)
@@ -128,13 +154,6 @@ contains
 
       product_of = sum(a(:n_shear)*b(:n_shear)) + 2.0_wp*sum(a(n_shear + 1:)*b(n_shear + 1:))
    end function product_of
-
-   pure function outer(a, b) result(c)
-      real(wp), intent(in) :: a(n_strain), b(n_strain)
-      real(wp) :: c(n_strain, n_strain)
-
-      c = spread(a, 2, n_strain)*spread(b, 1, n_strain)
-   end function outer
 
    !> a x b, symmetric and bilinear, of which a x a is twice the cofactor of a.
    pure function cross(a, b) result(c)

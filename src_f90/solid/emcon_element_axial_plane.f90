@@ -9,7 +9,8 @@ module emcon_element_axial_plane
    use emcon_element_space, only : space_motion_t, space_part_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_space, only : law_response_space, n_strain, space_response_t
+   use emcon_law_space, only : law_response_space, law_stress_space, n_strain, &
+      space_response_t
    implicit none
    private
    public :: axial_element_respond, axial_element_hold
@@ -51,7 +52,7 @@ contains
          call place_point(self, k, motion, point)
          part%is_inverted = .not. is_regular(point, law%has_volume)
          if (part%is_inverted) return
-         call law_response_space(law, point%strain, point%dstrain, response)
+         call law_stress_space(law, point%strain, point%dstrain, response, with_tangent)
          call add_point(self, k, point, response, part)
          if (with_tangent) call add_tangent(self, k, point, response, part)
       end do

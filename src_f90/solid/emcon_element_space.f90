@@ -7,7 +7,8 @@ module emcon_element_space
    use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_space, only : law_response_space, n_strain, space_response_t
+   use emcon_law_space, only : law_response_space, law_stress_space, n_strain, &
+      space_response_t
    use emcon_rotation, only : product_of => cross_product
    use emcon_shape, only : max_node => max_element_nodes, shape_t, shape_table_t, shape_tabulate
    implicit none
@@ -148,7 +149,7 @@ contains
          call space_point(self, k, motion, point)
          part%is_inverted = .not. space_point_is_regular(point, law%has_volume)
          if (part%is_inverted) return
-         call law_response_space(law, point%strain, point%dstrain, response)
+         call law_stress_space(law, point%strain, point%dstrain, response, with_tangent)
          call space_part_add(self, k, point, response, part)
          if (with_tangent) call space_part_add_tangent(self, k, point, response, part)
       end do

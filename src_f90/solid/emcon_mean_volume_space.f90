@@ -10,8 +10,8 @@ module emcon_mean_volume_space
       space_point_is_regular, space_point_strain_by, space_point_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_space, only : law_change_space, law_response_space, space_change_t, &
-      space_response_t
+   use emcon_law_space, only : law_change_space, law_response_space, law_stress_space, &
+      space_change_t, space_response_t
    use emcon_shape, only : max_node => max_element_nodes
    implicit none
    private
@@ -49,7 +49,7 @@ contains
       do k = 1, self%n_gp
          call space_point(self, k, motion, point)
          call law_change_space(law, point%strain, point%dstrain, change)
-         call law_response_space(rest, point%strain, point%dstrain, response)
+         call law_stress_space(rest, point%strain, point%dstrain, response, with_tangent)
          response%stress = response%stress + u%g(1)*change%stress
          response%tangent = response%tangent + u%g(1)*change%tangent
          call space_part_add(self, k, point, response, part)

@@ -19,6 +19,9 @@ module emcon_single_elements
    public :: element_slots_t, single_respond, single_tangent_times, single_find_fastest
    public :: compare_frequency
 
+   !> Elements that threads share at a time.
+   integer, parameter :: n_block = 1024
+
    !> Where element matrices go.
    type :: element_slots_t
       integer, allocatable :: slot(:)            !! element matrices by columns
@@ -27,7 +30,8 @@ module emcon_single_elements
 
 contains
 
-   !> Forces of a motion. What displacements are rounded by, forces are too.
+   !> Forces of a motion. What displacements are rounded by, forces are too. Threads share the
+   !> elements of a block, whose forces are added in the order of the scene.
    subroutine single_respond(solid, nlgeom, slots, motion, response, value, side)
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: nlgeom              !! .false.: small strains
@@ -35,22 +39,36 @@ contains
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      type(space_motion_t) :: local
-      type(space_part_t) :: part
-      integer :: e
+      type(space_motion_t), allocatable :: local(:)
+      type(space_part_t), allocatable :: part(:)
+      logical :: with_tangent
+      integer :: e, first, k, n
 
+      with_tangent = present(value)
+      n = merge(n_block, 1, response%n_thread > 1)
+      allocate(local(n), part(n))
       local%nlgeom = nlgeom
-      do e = 1, solid%n_element
-         if (solid%is_rigid(e)) cycle
-         call respond_at(solid, e, motion, present(value), local, part)
-         if (part%is_inverted) then
-            response%refusal = "element " // to_text(solid%label(e)) // " is inverted"
-            return
-         end if
-         response%energy(e) = part%energy
-         call add_forces(solid, e, motion, local, part, response)
-         if (present(value)) call add_tangent(slots%slot(slots%first(e):), motion%weight, &
-            solid%n_dim, solid%geometry(e)%n_node, part, value, side)
+      do first = 0, solid%n_element - 1, n
+         n = min(n, solid%n_element - first)
+         !$omp parallel do default(none) num_threads(response%n_thread) if(n > 1) &
+         !$omp shared(solid, motion, local, part, first, n, with_tangent) schedule(static)
+         do k = 1, n
+            if (.not. solid%is_rigid(first + k)) call respond_at(solid, first + k, motion, &
+               with_tangent, local(k), part(k))
+         end do
+         !$omp end parallel do
+         do k = 1, n
+            e = first + k
+            if (solid%is_rigid(e)) cycle
+            if (part(k)%is_inverted) then
+               response%refusal = "element " // to_text(solid%label(e)) // " is inverted"
+               return
+            end if
+            response%energy(e) = part(k)%energy
+            call add_forces(solid, e, motion, local(k), part(k), response)
+            if (present(value)) call add_tangent(slots%slot(slots%first(e):), motion%weight, &
+               solid%n_dim, solid%geometry(e)%n_node, part(k), value, side)
+         end do
       end do
    end subroutine single_respond
 
