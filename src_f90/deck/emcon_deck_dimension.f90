@@ -5,6 +5,7 @@ module emcon_deck_dimension
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_materials, only : kinematics_nonlinear
+   use emcon_requests, only : output_t
    use emcon_scene, only : scene_t
    implicit none
    private
@@ -31,7 +32,7 @@ module emcon_deck_dimension
       plane_card_t("CONTACTPAIR", "contact"), &
       plane_card_t("CONTACT", "contact"), &
       plane_card_t("TIE", "ties", "are"), &
-      plane_card_t("RIGIDBODY", "rigid bodies", "are"), &
+      plane_card_t("RIGIDBODY", "rigid bodies", "are", .true.), &
       plane_card_t("USERELEMENT", "elements of a program", "are"), &
       plane_card_t("USERMATERIAL", "laws of a program", "are"), &
       plane_card_t("GIVENFORCES", "forces of a program", "are", .true.)]
@@ -133,7 +134,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable :: missing
-      integer :: i
+      integer :: i, k
 
       missing = " " // trim(merge(in_space, on_rings // "  ", scene%n_dim == n_space)) &
          // " is not in this version"
@@ -153,8 +154,23 @@ contains
          associate (step => scene%step(i))
             if (step%scheme%dissipates) call add_error(reader%log, step%choice%origin, &
                "*TIME INTEGRATION: SCHEME=" // trim(step%scheme%word) // missing)
+            do k = 1, size(step%output)
+               if (size(scene%rigid) > 0 .and. asks_for_turns(step%output(k))) call add_error( &
+                  reader%log, step%origin, "UR, VR, RM: the rotation of rigid bodies" // missing)
+            end do
          end associate
       end do
    end subroutine check_dimension
+
+   !> Is the rotation of reference nodes to be written?
+   pure logical function asks_for_turns(output)
+      type(output_t), intent(in) :: output
+      integer :: k
+
+      asks_for_turns = .false.
+      do k = 1, size(output%variable)
+         asks_for_turns = asks_for_turns .or. any(["UR", "VR", "RM"] == output%variable(k)%text)
+      end do
+   end function asks_for_turns
 
 end module emcon_deck_dimension

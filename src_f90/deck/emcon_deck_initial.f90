@@ -9,7 +9,7 @@ module emcon_deck_initial
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
-   use emcon_rotation, only : cross_product
+   use emcon_rotation, only : cross_product, n_turn
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use emcon_turn_plane, only : turned_left
@@ -26,7 +26,7 @@ module emcon_deck_initial
    type :: field_t
       real(wp), allocatable :: value(:, :)         !! (n_dim, n_node) [L] or [L/T]
       logical, allocatable :: is_given(:)          !! (n_node)
-      real(wp), allocatable :: spin(:)             !! (n_rigid) [1/T]
+      real(wp), allocatable :: spin(:, :)          !! (n_turn, n_rigid) [1/T]
       type(origin_t) :: origin                     !! of the last card
    end type field_t
 
@@ -74,7 +74,7 @@ contains
 
       allocate(self%value(scene%n_dim, size(scene%node_label)), source=0.0_wp)
       allocate(self%is_given(size(scene%node_label)), source=.false.)
-      allocate(self%spin(size(scene%rigid)), source=0.0_wp)
+      allocate(self%spin(n_turn(scene%n_dim), size(scene%rigid)), source=0.0_wp)
    end subroutine begin
 
    !> Lines of node or set, degree of freedom, value.
@@ -95,9 +95,9 @@ contains
          call check_count(reader, data, 3, 3, "node or node set, degree of freedom, value")
          if (.not. data%ok) cycle
          call get_integer(reader, data, 2, "degree of freedom", dof)
-         if (data%ok .and. dof > 3 .and. dof /= last_freedom) call data_error(reader, data, &
-            "degree of freedom " // to_text(dof) // " does not exist; known: " &
-            // freedoms_text(scene%n_dim))
+         if (data%ok .and. (dof > 3 .and. dof <= last_freedom - size(field%spin, 1) &
+            .or. dof > last_freedom)) call data_error(reader, data, "degree of freedom " // &
+            to_text(dof) // " does not exist; known: " // freedoms_text(scene%n_dim))
          value = 0.0_wp
          call get_real(reader, data, 3, "value", value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
@@ -105,21 +105,23 @@ contains
          if (dof <= scene%n_dim) then
             field%value(dof, item) = value
             field%is_given(item) = .true.
-         else if (dof == last_freedom .and. may_turn) then
-            call put_spin(reader, data, scene, item, value, field)
+         else if (dof > last_freedom - size(field%spin, 1) .and. may_turn) then
+            call put_spin(reader, data, scene, item, dof, value, field)
          else if (abs(value) > 0.0_wp) then
-            call data_error(reader, data, "the model is plane: degree of freedom " // &
+            call data_error(reader, data, trim(merge("the model is plane", &
+               "nodes do not turn ", scene%n_dim == n_plane)) // ": degree of freedom " // &
                to_text(dof) // " must start at 0")
          end if
       end do
    end subroutine read_values
 
    !> The spin of the rigid bodies whose reference nodes `item` are.
-   subroutine put_spin(reader, data, scene, item, value, field)
+   subroutine put_spin(reader, data, scene, item, dof, value, field)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: item(:)               !! nodes
+      integer, intent(in) :: dof                   !! about x, y, z: 4, 5, 6; in the plane 6
       real(wp), intent(in) :: value                !! [1/T]
       type(field_t), intent(inout) :: field
       integer :: i, b
@@ -127,11 +129,12 @@ contains
       do i = 1, size(item)
          b = findloc(scene%rigid%reference, item(i), 1)
          if (b > 0) then
-            field%spin(b) = value
+            field%spin(dof + size(field%spin, 1) - last_freedom, b) = value
             field%is_given(item(i)) = .true.
          else if (abs(value) > 0.0_wp .and. .not. reader%doubt_rigid) then
             call data_error(reader, data, "node " // to_text(scene%node_label(item(i))) // &
-               " cannot turn: degree of freedom 6 is that of the reference node of a *RIGID BODY")
+               " cannot turn: degree of freedom " // to_text(dof) // " is that of the reference " &
+               // "node of a *RIGID BODY")
             return
          end if
       end do
@@ -170,23 +173,44 @@ contains
          end do
          field%is_given(item) = .true.
          do i = 1, size(scene%rigid)
-            if (any(item == scene%rigid(i)%reference)) field%spin(i) = spin
+            if (any(item == scene%rigid(i)%reference)) field%spin(:, i) = spin*about(axis, &
+               scene%n_dim)
          end do
       end do
    end subroutine read_rotating
+
+   !> A spin of one about an axis, by its components.
+   pure function about(axis, n_dim) result(spin)
+      real(wp), intent(in) :: axis(:)              !! (n_axis) [L]
+      integer, intent(in) :: n_dim
+      real(wp) :: spin(n_turn(n_dim))
+
+      spin = 1.0_wp
+      if (n_dim == n_plane) return
+      spin = axis(n_dim + 1:) - axis(:n_dim)
+      spin = spin/norm2(spin)
+   end function about
+
+   !> How the end of an arm moves by a spin.
+   pure function carried(arm, spin) result(velocity)
+      real(wp), intent(in) :: arm(:)               !! (n_dim) [L]
+      real(wp), intent(in) :: spin(:)              !! (n_turn) [1/T]
+      real(wp) :: velocity(size(arm))
+
+      if (size(arm) == n_plane) then
+         velocity = spin(1)*turned_left(arm)
+      else
+         velocity = cross_product(spin, arm)
+      end if
+   end function carried
 
    !> How a point at `x` moves by a unit spin about an axis: two points of it, or one in the plane.
    pure function turned(x, axis) result(velocity)
       real(wp), intent(in) :: x(:)                 !! (n_dim) [L]
       real(wp), intent(in) :: axis(:)              !! (n_axis) [L]
-      real(wp) :: velocity(size(x)), along(size(x))
+      real(wp) :: velocity(size(x))
 
-      if (size(x) == n_plane) then
-         velocity = turned_left(x - axis(:size(x)))
-      else
-         along = axis(size(x) + 1:) - axis(:size(x))
-         velocity = cross_product(along/norm2(along), x - axis(:size(x)))
-      end if
+      velocity = carried(x - axis(:size(x)), about(axis, size(x)))
    end function turned
 
    !> The line behind: a point on the axis; in the plane a second one has to be above it, along 3,
@@ -235,15 +259,16 @@ contains
          associate (body => scene%rigid(b))
             largest = maxval(abs(field%value(:, body%node)))
             do i = 1, size(body%node)
-               start = field%value(:, body%reference) + field%spin(b)*turned_left( &
-                  scene%x(:, body%node(i)) - scene%x(:, body%reference))
+               start = field%value(:, body%reference) + carried(scene%x(:, body%node(i)) &
+                  - scene%x(:, body%reference), field%spin(:, b))
                if (field%is_given(body%node(i)) .and. any(abs(field%value(:, body%node(i)) &
                   - start) > rounding*largest)) then
                   call add_error(reader%log, field%origin, "*INITIAL CONDITIONS: the " // name &
                      // " of node " // to_text(scene%node_label(body%node(i))) // &
                      " does not fit the motion of rigid body " // body%name // &
                      "; give it at the reference node " // &
-                     to_text(scene%node_label(body%reference)) // ", degrees of freedom 1, 2, 6")
+                     to_text(scene%node_label(body%reference)) // ", degrees of freedom " &
+                     // trim(merge("1, 2, 6", "1 to 6 ", scene%n_dim == n_plane)))
                   exit
                end if
                field%value(:, body%node(i)) = start

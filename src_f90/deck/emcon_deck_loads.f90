@@ -96,6 +96,7 @@ contains
          call read_boundary_line(reader, data, scene%n_dim, is_held, new%value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (data%ok) call check_rigid(reader, data, scene, is_held, item)
+         if (data%ok) call check_turns(reader, data, scene, is_held, item, new%value)
          if (data%ok) call check_value(reader, data, scene, is_held, item, new)
          if (.not. data%ok) cycle
          allocate(is_other(size(item)), source=.false.)
@@ -148,6 +149,28 @@ contains
          end associate
       end do
    end subroutine check_rigid
+
+   !> In space a reference node turns about all axes or about none.
+   subroutine check_turns(reader, data, scene, is_held, item, value)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_held(:)            !! (last_freedom)
+      integer, intent(in) :: item(:)               !! nodes
+      real(wp), intent(in) :: value
+      integer :: i
+
+      if (scene%n_dim == n_plane .or. .not. any(is_held(scene%n_dim + 1:))) return
+      if (all(is_held(scene%n_dim + 1:)) .and. .not. abs(value) > 0.0_wp) return
+      do i = 1, size(item)
+         if (.not. any(scene%rigid%reference == item(i))) cycle
+         call data_error(reader, data, "reference node " // to_text(scene%node_label(item(i))) &
+            // ": a rigid body of three dimensions turns freely, or degrees of freedom 4 to 6 " &
+            // "are all held at 0 by one line; single axes and driven rotations are not in " &
+            // "this version")
+         return
+      end do
+   end subroutine check_turns
 
    subroutine check_boundary_options(reader, card)
       type(reader_t), intent(inout) :: reader
@@ -287,7 +310,7 @@ contains
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (data%ok) call check_force(reader, data, scene, item, new)
          if (.not. data%ok) cycle
-         is_moment = new%place == last_freedom
+         is_moment = new%place == last_freedom .and. scene%n_dim == n_plane
          if (new%place > scene%n_dim .and. .not. is_moment) cycle
          new%kind = merge(load_moment, load_point, is_moment)
          if (is_moment) new%place = scene%n_dim + 1
@@ -309,9 +332,9 @@ contains
       integer :: i
 
       if (new%value == 0.0_wp .and. new%place <= last_freedom) return
-      if (new%place == last_freedom .and. .not. reader%doubt_rigid) then
+      if (new%place == last_freedom .and. scene%n_dim == n_plane) then
          do i = 1, size(item)
-            if (any(scene%rigid%reference == item(i))) cycle
+            if (reader%doubt_rigid .or. any(scene%rigid%reference == item(i))) cycle
             call data_error(reader, data, "no moment can act on node " // &
                to_text(scene%node_label(item(i))) // ": degree of freedom 6 is that of the " // &
                "reference node of a *RIGID BODY")

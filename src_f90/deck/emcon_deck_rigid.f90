@@ -1,10 +1,11 @@
 !> *RIGID BODY: element sets that keep their shape, their reference nodes, how these turn.
 module emcon_deck_rigid
+   use emcon_deck_dimension, only : n_plane
    use emcon_deck_labels, only : find_label
    use emcon_deck_named, only : find_set, hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t
    use emcon_deck_surfaces, only : find_surface, surface_names
-   use emcon_diagnostics, only : label_list, quoted, suggestion
+   use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
@@ -66,7 +67,8 @@ contains
       call rigid_frame_choose(scene%x, new%node, new%reference, new%frame)
       if (.not. allocated(new%frame)) call card_error(reader, card, "the nodes of " &
          // new%name // " and the reference node " // to_text(scene%node_label(new%reference)) &
-         // " lie on one line, which tells no rotation; put the reference node beside it")
+         // " lie " // trim(merge("on one line ", "in one plane", scene%n_dim == n_plane)) &
+         // ", which tells no rotation; put the reference node beside it")
    end subroutine read_card
 
    subroutine find_elements(reader, card, scene, new)
@@ -197,7 +199,8 @@ contains
 
    !> What turns: with its reference node prescribed, a body is prescribed by its frame, else by
    !> nodes of their own that its arms follow.
-   subroutine read_turns(scene)
+   subroutine read_turns(reader, scene)
+      type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
       integer :: i_step, i, a
 
@@ -211,9 +214,32 @@ contains
                if (.not. turn%is_about) call add_arms(scene, turn%angle%origin, turn%rigid)
                call prescribe_turn(scene, i_step, i)
             end associate
+            if (scene%n_dim /= n_plane) call check_hold(reader, scene, i_step, i)
          end do
       end do
    end subroutine read_turns
+
+   !> In space a body that has turned is held as it is, by FIXED: the rotation 0 is that of the
+   !> start.
+   subroutine check_hold(reader, scene, i_step, i)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step, i             !! turn `i` of that step
+      integer :: k
+
+      associate (angle => scene%step(i_step)%turn(i)%angle)
+         if (angle%is_frozen .or. i_step == 1) return
+         associate (earlier => scene%step(i_step - 1)%turn%angle)
+            k = findloc(earlier%node, angle%node, 1)
+            if (k > 0) then
+               if (.not. earlier(k)%is_frozen) return
+            end if
+         end associate
+         call add_error(reader%log, angle%origin, "*BOUNDARY: rigid body " // &
+            scene%rigid(scene%step(i_step)%turn(i)%rigid)%name // " may have turned before step " &
+            // to_text(i_step) // ": in three dimensions FIXED holds it as it is then")
+      end associate
+   end subroutine check_hold
 
    !> Nodes at the ends of the arms of rigid body `b`, behind all others, if it has none.
    subroutine add_arms(scene, origin, b)

@@ -79,7 +79,7 @@ contains
          scene%step(k)%output = requests%output
          last = scene%step(k)
       end do
-      call read_turns(scene)
+      call read_turns(reader, scene)
       call pairs_ask(reader, scene%pair, scene%step)
       call suit_explicit(reader, scene%pair, scene%step)
       call check_massless(reader, scene%step)

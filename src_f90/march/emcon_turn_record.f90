@@ -1,4 +1,4 @@
-!> How far rigid bodies have turned, and the moments that their supports exert.
+!> How far rigid bodies of the plane have turned, and the moments that their supports exert.
 !>
 !> Where the rotation of a body is prescribed, forces on its arms turn it: their moment about the
 !> reference node is what the support has to give. Source: docs/theory.md, section 13.
@@ -7,14 +7,16 @@ module emcon_turn_record
    use emcon_moment_plane, only : moment_of
    use emcon_motion, only : motion_t
    use emcon_rigid_bodies, only : rigid_body_t
+   use emcon_rotation, only : n_turn
    use emcon_turn_plane, only : turned_by
    implicit none
    private
    public :: turn_record_t, turn_record_init, turn_record_measure, turn_record_spin
 
    type :: turn_record_t
-      real(wp), allocatable :: angle(:)          !! (n_rigid) from the reference positions on
-      !> (n_rigid) of the last step, about the reference node, on the body [M L^2/T^2]
+      !> (n_rigid, 0 in space) from the reference positions on
+      real(wp), allocatable :: angle(:)
+      !> (likewise) of the last step, about the reference node, on the body [M L^2/T^2]
       real(wp), allocatable :: moment(:)
    end type turn_record_t
 
@@ -27,8 +29,9 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       integer :: b
 
-      allocate(self%angle(size(rigid)), self%moment(size(rigid)), source=0.0_wp)
-      do b = 1, size(rigid)
+      b = merge(size(rigid), 0, n_turn(size(x, 1)) == 1)
+      allocate(self%angle(b), self%moment(b), source=0.0_wp)
+      do b = 1, size(self%angle)
          self%angle(b) = turned_by(arm_of(rigid(b), 2, x), arm_of(rigid(b), 2, x + u))
       end do
    end subroutine turn_record_init
@@ -42,7 +45,7 @@ contains
       real(wp) :: first(size(reaction, 1)), way(size(reaction, 1))
       integer :: b, k, node
 
-      do b = 1, size(rigid)
+      do b = 1, size(self%angle)
          self%moment(b) = 0.0_wp
          do k = size(rigid(b)%frame), 2, -1
             first = arm_of(rigid(b), k, motion%x) + arm_of(rigid(b), k, motion%u0)

@@ -3,6 +3,7 @@ module emcon_prescribed
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
    use emcon_kinds, only : wp
    use emcon_pose, only : instant_t
+   use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_find, prescribed_t, step_t
    use emcon_turn_plane, only : turn_arm, turn_of, turned_by
@@ -55,10 +56,8 @@ contains
          v = 0.0_wp
          if (turn%is_about) call given_motion(scene, step, step%prescribed(prescribed_find( &
             step%prescribed, turn%angle%node, a)), instant, u_start(a, turn%angle%node), u, v)
-         if (turn%angle%is_frozen) then
-            u = u + start(a)
-            return
-         end if
+         if (turn%angle%is_frozen) u = u + start(a)
+         if (turn%angle%is_frozen .or. n_turn(size(arm)) > 1) return    ! in space: as at the start
          begun = turned_by(arm, arm + start)
          begun = begun + turn_of*anint((turn%angle%before - begun)/turn_of)
          call given_motion(scene, step, turn%angle, instant, begun, angle, spin)

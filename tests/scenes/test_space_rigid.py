@@ -1,0 +1,169 @@
+"""Rigid bodies of three dimensions: a free top, a heavy one on a joint, one that holds a beam."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_tools import Run, emcon, run_deck
+from scipy.spatial.transform import Rotation
+from space_mesh import Block
+
+LAW = "*HYPERELASTIC, NEO HOOKE\n20., 0.01\n"
+#: A rod with a square section: its moments of inertia about its axis z, and about x and y.
+SIZE, DENSITY = (1.0, 1.0, 2.0), 0.5
+MASS = DENSITY*SIZE[0]*SIZE[1]*SIZE[2]
+ALONG, ACROSS = MASS*2/12, MASS*(SIZE[0]**2 + SIZE[2]**2)/12
+REFERENCE = 9999
+
+
+def top(kind: str, reference: tuple[float, float, float], tilt: Rotation, spin: np.ndarray,
+        velocity: tuple[float, float, float], step: str) -> tuple[str, np.ndarray]:
+    """The deck of a rod that is turned by `tilt` about its reference node, and its nodes."""
+    mesh = Block(kind, (1, 1, 2), SIZE)
+    at = np.array(reference)
+    mesh.x = at + tilt.apply(mesh.x - at)
+    starts = "".join(f"{REFERENCE}, {k}, {v!r}\n"
+                     for k, v in enumerate([*velocity, *map(float, spin)], 1))
+    return mesh.deck("", f"*NODE\n{REFERENCE}, {', '.join(map(repr, map(float, at)))}\n"
+                     f"*RIGID BODY, ELSET=ALL, REF NODE={REFERENCE}\n"
+                     f"*INITIAL CONDITIONS, TYPE=VELOCITY\n{starts}{step}", DENSITY), mesh.x
+
+
+def run(text: str, folder: Path) -> Run:
+    folder.mkdir(exist_ok=True)
+    (folder/"deck.inp").write_text(text)
+    return run_deck(folder/"deck.inp", folder)
+
+
+def dynamic(h: float, n: int, cards: str = "") -> str:
+    return (f"*STEP, NLGEOM, INC={n}\n*DYNAMIC, DIRECT\n{h!r}, {h*n!r}\n{cards}"
+            f"*NODE FILE, FREQUENCY={n}\nU\n*END STEP\n")
+
+
+def drift(history: np.ndarray, names: list[str]) -> float:
+    size = np.sqrt(sum(history[name][0]**2 for name in names))
+    return max(np.abs(history[name] - history[name][0]).max() for name in names)/size
+
+
+def shape_error(x: np.ndarray, rest: np.ndarray) -> float:
+    def apart(p: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(p[:, None] - p[None], axis=2)
+    return float(np.abs(apart(x) - apart(rest)).max()/apart(rest).max())
+
+
+TILT = Rotation.from_rotvec([0.3, -0.5, 0.2])
+SPIN = np.array([0.9, -0.4, 2.5])
+CENTRE, VELOCITY = (0.5, 0.5, 1.0), (0.25, -0.5, 0.125)
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D10"])
+def test_a_free_top(kind: str, tmp_path: Path) -> None:
+    """Energy, six momenta and shape over 1000 increments, with the moments of inertia of a rod."""
+    text, rest = top(kind, CENTRE, TILT, SPIN, VELOCITY, dynamic(0.05, 1000))
+    found = run(text, tmp_path)
+    history = found.history
+    assert len(history) == 1001
+    for names in (["total"], ["px", "py", "pz"], ["lx", "ly", "lz"]):
+        assert drift(history, names) <= 1e-12, names
+    own = TILT.inv().apply(SPIN)
+    inertia = np.array([ACROSS, ACROSS, ALONG])
+    kinetic = 0.5*inertia @ own**2 + 0.5*MASS*np.dot(VELOCITY, VELOCITY)
+    assert history["kinetic"][0] == pytest.approx(kinetic, rel=1e-13)
+    momentum = TILT.apply(inertia*own) + MASS*np.cross(CENTRE, VELOCITY)
+    for name, wanted in zip(("lx", "ly", "lz"), momentum, strict=True):
+        assert history[name][0] == pytest.approx(wanted, abs=1e-13*np.linalg.norm(momentum))
+    x = found.fields().x + found.fields()["displacement"][-1]
+    assert shape_error(x[:len(rest)], rest) <= 1e-12
+
+
+def test_it_precesses_as_a_symmetric_top_does(tmp_path: Path) -> None:
+    """About the angular momentum by |L| t over the moment across, and about its own axis by what
+    is left of its spin: places come near at second order."""
+    own = TILT.inv().apply(SPIN)
+    momentum = TILT.apply(own*[ACROSS, ACROSS, ALONG])
+    time = 4.0
+    turn = (Rotation.from_rotvec(momentum/ACROSS*time)
+            * Rotation.from_rotvec(TILT.apply([0, 0, own[2]*(1 - ALONG/ACROSS)*time])))
+    error = []
+    for k, n in enumerate((200, 400)):
+        text, rest = top("C3D8", CENTRE, TILT, SPIN, VELOCITY, dynamic(time/n, n))
+        fields = run(text, tmp_path/str(k)).fields()
+        exact = turn.apply(rest - CENTRE) + CENTRE + np.array(VELOCITY)*time
+        found = fields.x + fields["displacement"][-1]
+        error.append(np.abs(found[:len(rest)] - exact).max())
+    assert error[0] < 0.02
+    assert error[0]/error[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_heavy_top_on_a_joint(tmp_path: Path) -> None:
+    """Its foot is held, its weight pulls: energy, and the angular momentum about the vertical."""
+    foot = (0.5, 0.5, 0.0)
+    text, rest = top("C3D8", foot, Rotation.from_rotvec([0.4, 0, 0]), np.array([0, -4.0, 9.0]),
+                     (0, 0, 0), f"*BOUNDARY\n{REFERENCE}, 1, 3\n" + dynamic(
+                         0.02, 500, "*DLOAD\nALL, GRAV, 5., 0., 0., -1.\n"))
+    found = run(text, tmp_path)
+    history = found.history
+    # About the vertical through the foot: the momentum moves the axis from the origin.
+    lz = history["lz"] - (foot[0]*history["py"] - foot[1]*history["px"])
+    assert np.abs(lz - lz[0]).max() <= 1e-12*abs(lz[0])
+    assert np.abs(history["total"] - history["total"][0]).max() <= 1e-12*history["kinetic"].max()
+    assert np.ptp(history["kinetic"]) > 0.01*history["kinetic"].max()
+    x = found.fields().x + found.fields()["displacement"][-1]
+    assert np.array_equal(x[-1], foot)
+    assert shape_error(x[:len(rest)], rest) <= 1e-12
+
+
+def test_a_held_body_is_a_clamp(tmp_path: Path) -> None:
+    """A beam whose first cells are rigid and held bends as one whose nodes there are held; held at
+    one point but free to turn it is told to be free."""
+    mesh = Block("C3D8", (6, 1, 1), (6, 1, 1))
+    nodes = "".join(f"{k}, 1, 3\n" for k in range(1, len(mesh.x) + 1) if mesh.x[k - 1, 0] < 1.5)
+    end = "".join(f"{k}, 3, -0.01\n" for k in mesh.on(0, 1))
+    rigid = (f"*NODE\n{REFERENCE}, 0.5, 0.5, 3.\n*ELSET, ELSET=FOOT\n1\n"
+             f"*RIGID BODY, ELSET=FOOT, REF NODE={REFERENCE}\n")
+    step = (f"*STEP, NLGEOM\n*STATIC\n1., 1.\n*CLOAD\n{end}*NODE FILE\nU\n*END STEP\n")
+    held = run(mesh.deck(LAW, f"*BOUNDARY\n{nodes}{step}"), tmp_path/"nodes").fields()
+    bodies = run(mesh.deck(LAW, f"{rigid}*BOUNDARY\n{REFERENCE}, ENCASTRE\n{step}"),
+                 tmp_path/"body").fields()
+    wanted = held["displacement"][-1]
+    found = bodies["displacement"][-1][:len(wanted)]
+    assert np.abs(wanted).max() > 0.01
+    assert np.abs(found - wanted).max() <= 1e-10*np.abs(wanted).max()
+    (tmp_path/"free.inp").write_text(mesh.deck(LAW, f"{rigid}*BOUNDARY\n{REFERENCE}, PINNED\n{step}"))
+    done = emcon(tmp_path/"free.inp", "--quiet", "--output", tmp_path)
+    assert done.returncode == 3
+    assert "free to rotate about x, rotate about y, rotate about z" in done.stderr
+
+
+@pytest.mark.parametrize(("cards", "text"), [
+    (f"*BOUNDARY\n{REFERENCE}, 4\n", "degrees of freedom 4 to 6 are all held at 0 by one line"),
+    (f"*BOUNDARY\n{REFERENCE}, 4, 6, 0.5\n", "driven rotations are not in this version"),
+    (f"*BOUNDARY\n{REFERENCE}, XSYMM\n", "single axes"),
+    (f"*CLOAD\n{REFERENCE}, 6, 1.\n", "degree of freedom 6 does not exist"),
+    ("*BOUNDARY\n1, 1, 3\n", "prescribe that node"),
+    ("*NODE FILE\nUR\n", "rotation of rigid bodies in three dimensions is not in this version")])
+def test_what_is_refused(cards: str, text: str, tmp_path: Path) -> None:
+    deck, _ = top("C3D8", CENTRE, TILT, SPIN, VELOCITY, dynamic(0.05, 2, cards))
+    (tmp_path/"deck.inp").write_text(deck)
+    done = emcon("check", tmp_path/"deck.inp")
+    assert done.returncode == 2
+    assert text in done.stderr
+    assert done.stderr.count("error:") == 1
+
+
+def test_a_turned_body_is_held_as_it_is(tmp_path: Path) -> None:
+    hold = f"*BOUNDARY{{}}\n{REFERENCE}, 4, 6\n"
+    for k, (fixed, code) in enumerate((("", 2), (", FIXED", 0))):
+        deck, rest = top("C3D8", CENTRE, TILT, SPIN, VELOCITY,
+                         dynamic(0.05, 4) + dynamic(0.05, 4, hold.format(fixed)))
+        (tmp_path/f"{k}.inp").write_text(deck)
+        done = emcon(tmp_path/f"{k}.inp", "--quiet", "--output", tmp_path)
+        assert done.returncode == code, done.stderr
+        assert code == 0 or "FIXED holds it as it is" in done.stderr
+    fields = Run(tmp_path/"1").fields()
+    way = (fields["displacement"][-1] - fields["displacement"][-2])[:len(rest)]
+    assert np.abs(way - way[0]).max() <= 1e-12
+    x = fields.x + fields["displacement"][-1]
+    assert shape_error(x[:len(rest)], rest) <= 1e-12
