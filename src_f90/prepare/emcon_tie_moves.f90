@@ -34,7 +34,7 @@ contains
       if (size(scene%tie) == 0) return
       call linear_rows_init(linear, scene)
       linear%is_used = linear%tie > 0
-      allocate(is_alive(2, size(scene%x, 2)), source=.true.)
+      allocate(is_alive(size(scene%x, 1), size(scene%x, 2)), source=.true.)
       call numbering_init(numbering, is_alive, nothing, linear)
       allocate(move, source=0.0_wp*scene%x)
       call find_moves(numbering, scene%x, move)
@@ -101,7 +101,7 @@ contains
                before = corner_area(scene%x(:, node), i)
                after = corner_area(scene%x(:, node) + move(:, node), i)
                if (.not. before > 0.0_wp .or. after > least_area*before) cycle
-               k = maxloc(abs(move(1, node)) + abs(move(2, node)), 1)
+               k = maxloc(sum(abs(move(:, node)), 1), 1)
                call tie_text(scene, node(k), tie)
                call raise(error, err_input, tie // "element " // &
                   to_text(scene%element_label(e)) // " would be spoilt: the tie moves its " // &

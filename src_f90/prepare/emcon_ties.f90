@@ -173,10 +173,10 @@ contains
    !> Freedoms that are prescribed in some step.
    pure subroutine find_held(scene, is_held)
       type(scene_t), intent(in) :: scene
-      logical, allocatable, intent(out) :: is_held(:, :)     !! (2, n_node)
+      logical, allocatable, intent(out) :: is_held(:, :)     !! (n_dim, n_node)
       integer :: i, k
 
-      allocate(is_held(2, size(scene%x, 2)), source=.false.)
+      allocate(is_held(size(scene%x, 1), size(scene%x, 2)), source=.false.)
       do i = 1, size(scene%step)
          associate (prescribed => scene%step(i)%prescribed)
             do k = 1, size(prescribed)

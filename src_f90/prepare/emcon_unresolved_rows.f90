@@ -65,7 +65,7 @@ contains
             if (prescribed(k)%amplitude == 0) motion = motion - u(prescribed(k)%dof, &
                prescribed(k)%node)
             do i = 1, size(item%dof)
-               if (item%dof(i) /= 2*(prescribed(k)%node - 1) + prescribed(k)%dof) cycle
+               if (item%dof(i) /= size(u, 1)*(prescribed(k)%node - 1) + prescribed(k)%dof) cycle
                part = item%weight(i)*motion
                associate (a => prescribed(k)%amplitude)
                   total(a) = total(a) + part
@@ -85,7 +85,7 @@ contains
       character(len=:), allocatable :: nodes
 
       call row_text(scene, linear, item%row, text)
-      call nodes_text(scene, (item%dof + 1)/2, nodes)
+      call nodes_text(scene, nodes_of(scene, item%dof), nodes)
       text = text // " contradicts what is prescribed at " // nodes // &
          ": the model is over-constrained; take *BOUNDARY off one side"
    end subroutine contradiction_text
@@ -100,23 +100,37 @@ contains
       associate (k => linear%place(row), t => linear%tie(row))
          if (t < 0) then
             text = where_text(scene, scene%rigid(-t)%origin) // ": *RIGID BODY " // &
-               scene%rigid(-t)%name // " in " // direction(linear%own(row)) // " at node " // &
-               to_text(scene%node_label(k))
+               scene%rigid(-t)%name // " in " // direction(scene, linear%own(row)) &
+               // " at node " // to_text(scene%node_label(k))
          else if (t == 0) then
             text = where_text(scene, scene%equation(k)%origin) // ": *EQUATION " // to_text(k)
          else
             text = where_text(scene, scene%tie(t)%origin) // ": *TIE " // scene%tie(t)%name // &
-               " in " // direction(linear%own(row)) // " at slave node " // &
+               " in " // direction(scene, linear%own(row)) // " at slave node " // &
                to_text(scene%node_label(scene%tie(t)%rows%slave(k)))
          end if
       end associate
    end subroutine row_text
 
-   pure character(len=1) function direction(dof)
+   !> The axis of a degree of freedom.
+   pure character(len=1) function direction(scene, dof)
+      type(scene_t), intent(in) :: scene
       integer, intent(in) :: dof
+      character(len=*), parameter :: axes = "xyz"
+      integer :: a
 
-      direction = merge("x", "y", mod(dof, 2) == 1)
+      a = 1 + mod(dof - 1, scene%n_dim)
+      direction = axes(a:a)
    end function direction
+
+   !> The nodes of degrees of freedom.
+   pure function nodes_of(scene, dof) result(node)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: dof(:)
+      integer :: node(size(dof))
+
+      node = (dof - 1)/scene%n_dim + 1
+   end function nodes_of
 
    subroutine nodes_text(scene, node, text)
       type(scene_t), intent(in) :: scene
@@ -150,7 +164,7 @@ contains
          call note_add(notes, text // " follows from other " // &
             "constraints: left out (such equations: " // to_text(size(row)) // ")")
       else
-         call nodes_text(scene, (linear%own(row) + 1)/2, text)
+         call nodes_text(scene, nodes_of(scene, linear%own(row)), text)
          call note_add(notes, "*TIE " // scene%tie(t)%name // ": constraints at slave " // text // &
             " follow from others or from *BOUNDARY: left out")
       end if
