@@ -4,6 +4,7 @@ Counted from the sizes of the mesh and from what the run did; the rates are thos
 reaches on one thread: of a product of matrices, and of sums of vectors as long as the data.
 """
 
+import math
 import sys
 
 import numpy as np
@@ -86,18 +87,31 @@ def least_times(size, counts):
     return {name: least[name]/INCREMENTS for name in PHASES}, held, flops, speed
 
 
+def growth(unknowns, total):
+    """The exponents by which both of `total`, found and least, have grown with the unknowns."""
+    if len(total) < 2:
+        return "-"
+    size = math.log(unknowns[-1]/unknowns[0])
+    return ", ".join(f"{math.log(last/first)/size:.2f}"
+                     for first, last in zip(total[0], total[-1], strict=True))
+
+
 def floors(sizes):
     """Lines of the table."""
-    heads, columns = ["phase"], []
+    heads, columns, all_unknowns, total = ["phase"], [], [], []
     for size in sizes:
         unknowns, seconds, counts, written = ring_run(*size)
         least, held, flops, speed = least_times(size, counts)
         heads.append(f"{unknowns} unknowns")
         figures = [f"{1e3*seconds[name]/INCREMENTS:.3g} ms, {1e3*least[name]:.2g} ms"
                    for name in PHASES]
+        all_unknowns.append(unknowns)
+        total.append([1e3*sum(times[name] for name in PHASES)/n
+                      for times, n in ((seconds, INCREMENTS), (least, 1))])
+        figures += ["{:.3g} ms, {:.2g} ms".format(*total[-1]), growth(all_unknowns, total)]
         columns.append([*figures, f"{1e3*seconds['output']/INCREMENTS:.3g} ms, "
                         f"{1e-3*written/INCREMENTS:.0f} kB", held, f"{1e-9*flops:.0f}",
                         f"{1e-9*speed:.0f}"])
-    names = (*PHASES, "output", "entries of the factor", "10^9 operations per second",
-             "GB per second")
+    names = (*PHASES, "all of these", "exponents from the smallest on", "output",
+             "entries of the factor", "10^9 operations per second", "GB per second")
     return table(heads, zip(names, *columns, strict=True))
