@@ -23,7 +23,8 @@ module emcon_kept_factor
    private
    public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
       kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
-      kept_factor_free, kept_factor_is_possible, kept_factor_multipliers, kept_factor_reach
+      kept_factor_free, kept_factor_is_possible, kept_factor_has_room, kept_factor_multipliers, &
+      kept_factor_reach
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -128,6 +129,15 @@ contains
       end associate
    end subroutine lay_out
 
+   !> May `n` constraints be taken, by the factor there is or a new one?
+   pure logical function kept_factor_has_room(self, n, n_entry)
+      type(kept_factor_t), intent(in) :: self
+      integer, intent(in) :: n                   !! >= 0
+      integer, intent(in) :: n_entry             !! of the matrix that a new one would be of
+
+      kept_factor_has_room = n**2 <= self%most_products*merge(self%n_slot, n_entry, self%is_made)
+   end function kept_factor_has_room
+
    !> Take the constraints of `set` at their present gradients.
    subroutine kept_factor_take(self, set, is_fit, error)
       type(kept_factor_t), intent(inout) :: self
@@ -136,7 +146,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: k, n
 
-      is_fit = self%is_made .and. set%n**2 <= self%most_products*self%n_slot
+      is_fit = self%is_made .and. kept_factor_has_room(self, set%n, self%n_slot)
       if (.not. is_fit) return
       if (allocated(self%l)) then
          if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start, self%bend)

@@ -15,7 +15,7 @@ module emcon_newton
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_keeping, only : keeping_begin, keeping_break_off, keeping_correct, keeping_give_up, &
       keeping_looks, keeping_make, keeping_renew, keeping_t
-   use emcon_kept_factor, only : kept_factor_serves
+   use emcon_kept_factor, only : kept_factor_has_room, kept_factor_serves
    use emcon_kinds, only : int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
@@ -461,7 +461,8 @@ contains
       call phase_enter(system%phases, phase_gaps, left)
       if (set%n > 0) then
          leaves_second = .not. with_tangent
-         if (self%convergence%is_kept) leaves_second = .not. keeping_looks(self%keeping)
+         if (self%convergence%is_kept) leaves_second = .not. (keeping_looks(self%keeping) .and. &
+            kept_factor_has_room(self%correction%kept, set%n, size(system%matrix%column)))
          call constraints_evaluate(set, system, motion, leaves_second)
          call constraints_rows(set, system%space%numbering)
       end if

@@ -3,9 +3,9 @@ module test_kept_factor
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
-   use emcon_kept_factor, only : kept_factor_correct, kept_factor_free, kept_factor_look, &
-      kept_factor_multipliers, kept_factor_renew, kept_factor_serves, kept_factor_set_up, &
-      kept_factor_t, kept_factor_take
+   use emcon_kept_factor, only : kept_factor_correct, kept_factor_free, kept_factor_has_room, &
+      kept_factor_look, kept_factor_multipliers, kept_factor_renew, kept_factor_serves, &
+      kept_factor_set_up, kept_factor_t, kept_factor_take
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_default
@@ -27,6 +27,7 @@ contains
          test_case_t("no factor of a pattern that is not symmetric", test_pattern), &
          test_case_t("no factor of what is not definite", test_indefinite), &
          test_case_t("strong curvature is told", test_curvature), &
+         test_case_t("it is known beforehand for how many constraints there is room", test_room), &
          test_case_t("a constraint takes up what is along its gradients", test_along)]
    end subroutine collect_kept_factor
 
@@ -153,6 +154,32 @@ contains
       call check_true(error, .not. is_fit, "nothing to solve with")
       call kept_factor_free(kept)
    end subroutine test_indefinite
+
+   !> Entries of W^T W are counted against those of the matrix, and there is room for none at last:
+   !> told before the factor is made as after.
+   subroutine test_room(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      logical :: is_fit, has_room
+      integer :: k, n_entry
+
+      call make_symmetric(problem)
+      n_entry = size(problem%base%column)
+      call kept_factor_set_up(kept, solver_default)
+      do k = problem%set%n**2/n_entry + 1, 0, -1
+         kept%most_products = k
+         has_room = kept_factor_has_room(kept, problem%set%n, n_entry)
+         call kept_factor_renew(kept, problem%base, error)
+         if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
+         if (allocated(error)) return
+         call check_true(error, is_fit .eqv. problem%set%n**2 <= k*n_entry, "taken")
+         call check_true(error, is_fit .eqv. has_room, "foretold")
+         call check_true(error, is_fit .eqv. kept_factor_has_room(kept, problem%set%n, 0), "made")
+         kept%is_made = .false.
+      end do
+      call kept_factor_free(kept)
+   end subroutine test_room
 
    !> At a kink the second derivative of a gap is as large as one likes.
    subroutine test_curvature(error)
