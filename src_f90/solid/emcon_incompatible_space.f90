@@ -8,7 +8,7 @@ module emcon_incompatible_space
    use emcon_incompatible_modes, only : modes_relax, modes_return
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_space, only : law_response_space, n_strain, space_response_t
+   use emcon_law_space, only : law_stress_space, n_strain, space_response_t
    implicit none
    private
    public :: incompatible_space_respond
@@ -41,7 +41,7 @@ contains
          point(k)%dstrain = dstrain(:, k)
          part%is_inverted = .not. space_point_is_regular(point(k), law%has_volume)
          if (part%is_inverted) return
-         call law_response_space(law, strain(:, k), dstrain(:, k), response(k))
+         call law_stress_space(law, strain(:, k), dstrain(:, k), response(k), with_tangent)
          stress(:, k) = response(k)%stress
          moduli(:, :, k) = response(k)%tangent
       end do
