@@ -23,7 +23,7 @@ class FieldFile:
     """Fields over time of one run (NAME.vtkhdf), read when asked for.
 
     Attributes: `times` (n_frame) [T], `points` (n_node, 3) reference positions [L], `cells` list
-    of node numbers (0-based) per element, `point_fields` and `cell_fields` names. Frames are
+    of node numbers (0-based) per element, `types` of these as VTK counts, `point_fields` and `cell_fields` names. Frames are
     counted from 0; -1 is the last. `file[name]` is a field at all frames, a `FieldSeries`.
 
     Raises `ResultError` for a file that is missing, foreign or damaged, for a field that it does
@@ -59,9 +59,10 @@ class FieldFile:
                 or (np.diff(offsets) <= 0).any() or not len(connectivity)
                 or connectivity.min() < 0 or connectivity.max() >= n_node):
             raise ResultError(f"{self.path}: the mesh in it is broken")
+        self.types: NDArray[np.int64] = read(root, "Types").astype(np.int64)
         self.cells: list[NDArray[np.int64]] = [
             _outline(cell, kind) for cell, kind
-            in zip(np.split(connectivity, offsets[1:-1]), read(root, "Types"))]
+            in zip(np.split(connectivity, offsets[1:-1]), self.types)]
         self.point_fields = self._names("PointData")
         self.cell_fields = self._names("CellData")
         if not len(self.times):

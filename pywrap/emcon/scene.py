@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from .projection import basis, far_first, outer_faces, project
+from .projection import SOLIDS, basis, far_first, outer_faces, project
 from .results import Array, FieldFile, ResultError
 
 #: A body that moves less than this fraction of the largest displacement counts as support.
@@ -145,7 +145,8 @@ def _colour_values(file: FieldFile, name: str, frame: int) -> Array | None:
 def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") -> Scene:
     """The bodies at some frames, coloured by the point or cell field `name`.
 
-    Raises `ResultError` for a field that is not there; a missing stress or displacement is a note.
+    Raises `ResultError` for a field that is not there and for shells in space; a missing stress or
+    displacement is a note.
     """
     notes = []
     if "displacement" in file.point_fields:
@@ -168,6 +169,9 @@ def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") 
                   values=values or None, label=label, cells=file.cells,
                   is_support=(body < 0) | support[body], notes=notes)
     if np.ptp(file.points[:, 2]) > 0.0:
+        if not np.isin(file.types, SOLIDS).all():
+            raise ResultError(f"{file.path} is three-dimensional, and not of tetrahedra and "
+                              "hexahedra alone; open it in ParaView")
         _see(scene, place)
     return scene
 

@@ -92,6 +92,7 @@ module emcon_api
       stepper_give_scheme, stepper_give_solver
    use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &
       stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
+   use emcon_stepper_loads, only : stepper_add_loads, stepper_find_load, stepper_set_load
    use emcon_stepper_null_space, only : query_follow_links, query_gather_links, query_links, &
       query_multipliers, query_null_space, query_particular
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &

@@ -66,7 +66,7 @@ contains
       allocate(self%acts(n), source=.false.)
       allocate(self%lam(n), source=0.0_wp)
       allocate(self%state%is_active, source=self%acts)
-      allocate(self%state%lam, source=self%lam)
+      allocate(self%state%lam, self%state%closure, source=self%lam)
       call motion_init(self%motion, scene%x)
       allocate(self%du, self%push, source=at_rest(scene%x))
       allocate(self%slave_push(size(scene%x, 1), size(model%contact)), source=0.0_wp)

@@ -46,8 +46,8 @@ contains
          load = place_in(self%scene%step(i_step)%load, kind, find_target(self%scene, kind, label), &
             place)
          call check_that(load > 0, "there is no load of this kind on " // &
-            target_text(kind, label) // " in step " // to_text(i_step) // " of the deck; one " // &
-            "that is not there can be added", error)
+            trim(noun_of(kind)) // " " // to_text(label) // " in step " // to_text(i_step) // &
+            " of the deck; one that is not there can be added", error)
       end associate
    end subroutine stepper_find_load
 
@@ -112,8 +112,8 @@ contains
                new%place = merge(0, place(i), kind == load_gravity)
                call check_place(self, new, label(i), number, error)
                call check_that(place_in(list(:n + i - 1), kind, new%target, new%place) == 0, &
-                  "there is such a load on " // target_text(kind, label(i)) // " already: it can " &
-                  // "be given another value", error)
+                  "there is such a load on " // trim(noun_of(kind)) // " " // &
+                  to_text(label(i)) // " already: it can be given another value", error)
                if (allocated(error)) return
                new%value = value(i)
                call ramp_turn(step, self%march%state%step_time, 0.0_wp, value(i), new%value_start)
@@ -142,13 +142,12 @@ contains
       end if
    end function find_target
 
-   pure function target_text(kind, label) result(text)
+   !> What a load of this kind acts on.
+   pure character(len=7) function noun_of(kind)
       integer, intent(in) :: kind                    !! one of `load_`
-      integer, intent(in) :: label
-      character(len=:), allocatable :: text
 
-      text = trim(merge("node   ", "element", kind == load_point)) // " " // to_text(label)
-   end function target_text
+      noun_of = merge("node   ", "element", kind == load_point)
+   end function noun_of
 
    !> The first load of this kind there; 0: there is none.
    pure integer function place_in(list, kind, target, place)
@@ -189,7 +188,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: section
 
-      call check_that(load%target > 0, "there is no " // target_text(load%kind, label), error)
+      call check_that(load%target > 0, "there is no " // trim(noun_of(load%kind)) // " " // &
+         to_text(label), error)
       if (allocated(error)) return
       select case (load%kind)
       case (load_point)

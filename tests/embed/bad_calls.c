@@ -148,7 +148,7 @@ static void without_arrays(int n_node, int n_constraint)
 /* What was not asked for yet, counts that do not fit, numbers that are none. */
 static void with_rubbish(double *x, const emcon_sizes *sizes)
 {
-   const int n = sizes->n_node, nc = sizes->n_constraint;
+   const int n = sizes->n_node, nc = sizes->n_constraint, i[1] = {1};
    const double early = -1;
    emcon_csr matrix;
 

@@ -380,8 +380,8 @@ contains
                call press_ring(edge, p, sample%x, -u, .true., other)
                near = -(force - other)/(2.0_wp*h)
                call check_near(error, real(value(slot(:, 2*(j - 1) + a)), wp), &
-                  [near(:, edge(1)), near(:, edge(2)), near(:, edge(3))], tol, two_pi, &
-                  sample%what // ": tangent")
+                  [near(:, edge(1)), near(:, edge(2)), near(:, edge(3))], &
+                  512.0_wp*max(eps, real(epsilon(value), wp)), two_pi, sample%what // ": tangent")
             end do
          end do
          if (allocated(error)) return
