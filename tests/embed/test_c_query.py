@@ -30,7 +30,8 @@ RUBBISH = [
     "n_constraint is 5, but the model has 4", "n_node is 107", "n_constraint is 11", "not 0", "",
     "without tangent", "n_unknown is 203, but the model has 204", "finite", "not -0.1", "finite",
     "finite", "last one of the deck", "built already", "time -1 is before", "no load 51: .* has 50",
-    "no load 0", "not finite", "no load of this kind", "no node 0", "1 to 2, not 3",
+    "no load 0", "is -1", "NULL", "kind 99 is not one of loads", "not finite", "no load of this kind",
+    "no node 0", "1 to 2, not 3",
     "is not prescribed", "0 threads", "cannot create no/such/folder", "u is not finite at node 106",
     "u1 is not finite", "u0 is not finite",
 ]
