@@ -1,29 +1,22 @@
-!> All elements of a scene: reference geometry, laws, mass; what one of them responds.
+!> All elements of a scene: reference geometry, laws, mass.
 module emcon_solid
-   use emcon_element, only : element_geometry_t, element_motion_t, element_point, &
-      element_response_t, point_is_regular, point_motion_t
-   use emcon_element_pack_plane, only : element_pack_t, pack_add_point, pack_clear, pack_fill, &
-      pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
+   use emcon_element, only : element_geometry_t
+   use emcon_element_pack_plane, only : element_pack_t, pack_fill
    use emcon_element_space, only : n_space, space_element_add_mass, space_element_place
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_host_law, only : host_answer, host_law_t, host_law_take, host_points_make_room, &
-      host_response_t, host_rest_stiffness
+   use emcon_host_law, only : host_law_t, host_law_take, host_rest_stiffness
    use emcon_incompatible_modes, only : modes_init
-   use emcon_incompatible_plane, only : incompatible_respond
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t, law_t, n_lane
    use emcon_law_space, only : law_response_space, n_strain, space_response_t
    use emcon_law_registry, only : law_create, law_given, law_linearise, law_make_thin
-   use emcon_mean_volume_plane, only : mean_volume_respond
    use emcon_materials, only : kinematics_corotated, kinematics_linear
-   use emcon_point_function, only : point_gradient, point_ok
    use emcon_scene, only : scene_t, where_text
    use emcon_shape, only : shape_table_t, shape_tabulate
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: solid_t, solid_init, solid_element_respond, solid_pack_respond
-   public :: solid_evaluate_given, solid_gather
+   public :: solid_t, solid_init
 
    !> How stress at the quadrature points of a kind of elements is carried to its nodes.
    type :: to_nodes_t
@@ -178,7 +171,8 @@ contains
             call raise(error, err_input, "element " // to_text(self%label(e)) // " has " &
                // "incompatible modes, for which the law given for material " &
                // self%material(1 + mod(self%law_of(e) - 1, size(self%material)))%text &
-               // " tells no moduli; take CPE4 or CPE8")
+               // " tells no moduli; take " // trim(merge("C3D8 or C3D20", "CPE4 or CPE8 ", &
+               self%n_dim == n_space)))
          else if (self%n_dim == n_space) then
             call law_response_space(law%law, rest, rest, space)
             call modes_init(self%geometry(e), table, space%tangent)
@@ -472,144 +466,5 @@ contains
          gradient(2, i) = (jacobian(1, 1)*slope(2, i) - jacobian(1, 2)*slope(1, i))/det
       end do
    end subroutine reference_gradient
-
-   !> Response of a pack to a motion, which is that of `given` too.
-   pure subroutine solid_pack_respond(self, pack, motion, given, with_tangent, point, part)
-      type(solid_t), intent(in) :: self
-      type(element_pack_t), intent(in) :: pack
-      type(pack_motion_t), intent(in) :: motion
-      type(host_response_t), intent(in) :: given
-      logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(pack_point_t), intent(inout) :: point         !! work space
-      type(pack_response_t), intent(inout) :: part
-      integer :: k
-
-      if (allocated(pack%mode)) then
-         call incompatible_respond(pack, self%law(pack%law)%law, motion, with_tangent, part)
-         return
-      else if (self%has_mean(pack%element(1))) then
-         call mean_volume_respond(pack, self%law(pack%law)%law, self%rest(pack%law)%law, motion, &
-            with_tangent, part)
-         return
-      end if
-      call pack_clear(pack%n_node, part, with_tangent)
-      do k = 1, pack%n_gp
-         call pack_point(pack, k, motion, point)
-         if (self%first_point(pack%element(1)) > 0) then
-            call host_answer(given%points(pack%law), self%first_point(pack%element) - 1 + k, &
-               point%law)
-         else
-            associate (law => self%law(pack%law)%law)
-               call pack_point_check(law%has_volume, point, part)
-               call law%respond(point%law, with_tangent)
-            end associate
-         end if
-         call pack_add_point(pack, k, point, with_tangent, part)
-      end do
-   end subroutine solid_pack_respond
-
-   !> Response of element `e` alone.
-   pure subroutine solid_element_respond(self, e, motion, given, with_tangent, part)
-      type(solid_t), intent(in) :: self
-      integer, intent(in) :: e                   !! 1 to n_element
-      type(element_motion_t), intent(in) :: motion
-      type(host_response_t), intent(in) :: given
-      logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(element_response_t), intent(inout) :: part
-      type(element_pack_t) :: pack
-      type(pack_motion_t) :: motions
-      type(pack_point_t) :: point
-      type(pack_response_t) :: parts
-      integer :: i, n
-
-      call pack_fill(pack, [e], self%law_of(e), self%node, self%geometry)
-      motions%nlgeom = motion%nlgeom
-      n = pack%n_node
-      do i = 1, n
-         motions%from(:, :, i) = spread(motion%from(:, i) - motion%from(:, 1), 1, n_lane)
-         motions%by(:, :, i) = spread(motion%by(:, i) - motion%by(:, 1), 1, n_lane)
-      end do
-      call solid_pack_respond(self, pack, motions, given, with_tangent, point, parts)
-      part%energy = parts%energy(1)
-      part%force(:, :n) = parts%force(1, :, :n)
-      part%magnitude(:, :n) = parts%magnitude(1, :, :n)
-      if (with_tangent) part%tangent(:2*n, :2*n) = reshape(parts%tangent(1, :, :n, :, :n), &
-         [2*n, 2*n])
-      part%is_inverted = parts%is_inverted(1)
-   end subroutine solid_element_respond
-
-   !> Let the given laws answer to the step, each in one call for all its points.
-   subroutine solid_evaluate_given(self, u0, du, nlgeom, with_tangent, given)
-      type(solid_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      logical, intent(in) :: nlgeom              !! .false.: small strains
-      logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(host_response_t), intent(inout) :: given
-      integer :: k
-
-      given%material = 0
-      given%status = point_ok
-      call gather_strains(self, u0, du, nlgeom, given)
-      if (given%inverted_element > 0) return
-      do k = 1, size(self%given)
-         if (self%n_point(k) == 0) cycle
-         associate (points => given%points(k))
-            call point_gradient(self%given(k)%energy, points%strain, points%dstrain, &
-               with_tangent, points%response, given%status)
-         end associate
-         if (given%status == point_ok) cycle
-         given%material = k
-         given%inverted_element = findloc(self%law_of, k, 1)
-         return
-      end do
-   end subroutine solid_evaluate_given
-
-   !> The strains of the elements of given laws, and the first of these that is inverted.
-   pure subroutine gather_strains(self, u0, du, nlgeom, given)
-      type(solid_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      logical, intent(in) :: nlgeom
-      type(host_response_t), intent(inout) :: given
-      type(element_motion_t) :: local
-      type(point_motion_t) :: point
-      integer :: e, i, k
-
-      if (.not. allocated(given%points)) allocate(given%points(size(self%given)))
-      do k = 1, size(self%given)
-         call host_points_make_room(given%points(k), self%n_point(k))
-      end do
-      given%inverted_element = 0
-      local%nlgeom = nlgeom
-      do e = 1, self%n_element
-         if (self%first_point(e) == 0) cycle
-         call solid_gather(self%node(:self%geometry(e)%n_node, e), u0, du, local)
-         do k = 1, self%geometry(e)%n_gp
-            i = self%first_point(e) - 1 + k
-            call element_point(self%geometry(e), k, local, point)
-            associate (points => given%points(self%law_of(e)))
-               points%strain(:, i) = point%strain
-               points%dstrain(:, i) = point%dstrain
-            end associate
-            if (.not. point_is_regular(point, .false.)) then
-               given%inverted_element = e
-               return
-            end if
-         end do
-      end do
-   end subroutine gather_strains
-
-   !> Displacements of the nodes of an element relative to its first node, which does not round them
-   !> with the distance that a body has flown.
-   pure subroutine solid_gather(node, u0, du, local)
-      integer, intent(in) :: node(:)                             !! of the element
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      type(element_motion_t), intent(inout) :: local             !! `from`, `by` are set
-      integer :: i
-
-      do i = 1, size(node)
-         local%from(:, i) = u0(:, node(i)) - u0(:, node(1))
-         local%by(:, i) = du(:, node(i)) - du(:, node(1))
-      end do
-   end subroutine solid_gather
 
 end module emcon_solid

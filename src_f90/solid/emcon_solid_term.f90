@@ -15,7 +15,8 @@ module emcon_solid_term
    use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
    use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_evaluate_given, solid_init, solid_pack_respond, solid_t
+   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid_respond, only : solid_evaluate_given, solid_pack_respond
    use emcon_single_elements, only : compare_frequency, element_slots_t, single_find_fastest, &
       single_respond, single_tangent_times
    use emcon_space, only : lists_append, lists_t, space_t

@@ -6,7 +6,8 @@ module emcon_stiff_elements
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
    use emcon_lumped_mass, only : lumped_mass
-   use emcon_solid, only : solid_element_respond, solid_t
+   use emcon_solid, only : solid_t
+   use emcon_solid_respond, only : solid_element_respond
    use emcon_term, only : fastest_t
    implicit none
    private

@@ -18,7 +18,8 @@ module emcon_stress
    use emcon_mean_volume_plane, only : mean_volume_hold
    use emcon_mean_volume_space, only : mean_volume_space_hold
    use emcon_push_forward_plane, only : push_forward
-   use emcon_solid, only : solid_evaluate_given, solid_t
+   use emcon_solid, only : solid_t
+   use emcon_solid_respond, only : solid_evaluate_given
    implicit none
    private
    public :: nodal_stress, element_means, element_energies, von_mises

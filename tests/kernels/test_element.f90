@@ -9,7 +9,8 @@ module test_element
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_element_respond, solid_init, solid_t
+   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid_respond, only : solid_element_respond
    use emcon_text, only : to_text
    use random_draws, only : draw_random
    use small_scenes, only : block_t, make_block, shake, young

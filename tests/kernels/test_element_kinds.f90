@@ -11,7 +11,8 @@ module test_element_kinds
       law_neo_hooke, law_ogden, law_yeoh
    use emcon_scene, only : scene_t
    use emcon_shape, only : max_plane_nodes
-   use emcon_solid, only : solid_element_respond, solid_init, solid_t
+   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid_respond, only : solid_element_respond
    use emcon_text, only : to_text
    use small_scenes, only : scene_begin, shake, young
    implicit none

@@ -8,7 +8,8 @@ module test_solid
    use emcon_motion, only : motion_of
    use emcon_pose, only : pose_t
    use emcon_scene, only : scene_t
-   use emcon_solid, only : solid_element_respond, solid_init, solid_t
+   use emcon_solid, only : solid_init, solid_t
+   use emcon_solid_respond, only : solid_element_respond
    use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
    use small_scenes, only : add_block, block_t, make_block, shake, young

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -18,8 +19,9 @@ TURNS = "rotate about x, rotate about y, rotate about z"
 
 
 def solve(kind: str, supports: list[tuple[tuple[int, ...], tuple[int, ...]]],
-          equations: list[tuple[int, ...]] = []) -> None:
-    """A unit cube turned by nothing, 2 x 2 x 2; supports and equations at corners 000 to 111."""
+          equations: list[tuple[int, ...]] = []) -> np.ndarray:
+    """Reactions of a unit cube, 2 x 2 x 2, pulled at 111 by 0.1 along z; supports and equations are at
+    corners 000 to 111."""
     mesh = block(cells=(2, 2, 2), kind=kind)
     model = Model.from_mesh(mesh)
     model.material("M", elastic=(100.0, 0.3)).section("M", "BLOCK")
@@ -32,6 +34,7 @@ def solve(kind: str, supports: list[tuple[tuple[int, ...], tuple[int, ...]]],
     step.load(corner[1, 1, 1], 3, 0.1)
     with model.stepper() as stepper:
         stepper.run()
+        return stepper.reactions
 
 
 @pytest.mark.parametrize("kind", ["C3D8", "C3D10"])
@@ -55,4 +58,5 @@ def test_what_is_free_is_named(kind: str, supports: list, equations: list, text:
 
 @pytest.mark.parametrize("kind", ["C3D8", "C3D10"])
 def test_a_body_that_just_stands_is_solved(kind: str) -> None:
-    solve(kind, [((0, 0, 0), (1, 2, 3)), ((1, 0, 0), (2, 3)), ((0, 1, 0), (3,))])
+    reactions = solve(kind, [((0, 0, 0), (1, 2, 3)), ((1, 0, 0), (2, 3)), ((0, 1, 0), (3,))])
+    assert reactions.sum(axis=0) == pytest.approx([0, 0, -0.1], abs=1e-9*0.1)
