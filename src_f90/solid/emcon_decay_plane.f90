@@ -5,8 +5,9 @@
 !> Source: docs/theory.md, eqs. (4e) to (4g), (11a) and (11b).
 module emcon_decay_plane
    use emcon_csr, only : csr_t
-   use emcon_element, only : element_geometry_t, element_motion_t, element_point, point_motion_t
+   use emcon_element, only : element_geometry_t
    use emcon_element_lists, only : element_lists
+   use emcon_element_plane, only : element_motion_t, element_point, point_motion_t
    use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_response_plane, law_response_t

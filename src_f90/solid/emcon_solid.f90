@@ -2,6 +2,7 @@
 module emcon_solid
    use emcon_element, only : element_geometry_t
    use emcon_element_pack_plane, only : element_pack_t, pack_fill
+   use emcon_element_plane, only : reference_gradient
    use emcon_element_space, only : n_space, space_element_add_mass, space_element_place
    use emcon_errors, only : err_input, error_t, raise
    use emcon_host_law, only : host_law_t, host_law_take, host_rest_stiffness
@@ -444,27 +445,5 @@ contains
          end do
       end associate
    end subroutine estimate_stiffness
-
-   !> Gradient of the shape functions by X and the Jacobian determinant.
-   pure subroutine reference_gradient(n, x, slope, gradient, det)
-      integer, intent(in) :: n
-      real(wp), intent(in) :: x(2, n), slope(2, n)
-      real(wp), intent(out) :: gradient(2, n), det
-      real(wp) :: jacobian(2, 2)
-      integer :: i
-
-      jacobian = 0.0_wp
-      do i = 1, n
-         jacobian(:, 1) = jacobian(:, 1) + x(:, i)*slope(1, i)
-         jacobian(:, 2) = jacobian(:, 2) + x(:, i)*slope(2, i)
-      end do
-      det = jacobian(1, 1)*jacobian(2, 2) - jacobian(1, 2)*jacobian(2, 1)
-      gradient = 0.0_wp
-      if (.not. abs(det) > 0.0_wp) return
-      do i = 1, n
-         gradient(1, i) = (jacobian(2, 2)*slope(1, i) - jacobian(2, 1)*slope(2, i))/det
-         gradient(2, i) = (jacobian(1, 1)*slope(2, i) - jacobian(1, 2)*slope(1, i))/det
-      end do
-   end subroutine reference_gradient
 
 end module emcon_solid

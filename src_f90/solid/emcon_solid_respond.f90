@@ -3,10 +3,10 @@
 !>
 !> Source: docs/theory.md, eqs. (6) and (11).
 module emcon_solid_respond
-   use emcon_element, only : element_motion_t, element_point, element_response_t, &
-      point_is_regular, point_motion_t
    use emcon_element_pack_plane, only : element_pack_t, pack_add_point, pack_clear, pack_fill, &
       pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
+   use emcon_element_plane, only : element_motion_t, element_point, element_response_t, &
+      point_is_regular, point_motion_t
    use emcon_host_law, only : host_answer, host_points_make_room, host_response_t
    use emcon_incompatible_plane, only : incompatible_respond
    use emcon_kinds, only : wp

@@ -1,8 +1,8 @@
 !> Elements whose stiffness stays: which they are, and the stiffness of their laws at rest.
 module emcon_stiff_elements
-   use emcon_element, only : element_motion_t, element_response_t
    use emcon_element_frequency, only : element_frequency
    use emcon_element_lists, only : element_lists
+   use emcon_element_plane, only : element_motion_t, element_response_t
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
    use emcon_lumped_mass, only : lumped_mass

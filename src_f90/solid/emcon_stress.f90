@@ -8,8 +8,8 @@ module emcon_stress
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t, &
       corotated_turn_stress
-   use emcon_element, only : element_motion_t, element_point, point_motion_t
    use emcon_element_axial_plane, only : axial_element_hold
+   use emcon_element_plane, only : element_motion_t, element_point, point_motion_t
    use emcon_element_space, only : space_element_hold, space_motion_t
    use emcon_host_law, only : host_response_t, host_state
    use emcon_incompatible_modes, only : modes_relax

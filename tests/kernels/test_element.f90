@@ -1,8 +1,9 @@
 !> One element over one step: identity, momenta, tangent, rigid motions, patch, inversion.
 module test_element
    use check, only : check_near, check_true, test_case_t
-   use emcon_element, only : element_geometry_t, element_motion_t, element_response_t, &
-      point_motion_t, point_strain
+   use emcon_element, only : element_geometry_t
+   use emcon_element_plane, only : element_motion_t, element_response_t, point_motion_t, &
+      point_strain
    use emcon_errors, only : error_t
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp

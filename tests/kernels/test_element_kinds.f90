@@ -1,7 +1,7 @@
 !> Every kind of element of the plane, distorted, with each law: what a step and a mesh ask of it.
 module test_element_kinds
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_element, only : element_motion_t, element_response_t
+   use emcon_element_plane, only : element_motion_t, element_response_t
    use emcon_element_registry, only : element_rows => plane_rows, find_element_row
    use emcon_errors, only : error_t
    use emcon_host_law, only : host_response_t

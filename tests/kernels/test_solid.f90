@@ -1,7 +1,7 @@
 !> All elements together: masses in closed form, assembly, bad geometry.
 module test_solid
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
-   use emcon_element, only : element_motion_t, element_response_t
+   use emcon_element_plane, only : element_motion_t, element_response_t
    use emcon_host_law, only : host_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
