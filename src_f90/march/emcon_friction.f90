@@ -275,23 +275,26 @@ contains
    end function friction_missed
 
    !> The mean stiffness of the system at the slave node of a condition: of its unknowns, or those
-   !> that it follows.
+   !> that it follows. Where it is held and has none, that at the next node of the condition.
    pure real(wp) function stiffness_at(system, item) result(stiffness)
       type(system_t), intent(in) :: system
       type(condition_t), intent(in) :: item
-      integer :: a, t, n, place
+      integer :: a, k, t, n, place
 
       stiffness = 0.0_wp
       n = 0
       associate (numbering => system%space%numbering, n_dim => size(item%g, 1))
-         do a = n_dim*(item%node(1) - 1) + 1, n_dim*item%node(1)
-            do t = numbering%start(a) + 1, numbering%start(a + 1)
-               if (numbering%column(t) == 0) cycle
-               place = csr_find(system%matrix, numbering%column(t), numbering%column(t))
-               if (place == 0 .or. .not. abs(numbering%weight(t)) > 0.5_wp) cycle
-               stiffness = stiffness + real(abs(system%matrix%value(place)), wp)
-               n = n + 1
+         do k = 1, item%n_node
+            do a = n_dim*(item%node(k) - 1) + 1, n_dim*item%node(k)
+               do t = numbering%start(a) + 1, numbering%start(a + 1)
+                  if (numbering%column(t) == 0) cycle
+                  place = csr_find(system%matrix, numbering%column(t), numbering%column(t))
+                  if (place == 0 .or. .not. abs(numbering%weight(t)) > 0.5_wp) cycle
+                  stiffness = stiffness + real(abs(system%matrix%value(place)), wp)
+                  n = n + 1
+               end do
             end do
+            if (n > 0) exit
          end do
       end associate
       if (n > 0) stiffness = stiffness/n

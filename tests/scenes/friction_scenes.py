@@ -63,6 +63,60 @@ def block_on_floor(h, t_end, mu, *, v0=0.0, slope=0.0, push=0.0, rigid=False, st
     return deck
 
 
+def arch(mu, sides=ONE, h=0.01, t_end=0.4, stones=5):
+    """Half a ring of wedges on two that are held, under gravity; nothing but friction holds them.
+    The radii are 1 and 1.4, where a ring as thin as 1.11 would still stand by its shape."""
+    scene = Scene(h, t_end, gravity=G)
+    part = math.pi/(stones + 2)
+
+    def stone(k):
+        def place(x, y):
+            angle = math.pi - (k + x)*part
+            return (1 + 0.4*y)*math.cos(angle), (1 + 0.4*y)*math.sin(angle)
+        return place
+
+    names = [f"S{k}" for k in range(stones + 2)]
+    for k, name in enumerate(names):
+        scene.block(name, (0, 0), (1, 1), (2, 3), stiffness=2e4, shape=stone(k))
+    for name in (names[0], names[-1]):
+        scene.hold(name, lambda x, y: True)
+    scene.pairs = [(names[1], names[0]), *zip(names[1:-1], names[2:], strict=True)]
+    deck = rubbing(scene.deck(sides), mu)
+    for name in names:
+        deck.replace(f"*MATERIAL, NAME={name}\n", f"*MATERIAL, NAME={name}\n*DAMPING, BETA=5e-3\n")
+    return deck
+
+
+def arch_needs(stones=5):
+    """The least coefficient with which such an arch of rigid stones stands, by one on its crown: the
+    weights of the stones and one thrust H must push through each joint within its cone of friction;
+    closed form but for the best H."""
+    k = np.arange(1, stones + 1, 2)
+    tilt = k*math.pi/(2*(stones + 2))              # of the joints, from the crown
+    share = np.linspace(0.01, 2.0, 20001)          # half of the weight of a stone by H
+    off = np.abs(np.arctan(np.outer(share, k)) - tilt).max(axis=1)
+    return math.tan(off.min())
+
+
+def stack_on_slope(mu, slope, n=4, sides=ONE, h=0.01, t_end=0.4):
+    """So many damped blocks on each other, on a floor that is held and slopes."""
+    def turn(x, y):
+        c, s = math.cos(slope), math.sin(slope)
+        return c*x - s*y, s*x + c*y
+
+    scene = Scene(h, t_end, gravity=G)
+    names = [f"B{k}" for k in range(n)]
+    for k, name in enumerate(names):
+        scene.block(name, (0.02*k, 0.5*k), (2, 0.5), (4 + k % 2, 2), stiffness=2e4, shape=turn)
+    scene.block("FLOOR", (-1, -1), (6, 1), (6, 1), stiffness=2e4, shape=turn)
+    scene.hold("FLOOR", lambda x, y: True)
+    scene.pairs = list(zip(names, ["FLOOR", *names[:-1]], strict=True))
+    deck = rubbing(scene.deck(sides), mu)
+    for name in names:
+        deck.replace(f"*MATERIAL, NAME={name}\n", f"*MATERIAL, NAME={name}\n*DAMPING, BETA=5e-3\n")
+    return deck
+
+
 def way(run, n, slope=0.0):
     """Mean displacements of the first n nodes along the floor, of all frames."""
     u = run.fields()["displacement"][:, :n]
@@ -196,9 +250,10 @@ def pressed_sideways(n):
     return deck, np.array([node[label] for label in sorted(node)])
 
 
-def pressed_round(n, radius=50.0, mu=0.3):
+def pressed_round(n, radius=50.0, mu=0.3, back=0.0):
     """Two bodies of one material, the upper one round, pressed together and then moved sideways in
-    twenty static increments; meshes are finest in the middle. Also the places of its nodes."""
+    twelve static increments; meshes are finest in the middle. With `back` only by this part, and then
+    to the other side in another twelve. Also the places of its nodes."""
     width = 10.0
 
     def grade(t):
@@ -207,7 +262,7 @@ def pressed_round(n, radius=50.0, mu=0.3):
     def upper(x, y):
         return grade(x), grade(y) + grade(x)**2/(2*radius)*(1 - y)
 
-    scene = Scene(0.05, 1.0)
+    scene = Scene(0.05, 1.6 if back else 1.0)
     scene.block("UPPER", (-1, 0), (2, 1), (n, 20), stiffness=100.0, shape=upper)
     scene.block("LOWER", (-1, -1), (2, 1), (n + 6, 20), stiffness=100.0,
                 shape=lambda x, y: (grade(x), grade(y)))
@@ -224,8 +279,8 @@ def pressed_round(n, radius=50.0, mu=0.3):
     motion, tail = body.split("*CONSTRAINT METHOD")
     lines = motion.strip().splitlines()
     text = head.replace("*AMPLITUDE, NAME=RAMP", "*AMPLITUDE, NAME=DOWN\n0., 0., 0.4, 1., 2., 1.\n"
-                        "*AMPLITUDE, NAME=SIDEWAYS\n0., 0., 0.4, 0., 1., 1.\n"
-                        "*AMPLITUDE, NAME=RAMP")
+                        f"*AMPLITUDE, NAME=SIDEWAYS\n0., 0., 0.4, 0., 1., {back or 1.0!r}, 1.6, "
+                        f"{-back!r}\n*AMPLITUDE, NAME=RAMP")
     for name, axis in (("DOWN", "2, 2"), ("SIDEWAYS", "1, 1")):
         text += "\n".join([f"*BOUNDARY, AMPLITUDE={name}",
                            *(line for line in lines if f", {axis}, " in line), ""])
@@ -236,7 +291,7 @@ def pressed_round(n, radius=50.0, mu=0.3):
 
 def partial_slip(run, place, mu=0.3):
     """Of each increment that moves sideways: force along the surface by mu times that across, width
-    of what sticks by that in contact, and the least distance of nodes by it."""
+    of what sticks by that in contact, and the largest distance of nodes by it."""
     status = run.fields()["contact_status"][:, :len(place)]
     history, rows = run.history, []
     for k in np.flatnonzero(history["time"] > 0.4 + 1e-9):

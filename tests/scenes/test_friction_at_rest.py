@@ -1,0 +1,103 @@
+"""`*FRICTION`: bodies that nothing else holds, slaves that are held, and partial slip to and fro."""
+
+import math
+
+import numpy as np
+import pytest
+from friction_scenes import (
+    NODES,
+    arch,
+    arch_needs,
+    balance,
+    block_on_floor,
+    partial_slip,
+    pressed_round,
+    stack_on_slope,
+    way,
+)
+from plain_scenes import BOTH, ONE
+from scene_tools import run_deck
+
+
+def loses(run):
+    """Energy goes to friction and damping alone, and the laws are met."""
+    assert balance(run.history) < 1e-12 and run.verdict["law_violation"] <= 1e-9
+    largest = (run.history["strain"] + run.history["kinetic"]).max()
+    assert (np.diff(run.history["friction_loss"]) >= -1e-15*largest).all()
+
+
+@pytest.mark.parametrize(("formulation", "rigid"),
+                         [("SEGMENT", True), ("SEGMENT", False), ("MORTAR", True)])
+def test_the_floor_is_the_slave(formulation, rigid, tmp_path):
+    """Nodes that are held have no stiffness to try slips with: that of others counts. The block stops,
+    and is not driven back. Nodes of the floor come and go, each with an increment of smaller force."""
+    deck = block_on_floor(0.01, 0.8, 0.3, v0=2.0, rigid=rigid, eta=0.0 if rigid else 2e-3)
+    deck.replace("BLOCK, FLOOR", "FLOOR, BLOCK")
+    run = run_deck(deck, tmp_path, formulation=formulation)
+    loses(run)
+    gone = way(run, 15)
+    assert gone[-1] == pytest.approx(2/3, rel=5e-3)
+    assert np.ptp(gone[-10:]) < 1e-3
+    assert run.history["friction_loss"][-1] == pytest.approx(4.0, rel=5e-3)
+
+
+@pytest.mark.parametrize(("part", "sides", "formulation"), [
+    (0.8, ONE, "MORTAR"), (1.2, ONE, "MORTAR"), (0.8, BOTH, "NODE TO SURFACE"),
+    (2.5, BOTH, "NODE TO SURFACE")])
+def test_an_arch(part, sides, formulation, tmp_path):
+    """It stands by friction where a line of thrust has room in all cones, and else gives way."""
+    run = run_deck(arch(part*arch_needs(), sides), tmp_path, formulation=formulation)
+    loses(run)
+    u = np.abs(run.fields()["displacement"]).max(axis=(1, 2))
+    if part > 1:
+        assert run.verdict["verdict"] == "good"
+        assert u[-1] < 2e-3 and u[-1] < 1.05*u[len(u)//2]
+    else:
+        assert u[-1] > 0.05 and u[-1] > 3*u[len(u)//2]
+
+
+@pytest.mark.parametrize(("sides", "formulation"),
+                         [(ONE, "MORTAR"), (BOTH, "NODE TO SURFACE")])
+@pytest.mark.parametrize("mu", [0.25, 0.15])
+def test_a_stack_on_a_slope(mu, sides, formulation, tmp_path):
+    """Of 1 in 5: all of it rests, or slides as one."""
+    slope = -math.atan(0.2)
+    run = run_deck(stack_on_slope(mu, slope, sides=sides), tmp_path, formulation=formulation)
+    loses(run)
+    assert run.verdict["verdict"] == "good" and run.history["cuts"].sum() == 0
+    gone, time = way(run, 2*(5 + 6)*3, slope), run.history["time"]
+    later = time > 0.1
+    seen = 2*np.polyfit(time[later], gone[later], 2)[0]
+    exact = 10*math.cos(slope)*max(0.0, 0.2 - mu)
+    assert seen == pytest.approx(exact, abs=0.02)
+    if mu > 0.2:
+        assert np.ptp(gone[time > 0.2]) < 1e-4
+
+
+def test_partial_slip_to_and_fro(tmp_path):
+    """Mindlin and Deresiewicz: on the way back from Q* what slides anew leaves a strip of
+    sqrt(1 - (Q* - Q)/(2 mu P)) stuck, with what the way there has locked in."""
+    deck, place = pressed_round(64, back=0.546)
+    run = run_deck(deck, tmp_path, **NODES)
+    assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+    assert run.history["cuts"].sum() == 0 and (np.diff(run.history["friction_loss"]) >= -1e-18).all()
+    force, width, strip = partial_slip(run, place).T
+    turn = np.argmax(force)
+    there, back = np.arange(len(force)) <= turn, np.arange(len(force)) > turn
+    assert force[turn] == pytest.approx(0.92, abs=0.005) and force[-1] < -0.9
+    assert (np.abs(width - np.sqrt(1 - force))[there] < strip[there]).all()
+    assert (np.abs(width - np.sqrt(1 - (force[turn] - force)/2))[back] < strip[back]).all()
+
+    fields, k = run.fields(), len(run.history) - len(force) + 6 + turn
+    q, p = (fields[name][k, :len(place)] for name in ("contact_shear", "contact_pressure"))
+    bears = fields["contact_status"][k, :len(place)] > 0
+    x, q, p = place[bears, 0], q[bears], p[bears]
+    half = np.ptp(x)/2
+
+    def ellipse(part):
+        return np.sqrt(np.maximum(0.0, part - (x/half)**2))
+
+    now = force[k - len(run.history) + len(force)]
+    exact = ellipse(1) - 2*ellipse(1 - (force[turn] - now)/2) + ellipse(1 - force[turn])
+    error = min(np.sqrt(np.mean((sign*q/(0.3*p.max()) - exact)**2)) for sign in (1, -1))
+    assert error < strip[k - len(run.history)]
