@@ -39,6 +39,9 @@ module emcon_verdict
    real(wp), parameter :: touching = 1.0e-3_wp, far_behind = 0.1_wp
    !> What contact gives way by is told; so many times that is deeper, whichever edge counts.
    real(wp), parameter :: most_give = 2.0_wp
+   !> The laws of contact and friction may be missed by this part of the largest force; forces that
+   !> differ by half of the second number are one to `emcon_friction`.
+   real(wp), parameter :: law_bar = max(half_digits, 1.0e5_wp*epsilon(1.0_wp))
    character(len=*), parameter :: stray_words = ", which no contact pair brings together, overlap"
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
@@ -312,6 +315,8 @@ contains
       if (self%give > far_behind) call note_add(self%reasons, "contact gives way by up to " // &
          to_text(self%give, 3) // " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too " &
          // "small")
+      if (self%law_missed > law_bar) call note_add(self%reasons, "the laws of contact and " // &
+         "friction are missed by " // to_text(self%law_missed, 3) // " of the largest force")
       if (self%unconverged > half_digits) call note_add(self%reasons, "a residual of " // &
          to_text(self%unconverged, 3) // " was accepted at time " // &
          to_text(self%unconverged_time, 9))

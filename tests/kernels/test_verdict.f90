@@ -45,11 +45,13 @@ contains
       verdict%dynamic_drift = 3.0_wp*energy_bar()
       verdict%unconverged = 1.0e-3_wp
       verdict%deepest = 1.0e-2_wp
+      verdict%law_missed = 0.5_wp
       call verdict_end(verdict)
-      call check_equal(error, verdict%reasons%n, 3, "reasons")
+      call check_equal(error, verdict%reasons%n, 4, "reasons")
       call verdict_line(verdict, line)
       call check_true(error, index(line, "verdict: BAD: ") == 1, line)
       call check_true(error, index(line, "does NOT close") > 0, line)
+      call check_true(error, index(line, "friction are missed by 0.5 of") > 0, line)
       call check_true(error, .not. verdict_is_good(verdict), "not good")
       call check_true(error, .not. verdict_is_failure(verdict, .false.), "no failure by itself")
       call check_true(error, verdict_is_failure(verdict, .true.), "a failure if strict")
