@@ -126,6 +126,22 @@ def test_sections(tmp_path, option):
     assert_same_bits(runs[1], runs[0], units)
 
 
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_friction(tmp_path, formulation):
+    units = (-13, 7, 5)
+    parameters = {"h": 0.02, "t_end": 0.4, "frame": 0.2, "formulation": formulation}
+    runs = []
+    for exponents in ((0, 0, 0), units):
+        deck = in_units(*exponents, **parameters)
+        deck.replace("NAME=FRICTIONLESS", "NAME=FRICTIONLESS\n*FRICTION\n0.5")
+        runs.append(run_deck(deck, tmp_path/str(len(runs))))
+    assert runs[0].history["friction_loss"][-1] > 0
+    assert_same_bits(runs[1], runs[0], units)
+    taken = [run.history["pair1_friction_loss"] for run in runs]
+    energy = int(np.dot(DIMENSION["friction_loss"], units))
+    np.testing.assert_array_equal(np.ldexp(taken[1], -energy), taken[0])
+
+
 FORMULATIONS = [
     {"formulation": "NODE TO SURFACE", "smoothing": "HERMITE"},
     {"formulation": "SEGMENT", "multiplier": "STANDARD"},

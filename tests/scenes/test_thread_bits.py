@@ -16,6 +16,7 @@ SCENES = {
     "ring, Newton": {"h": 0.04, "t_end": 0.2, "frame": 0.2, "method": "SADDLE POINT"},
     "tied_ring": {"h": 0.05, "t_end": 0.2},
     "press_fit": {},
+    "sliding_block": {"t_end": 0.4},
 }
 RING = DECKS/"ring.inp"
 
