@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from .results import FieldFile, ResultError, ResultPaths, locate
 from .scene import STYLE, Scene, colour_scale, draw_bodies, draw_colour_bar, read_scene
-from .scene import frame_view, set_view
+from .scene import frame_view, number, set_view
 
 #: Sizes [inch].
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 8.0, 0.62, 0.95, 0.34, 0.48
@@ -116,5 +116,5 @@ def _write(writer: AbstractMovieWriter, scene: Scene, output: Path) -> None:
             if scene.values is not None:
                 elements.set_array(scene.colours(k))
             set_view(axes, view, width, height)
-            axes.set_title(f"$t = {scene.times[k]:.4g}$", fontsize=10, pad=4)
+            axes.set_title(f"$t = {number(scene.times[k])}$", fontsize=10, pad=4)
             writer.grab_frame()

@@ -1,33 +1,32 @@
-"""One picture of a run: the deformed bodies at six times, energies, drift, contact force."""
+"""One picture of a run: the deformed bodies at six times, and three panels (`panels.py`)."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
-from .results import (Array, FieldFile, ResultError, ResultPaths, asked_losses, energy_drift,
-                      locate, read_contact_force, read_history)
-from .scene import (BLACK, BLUE, GREY, LABEL_OFFSET, ORANGE, STYLE, Scene, colour_scale,
-                    draw_bodies, draw_colour_bar, fixed_scale, frame_view, read_scene)
+from .panels import (Force, Load, draw_convergence, draw_drift, draw_energies, draw_force,
+                     draw_load, draw_momentum, is_static, read_force, read_load, read_residuals,
+                     say)
+from .results import Array, FieldFile, ResultError, ResultPaths, locate, read_history
+from .scene import (LABEL_OFFSET, STYLE, Scene, colour_scale, draw_bodies, draw_colour_bar,
+                    fixed_scale, frame_view, number, read_scene, scale_ticks)
 
 N_TIMES = 6
 #: Sizes on paper [inch].
-WIDTH, LEFT, RIGHT, TOP, BOTTOM = 11.0, 0.62, 0.95, 0.30, 0.48
+WIDTH, LEFT, RIGHT, TOP, BOTTOM = 11.0, 0.62, 1.0, 0.30, 0.48
 SCENE_GAP, PANEL_GAP, ROW_GAP, PANEL_HEIGHT = 0.07, 0.72, 0.86, 1.85
 SCENE_HEIGHT = (1.0, 4.2)      # least, largest
 RESOLUTION = 200               # dots per inch
-
-#: Least drift drawn; an exact zero is drawn there.
-DRIFT_FLOOR = 1e-17
 
 
 def _choose_frames(file: FieldFile, times: Sequence[float] | None) -> list[int]:
@@ -58,30 +57,6 @@ class View:
         return [self.frame % count]
 
 
-@dataclass
-class _Force:
-    """Vertical resultant of the contact force on the slave side; without values a note says why."""
-
-    times: Array = field(default_factory=lambda: np.empty(0))    #: (n_time) [T]
-    values: Array = field(default_factory=lambda: np.empty(0))   #: (n_time) [M L/T^2]
-    is_sampled: bool = False                                     #: at frames, not increments
-    note: str = ""
-
-
-def _force_of_frames(file: FieldFile) -> _Force:
-    """Sum of the field `contact_force` over the slave nodes: those that have a gap."""
-    if "contact_force" not in file.point_fields:
-        return _Force(note="no contact force in the result\n(asked for by *CONTACT FILE, CF)")
-    if "contact_gap" not in file.point_fields:
-        return _Force(note="no contact gap in the result, slave nodes not known\n"
-                           "(asked for by *CONTACT FILE, CDIS)")
-    values = np.empty(len(file.times))
-    for k in range(len(values)):
-        is_slave = np.isfinite(file.point("contact_gap", k))
-        values[k] = file.point("contact_force", k)[is_slave, 1].sum()
-    return _Force(file.times, values, is_sampled=True)
-
-
 # --- drawing -----------------------------------------------------------------------------------
 
 def _draw_scene(figure: Figure, scene: Scene, clim: tuple[float, float] | None) -> None:
@@ -101,80 +76,31 @@ def _draw_scene(figure: Figure, scene: Scene, clim: tuple[float, float] | None) 
         axes = figure.add_axes((x/WIDTH, base/total, width/WIDTH, height/total))
         draw_bodies(axes, scene, k, view, width, scale)
         frame_view(axes, scene, view, width, height, is_first=k == 0)
-        axes.set_title(f"$t = {scene.times[k]:.4g}$", fontsize=10, pad=4)
+        axes.set_title(f"$t = {number(scene.times[k])}$", fontsize=10, pad=4)
     if scene.values is not None:
         draw_colour_bar(figure, ((LEFT + n*width + (n - 1)*SCENE_GAP + 0.14)/WIDTH, base/total,
                                  0.11/WIDTH, height/total), scene, scale)
 
 
-def _draw_energies(axes: Axes, history: NDArray[np.void]) -> None:
-    for name, label, colour, style in (
-            ("total", "total", BLACK, "-"), ("kinetic", "kinetic", BLUE, "-"),
-            ("strain", "strain", ORANGE, "-"), ("external_work", "external work", GREY, "--")):
-        axes.plot(history["time"], history[name], style, color=colour, label=label)
-    taken = asked_losses(history)
-    if np.any(taken > 0.0):
-        axes.plot(history["time"], taken, ":", color=BLACK, label="losses")
-    axes.set_ylabel("energy")
-    _legend(axes)
-
-
-def _legend(axes: Axes) -> None:
-    """Above the axes, where no curve is."""
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=5, handlelength=1.3,
-                columnspacing=1.0, handletextpad=0.4, borderaxespad=0.1)
-
-
-def _draw_drift(axes: Axes, history: NDArray[np.void]) -> None:
-    drift, scale = energy_drift(history)
-    at_start = abs(float(history["total"][0]))
-    axes.semilogy(history["time"], np.maximum(drift, DRIFT_FLOOR), color=BLACK, linewidth=0.8)
-    epsilon = float(np.finfo(np.float64).eps)
-    axes.axhline(epsilon, color=GREY, linewidth=0.6, linestyle="--", label="machine epsilon")
-    _legend(axes)
-    top = float(np.nanmax(drift, initial=0.0))
-    axes.set_ylim(DRIFT_FLOOR, max(1e-8, 30.0*top))
-    axes.yaxis.set_major_locator(LogLocator(10.0, numticks=7))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.set_ylabel(r"energy drift $|E - E_0|/|E_0|$" if scale == at_start and scale > 0.0
-                    else r"energy drift $|E - E_0|/E_{\max}$")
-
-
-def _draw_force(axes: Axes, force: _Force) -> None:
-    axes.axhline(0.0, color=GREY, linewidth=0.5)
-    axes.plot(force.times, force.values, color=BLACK, linewidth=0.8,
-              marker="o" if force.is_sampled else "", markersize=1.8, markeredgewidth=0.0)
-    axes.set_ylabel("contact force, vertical")
-
-
-def _say(axes: Axes, text: str) -> None:
-    """A panel without data says why."""
-    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY)
-    axes.set_xticks([])
-    axes.set_yticks([])
-
-
 def draw(paths: ResultPaths, view: View = View()) -> tuple[Figure, list[str]]:
     """The picture of a run as a matplotlib figure, and notes on what is missing in it."""
     notes: list[str] = []
-    scene, history = None, None
-    force = _Force(note=f"no field file\n{paths.field.name}")
+    scene, history, load = None, None, None
+    if paths.table.is_file() or paths.history.is_file():
+        history = read_history(paths)
     if paths.field.is_file():
         with FieldFile(paths.field) as file:
             scene = read_scene(file, view.frames(file), view.field)
-            force = _force_of_frames(file)
+            force = read_force(paths, file, history)
+            if history is not None and is_static(history):
+                load = read_load(file, history)
         notes += scene.notes
     else:
         notes.append(f"no field file {paths.field}: bodies are not shown")
-    by_increment = read_contact_force(paths)
-    if by_increment is not None:
-        force = _Force(by_increment[0], by_increment[1][:, 1])
-    if force.note:
-        notes.append(force.note.replace("\n", " "))
-    if paths.table.is_file() or paths.history.is_file():
-        history = read_history(paths)
-    else:
+        force = read_force(paths, None, history)
+    if history is None:
         notes.append(f"no history {paths.table}: energies are not shown")
+    marks = scene.times if scene is not None else []
 
     with matplotlib.rc_context(STYLE):
         figure = Figure()
@@ -182,36 +108,72 @@ def draw(paths: ResultPaths, view: View = View()) -> tuple[Figure, list[str]]:
             _draw_scene(figure, scene, view.clim)
         else:
             figure.set_size_inches(WIDTH, TOP + PANEL_HEIGHT + BOTTOM)
-        _draw_panels(figure, history, force, scene.times if scene is not None else [])
+        panels = _add_panels(figure)
+        if history is not None and is_static(history):
+            _draw_statics(panels, history, force, load, read_residuals(paths))
+        else:
+            notes += _draw_dynamics(panels, history, force)
+        for axes in panels:
+            _finish(axes, force.times if history is None else history["time"], marks)
+        panels[0].yaxis.set_label_coords(-LABEL_OFFSET/_panel_width(), 0.5)
     return figure, notes
 
 
-def _draw_panels(figure: Figure, history: NDArray[np.void] | None, force: _Force,
-                 marks: list[float]) -> None:
-    """The lower row: energies, drift, contact force over one time axis; lines at `marks`."""
-    panels = _add_panels(figure)
-    times = force.times
+def _draw_dynamics(panels: list[Axes], history: NDArray[np.void] | None,
+                   force: Force) -> list[str]:
+    """Energies, drift, contact force; returns what is missing."""
     if history is not None:
-        times = history["time"]
-        _draw_energies(panels[0], history)
-        _draw_drift(panels[1], history)
+        draw_energies(panels[0], history)
+        draw_drift(panels[1], history)
     else:
-        _say(panels[0], "no history")
-        _say(panels[1], "no history")
-    if force.values.size:
-        _draw_force(panels[2], force)
+        say(panels[0], "no history")
+        say(panels[1], "no history")
+    if force.curves:
+        draw_force(panels[2], force)
+    elif history is not None and not force.note:
+        draw_momentum(panels[2], history)
     else:
-        _say(panels[2], force.note)
-    for axes in panels:
-        if not axes.lines:
-            continue
+        say(panels[2], force.note)
+        return [force.note.replace("\n", " ")]
+    return []
+
+
+def _draw_statics(panels: list[Axes], history: NDArray[np.void], force: Force, load: Load | None,
+                  solves: list[tuple[float, Array]]) -> None:
+    """Load against displacement, convergence, contact force; energies where one is not there."""
+    missing = []
+    if load is not None:
+        draw_load(panels[0], load)
+    else:
+        missing.append((panels[0], "no reactions in the result\n(asked for by *NODE FILE, RF)"))
+    if solves:
+        draw_convergence(panels[1], solves)
+    else:
+        missing.append((panels[1], "no log"))
+    if force.curves:
+        draw_force(panels[2], force)
+    else:
+        missing.append((panels[2], force.note))
+    for axes, why in missing[:-1]:
+        say(axes, why)
+    if missing:
+        draw_energies(missing[-1][0], history)
+
+
+def _finish(axes: Axes, times: Array, marks: list[float]) -> None:
+    """A panel over time gets its axis, and lines at the times `marks` that are shown above."""
+    if not axes.lines:
+        return
+    if not axes.get_xlabel():
         if times[-1] > times[0]:
             axes.set_xlim(times[0], times[-1])
         axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
-        axes.set_xlabel("time $t$", labelpad=1)
+        axes.set_xlabel("time $t$ [T]", labelpad=1)
         for mark in marks:
             axes.axvline(mark, color="#e4e4e4", linewidth=0.6, zorder=0)
-    panels[0].yaxis.set_label_coords(-LABEL_OFFSET/_panel_width(), 0.5)
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() == "linear" and not isinstance(axis.get_major_locator(), FixedLocator):
+            scale_ticks(axis)
 
 
 def _panel_width() -> float:
@@ -229,7 +191,8 @@ def _add_panels(figure: Figure) -> list[Axes]:
 def plot(result: str | os.PathLike[str], output: str | os.PathLike[str] | None = None,
          times: Sequence[float] | None = None, *, frame: int | None = None,
          field: str = "von_mises", clim: tuple[float, float] | None = None) -> Path:
-    """Draw a run: bodies at some times, energies, drift, contact force; returns the picture's path.
+    """Draw a run: bodies at some times, energies, drift, contact forces, of statics load and
+    convergence; returns the picture's path.
 
     result   base name of the run, or any one of its files
     output   file to write, its suffix tells the format; default NAME.png

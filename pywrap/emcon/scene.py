@@ -9,10 +9,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
 from numpy.typing import NDArray
 
 from .projection import SOLIDS, basis, far_first, outer_faces, project
@@ -27,7 +28,7 @@ FOLLOW_RATIO = 1.25
 #: The colour scale ends where all but this fraction of the elements that move are below.
 COLOUR_CUT = 0.01
 #: Distance of the y labels from the axes at the left [inch].
-LABEL_OFFSET = 0.36
+LABEL_OFFSET = 0.43
 #: Length of the axes that tell directions [inch].
 DIRECTION_LENGTH = 0.16
 
@@ -38,6 +39,16 @@ STYLE: dict[Any, Any] = {"font.family": "STIXGeneral", "mathtext.fontset": "stix
          "ytick.major.width": 0.6, "legend.frameon": False, "legend.fontsize": 9,
          "lines.linewidth": 1.1, "svg.hashsalt": "emcon", "pdf.fonttype": 42}
 BLACK, BLUE, ORANGE, GREY = "#1a1a1a", "#1f5fa8", "#d1660f", "#8a8a8a"
+
+#: Consistent units, as powers of length, mass and time.
+UNITS = {"length": "[L]", "time": "[T]", "energy": "[M L$^2$/T$^2$]",
+         "force": "[M L/T$^2$]", "stress": "[M/(L T$^2$)]", "velocity": "[L/T]",
+         "action": "[M L$^2$/T]"}
+#: Of the fields that the program writes.
+FIELD_UNITS = {"von_mises": "stress", "cauchy_stress": "stress", "contact_pressure": "stress",
+               "contact_shear": "stress", "displacement": "length", "contact_gap": "length",
+               "contact_slip": "length", "velocity": "velocity", "strain_energy": "energy",
+               "contact_force": "force", "reaction_force": "force"}
 
 #: (x_min, x_max, y_min, y_max) [L]
 View = tuple[float, float, float, float]
@@ -165,6 +176,8 @@ def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") 
     most = np.array([np.max(travel[body == b], initial=0.0) for b in range(body.max() + 1)])
     support = most < SUPPORT_FRACTION*most.max()
     label = "von Mises stress" if name == "von_mises" else name.replace("_", " ")
+    if name in FIELD_UNITS:
+        label = f"{label}\n{UNITS[FIELD_UNITS[name]]}"
     scene = Scene(times=[float(file.times[k]) for k in frames], position=[p[:, :2] for p in place],
                   values=values or None, label=label, cells=file.cells,
                   is_support=(body < 0) | support[body], notes=notes)
@@ -255,10 +268,31 @@ def draw_colour_bar(figure: Figure, box: tuple[float, float, float, float], scen
     bar = figure.add_axes(box)
     mappable = matplotlib.cm.ScalarMappable(scale.norm, scale.colours)
     colour_bar = figure.colorbar(mappable, cax=bar, extend=scale.extend, extendfrac=0.04)
-    colour_bar.set_label(scene.label)
+    colour_bar.set_label(scene.label, labelpad=2, linespacing=0.95)
     colour_bar.outline.set_linewidth(0.5)
     bar.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     bar.tick_params(direction="in", width=0.5)
+    scale_ticks(bar.yaxis)
+
+
+def number(value: float) -> str:
+    """A number of four digits in mathematical type."""
+    digits, _, power = f"{value:.4g}".partition("e")
+    return rf"{digits}\times10^{{{int(power)}}}" if power else digits
+
+
+def scale_ticks(axis: Axis) -> None:
+    """Numbers of an axis that are large or small by a power of ten, which its unit then has."""
+    largest = max(map(abs, axis.get_view_interval()))
+    power = int(np.floor(np.log10(largest))) if largest > 0.0 and np.isfinite(largest) else 0
+    power = 0 if -3 < power < 5 else 3*(power//3)
+    if power:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value/10.0**power:.4g}"))
+        label = axis.get_label_text()
+        axis.set_label_text(label.replace("[", f"[10$^{{{power}}}$ ", 1) if "[" in label else
+                            f"{label} / 10$^{{{power}}}$")
+    elif isinstance(axis.get_major_formatter(), ScalarFormatter):
+        axis.get_major_formatter().set_useOffset(False)
 
 
 def _edge_width(scene: Scene, view: View, width: float) -> float:
@@ -289,12 +323,12 @@ def frame_view(axes: Axes, scene: Scene, view: View, width: float, height: float
         if is_first:
             _draw_directions(axes, width, height)
         return
-    axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+    axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10], prune="upper"))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.tick_params(width=0.4, length=2.5)
-    axes.set_xlabel("$x$", labelpad=1)
+    axes.set_xlabel("$x$ [L]", labelpad=1)
     if is_first:
-        axes.set_ylabel("$y$")
+        axes.set_ylabel("$y$ [L]")
         axes.yaxis.set_label_coords(-LABEL_OFFSET/width, 0.5)
     else:
         axes.tick_params(labelleft=False)

@@ -277,7 +277,7 @@ def test_plot_of_a_frame_a_field_and_colours(run: Path, tmp_path: Path) -> None:
     assert shown[0].get_title() == f"$t = {TIMES[-1]:g}$"
     assert np.array_equal(elements.get_array(), np.arange(3.0))
     assert elements.get_clim() == (0.5, 1.5)
-    assert "strain energy" in [axes.get_ylabel() for axes in figure.axes]
+    assert "strain energy\n[M L$^2$/T$^2$]" in [axes.get_ylabel() for axes in figure.axes]
     assert is_png(plot(run, tmp_path/"one.png", frame=0, field="displacement", clim=(0, 2)))
     for wrong, why in ((View(frame=99), "no frame 99"), (View([0.0], frame=0), "not both"),
                        (View(field="heat"), "heat"), (View(clim=(1, 1)), "larger one"),
