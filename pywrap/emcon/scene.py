@@ -268,7 +268,7 @@ def draw_colour_bar(figure: Figure, box: tuple[float, float, float, float], scen
     bar = figure.add_axes(box)
     mappable = matplotlib.cm.ScalarMappable(scale.norm, scale.colours)
     colour_bar = figure.colorbar(mappable, cax=bar, extend=scale.extend, extendfrac=0.04)
-    colour_bar.set_label(scene.label, labelpad=2, linespacing=0.95)
+    colour_bar.set_label(scene.label, labelpad=4, linespacing=0.95)
     colour_bar.outline.set_linewidth(0.5)
     bar.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     bar.tick_params(direction="in", width=0.5)
