@@ -1,10 +1,16 @@
-"""Coulomb friction: blocks that slide to rest, scenes of closed form, the ring on a free block."""
+"""Coulomb friction: blocks that slide to rest, scenes of closed form, flutter, bodies that friction
+holds, the ring on a free block."""
 
 import math
+import re
+import subprocess
 
 import numpy as np
+from flutter import RISE, fastest, fluttering, rate_of
 from friction_scenes import (
     NODES,
+    arch,
+    arch_needs,
     balance,
     belt_way,
     block_on_floor,
@@ -15,8 +21,11 @@ from friction_scenes import (
     pressed_sideways,
     ring,
     rolling,
+    stack_on_slope,
     way,
 )
+from plain_scenes import BOTH, ONE
+from scene_tools import PROGRAM
 
 from .common import Chapter, drift, size, table
 
@@ -31,12 +40,20 @@ BLOCKS = {
     "elastic, `BETA=2e-3`": {"eta": 2e-3},
     "elastic, `BETA=2e-3`, 8 x 4": {"eta": 2e-3, "cells": (8, 4)},
     "elastic, undamped": {},
+    "elastic, `BETA=2e-3`, `SEGMENT`": {"eta": 2e-3, "formulation": "SEGMENT"},
+    "elastic, `BETA=2e-3`, `MORTAR`": {"eta": 2e-3, "formulation": "MORTAR"},
 }
 
 
 def start_rest(runs):
-    return {(name, h): runs.start(block_on_floor(h, 0.72, 0.3, v0=2.0, **more), **NODES)
-            for name, more in BLOCKS.items() for h in (0.01, 0.005, 0.0025)}
+    started = {}
+    for name, more in BLOCKS.items():
+        body = {key: value for key, value in more.items() if key != "formulation"}
+        for h in (0.02, 0.01, 0.005, 0.0025):
+            started[name, h] = runs.start(
+                block_on_floor(h, 0.72, 0.3, v0=2.0, **body),
+                formulation=more.get("formulation", NODES["formulation"]))
+    return started
 
 
 def report_rest(started, _):
@@ -53,6 +70,12 @@ def report_rest(started, _):
 
 
 # ---- known -------------------------------------------------------------------------------------
+
+
+#: Elements of the plate along its side.
+PLATES = (32, 64)
+#: So far sideways that 0.92 of the force slides.
+BACK = 0.546
 
 
 def on_belt(h):
@@ -73,16 +96,16 @@ def start_known(runs):
                                      **NODES) for mu in (0.49, 0.5)},
         **{("rolls", inner): runs.start(rolling(inner, 2.5e-4, 4e-3, 0.3, 0.02), **NODES)
            for inner in (0.95, 0.05)},
-        "plate": runs.start(pressed_sideways(32)[0], **NODES),
-        "pressed_round": runs.start(pressed_round(96)[0], **NODES),
+        **{("plate", n): runs.start(pressed_sideways(n)[0], **NODES) for n in PLATES},
+        "to and fro": runs.start(pressed_round(96, back=BACK)[0], **NODES),
         **{("belt", h): runs.start(None, on_belt(h)) for h in (0.02, 0.01, 0.005)},
         "pulled": runs.start(None, pulled),
     }
 
 
-def plate(run):
+def plate(run, n):
     """Displacements of the plate at the floor."""
-    place = pressed_sideways(32)[1]
+    place = pressed_sideways(n)[1]
     u = run.fields()["displacement"][-1, :len(place), 0]
     return [u[(abs(place[:, 0] - x) < 1e-9) & (place[:, 1] < 1e-9)].item()*1e6
             for x in (0, 0.00125, 0.005, 0.0075, 0.01125)]
@@ -114,42 +137,129 @@ def report_known(started, _):
     time, x, _ = done["pulled"]
     rows.append(("SDNV104, block pulled against a spring: places at t = 1.7 and 3.4", "14.917, 3.5",
                  f"{np.interp(1.7, time, x):.3f}, {np.interp(3.4, time, x):.3f}"))
-    rows.append(("SSNV128, plate pressed sideways, 32 x 32: displacements at the floor, 1e-6",
-                 "28.6, 27.2, 22.8, 19.8, 15.0",
-                 ", ".join(f"{u:.2f}" for u in plate(done["plate"]))))
-    force, width, strip = partial_slip(done["pressed_round"], pressed_round(96)[1]).T
-    for k in np.flatnonzero(force < 0.98)[::2]:
-        rows.append((f"two like bodies, one round, Q = {force[k]:.3f} mu P: strip that sticks by "
-                     f"that in contact, nodes {strip[k]:.2f} apart",
-                     f"{math.sqrt(1 - force[k]):.3f}",
-                     f"{width[k]:.3f}"))
+    rows += [(f"SSNV128, plate pressed sideways, {n} x {n}: displacements at the floor, 1e-6",
+              "28.6, 27.2, 22.8, 19.8, 15.0",
+              ", ".join(f"{u:.2f}" for u in plate(done["plate", n], n))) for n in PLATES]
+    force, width, strip = partial_slip(done["to and fro"], pressed_round(96, back=BACK)[1]).T
+    turn = np.argmax(force)
+    for k in (*range(3, turn, 4), turn, *range(turn + 2, len(force), 3)):
+        goes_back = k > turn
+        share = (force[turn] - force[k])/2 if goes_back else force[k]
+        rows.append((f"two like bodies, one round, Q = {force[k]:.3f} mu P{', back' if goes_back else ''}: "
+                     f"strip that sticks by that in contact, nodes {strip[k]:.2f} apart",
+                     f"{math.sqrt(1 - share):.3f}", f"{width[k]:.3f}"))
     return table(["scene", "known", "here"], rows)
+
+
+# ---- flutter -----------------------------------------------------------------------------------
+
+#: Cells and damping of a block that slides, the periods of its shear that are looked at.
+SLIDING = (((4, 2), 0.0, 4), ((4, 2), 2e-3, 8), ((8, 4), 2e-3, 8))
+STEP = 5e-4
+
+
+def start_flutter(runs):
+    return {(cells, eta): (runs.start(fluttering(STEP, RISE + (n + 1)*2*math.pi/200, eta, cells),
+                                      **NODES)) for cells, eta, n in SLIDING}
+
+
+def report_flutter(started, _):
+    rows = []
+    for (cells, eta), future in started.items():
+        rate, row = fastest(0.3, cells=cells, eta=eta)
+        run = future.result()
+        seen = rate_of(run, row, STEP)
+        rows.append((f"{cells[0]} x {cells[1]}", f"{eta:g}", f"{rate.real:.2f}", f"{seen.real:.2f}",
+                     f"{rate.imag:.1f}", f"{seen.imag:.1f}", law(run)))
+    return table(["mesh", "`BETA`", "growth, eigenvalue [1/s]", "in the run", "frequency, eigenvalue",
+                  "in the run", "law"], rows)
+
+
+# ---- bodies that friction holds ----------------------------------------------------------------
+
+#: Sides, formulation.
+HELD = ((ONE, "MORTAR"), (ONE, "SEGMENT"), (BOTH, "NODE TO SURFACE"))
+
+
+def start_held(runs):
+    started = {}
+    for sides, formulation in HELD:
+        for part in (0.8, 1.2, 2.5):
+            started["arch", part*arch_needs(), sides, formulation] = runs.start(
+                arch(part*arch_needs(), sides), formulation=formulation)
+        for mu in (0.15, 0.25):
+            started["stack", mu, sides, formulation] = runs.start(
+                stack_on_slope(mu, -math.atan(0.2), sides=sides), formulation=formulation)
+    return started
+
+
+def report_held(started, _):
+    rows = []
+    for (scene, mu, sides, formulation), future in started.items():
+        run = future.result()
+        history = run.history
+        if scene == "arch":
+            u = np.abs(run.fields()["displacement"]).max(axis=(1, 2))
+            needs, stands = arch_needs(), mu > arch_needs()
+        else:
+            u = way(run, 66, -math.atan(0.2))
+            needs, stands = 0.2, mu > 0.2
+        rows.append((scene, f"`{formulation}`", f"`{sides}`", f"{mu:.3f}", f"{needs:.4f}",
+                     "stands" if stands else "slides", f"{u[len(u)//2]:.4f}", f"{u[-1]:.4f}",
+                     size(balance(history)), f"{history['newton'][1:].mean():.1f}",
+                     int(history["cuts"].sum()), law(run), run.verdict["verdict"]))
+    return table(["scene", "type", "sides", "mu", "mu needed", "known", "moved at 0.2", "at 0.4",
+                  "balance", "Newton", "cuts", "law", "verdict"], rows)
+
+
+# ---- small problems ----------------------------------------------------------------------------
+
+
+def start_random(runs):
+    return runs.pool.submit(subprocess.run, [PROGRAM.with_name("kernels"), "friction"],
+                            capture_output=True, text=True, check=True)
+
+
+def report_random(started, _):
+    found = re.search(r"(\d+) problems, (\d+) not by trials alone, law missed by (\S+)",
+                      started.result().stdout)
+    return table(["problems", "solved", "by Lemke's method", "law"],
+                 [(found[1], found[1], found[2], size(float(found[3])))])
 
 
 # ---- ring ---------------------------------------------------------------------------------------
 
 
+#: Formulation, method, sides.
+RINGS = (("NODE TO SURFACE", "NULL SPACE", "ONE"), ("NODE TO SURFACE", "SADDLE POINT", "ONE"),
+         ("NODE TO SURFACE", "NULL SPACE", "BOTH"), ("SEGMENT", "NULL SPACE", "ONE"),
+         ("MORTAR", "NULL SPACE", "ONE"), ("MORTAR", "SADDLE POINT", "ONE"))
+
+
 def start_ring(runs):
-    return {(mu, method, sides): runs.start(ring(mu), **NODES, h=0.01, t_end=1.0, method=method,
-                                            sides=sides)
-            for mu in (0.2, 0.8)
-            for method, sides in (("NULL SPACE", "ONE"), ("SADDLE POINT", "ONE"),
-                                  ("NULL SPACE", "BOTH"))}
+    return {(mu, *kind): runs.start(ring(mu), h=0.01, t_end=1.0, formulation=kind[0], method=kind[1],
+                                    sides=kind[2])
+            for mu in (0.2, 0.8) for kind in RINGS}
 
 
 def report_ring(started, _):
     rows = []
-    for (mu, method, sides), future in started.items():
+    for (mu, *kind), future in started.items():
         run = future.result()
         history = run.history
-        rows.append((f"{mu:g}", f"`{method}`", f"`{sides}`", f"{history['friction_loss'][-1]:.12f}",
+        least = np.diff(history["friction_loss"]).min()
+        rows.append((f"{mu:g}", *(f"`{word}`" for word in kind),
+                     f"{history['friction_loss'][-1]:.12f}", size(max(0.0, -least)),
                      size(balance(history)), *(size(drift(history[name]))
                                                for name in ("px", "py", "lz")),
                      f"{history['newton'][1:].mean():.1f}", int(history["cuts"].sum()), law(run)))
-    return table(["mu", "method", "sides", "taken by friction", "balance", "px", "py", "lz",
-                  "Newton", "cuts", "law"], rows)
+    return table(["mu", "type", "method", "sides", "taken by friction", "given by it", "balance", "px",
+                  "py", "lz", "Newton", "cuts", "law"], rows)
 
 
 CHAPTERS = [Chapter("friction_rest", start_rest, report_rest),
             Chapter("friction_known", start_known, report_known),
+            Chapter("friction_flutter", start_flutter, report_flutter),
+            Chapter("friction_held", start_held, report_held),
+            Chapter("friction_random", start_random, report_random),
             Chapter("friction_ring", start_ring, report_ring)]
