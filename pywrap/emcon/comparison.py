@@ -113,19 +113,22 @@ def compare(one: str | os.PathLike[str], other: str | os.PathLike[str], *,
     return Comparison(str(paths[0].base), str(paths[1].base), chosen, tuple(notes))
 
 
-def common_times(a: Array, b: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def common_times(a: Array, b: Array, same: float = SAME_TIME
+                 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Rows (k), (k) of the times that are in both `a` and `b` [T], both ascending.
+
+    same      times this far apart, by the whole time, are one
 
     Of equal times (a step of no duration, a restart) the last one counts.
     """
     if not len(a) or not len(b):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    slack = SAME_TIME*max(float(np.ptp(a)), float(np.ptp(b)))
+    slack = same*max(float(np.ptp(a)), float(np.ptp(b)))
     # the last row of b that is not later than a time of a
     row = np.searchsorted(b, a + slack, side="right") - 1
-    same = (row >= 0) & (np.abs(b[np.maximum(row, 0)] - a) <= slack)
-    same[:-1] &= np.diff(a) > slack
-    return np.flatnonzero(same), row[same]
+    is_common = (row >= 0) & (np.abs(b[np.maximum(row, 0)] - a) <= slack)
+    is_common[:-1] &= np.diff(a) > slack
+    return np.flatnonzero(is_common), row[is_common]
 
 
 def _history(paths: tuple[ResultPaths, ResultPaths], notes: list[str]) -> Iterator[Difference]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import itertools
 import math
@@ -19,11 +20,13 @@ from emcon.study.accuracy import (Limit, Run, common_nodes, difference, fitted_o
 from emcon.study.choice import cheapest, pareto_front, parse_goals
 from emcon.study.deck import DeckFile, read_deck, refined_deck
 from emcon.study.execution import Progress, bar_text
+from emcon.study.figures import _draw_work
 from emcon.study.measures import (Measured, _of_history, _of_pairs, _per_mass, body_geometry,
                                   rigid_energy, windowed)
 from emcon.study.plan import Member, make_plan, parse_vary, read_manifest, write_manifest
 from emcon.study.reference import Reference
 from emcon.study.report import Study, goal_words, goals_met, missing_knobs
+from matplotlib.figure import Figure
 
 EPSILON = np.finfo(float).eps
 SIZES = [(1.0, 2.0, 4.0), (0.1, 0.15, 0.4), (0.01, 0.02, 0.03)]
@@ -177,6 +180,32 @@ def test_a_finer_mesh_is_no_other_treatment(last: float, words: str) -> None:
     study = study_of(errors, 0.005, "impulse:0.05", "mesh=1,2")
     found = goal_words(study, study.references[0], study.goals)
     assert found.endswith(f"with mesh and h alone the deck's own {words}")
+
+
+def test_figures_mark_the_front_the_floor_and_the_goal() -> None:
+    study = study_of(ERRORS, 0.02, "impulse:0.05")
+    axes = Figure().subplots()
+    _draw_work(axes, study, study.references[0], "impulse")
+    drawn = {artist.get_label(): artist for artist in (*axes.lines, *axes.patches)}
+    floor = drawn["reference not certain"].get_extents().transformed(axes.transData.inverted())
+    assert floor.y1 == pytest.approx(0.02, rel=1e-12) and floor.y0 < 0.003
+    # 1 s for 0.04, 10 s for 0.01; what is dearer and worse is not on it
+    assert drawn["Pareto front"].get_xydata() == pytest.approx(np.array([[1.0, 0.04],
+                                                                         [10.0, 0.01]]))
+    assert list(drawn["goal"].get_ydata()) == [0.05, 0.05]
+
+
+def test_the_price_may_leave_out_the_start() -> None:
+    """Of two settings that meet the goal, by one the whole process is cheaper, by the other the
+    increments."""
+    plain = study_of({**ERRORS, "0.01 A": (1.5, 0.01)}, 0.005, "impulse:0.05")
+    for run, parts in zip(plain.runs, (0.8, 1.0, 0.5, 11.0), strict=True):
+        run.record["increments_cpu"] = parts
+    words = goal_words(plain, plain.references[0], plain.goals)
+    assert "h=0.1, initiation=ADMISSIBLE: 1 s" in words and "12 times cheaper" in words
+    study = dataclasses.replace(plain, cost="increments")
+    words = goal_words(study, study.references[0], study.goals)
+    assert "h=0.01, initiation=ADMISSIBLE: 0.5 s" in words and "22 times cheaper" in words
 
 
 def test_each_knob_of_the_choice_is_asked_for_alone() -> None:

@@ -28,6 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("EMCON", ROOT/"build"/"release"/"emcon"))
 BAR = ROOT/"input_decks"/"bouncing_bar.inp"
 RING = ROOT/"input_decks"/"ring.inp"
+SINGLE = ROOT/"build"/"release-single"/"emcon"
 EPSILON = np.finfo(float).eps
 #: Of one study [s].
 LONGEST = 300
@@ -141,6 +142,91 @@ def test_errors_of_the_impact_and_a_goal_too_far(tmp_path: Path) -> None:
     finest = min(rows, key=lambda row: float(row["h"]))
     assert float(finest["impulse_y"]) > 0.0
     assert all(float(row["energy"]) < 1e-12 for row in rows)
+
+
+def test_the_contact_of_the_bar_is_measured(tmp_path: Path) -> None:
+    """The first impact in closed form, and what its measures are by each other."""
+    h, front = 0.005, 2*0.2/30                           # the wave front is some two elements wide
+    study(tmp_path, "--vary", f"h=0.03,{h}", "--vary", "initiation=MASSLESS,PERSISTENT",
+          "--set", "t_end=2")
+    found = {(row["h"], row["initiation"]): {name: float(value) for name, value in row.items()
+                                             if re.fullmatch(r"-?[\d.]+(e-?\d+)?", value)}
+             for row in table(tmp_path)}
+    smooth = found[f"{h}", "MASSLESS"]
+    slack = 2*h + front
+    assert smooth["switches"] == 2.0
+    assert smooth["duration"] == pytest.approx(2/3, abs=slack)
+    # of a width of 1, all of it in contact
+    mean = smooth["impulse_y"]/smooth["duration"]
+    assert smooth["mean_pressure"] == pytest.approx(mean, rel=1e-12)
+    assert mean == pytest.approx(400.0, rel=slack/(2/3))
+    assert smooth["penetration"] < 64*15/0.2*EPSILON     # heights up to 15 over the edge
+    # m = 10, the centre above x = 0.5; what gravity, 10, has done is in motion and strain
+    p = smooth["momentum_y"]
+    assert smooth["rebound_1_y"] == pytest.approx(p/10, rel=1e-12)
+    assert smooth["angular_momentum"] == pytest.approx(0.5*p, rel=1e-10)
+    assert smooth["rigid_energy_1"] == pytest.approx(p**2/20, rel=1e-10)
+    assert smooth["rigid_energy_1"] + smooth["vibration"] == pytest.approx(
+        -100*smooth["position_1_y"], rel=1e-10)
+    # held where it was at 0.99, when the next increment would have met the floor, an edge of 3
+    assert found["0.03", "PERSISTENT"]["stand_off"] == pytest.approx((5 - 5*0.99**2)/3, rel=1e-8)
+
+
+def test_each_treatment_has_its_own_limit(tmp_path: Path) -> None:
+    study(tmp_path, "--vary", "h=0.02,0.01", "--vary", "initiation=MASSLESS,PERSISTENT", "--set",
+          "t_end=1.5")
+    found = {(row["h"], row["initiation"]): row for row in table(tmp_path)}
+
+    def apart(other: str) -> float:
+        """Of the impulse of `PERSISTENT` from the finer run of a treatment."""
+        one, two = (float(found[key]["impulse_y"]) for key in (("0.02", "PERSISTENT"),
+                                                               ("0.01", other)))
+        return abs(one/two - 1.0)
+
+    row = found["0.02", "PERSISTENT"]
+    assert float(row["error_finest_impulse"]) == pytest.approx(apart("MASSLESS"), rel=1e-9)
+    assert float(row["own_impulse"]) == pytest.approx(apart("PERSISTENT"), rel=1e-9)
+    assert abs(apart("MASSLESS")/apart("PERSISTENT") - 1.0) > 1e-3
+
+
+def test_pressure_of_the_patch(tmp_path: Path) -> None:
+    """10 at all nodes, on an edge of 2 that Poisson's ratio makes longer; a study of statics."""
+    force = 10*2*1.00560920918586
+    (tmp_path/"closed.json").write_text(json.dumps({"peak_pressure": 10, "peak_force": force}))
+    study(tmp_path, "--vary", "formulation=MORTAR", "--reference", "closed-form:closed.json",
+          deck=ROOT/"input_decks"/"contact_patch.inp")
+    (row,) = table(tmp_path)
+    for name in ("peak_pressure", "peak_force"):
+        assert float(row[f"error_closed-form_{name}"]) < 1e-12, name
+
+
+def test_the_cost_may_be_that_of_the_increments(tmp_path: Path) -> None:
+    """A fall of one increment is all start and reading."""
+    options = ("--vary", "h=0.5,0.005", "--set", "t_end=0.5", "--set", "frame=0.5", "--goal",
+               "position:1e-9")
+    text = study(tmp_path, *options, "--cost", "increments").stdout
+    assert "CPU times of the increments alone" in text
+    one, many = table(tmp_path)
+    for row in (one, many):
+        assert 0.0 < float(row["increments_cpu"]) < float(row["cpu"])
+    whole, parts = (float(many[name])/float(one[name]) for name in ("cpu", "increments_cpu"))
+    assert parts > whole
+    told = re.search(r"cheapest setting is h=0.5: ([\d.e-]+) s.*?([\d.]+) times cheaper", text)
+    assert told and float(told[1]) == pytest.approx(float(one["increments_cpu"]), rel=5e-3)
+    assert float(told[2]) == pytest.approx(parts, rel=0.05)
+    again = study(tmp_path, *options).stdout             # the same runs, another price
+    assert "2 of them were there" in again and "of the increments alone" not in again
+
+
+@pytest.mark.skipif(not SINGLE.exists(), reason="make app PRECISION=single")
+def test_displacements_of_single_precision(tmp_path: Path) -> None:
+    """Its places and times are rounded, and are those of the others all the same."""
+    study(tmp_path, *FREE, "--vary", "precision=double,single", "--single-program", SINGLE)
+    rows = [row for row in table(tmp_path) if row["precision"] == "single"]
+    errors = [float(row["error_finest_displacement"]) for row in rows]
+    single = float(np.finfo(np.float32).eps)
+    # heights of 15 are rounded each increment, displacements are 1.25
+    assert len(errors) == 2 and all(0.0 < error < 10*15/1.25*single for error in errors)
 
 
 def test_a_refined_mesh_of_the_ring(tmp_path: Path) -> None:
@@ -306,7 +392,8 @@ def test_a_study_that_is_killed_goes_on(tmp_path: Path) -> None:
     other.mkdir()
     study(other, *options)
     for one, two in zip(table(tmp_path), table(other), strict=True):
-        one.pop("cpu"), two.pop("cpu")
+        for name in ("cpu", "increments_cpu"):
+            one.pop(name), two.pop(name)
         assert one == two
 
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..comparison import common_times
+from ..comparison import SAME_TIME, common_times
 from ..fields import FieldFile
 from ..hdf5 import ResultError
 from ..results import Array, ResultPaths
-from .measures import NAMES, OWN, ROWS, Measured
+from .measures import NAMES, OWN, ROWS, Measured, read_verdict
 from .plan import Member
 
 #: A reference value below this fraction of the largest size of the quantity counts as 0.
@@ -22,6 +22,9 @@ ZERO = math.sqrt(float(np.finfo(np.float64).eps))
 #: Orders that are believed of three runs: a scheme is of second order at most, and below a half
 #: three runs show no convergence.
 LEAST_ORDER, MOST_ORDER = 0.5, 2.0
+#: What counts as the cost of a run, and where its record has it.
+PROCESS, INCREMENTS = "process", "increments"
+COSTS = {PROCESS: "cpu", INCREMENTS: "increments_cpu"}
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,10 @@ class Run:
     record: dict[str, Any]
     measures: Mapping[str, Measured]
     paths: ResultPaths | None       #: None: there are no fields
+
+    def cost(self, kind: str) -> float:
+        """Processor time of the process, or of its increments [s]."""
+        return float(self.record[COSTS[kind]])
 
 
 def difference(one: Measured, other: Measured, row: int | None = None) -> float:
@@ -85,15 +92,19 @@ def base(name: str) -> str:
 
 
 def field_difference(one: ResultPaths | None, other: ResultPaths | None) -> float | None:
-    """Displacements at common frames and nodes: rms of the difference over rms of `other`."""
+    """Displacements at common frames and nodes: rms of the difference over rms of `other`.
+
+    Places and times of a run in single precision are those of another but for its rounding.
+    """
     if one is None or other is None or not (one.field.is_file() and other.field.is_file()):
         return None
     try:
         with FieldFile(one.field) as a, FieldFile(other.field) as b:
             if not all("displacement" in f.point_fields for f in (a, b)):
                 return None
-            nodes = common_nodes(a.points, b.points)
-            frames = common_times(a.times, b.times)
+            kind = _coarser_kind(one, other)
+            nodes = common_nodes(a.points.astype(kind), b.points.astype(kind))
+            frames = common_times(a.times, b.times, max(SAME_TIME, 8*float(np.finfo(kind).eps)))
             if nodes is None or not len(frames[0]):
                 return None
             apart = size = 0.0
@@ -105,6 +116,11 @@ def field_difference(one: ResultPaths | None, other: ResultPaths | None) -> floa
     except ResultError:
         return None
     return math.sqrt(apart/size) if size > 0.0 else (0.0 if apart == 0.0 else math.inf)
+
+
+def _coarser_kind(one: ResultPaths, other: ResultPaths) -> type[np.floating[Any]]:
+    is_single = any(read_verdict(paths).get("precision") == "single" for paths in (one, other))
+    return np.float32 if is_single else np.float64
 
 
 def common_nodes(a: Array, b: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:

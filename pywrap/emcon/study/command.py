@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..results import ResultPaths
-from .accuracy import Run
+from .accuracy import COSTS, INCREMENTS, PROCESS, Run
 from .choice import parse_goals
 from .deck import DeckFile, read_deck
 from .errors import StudyError
@@ -47,6 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="folder of the study (default NAME_study)")
     parser.add_argument("--repeat", metavar="N", type=_count, default=1,
                         help="run each member N times, the smallest CPU time counts")
+    parser.add_argument("--cost", choices=list(COSTS), default=PROCESS,
+                        help="CPU time of the whole process (default), or of its increments "
+                        "alone, without start, reading and closing")
     parser.add_argument("--jobs", metavar="N", type=_count, default=os.cpu_count() or 1,
                         help="runs at a time (default: the processors)")
     parser.add_argument("--executor", metavar="MODULE:CALLABLE",
@@ -235,9 +238,11 @@ def _study(setup: _Setup, options: argparse.Namespace, records: Mapping[int, dic
     n = len(setup.members)
     head = (f"study of {setup.deck.path.name}: {n} members, {len(runs)} done"
             + (f", {n - len(runs)} failed" if len(runs) < n else "")
-            + (f"; {n - n_run} of them were there" if n_run < n else ""))
+            + (f"; {n - n_run} of them were there" if n_run < n else "")
+            + ("; CPU times of the increments alone" if options.cost == INCREMENTS else ""))
     return Study(setup.plan, setup.members, records, runs,
-                 references_of(_kinds(options), setup.plan, runs), parse_goals(options.goal), head)
+                 references_of(_kinds(options), setup.plan, runs), parse_goals(options.goal), head,
+                 options.cost)
 
 
 def _conclude(setup: _Setup, study: Study, draws: bool) -> int:

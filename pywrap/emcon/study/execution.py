@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..program import find_program as packed_program
-from ..results import ResultError, ResultPaths
+from ..results import ResultError, ResultPaths, read_history
+from .accuracy import COSTS
 from .deck import DeckFile, refined_deck, times_of
 from .errors import StudyError
 from .measures import measure, read_verdict, to_json
@@ -55,7 +56,10 @@ def record_of(task: Task) -> dict[str, Any] | None:
         found = json.loads((task.home/RECORD).read_text("utf-8"))
     except (OSError, ValueError):
         return None
-    return found if isinstance(found, dict) and found.get("runs", 0) >= task.repeat else None
+    if not isinstance(found, dict) or found.get("runs", 0) < task.repeat:
+        return None
+    is_told = found.get("status") != "done" or set(COSTS.values()) <= set(found)
+    return found if is_told else None
 
 
 def run_member(task: Task) -> dict[str, Any]:
@@ -108,15 +112,16 @@ def _run(task: Task, part: Path) -> dict[str, Any]:
                 if name not in PROGRAM_KNOBS]
     if THREADS in settings:
         command += ["--threads", settings[THREADS]]
-    seconds: list[float] = []
+    paths = ResultPaths(part/task.deck.name)
+    seconds: list[tuple[float, float]] = []
     for _ in range(task.repeat):
         code, cpu, text = call(command, part/"messages.txt", task.time_limit)
-        seconds.append(cpu)
+        seconds.append((cpu, _of_increments(paths, cpu)))
         if code != 0:
             break
-    paths = ResultPaths(part/task.deck.name)
     verdict = read_verdict(paths)
-    record |= {"code": code, "cpu": min(seconds), "is_whole": code in _OVER,
+    record |= {"code": code, **dict(zip(COSTS.values(), map(min, zip(*seconds)))),
+               "is_whole": code in _OVER,
                **{name: verdict[name] for name in ("verdict", "reasons", "increments", "newton",
                                                    "cuts", "time") if name in verdict}}
     if code == 0 or (code == 3 and verdict.get("verdict") == "bad"):
@@ -125,6 +130,15 @@ def _run(task: Task, part: Path) -> dict[str, Any]:
         except ResultError as problem:
             return record | {"message": str(problem)}
     return record | {"message": _why(code, text, verdict, task.time_limit)}
+
+
+def _of_increments(paths: ResultPaths, cpu: float) -> float:
+    """Processor time from the state at the start to the last increment [s]; `cpu` without any."""
+    try:
+        told = read_history(paths)["cpu"]
+    except (ResultError, ValueError):
+        return cpu
+    return float(told[-1] - told[0]) if len(told) > 1 else cpu
 
 
 def _why(code: int, text: str, verdict: dict[str, Any], limit: float | None) -> str:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..plotting import GREY, RESOLUTION, STYLE
-from .accuracy import Run, fitted_order
+from .accuracy import PROCESS, Run, fitted_order
 from .choice import pareto_front
 from .measures import OWN
 from .plan import MEMBER
@@ -101,14 +101,14 @@ def _begin(axes: Axes, study: Study, reference: Reference, name: str,
 
 
 def _draw_work(axes: Axes, study: Study, reference: Reference, name: str) -> None:
-    axes.set_xlabel("CPU time [s]")
-    if not _begin(axes, study, reference, name, lambda run: float(run.record["cpu"])):
+    axes.set_xlabel("CPU time [s]" if study.cost == PROCESS else f"CPU time, {study.cost} [s]")
+    if not _begin(axes, study, reference, name, study.price):
         return
     points = _points(reference, candidates(study), name)
     for run, error in points:
         if run.member.role != MEMBER:
-            axes.plot(run.record["cpu"], error, "x", color="black", label="the deck as it is")
-    cost = [float(run.record["cpu"]) for run, _ in points]
+            axes.plot(study.price(run), error, "x", color="black", label="the deck as it is")
+    cost = [study.price(run) for run, _ in points]
     front = pareto_front(cost, [error for _, error in points])
     axes.plot([cost[k] for k in front], [points[k][1] for k in front], color="black",
               linewidth=3.0, alpha=0.2, marker="o", markersize=9, zorder=1, label="Pareto front")

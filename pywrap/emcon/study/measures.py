@@ -24,7 +24,7 @@ NAMES = {
     "force": "force of a pair over time, means of windows of the run [M L/T^2]",
     "peak_force": "largest force of a pair in an increment [M L/T^2]",
     "peak_pressure": "largest contact pressure at a node, of the frames [M/(L T^2)]",
-    "mean_pressure": "force over length in contact, mean over the contact [M/(L T^2)]",
+    "mean_pressure": "impulse over length in contact and time [M/(L T^2)]",
     "scatter": "force of an increment beside the mean of its neighbours, rms over rms of the force",
     "switches": "how often a pair came into contact or lost it",
     "penetration": "deepest overlap of bodies, looked for both ways, per edge",
@@ -64,9 +64,9 @@ def measure(paths: ResultPaths, windows: int = WINDOWS) -> dict[str, Measured]:
     pairs = read_pairs(paths)
     if pairs is not None:
         n = _n_pair(history)
-        spans = np.diff(pairs.time)[:, None]
-        force = (np.linalg.norm(pairs.force[1:, :n], axis=2)*spans).sum(axis=0)
-        length = (pairs.length[1:, :n]*spans).sum(axis=0)
+        size = np.linalg.norm(pair_columns(history, "force")[1:], axis=2)
+        force = (size*np.diff(history["time"])[:, None]).sum(axis=0)
+        length = (pairs.length[1:, :n]*np.diff(pairs.time)[:, None]).sum(axis=0)
         mean = np.divide(force, length, out=np.zeros_like(force), where=length > 0.0)
         found["mean_pressure"] = _of_rows(mean[:, None])
     if paths.field.is_file():

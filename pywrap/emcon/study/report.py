@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .accuracy import Run, fitted_order
+from .accuracy import COSTS, PROCESS, Run, fitted_order
 from .choice import Goal, cheapest
 from .measures import NAMES, OWN
 from .plan import DEFAULT, MEMBER, MESH, QUAD, Member, Plan, same_settings
@@ -36,6 +36,11 @@ class Study:
     references: Sequence[Reference]
     goals: Sequence[Goal]
     head: str
+    cost: str = PROCESS                     #: a key of `COSTS`
+
+    def price(self, run: Run) -> float:
+        """What a run costs: processor time [s]."""
+        return run.cost(self.cost)
 
     def label(self, member: Member) -> str:
         """`h=0.1, initiation=ADMISSIBLE`, with the mesh where there are several."""
@@ -79,7 +84,8 @@ def rows_of(study: Study) -> list[dict[str, object]]:
         record, run = study.records.get(member.index, {}), by_index.get(member.index)
         row: dict[str, object] = {"index": member.index, "role": member.role, **member.settings}
         row |= {name: record.get(name, "") for name in
-                ("status", "message", "verdict", "cpu", "increments", "newton", "cuts")}
+                ("status", "message", "verdict", *COSTS.values(), "increments", "newton",
+                 "cuts")}
         if run is not None:
             row |= _values(run)
             for reference in study.references:
@@ -172,7 +178,7 @@ def _of_reference(study: Study, reference: Reference) -> str:
              f"  {'':<{knobs}}{'CPU s':>9}" + "".join(f"{n:>{w}}" for n, w in zip(names, width))]
     for run in study.runs:
         errors = reference.errors(run)
-        lines.append(f"  {study.label(run.member):<{knobs}}{run.record['cpu']:>9.3g}"
+        lines.append(f"  {study.label(run.member):<{knobs}}{study.price(run):>9.3g}"
                      + "".join(f"{_size(errors.get(n)):>{w}}" for n, w in zip(names, width))
                      + ("   the reference" if run is reference.run else ""))
     if reference.limits:
@@ -234,7 +240,7 @@ def candidates(study: Study) -> list[Run]:
 def choice(study: Study, reference: Reference, goals: Sequence[Goal]) -> Run | None:
     """The cheapest run that meets all `goals`."""
     runs = candidates(study)
-    k = cheapest([run.record["cpu"] for run in runs],
+    k = cheapest([study.price(run) for run in runs],
                  [excess(reference, run, goals) for run in runs], 1.0)
     return None if k is None else runs[k]
 
@@ -247,7 +253,7 @@ def goal_words(study: Study, reference: Reference, goals: Sequence[Goal]) -> str
         return _not_met(study, reference, goals, text)
     errors = ", ".join(f"{g.name} to {safe_error(reference, run, g.name):.1e}" for g in goals)
     return (f"goal {text}: the cheapest setting is {study.label(run.member)}: "
-            f"{run.record['cpu']:.3g} s, {errors}" + _against_default(study, reference, goals, run))
+            f"{study.price(run):.3g} s, {errors}" + _against_default(study, reference, goals, run))
 
 
 def missing_knobs(study: Study) -> list[dict[str, str]]:
@@ -294,8 +300,8 @@ def _against_default(study: Study, reference: Reference, goals: Sequence[Goal], 
                     and run.member.role in (MEMBER, DEFAULT)), None)
     if default is None or default is chosen:
         return "; it is the deck's own" if default is chosen else ""
-    cpu = default.record["cpu"]
-    gain = cpu/chosen.record["cpu"]
+    cpu = study.price(default)
+    gain = cpu/study.price(chosen)
     words = [f"; {max(gain, 1.0/gain):.2g} times {'cheaper' if gain >= 1.0 else 'dearer'} than the "
              f"deck's own ({study.label(default.member)}, {cpu:.3g} s"
              + ("" if excess(reference, default, goals) <= 1.0 else ", and the goal is not met")
@@ -310,7 +316,7 @@ def _against_default(study: Study, reference: Reference, goals: Sequence[Goal], 
             words.append(f"{knob}={value} alone: failed")
         elif alone is not chosen:
             met = excess(reference, alone, goals) <= 1.0
-            words.append(f"{knob}={value} alone: {cpu/alone.record['cpu']:.2g} times"
+            words.append(f"{knob}={value} alone: {cpu/study.price(alone):.2g} times"
                          + ("" if met else ", and the goal is not met"))
     return "; ".join([*words, *_by_refinement(study, reference, goals, chosen)])
 
@@ -328,12 +334,12 @@ def _by_refinement(study: Study, reference: Reference, goals: Sequence[Goal],
     words = f"with {' and '.join(fine)} alone the deck's own "
     met = [run for run in runs if excess(reference, run, goals) <= 1.0]
     if met:
-        run = min(met, key=lambda run: float(run.record["cpu"]))
+        run = min(met, key=study.price)
         words += "meets the goal at "
     else:
         run = min(runs, key=lambda run: tuple(knob_size(run, knob) for knob in fine))
         words += "does not meet the goal down to "
-    gain = run.record["cpu"]/chosen.record["cpu"]
+    gain = study.price(run)/study.price(chosen)
     where = ", ".join(f"{knob}={run.member.settings[knob]}" for knob in fine)
     return [f"{words}{where}, for {gain:.2g} times the time"] if run is not chosen else []
 
