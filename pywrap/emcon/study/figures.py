@@ -10,7 +10,8 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plotting import GREY, RESOLUTION, STYLE
+from ..plotting import RESOLUTION
+from ..scene import GREY, STYLE
 from .accuracy import PROCESS, Run, fitted_order
 from .choice import pareto_front
 from .measures import OWN
