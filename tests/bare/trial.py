@@ -4,7 +4,8 @@ Bare folders of Debian 12 and Ubuntu 24.04 (debootstrap) with Python and without
 each: `pip install` of the wheel that fits its Python, the lines of README.md, the scenes that are
 drawn in Gmsh from script to picture, in under two minutes each; then CMake and a compiler, and the
 host in C++ from the files of the wheel; with --prefix also from an installed one. Says seconds and
-those of the processor, ends with 1 where something fails.
+those of the processor, by which the two minutes are judged where the machine is loaded with other
+work; ends with 1 where something fails.
 
 It needs root, debootstrap, and a network; folders that are there already are used again.
 """
@@ -88,12 +89,16 @@ class Bare:
         start, before = time.monotonic(), os.times()
         done = subprocess.run(["chroot", str(self.folder), "sh", "-ec", f"cd /trial; {command}"],
                               env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        seconds, after = time.monotonic() - start, os.times()
+        seconds = elapsed = time.monotonic() - start
+        after = os.times()
         busy = max(0.0, after.children_user + after.children_system
                    - before.children_user - before.children_system)
+        # Where others hold the processors too, only the time of the processor says anything.
+        if os.getloadavg()[0] > 2*(os.cpu_count() or 1):
+            seconds = min(seconds, busy)
         is_good = done.returncode == 0 and (not limit or seconds < limit)
         last = (done.stdout.strip().splitlines() or [""])[-1]
-        print(f"{self.system.name:8}{what:34}{seconds:7.1f} s, busy {busy:5.1f} s  "
+        print(f"{self.system.name:8}{what:34}{elapsed:7.1f} s, busy {busy:5.1f} s  "
               f"{'' if is_good else 'FAILED  '}{last[:80]}", flush=True)
         if not is_good:
             self.failed.append(what)
