@@ -5,7 +5,8 @@ module emcon_dgrad_series
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: atanh_excess, log1p_of, log1p_excess, exp_of, expm1_of, sinh_ratio
+   public :: atanh_excess, log1p_of, log1p_excess, exp_of, expm1_of, exp_excess, sinh_ratio
+   public :: sinh_excess
    public :: cosh_excess, cosh_chord
 
    !> Below this the power series is used; 1/4 costs at most 14 terms in double precision.
@@ -105,6 +106,45 @@ contains
          expm1_of = 2.0_wp*t/(1.0_wp - t)
       end if
    end function expm1_of
+
+   !> exp(a) - 1 - a, to relative accuracy.
+   elemental real(wp) function exp_excess(a)
+      real(wp), intent(in) :: a
+      real(wp) :: term
+      integer :: k
+
+      if (abs(a) >= 1.0_wp) then
+         exp_excess = (exp(a) - 1.0_wp) - a
+         return
+      end if
+      term = 0.5_wp*a*a
+      exp_excess = term
+      do k = 3, 40
+         term = term*a/real(k, wp)
+         exp_excess = exp_excess + term
+         if (abs(term) <= 0.01_wp*epsilon(a)*exp_excess) exit
+      end do
+   end function exp_excess
+
+   !> sinh(x)/x - 1, to relative accuracy.
+   elemental real(wp) function sinh_excess(x)
+      real(wp), intent(in) :: x
+      real(wp) :: square, term
+      integer :: k
+
+      if (abs(x) >= 1.0_wp) then
+         sinh_excess = sinh(x)/x - 1.0_wp
+         return
+      end if
+      square = x*x
+      term = square/6.0_wp
+      sinh_excess = term
+      do k = 2, 40
+         term = term*square/real(2*k*(2*k + 1), wp)
+         sinh_excess = sinh_excess + term
+         if (term <= 0.01_wp*epsilon(x)*sinh_excess) exit
+      end do
+   end function sinh_excess
 
    !> sinh(x)/x and its derivative by x.
    pure subroutine sinh_ratio(x, ratio, rate)

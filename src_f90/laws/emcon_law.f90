@@ -13,7 +13,7 @@ module emcon_law
    private
    public :: law_t, law_box_t, law_points_t, law_response_t, n_lane
    public :: law_response_plane, law_respond_one, law_hold_one, volume_excess
-   public :: change_points_t, law_change_points, no_volume
+   public :: change_points_t, law_change_points, max_part, no_volume
    public :: claim, isochoric_excess, lame_constants, take_elastic, volume_energy
 
    !> Points that are computed side by side. No lane knows of another: the bits of a point depend
@@ -22,12 +22,16 @@ module emcon_law
    !> A law leaves out what resists a change of volume by making it so many powers of two smaller,
    !> below all round-off: loops over points would divide by a D of 0 before they look.
    integer, parameter :: no_volume = digits(1.0_wp) + 7
+   integer, parameter :: max_part = 3
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
       real(wp) :: shear = 0.0_wp                 !! shear modulus at rest [M/(L T^2)]
       logical :: has_volume = .true.             !! W is infinite where det C = 0
-      logical :: is_plane = .false.              !! W is that of E33 = E13 = E23 = 0 alone
+      !> Parts of W that are of sums over principal stretches, 0: none. Then `energy` is that of
+      !> E33 = E13 = E23 = 0 alone, and W in space is the sum of `part`.
+      integer :: n_part = 0
+      real(wp) :: exponent(max_part) = 1.0_wp    !! (:n_part) of the stretches
    contains
       procedure(take_interface), deferred :: take
       procedure(energy_interface), deferred :: energy
@@ -36,6 +40,7 @@ module emcon_law
       procedure :: divide => law_divide
       procedure :: change => law_change
       procedure :: volume => law_volume
+      procedure :: part => law_part
    end type law_t
 
    !> For arrays of laws of different types.
@@ -195,6 +200,20 @@ contains
       end associate
       u = dg_t()
    end function law_volume
+
+   !> Part `i` of W in space, of a law that has such parts, by the change of volume and
+   !> t = sum of l^a - 1 - a ln l over the principal stretches, a = `exponent(i)`.
+   pure function law_part(self, i, y, t) result(w)
+      class(law_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_part
+      type(dg_t), intent(in) :: y                !! J^2 - 1
+      type(dg_t), intent(in) :: t                !! of second order at small strains
+      type(dg_t) :: w                            !! [M/(L T^2)]
+
+      associate (unused => self, no => i, never => y, neither => t)
+      end associate
+      w = dg_t()
+   end function law_part
 
    !> The change of volume of points in plane strain, with its gradients.
    pure subroutine law_change_points(law, with_tangent, points)

@@ -4,7 +4,7 @@
 !>
 !> Source: docs/theory.md, section 3, principal stretches.
 module emcon_law_ogden
-   use emcon_dgrad3, only : dg_chain, dg_expm1, dg_log1p, dg_sqrt, dg_t, operator(*), &
+   use emcon_dgrad3, only : dg_chain, dg_excess, dg_expm1, dg_log1p, dg_sqrt, dg_t, operator(*), &
       operator(-), operator(+), operator(/)
    use emcon_dgrad_series, only : cosh_chord, cosh_excess, expm1_of, log1p_of
    use emcon_kinds, only : wp
@@ -23,6 +23,7 @@ module emcon_law_ogden
       procedure :: energy => ogden_energy
       procedure :: divide
       procedure :: volume
+      procedure :: part
    end type law_ogden_t
 
 contains
@@ -33,11 +34,12 @@ contains
       character(len=:), allocatable, intent(out) :: fault   !! what is wrong; empty: nothing
       integer :: i, n
 
-      self%is_plane = .true.
       n = size(constant)/3
+      self%n_part = n
       self%order = n
       self%mu(:n) = constant(1:2*n:2)
       self%alpha(:n) = constant(2:2*n:2)
+      self%exponent(:n) = self%alpha(:n)
       self%d(:n) = constant(2*n + 1:3*n)
       self%shear = sum(self%mu(:n))
       call claim(self%shear > 0.0_wp, "the sum of all mu", self%shear, "must be positive", fault)
@@ -138,5 +140,19 @@ contains
 
       u = volume_energy(self%d(:self%order), v*(v + 2.0_wp))
    end function volume
+
+   !> With p = alpha ln(J)/3 a term is exp(-p) (t - 3 (exp(p) - 1 - p)); the first one has the
+   !> energy of the change of volume beside it.
+   pure function part(self, i, y, t) result(w)
+      class(law_ogden_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..order
+      type(dg_t), intent(in) :: y                !! J^2 - 1
+      type(dg_t), intent(in) :: t                !! sum of l^alpha - 1 - alpha ln l
+      type(dg_t) :: w, above
+
+      above = dg_expm1((self%alpha(i)/6.0_wp)*dg_log1p(y))
+      w = (2.0_wp*self%mu(i)/self%alpha(i)**2)*((t - 3.0_wp*dg_excess(above))/(above + 1.0_wp))
+      if (i == 1) w = w + volume_energy(self%d(:self%order), y)
+   end function part
 
 end module emcon_law_ogden

@@ -11,6 +11,7 @@ module emcon_element_space
       space_response_t
    use emcon_rotation, only : product_of => cross_product
    use emcon_shape, only : max_node => max_element_nodes, shape_t, shape_table_t, shape_tabulate
+   use emcon_stretch_sums_space, only : column, row
    implicit none
    private
    public :: n_space, space_element_t, space_motion_t, space_part_t
@@ -20,8 +21,6 @@ module emcon_element_space
       space_point_cauchy, space_part_clear, space_part_add, space_part_add_tangent
 
    integer, parameter :: n_space = 3, n_dim = n_space
-   !> Rows and columns of the components of a strain.
-   integer, parameter :: row(n_strain) = [1, 2, 3, 1, 2, 1], column(n_strain) = [1, 2, 3, 2, 3, 3]
 
    !> Motion of the nodes, from `from` by `by`.
    type :: space_motion_t
@@ -270,7 +269,8 @@ contains
          c(column(v), row(v)) = c(row(v), column(v))
       end do
       is_regular = dot_product(c(:, 1), product_of(c(:, 2), c(:, 3))) &
-         > noise*product(sum(abs(c), 1))
+         > noise*product(sum(abs(c), 1)) .and. c(1, 1) > 0.0_wp &
+         .and. c(1, 1)*c(2, 2) > c(1, 2)**2
    end function space_point_is_regular
 
    !> Add the forces of a point, F S grad N.

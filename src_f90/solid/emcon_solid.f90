@@ -141,8 +141,7 @@ contains
          if (allocated(self%law(self%law_of(e))%law)) return
          where_it_is = "plane stress"
       else if (self%is_single) then
-         if (.not. allocated(self%law(self%law_of(e))%law)) return
-         if (.not. self%law(self%law_of(e))%law%is_plane) return
+         if (allocated(self%law(self%law_of(e))%law)) return
          where_it_is = trim(merge("in three dimensions", "axisymmetric       ", &
             self%n_dim == n_space))
       else

@@ -47,6 +47,7 @@ program main
    use test_judge, only : collect_judge
    use test_law, only : collect_law
    use test_law_points, only : collect_law_points
+   use test_law_space, only : collect_law_space
    use test_law_thin, only : collect_law_thin
    use test_linear_rows, only : collect_linear_rows
    use test_line_search, only : collect_line_search
@@ -143,6 +144,7 @@ program main
    call run("judge", collect_judge)
    call run("law", collect_law)
    call run("law_points", collect_law_points)
+   call run("law_space", collect_law_space)
    call run("law_thin", collect_law_thin)
    call run("element", collect_element)
    call run("element_kinds", collect_element_kinds)

@@ -1,8 +1,8 @@
 !> Functions of one variable near zero, against power series and quadruple precision.
 module test_dgrad_series
    use check, only : check_near, check_true, test_case_t
-   use emcon_dgrad_series, only : atanh_excess, cosh_chord, expm1_of, log1p_excess, log1p_of, &
-      sinh_ratio
+   use emcon_dgrad_series, only : atanh_excess, cosh_chord, exp_excess, expm1_of, log1p_excess, &
+      log1p_of, sinh_excess, sinh_ratio
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
@@ -32,6 +32,7 @@ contains
          test_case_t("exp(a) - 1", test_expm1), &
          test_case_t("atanh(w)/w - 1", test_atanh), &
          test_case_t("sinh(x)/x", test_sinh), &
+         test_case_t("exp(a) - 1 - a and sinh(x)/x - 1", test_excesses), &
          test_case_t("smallest and largest arguments", test_ends), &
          test_case_t("divided difference of cosh(k q)", test_cosh_chord)]
    end subroutine collect_dgrad_series
@@ -190,6 +191,33 @@ contains
             abs(real(expected_rate, wp)), "rate at " // to_text(list(k)))
       end do
    end subroutine test_sinh
+
+   !> By power series all through: where 1 is subtracted they are larger than a sixth.
+   subroutine test_excesses(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: list(n_argument)
+      real(qp) :: expected, x
+      integer :: k, i
+
+      list = arguments()
+      do k = 1, size(list)
+         x = real(list(k), qp)
+         expected = 1.0_qp
+         do i = n_term, 3, -1
+            expected = 1.0_qp + expected*x/real(i, qp)
+         end do
+         expected = 0.5_qp*x*x*expected
+         call check_near(error, exp_excess(list(k)), real(expected, wp), tol, real(expected, wp), &
+            "exp at " // to_text(list(k)))
+         expected = 1.0_qp
+         do i = 24, 2, -1
+            expected = 1.0_qp + expected*x*x/real(2*i*(2*i + 1), qp)
+         end do
+         expected = expected*x*x/6.0_qp
+         call check_near(error, sinh_excess(list(k)), real(expected, wp), tol, &
+            real(expected, wp), "sinh at " // to_text(list(k)))
+      end do
+   end subroutine test_excesses
 
    !> Where squares underflow the first term is the function.
    subroutine test_ends(error)

@@ -7,7 +7,7 @@ module test_element_axial
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_mooney_rivlin, &
-      law_neo_hooke, law_yeoh
+      law_neo_hooke, law_ogden, law_yeoh
    use emcon_law_space, only : law_response_space, space_response_t
    use emcon_pressure_ring_plane, only : press_ring, press_ring_stiffness
    use emcon_scene, only : scene_t
@@ -22,7 +22,7 @@ module test_element_axial
    real(wp), parameter :: eps = epsilon(1.0_wp), two_pi = 8.0_wp*atan(1.0_wp)
    !> Sums over up to nine points and nodes, each term of some dozen roundings.
    real(wp), parameter :: tol = 512.0_wp*eps
-   integer, parameter :: n_law = 5
+   integer, parameter :: n_law = 6
 
    !> One distorted element of size 1 at radii about 1.5, with its law.
    type :: sample_t
@@ -103,7 +103,7 @@ contains
       integer, intent(in) :: law                 !! 1..n_law
       type(scene_t), intent(inout) :: scene
       integer, parameter :: codes(n_law) = [law_linear, law_coupled_neo_hooke, law_neo_hooke, &
-         law_mooney_rivlin, law_yeoh]
+         law_mooney_rivlin, law_yeoh, law_ogden]
       real(wp), parameter :: c = 0.2_wp*young, d = 1.0_wp/young
 
       scene%material(1)%law = codes(law)
@@ -114,6 +114,8 @@ contains
          scene%material(1)%constant = [c, 0.5_wp*c, d]
       case (5)
          scene%material(1)%constant = [c, 0.1_wp*c, 0.1_wp*c, d, d, d]
+      case (6)
+         scene%material(1)%constant = [c, 1.3_wp, 0.5_wp*c, -2.5_wp, d, d]
       end select
    end subroutine set_law
 
