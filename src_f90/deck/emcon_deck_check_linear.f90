@@ -6,6 +6,7 @@ module emcon_deck_check_linear
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_materials, only : kinematics_linear
+   use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    implicit none
@@ -14,6 +15,7 @@ module emcon_deck_check_linear
 
    !> A rotation that small kinematics do not follow [rad].
    real(wp), parameter :: most_turned = 0.1_wp
+   integer, parameter :: n_space = 3
 
 contains
 
@@ -92,6 +94,32 @@ contains
       end do
       moment = moment - transpose(moment)
       spin = sqrt(0.5_wp*sum(moment**2))/inertia
+      if (size(x, 1) == n_space) spin = spin_in_space(x - spread(centre, 2, size(x, 2)), moment, &
+         spin)
    end function spin
+
+   !> The same by the inertia about each axis; of nodes on a line the `otherwise`.
+   pure real(wp) function spin_in_space(x, moment, otherwise)
+      real(wp), intent(in) :: x(:, :)            !! (3, n) from the centre [L]
+      real(wp), intent(in) :: moment(:, :)       !! (3, 3) sum of v x^T - x v^T [L^2/T]
+      real(wp), intent(in) :: otherwise          !! [1/T]
+      real(wp), parameter :: flat = 1024.0_wp*epsilon(1.0_wp)
+      real(wp) :: inertia(n_space, n_space), cofactor(n_space, n_space), det, all_around
+      integer :: a
+
+      inertia = -matmul(x, transpose(x))
+      all_around = sum(x**2)
+      do a = 1, n_space
+         inertia(a, a) = inertia(a, a) + all_around
+      end do
+      do a = 1, n_space
+         cofactor(:, a) = cross_product(inertia(:, 1 + mod(a, n_space)), &
+            inertia(:, 1 + mod(a + 1, n_space)))
+      end do
+      det = dot_product(inertia(:, 1), cofactor(:, 1))
+      spin_in_space = otherwise
+      if (det > flat*all_around**3) spin_in_space = norm2(matmul([moment(3, 2), moment(1, 3), &
+         moment(2, 1)], cofactor))/det
+   end function spin_in_space
 
 end module emcon_deck_check_linear

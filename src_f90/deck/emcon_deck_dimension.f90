@@ -4,7 +4,7 @@ module emcon_deck_dimension
    use emcon_deck_reader, only : card_error, card_t, option_name, reader_t
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
-   use emcon_materials, only : kinematics_nonlinear
+   use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_requests, only : output_t
    use emcon_scene, only : scene_t
    implicit none
@@ -140,8 +140,10 @@ contains
          // " is not in this version"
       do i = 1, size(scene%section)
          associate (section => scene%section(i))
-            if (section%kinematics /= kinematics_nonlinear) call add_error(reader%log, &
-               section%origin, "*SOLID SECTION: KINEMATICS=LINEAR or COROTATED" // missing)
+            if (section%kinematics == kinematics_corotated .or. (scene%n_dim == n_plane &
+               .and. section%kinematics == kinematics_linear)) call add_error(reader%log, &
+               section%origin, "*SOLID SECTION: KINEMATICS=" // trim(merge("COROTATED          ", &
+               "LINEAR or COROTATED", scene%n_dim == n_space)) // missing)
          end associate
       end do
       do i = 1, size(scene%material)

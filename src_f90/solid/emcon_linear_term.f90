@@ -14,7 +14,7 @@ module emcon_linear_term
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_stiff_elements, only : stiff_elements_fastest, stiff_elements_gather, &
       stiff_elements_init, stiff_elements_t
-   use emcon_stiff_product_plane, only : stiff_product_find_sizes, stiff_product_form, &
+   use emcon_stiff_product, only : stiff_product_find_sizes, stiff_product_form, &
       stiff_product_init, stiff_product_load, stiff_product_t
    use emcon_term, only : fastest_t, response_t, role_internal, term_t
    implicit none
@@ -51,7 +51,8 @@ contains
       call stiff_elements_init(self%own, solid, n_dim, solid%is_linear)
       call stiff_elements_fastest(self%own, solid, self%fastest)
       call element_lists(solid, 1, start, node, solid%is_linear)
-      call stiff_product_init(self%product, solid%n_node, start, node, self%own%stiffness, error)
+      call stiff_product_init(self%product, n_dim, solid%n_node, start, node, self%own%stiffness, &
+         error)
       allocate(self%rounding(solid%n_node), source=0.0_wp)
       do k = 1, size(self%own%element)
          do i = 1, self%own%n_node(k)

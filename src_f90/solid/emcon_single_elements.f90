@@ -17,7 +17,7 @@ module emcon_single_elements
    implicit none
    private
    public :: element_slots_t, single_respond, single_tangent_times, single_find_fastest
-   public :: compare_frequency
+   public :: single_rest_tangent, compare_frequency
 
    !> Elements that threads share at a time.
    integer, parameter :: n_block = 1024
@@ -53,13 +53,13 @@ contains
          !$omp parallel do default(none) num_threads(response%n_thread) if(n > 1) &
          !$omp shared(solid, motion, local, part, first, n, with_tangent) schedule(static)
          do k = 1, n
-            if (.not. solid%is_rigid(first + k)) call respond_at(solid, first + k, motion, &
+            if (is_here(solid, first + k)) call respond_at(solid, first + k, motion, &
                with_tangent, local(k), part(k))
          end do
          !$omp end parallel do
          do k = 1, n
             e = first + k
-            if (solid%is_rigid(e)) cycle
+            if (.not. is_here(solid, e)) cycle
             if (part(k)%is_inverted) then
                response%refusal = "element " // to_text(solid%label(e)) // " is inverted"
                return
@@ -71,6 +71,29 @@ contains
          end do
       end do
    end subroutine single_respond
+
+   !> Is the element one of those that respond here?
+   pure logical function is_here(solid, e)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+
+      is_here = .not. (solid%is_rigid(e) .or. solid%is_small(e))
+   end function is_here
+
+   !> The tangent of element `e` where it has not moved, of small strains.
+   pure subroutine single_rest_tangent(solid, e, tangent)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+      real(wp), intent(out) :: tangent(:, :)     !! (n_dim*n, n_dim*n), n nodes [M/T^2]
+      type(space_motion_t) :: rest
+      type(space_part_t) :: part
+
+      rest%nlgeom = .false.
+      call respond_to(solid, e, rest, .true., part)
+      associate (n => solid%geometry(e)%n_node, m => solid%n_dim)
+         tangent = reshape(part%tangent(:m, :n, :m, :n), [m*n, m*n])
+      end associate
+   end subroutine single_rest_tangent
 
    !> The response of element `e`, in space its motion from that of its first node.
    subroutine respond_at(solid, e, motion, with_tangent, local, part)
@@ -87,17 +110,28 @@ contains
          if (solid%is_axial) then
             local%from(:n, :size(node)) = motion%from(:, node)
             local%by(:n, :size(node)) = motion%by(:, node)
-            call axial_element_respond(solid%geometry(e), solid%law(solid%law_of(e))%law, local, &
-               with_tangent, part)
-            return
+         else
+            do i = 1, size(node)
+               local%from(:, i) = motion%from(:, node(i)) - motion%from(:, node(1))
+               local%by(:, i) = motion%by(:, node(i)) - motion%by(:, node(1))
+            end do
          end if
-         do i = 1, size(node)
-            local%from(:, i) = motion%from(:, node(i)) - motion%from(:, node(1))
-            local%by(:, i) = motion%by(:, node(i)) - motion%by(:, node(1))
-         end do
       end associate
+      call respond_to(solid, e, local, with_tangent, part)
+   end subroutine respond_at
+
+   !> The response of element `e` to a motion of its nodes.
+   pure subroutine respond_to(solid, e, local, with_tangent, part)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
+      type(space_motion_t), intent(in) :: local
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(space_part_t), intent(inout) :: part
+
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
-         if (solid%has_mean(e)) then
+         if (solid%is_axial) then
+            call axial_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
+         else if (solid%has_mean(e)) then
             call mean_volume_space_respond(solid%geometry(e), law%law, rest%law, local, &
                with_tangent, part)
          else if (allocated(solid%geometry(e)%mode)) then
@@ -106,7 +140,7 @@ contains
             call space_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
          end if
       end associate
-   end subroutine respond_at
+   end subroutine respond_to
 
    !> Add the forces of element `e`, with what its displacements are rounded by.
    subroutine add_forces(solid, e, motion, local, part, response)
@@ -183,7 +217,7 @@ contains
       local%nlgeom = nlgeom
       do e = 1, solid%n_element
          associate (node => solid%node(:solid%geometry(e)%n_node, e))
-            if (solid%is_rigid(e) .or. .not. any(abs(direction(:, node)) > 0.0_wp)) cycle
+            if (.not. (is_here(solid, e) .and. any(abs(direction(:, node)) > 0.0_wp))) cycle
             call respond_at(solid, e, motion, .true., local, part)
             if (part%is_inverted) return
             do i = 1, size(node)
@@ -210,7 +244,7 @@ contains
 
       local%nlgeom = nlgeom
       do e = 1, solid%n_element
-         if (solid%is_rigid(e)) cycle
+         if (.not. is_here(solid, e)) cycle
          call respond_at(solid, e, motion, .true., local, part)
          if (part%is_inverted) return
          associate (n => solid%geometry(e)%n_node, m => solid%n_dim)

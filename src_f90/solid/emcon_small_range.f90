@@ -1,12 +1,13 @@
 !> How far linear sections have left the range of small kinematics: the largest rotations and
 !> strains of their quadrature points.
 !>
-!> A rotation is the size of the skew part of grad u, in the plane the sine of its angle; a strain
+!> A rotation is the size of the skew part of grad u, the sine of its angle; a strain
 !> that of the symmetric part; of corotated elements both are in their frames.
 module emcon_small_range
    use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t
    use emcon_kinds, only : wp
-   use emcon_small_widen_plane, only : small_widen
+   use emcon_small_widen_plane, only : small_widen_plane => small_widen
+   use emcon_small_widen_space, only : small_widen_space => small_widen
    use emcon_solid, only : solid_t
    implicit none
    private
@@ -14,6 +15,7 @@ module emcon_small_range
 
    !> Errors of small kinematics are of the order of the rotation and the strain.
    real(wp), parameter :: small_limit = 0.05_wp
+   integer, parameter :: n_space = 3
 
    type :: small_range_t
       integer, allocatable :: section(:)         !! (n) linear sections
@@ -68,7 +70,11 @@ contains
                left = own
                call corotated_strip(self%frame(e), left, own, turn)
             end if
-            call small_widen(geometry, own, rotation(s), strain(s))
+            if (size(u, 1) == n_space) then
+               call small_widen_space(geometry, own, rotation(s), strain(s))
+            else
+               call small_widen_plane(geometry, own, rotation(s), strain(s))
+            end if
          end associate
       end do
       self%rotation = max(self%rotation, sqrt(rotation))

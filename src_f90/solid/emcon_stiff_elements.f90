@@ -6,6 +6,7 @@ module emcon_stiff_elements
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
    use emcon_lumped_mass, only : lumped_mass
+   use emcon_single_elements, only : single_rest_tangent
    use emcon_solid, only : solid_t
    use emcon_solid_respond, only : solid_element_respond
    use emcon_term, only : fastest_t
@@ -45,8 +46,13 @@ contains
       rest%nlgeom = .false.
       do k = 1, size(self%element)
          m = n_dim*self%n_node(k)
-         call solid_element_respond(solid, self%element(k), rest, none, .true., part)
-         self%stiffness(:m, :m, k) = 2.0_wp*part%tangent(:m, :m)   ! by the end of no way: half
+         if (solid%is_single) then
+            call single_rest_tangent(solid, self%element(k), self%stiffness(:m, :m, k))
+         else
+            call solid_element_respond(solid, self%element(k), rest, none, .true., part)
+            self%stiffness(:m, :m, k) = part%tangent(:m, :m)
+         end if
+         self%stiffness(:m, :m, k) = 2.0_wp*self%stiffness(:m, :m, k)   ! by the end of no way: half
       end do
    end subroutine stiff_elements_init
 

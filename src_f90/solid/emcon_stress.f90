@@ -93,7 +93,7 @@ contains
       type(space_motion_t) :: motion
       integer :: i
 
-      motion%nlgeom = nlgeom
+      motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
          if (solid%is_axial) then
             motion%from(:size(u, 1), :size(node)) = u(:, node)
