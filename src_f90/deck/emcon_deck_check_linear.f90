@@ -105,6 +105,7 @@ contains
       real(wp), intent(in) :: otherwise          !! [1/T]
       real(wp), parameter :: flat = 1024.0_wp*epsilon(1.0_wp)
       real(wp) :: inertia(n_space, n_space), cofactor(n_space, n_space), det, all_around
+      real(wp) :: about(n_space)
       integer :: a
 
       inertia = -matmul(x, transpose(x))
@@ -113,13 +114,14 @@ contains
          inertia(a, a) = inertia(a, a) + all_around
       end do
       do a = 1, n_space
-         cofactor(:, a) = cross_product(inertia(:, 1 + mod(a, n_space)), &
-            inertia(:, 1 + mod(a + 1, n_space)))
+         associate (b => 1 + mod(a, n_space), c => 1 + mod(a + 1, n_space))
+            cofactor(:, a) = cross_product(inertia(:, b), inertia(:, c))
+            about(a) = moment(c, b)
+         end associate
       end do
       det = dot_product(inertia(:, 1), cofactor(:, 1))
       spin_in_space = otherwise
-      if (det > flat*all_around**3) spin_in_space = norm2(matmul([moment(3, 2), moment(1, 3), &
-         moment(2, 1)], cofactor))/det
+      if (det > flat*all_around**3) spin_in_space = norm2(matmul(about, cofactor))/det
    end function spin_in_space
 
 end module emcon_deck_check_linear

@@ -134,7 +134,7 @@ contains
    pure subroutine stretch_add_tangent(path, k, factor, tangent)
       type(stretch_path_t), intent(in) :: path
       real(wp), intent(in) :: k                  !! power of c, not 0
-      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: factor             !! derivative of W by t [M/(L T^2)]
       real(wp), intent(inout) :: tangent(n_strain, n_strain)   !! by E11, .., 2 E12, ..
       real(wp) :: pull(n, n, n), direction(n_strain), d(n, n), m(n, n), f
       integer :: i, j, l

@@ -148,8 +148,8 @@ contains
       c11 = 1.0_wp + 2.0_wp*e(radial)
       c22 = 1.0_wp + 2.0_wp*e(axial)
       c33 = 1.0_wp + 2.0_wp*e(circle)
-      is_regular = c33 > noise .and. c11 > 0.0_wp .and. c11*c22 - e(shear)**2 > noise*(abs(c11) + abs(e(shear))) &
-         *(abs(c22) + abs(e(shear)))
+      is_regular = c33 > noise .and. c11 > 0.0_wp .and. c11*c22 - e(shear)**2 > noise &
+         *(abs(c11) + abs(e(shear)))*(abs(c22) + abs(e(shear)))
    end function is_regular
 
    !> Add the forces of a point, F S grad N, and those of the circle along the radius.

@@ -154,8 +154,8 @@ contains
       end do
    end subroutine test_energy
 
-   !> Principal stresses l_i^2 S_i = sum of 2 m/alpha (l_i^alpha - mean) + J U'(J), with axes anywhere;
-   !> two of three stretches equal (uniaxial and biaxial), and all.
+   !> Principal stresses l_i^2 S_i = sum of 2 m/alpha (l_i^alpha - mean) + J U'(J), with axes
+   !> anywhere; two of three stretches equal (uniaxial and biaxial), and all.
    subroutine test_stress(error)
       type(error_t), allocatable, intent(out) :: error
       class(law_t), allocatable :: law
