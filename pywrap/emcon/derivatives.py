@@ -9,15 +9,36 @@ from .errors import InputError
 from .given import Array, GivenPoints, Outside, PointFunction
 
 #: Strains at which the derivatives of a law are checked: of some size, and on no axis.
-_STRAINS = np.array([[0.03, -0.02, 0.01], [-0.01, 0.05, -0.04], [0.02, 0.01, 0.07],
-                     [-0.04, -0.03, 0.02], [0.11, 0.06, -0.09]])
+_PLANE = np.array([[0.03, -0.02, 0.01], [-0.01, 0.05, -0.04], [0.02, 0.01, 0.07],
+                   [-0.04, -0.03, 0.02], [0.11, 0.06, -0.09]])
+_SPACE = np.column_stack([_PLANE[:, :2], [-0.05, 0.02, 0.04, 0.06, 0.01], _PLANE[:, 2],
+                          [0.02, 0.05, -0.03, 0.08, -0.06], [-0.07, 0.03, 0.06, -0.01, 0.04]])
 
 
-def check_law(law: PointFunction) -> None:
-    """`check_derivatives` of a strain energy, at small strains where it has no values at others."""
+def check_law(law: PointFunction, n_dim: int | None = None) -> None:
+    """`check_derivatives` of a strain energy, at small strains where it has no values at others.
+
+    n_dim   None: it has to pass in the plane or in three dimensions
+    """
+    try:
+        _check_at(law, _SPACE if n_dim == 3 else _PLANE)
+    except Exception:
+        if n_dim is not None or not _is_of_space(law):
+            raise
+
+
+def _is_of_space(law: PointFunction) -> bool:
+    try:
+        _check_at(law, _SPACE)
+    except Exception:  # whatever a law of the plane says to six strains
+        return False
+    return True
+
+
+def _check_at(law: PointFunction, strains: Array) -> None:
     for part in (1.0, 0.125, 0.015625):
         try:
-            check_derivatives(law, part*_STRAINS)
+            check_derivatives(law, part*strains)
         except Outside:
             continue
         return

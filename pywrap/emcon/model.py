@@ -306,7 +306,8 @@ class Model(Cards):
         law                 a function of strains (n, 3), E11, E22, 2 E12 of Green and Lagrange (the
                             small ones without NLGEOM), that returns energies per reference volume
                             (n,), stresses (n, 3) and tangents (n, 3, 3), the first and second
-                            derivatives; checked here by differences, see `check_derivatives`
+                            derivatives; in three dimensions of strains (n, 6), E11, E22, E33,
+                            2 E12, 2 E23, 2 E13. Checked here by differences, see `check_derivatives`
         user                constants (k,) of `*USER MATERIAL`, for decks of other programs; the law
                             does not see them
         """
@@ -473,7 +474,7 @@ class Model(Cards):
 
     def give_law(self, material: str, law: PointFunction) -> Model:
         """The law of a `*USER MATERIAL`, as `law` of `material`, for the model of a deck."""
-        check_law(law)
+        check_law(law, self._nodes.n_dim if self._nodes.count else None)
         self._laws[material] = law
         return self
 

@@ -247,7 +247,7 @@ typedef int (*emcon_force_function)(void *user, int n_node, const double *u0, co
                                     double *energy, double *tangent);
 
 /* The strain energy per reference volume of the *USER MATERIAL `name`, a function of the strains
- * E11, E22, 2*E12. */
+ * E11, E22, 2*E12; in three dimensions E11, E22, E33, 2*E12, 2*E23, 2*E13. */
 int emcon_give_law(emcon_model *model, const char *name, emcon_point_function law, void *user);
 
 /* A potential of the present position of each of n nodes, counted from 0. `name` is for

@@ -12,6 +12,7 @@ module emcon_model_given
    use emcon_host_force, only : force_response_t, host_force_t
    use emcon_kinds, only : dp, wp
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
+   use emcon_rotation, only : n_turn
    use emcon_stepper, only : stepper_t
    use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_potential
    implicit none
@@ -45,8 +46,10 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call check(law, error)
-      if (.not. allocated(error)) call stepper_give_law(stepper, name, point_callback_t( &
-         n_variable=3, function=law, user=user), error)
+      associate (n => stepper%scene%n_dim)
+         if (.not. allocated(error)) call stepper_give_law(stepper, name, point_callback_t( &
+            n_variable=n + n_turn(n), function=law, user=user), error)
+      end associate
    end subroutine model_give_law
 
    subroutine model_give_potential(stepper, name, node, potential, user, error)

@@ -34,7 +34,7 @@ module emcon_deck_dimension
       plane_card_t("TIE", "ties", "are"), &
       plane_card_t("RIGIDBODY", "rigid bodies", "are", .true.), &
       plane_card_t("USERELEMENT", "elements of a program", "are"), &
-      plane_card_t("USERMATERIAL", "laws of a program", "are"), &
+      plane_card_t("USERMATERIAL", "laws of a program", "are", .true.), &
       plane_card_t("GIVENFORCES", "forces of a program", "are", .true.)]
 
    !> What a card or a value is refused for.

@@ -9,6 +9,7 @@ module emcon_host_law
    use emcon_materials, only : material_t
    use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
       point_response_t
+   use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : to_text
    implicit none
@@ -16,8 +17,9 @@ module emcon_host_law
    public :: host_law_t, host_points_t, host_response_t
    public :: host_law_take, host_points_make_room, host_rest_stiffness, host_answer, host_state
 
-   !> One of two: the energy W(E11, E22, 2 E12) per reference volume [M/(L T^2)] of a material, or
-   !> `law`, which takes the constants of its card. Without NLGEOM the strain is the small one.
+   !> One of two: the energy W(E11, E22, 2 E12), in space W(E11, E22, E33, 2 E12, 2 E23, 2 E13), per
+   !> reference volume [M/(L T^2)] of a material, or `law`, which takes the constants of its card.
+   !> Without NLGEOM the strain is the small one.
    type :: host_law_t
       character(len=:), allocatable :: material  !! its name
       class(point_function_t), allocatable :: energy
@@ -26,12 +28,13 @@ module emcon_host_law
 
    !> All quadrature points of the elements of one law.
    type :: host_points_t
-      real(wp), allocatable :: strain(:, :), dstrain(:, :)   !! (3, n)
+      real(wp), allocatable :: strain(:, :), dstrain(:, :)   !! (3 or 6, n)
       type(point_response_t) :: response
    end type host_points_t
 
    !> What the given laws answer to a step.
    type :: host_response_t
+      logical :: nlgeom = .true.                 !! .false.: to small strains
       type(host_points_t), allocatable :: points(:)         !! one per material
       integer :: inverted_element = 0            !! first one that cannot be answered for, or 0
       integer :: material = 0                    !! that has no value there, or 0: det F <= 0
@@ -48,8 +51,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
       character(len=:), allocatable :: fault
-      integer :: i
+      integer :: i, n_strain
 
+      n_strain = scene%n_dim + n_turn(scene%n_dim)
       if (present(given)) then
          do i = 1, size(given)
             if (given(i)%material /= material%name) cycle
@@ -69,21 +73,24 @@ contains
          call raise(error, err_input, where_text(scene, material%origin) // ": error: material " &
             // material%name // " is a *USER MATERIAL: a program has to give its strain energy, " &
             // "after the deck is read and before the model is built")
-      else if (law%energy%n_variable /= 3) then
+      else if (law%energy%n_variable /= n_strain) then
          call raise(error, err_input, "the law given for material " // material%name // " has " &
-            // to_text(law%energy%n_variable) // " variables, but a strain has 3")
+            // to_text(law%energy%n_variable) // " variables, but a strain has " &
+            // to_text(n_strain))
       end if
       if (allocated(error)) return
-      law%energy%weight = [1.0_wp, 1.0_wp, 0.5_wp]   ! |E|^2: axes do not matter
+      allocate(law%energy%weight(n_strain), source=1.0_wp)     ! |E|^2: axes do not matter
+      law%energy%weight(scene%n_dim + 1:) = 0.5_wp
    end subroutine host_law_take
 
    !> Room for `n` points.
-   pure subroutine host_points_make_room(self, n)
+   pure subroutine host_points_make_room(self, n_strain, n)
       type(host_points_t), intent(inout) :: self
+      integer, intent(in) :: n_strain            !! components of a strain
       integer, intent(in) :: n                   !! >= 0
 
       if (allocated(self%strain)) return
-      allocate(self%strain(3, n), self%dstrain(3, n), source=0.0_wp)
+      allocate(self%strain(n_strain, n), self%dstrain(n_strain, n), source=0.0_wp)
    end subroutine host_points_make_room
 
    !> The response at point `i`. The stress normal to the plane is not known, and given as 0.
@@ -117,10 +124,11 @@ contains
       real(wp), intent(out) :: stiffness         !! [M/(L T^2)]; 0 after an error
       type(error_t), allocatable, intent(out) :: error
       type(point_response_t) :: response
-      real(wp), parameter :: rest(3, 1) = 0.0_wp
+      real(wp) :: rest(law%energy%n_variable, 1)
       integer :: status
 
       stiffness = 0.0_wp
+      rest = 0.0_wp
       call point_gradient(law%energy, rest, rest, .true., response, status)
       if (status == point_ok) then
          stiffness = maxval(abs(response%tangent(:, :, 1)))

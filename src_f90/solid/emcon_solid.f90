@@ -141,9 +141,8 @@ contains
          if (allocated(self%law(self%law_of(e))%law)) return
          where_it_is = "plane stress"
       else if (self%is_single) then
-         if (allocated(self%law(self%law_of(e))%law)) return
-         where_it_is = trim(merge("in three dimensions", "axisymmetric       ", &
-            self%n_dim == n_space))
+         if (allocated(self%law(self%law_of(e))%law) .or. .not. self%is_axial) return
+         where_it_is = "axisymmetric"
       else
          return
       end if

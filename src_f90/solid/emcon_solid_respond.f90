@@ -7,6 +7,8 @@ module emcon_solid_respond
       pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
    use emcon_element_plane, only : element_motion_t, element_point, element_response_t, &
       point_is_regular, point_motion_t
+   use emcon_element_space, only : space_motion_t
+   use emcon_given_space, only : given_space_strain
    use emcon_host_law, only : host_answer, host_points_make_room, host_response_t
    use emcon_incompatible_plane, only : incompatible_respond
    use emcon_kinds, only : wp
@@ -88,7 +90,7 @@ contains
    !> Let the given laws answer to the step, each in one call for all its points.
    subroutine solid_evaluate_given(self, u0, du, nlgeom, with_tangent, given)
       type(solid_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (n_dim, n_node)
       logical, intent(in) :: nlgeom              !! .false.: small strains
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(host_response_t), intent(inout) :: given
@@ -96,7 +98,13 @@ contains
 
       given%material = 0
       given%status = point_ok
-      call gather_strains(self, u0, du, nlgeom, given)
+      given%nlgeom = nlgeom
+      call make_room(self, given)
+      if (self%is_single) then
+         call gather_in_space(self, u0, du, given)
+      else
+         call gather_strains(self, u0, du, nlgeom, given)
+      end if
       if (given%inverted_element > 0) return
       do k = 1, size(self%given)
          if (self%n_point(k) == 0) cycle
@@ -111,6 +119,18 @@ contains
       end do
    end subroutine solid_evaluate_given
 
+   pure subroutine make_room(self, given)
+      type(solid_t), intent(in) :: self
+      type(host_response_t), intent(inout) :: given
+      integer :: k
+
+      if (.not. allocated(given%points)) allocate(given%points(size(self%given)))
+      do k = 1, size(self%given)
+         if (self%n_point(k) > 0) call host_points_make_room(given%points(k), &
+            self%given(k)%energy%n_variable, self%n_point(k))
+      end do
+   end subroutine make_room
+
    !> The strains of the elements of given laws, and the first of these that is inverted.
    pure subroutine gather_strains(self, u0, du, nlgeom, given)
       type(solid_t), intent(in) :: self
@@ -121,10 +141,6 @@ contains
       type(point_motion_t) :: point
       integer :: e, i, k
 
-      if (.not. allocated(given%points)) allocate(given%points(size(self%given)))
-      do k = 1, size(self%given)
-         call host_points_make_room(given%points(k), self%n_point(k))
-      end do
       given%inverted_element = 0
       local%nlgeom = nlgeom
       do e = 1, self%n_element
@@ -144,6 +160,33 @@ contains
          end do
       end do
    end subroutine gather_strains
+
+   !> The same in three dimensions.
+   pure subroutine gather_in_space(self, u0, du, given)
+      type(solid_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (3, n_node)
+      type(host_response_t), intent(inout) :: given
+      type(space_motion_t) :: local
+      logical :: is_inverted
+      integer :: e, i
+
+      given%inverted_element = 0
+      local%nlgeom = given%nlgeom
+      do e = 1, self%n_element
+         if (self%first_point(e) == 0) cycle
+         associate (node => self%node(:self%geometry(e)%n_node, e))
+            do i = 1, size(node)
+               local%from(:, i) = u0(:, node(i)) - u0(:, node(1))
+               local%by(:, i) = du(:, node(i)) - du(:, node(1))
+            end do
+         end associate
+         call given_space_strain(self%geometry(e), self%first_point(e), local, &
+            given%points(self%law_of(e)), is_inverted)
+         if (.not. is_inverted) cycle
+         given%inverted_element = e
+         return
+      end do
+   end subroutine gather_in_space
 
    !> Displacements of the nodes of an element relative to its first node, which does not round them
    !> with the distance that a body has flown.

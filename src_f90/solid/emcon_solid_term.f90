@@ -88,6 +88,7 @@ contains
       integer :: e, next
 
       self%nlgeom = scene%step(i_step)%nlgeom
+      self%given%nlgeom = self%nlgeom
       self%to%slot = slot
       if (allocated(self%to%first)) deallocate(self%to%first)
       allocate(self%to%first(self%solid%n_element), source=0)
@@ -107,16 +108,16 @@ contains
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       integer :: t
 
-      if (self%solid%is_single) then
-         call single_respond(self%solid, self%nlgeom, self%to, motion, response, value, side)
-         return
-      end if
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, &
             present(value), self%given)
          if (self%given%inverted_element > 0) call refuse(self, self%given%inverted_element, &
             response)
          if (self%given%inverted_element > 0) return
+      end if
+      if (self%solid%is_single) then
+         call single_respond(self%solid, self%given, self%to, motion, response, value, side)
+         return
       end if
       call shares_lay_out(self%shares, self%solid%pack, size(motion%by, 2), response%n_thread)
       if (self%shares%n == 1) then               ! a team of one asks the system for each barrier
@@ -316,14 +317,14 @@ contains
       type(pack_motion_t) :: local
       integer :: k
 
-      if (self%solid%is_single) then
-         call single_tangent_times(self%solid, self%nlgeom, motion, direction, product)
-         return
-      end if
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
             self%given)
          if (self%given%inverted_element > 0) return
+      end if
+      if (self%solid%is_single) then
+         call single_tangent_times(self%solid, self%given, motion, direction, product)
+         return
       end if
       local%nlgeom = self%nlgeom
       do k = 1, size(self%solid%pack)
@@ -413,14 +414,14 @@ contains
       type(pack_motion_t) :: local
       integer :: k, l
 
-      if (self%solid%is_single) then
-         call single_find_fastest(self%solid, self%nlgeom, motion, fastest)
-         return
-      end if
       if (self%solid%has_given) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
             self%given)
          if (self%given%inverted_element > 0) return
+      end if
+      if (self%solid%is_single) then
+         call single_find_fastest(self%solid, self%given, motion, fastest)
+         return
       end if
       local%nlgeom = self%nlgeom
       do k = 1, size(self%solid%pack)

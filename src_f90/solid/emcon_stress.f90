@@ -11,6 +11,7 @@ module emcon_stress
    use emcon_element_axial_plane, only : axial_element_hold
    use emcon_element_plane, only : element_motion_t, element_point, point_motion_t
    use emcon_element_space, only : space_element_hold, space_motion_t
+   use emcon_given_space, only : given_space_hold
    use emcon_host_law, only : host_response_t, host_state
    use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : wp
@@ -72,7 +73,7 @@ contains
       integer :: k
 
       if (solid%is_single) then
-         call state_of_single(solid, e, u, nlgeom, stress, strain)
+         call state_of_single(solid, e, u, nlgeom, given, stress, strain)
          return
       end if
       motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
@@ -84,11 +85,12 @@ contains
       end do
    end subroutine state_of
 
-   pure subroutine state_of_single(solid, e, u, nlgeom, stress, strain)
+   pure subroutine state_of_single(solid, e, u, nlgeom, given, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: u(:, :)
       logical, intent(in) :: nlgeom
+      type(host_response_t), intent(in) :: given
       real(wp), intent(inout) :: stress(:, :), strain(:, :)
       type(space_motion_t) :: motion
       integer :: i
@@ -106,7 +108,10 @@ contains
          end do
       end associate
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
-         if (solid%has_mean(e)) then
+         if (solid%first_point(e) > 0) then
+            call given_space_hold(solid%geometry(e), merge(solid%first_point(e), 0, &
+               given%inverted_element == 0), given%points(solid%law_of(e)), motion, stress, strain)
+         else if (solid%has_mean(e)) then
             call mean_volume_space_hold(solid%geometry(e), law%law, rest%law, motion, stress, &
                strain)
          else

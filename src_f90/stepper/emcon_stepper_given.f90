@@ -40,8 +40,8 @@ module emcon_stepper_given
 
 contains
 
-   !> Give the strain energy of the *USER MATERIAL called `name`: W(E11, E22, 2 E12) per reference
-   !> volume [M/(L T^2)].
+   !> Give the strain energy of the *USER MATERIAL called `name`: W(E11, E22, 2 E12), in space
+   !> W(E11, E22, E33, 2 E12, 2 E23, 2 E13), per reference volume [M/(L T^2)].
    subroutine give_energy(self, name, energy, error)
       type(stepper_t), intent(inout) :: self
       character(len=*), intent(in) :: name           !! small or capital letters
