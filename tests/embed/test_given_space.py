@@ -69,21 +69,25 @@ def pulled(kind: str, law: Law | None = None, nlgeom: bool = True, **material: A
     model.material("RUBBER", law=law, **material).section("RUBBER", "BLOCK")
     model.boundary("BLOCK_LEFT", (1, 2, 3))
     step = model.step("STATIC", 0.5, nlgeom=nlgeom)
-    step.load("BLOCK_RIGHT", 2, -1.0).load("BLOCK_RIGHT", 3, 0.6)
+    step.load("BLOCK_RIGHT", 2, -0.05).load("BLOCK_RIGHT", 3, 0.03)
     return model
+
+
+def momenta_of(stepper: Stepper) -> np.ndarray:
+    return np.array(list(stepper.momenta().values()))
 
 
 def run(model: Model) -> tuple[np.ndarray, np.ndarray, float]:
     """Displacements and stress at the end, the largest relative change of energy."""
     with Stepper(model) as stepper:
         before, drift = stepper.energies()["total"], 0.0
-        momenta = stepper.momenta()
+        momenta = momenta_of(stepper)
         while not stepper.is_done:
             stepper.step()
             drift = max(drift, abs(stepper.energies()["total"] - before))
         if before:
-            assert np.abs(stepper.momenta() - momenta).max() <= 1e-12*np.abs(momenta).max()
-        return stepper.u, stepper.stress(), drift/abs(before) if before else drift
+            assert np.abs(momenta_of(stepper) - momenta).max() <= 1e-12*np.abs(momenta).max()
+        return stepper.u, stepper.stress, drift/abs(before) if before else drift
 
 
 @pytest.mark.parametrize("kind", ["C3D4", "C3D8", "C3D10", "C3D20"])
@@ -110,7 +114,7 @@ def test_law_that_is_built_in_gives_the_same(kind: str) -> None:
 def test_discrete_gradients_differ_in_second_order() -> None:
     """Two discrete gradients of one energy: a quarter of the difference for half of the step."""
     off = []
-    for h in (0.02, 0.01):
+    for h in (0.005, 0.0025):
         one, other = (run(flying("C3D8", h=h, **law))
                       for law in ({"law": neo_hooke}, {"coupled_neo_hooke": (YOUNG, NU)}))
         off.append(np.abs(one[0] - other[0]).max())
