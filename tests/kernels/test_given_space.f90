@@ -1,4 +1,4 @@
-!> Elements in three dimensions whose law is given at points, against a law of ours that is the same.
+!> Elements in three dimensions whose law is given at points, against a law of ours, the same one.
 module test_given_space
    use check, only : check_near, check_true, test_case_t
    use emcon_element_space, only : space_element_hold, space_element_init, space_element_respond, &
