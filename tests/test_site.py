@@ -1,8 +1,11 @@
 """The pages that `make docs` makes of the sources: nothing public is left out, no link leads nowhere."""
 
+import functools
+import http.server
 import re
 import subprocess
 import sys
+import threading
 
 import pytest
 from scene_tools import DECKS, PROGRAM, ROOT
@@ -98,3 +101,17 @@ def test_links_that_lead_nowhere_are_found(tmp_path):
     found, outside = links.broken(tmp_path)
     assert found == ["a.html: b.html#z", "a.html: c.html", "a.html: d.png"]
     assert outside == {"https://example.org/q"}
+
+
+def test_pages_of_others_that_are_gone_are_found(tmp_path, capsys):
+    """A server that has one page of two; an address where no server is is passed over."""
+    (tmp_path / "here.html").write_text("x")
+    serve = functools.partial(http.server.SimpleHTTPRequestHandler, directory=tmp_path)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), serve) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        base = f"http://127.0.0.1:{server.server_port}"
+        found = links.unanswered({f"{base}/here.html", f"{base}/gone.html"})
+        server.shutdown()
+    assert found == [f"{base}/gone.html: 404"]
+    assert not links.unanswered({f"{base}/here.html"})
+    assert f"not reached: {base}/here.html" in capsys.readouterr().out
