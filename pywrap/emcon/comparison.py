@@ -47,7 +47,7 @@ class Difference:
         return self.largest/self.scale if self.scale > 0.0 else math.inf
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
     """Two runs side by side."""
 
@@ -55,6 +55,10 @@ class Comparison:
     other: str
     differences: tuple[Difference, ...]
     notes: tuple[str, ...]      #: what could not be compared
+
+    def __repr__(self) -> str:
+        return (f"Comparison({self.one!r}, {self.other!r}): {len(self.differences)} quantities, "
+                f"largest relative difference {self.largest:.2e}")
 
     @property
     def largest(self) -> float:

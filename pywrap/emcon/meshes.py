@@ -21,7 +21,7 @@ CELLS = {5: ("triangle", 3), 9: ("quad", 4), 22: ("triangle6", 6), 23: ("quad8",
          10: ("tetra", 4), 12: ("hexahedron", 8), 24: ("tetra10", 10), 25: ("hexahedron20", 20)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Body:
     """A connected mesh in the present state.
 
@@ -36,6 +36,12 @@ class Body:
     spin: float | NDArray[np.float64]
     kinetic: float
     strain: float
+
+    def __repr__(self) -> str:
+        at, way = (np.array2string(x, precision=4, separator=", ")
+                   for x in (self.centre, self.velocity))
+        return (f"Body({len(self.nodes)} nodes, mass {self.mass:.4g}, centre {at}, velocity {way}, "
+                f"kinetic {self.kinetic:.4g}, strain {self.strain:.4g})")
 
 
 class Meshes:

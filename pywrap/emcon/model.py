@@ -153,6 +153,12 @@ class Model(Cards):
         model._nodes.rows = model._elements.rows = False
         return model
 
+    def __repr__(self) -> str:
+        cards = re.findall(r"^\*(?!\*)([^,\n]+)", "".join(b.text for b in self._all_blocks()),
+                           re.MULTILINE)
+        count = {card.strip().upper(): cards.count(card) for card in cards}
+        return f"Model({', '.join(f'{n} {card}' for card, n in count.items()) or 'empty'})"
+
     # --- text and parameters ---------------------------------------------------------------
 
     def heading(self, text: str) -> Model:

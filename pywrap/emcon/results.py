@@ -205,7 +205,7 @@ def energy_drift(history: NDArray[np.void]) -> tuple[Array, float]:
     return (change/scale if scale > 0.0 else change), scale
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Bodies:
     """Mass and momenta of each body, rows as in the history."""
 
@@ -216,6 +216,9 @@ class Bodies:
     pz: Array | None = None     #: in space; None in the plane
     lx: Array | None = None
     ly: Array | None = None
+
+    def __repr__(self) -> str:
+        return f"Bodies({len(self.mass)} bodies, {len(self.px)} rows, mass {self.mass.tolist()})"
 
     @property
     def momentum(self) -> Array:
@@ -275,7 +278,7 @@ def read_contact_force(paths: ResultPaths) -> tuple[Array, Array] | None:
     return times[:rows], force[:rows].sum(axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Pairs:
     """What the contact pairs transmit over time; second index the pair, in the order of the deck.
 
@@ -292,6 +295,10 @@ class Pairs:
     master_moment: Array        #: (n_time, n_pair)
     length: Array               #: (n_time, n_pair) of the slave surface in contact [L]
     active: NDArray[np.int64]   #: (n_time, n_pair) constraints that act
+
+    def __repr__(self) -> str:
+        names = ", ".join(map(" on ".join, zip(self.slave, self.master, strict=True)))
+        return f"Pairs({names}; {len(self.time)} times)"
 
 
 def read_pairs(paths: ResultPaths) -> Pairs | None:
@@ -353,6 +360,12 @@ class Results:
         self._series: HistoryFile | None = None
         self._history: NDArray[np.void] | None = None
         self._is_closed = False
+
+    def __repr__(self) -> str:
+        paths = (self.paths.field, self.paths.history, self.paths.table, self.paths.log)
+        state = "closed" if self._is_closed else ", ".join(
+            path.name for path in paths if path.is_file())
+        return f"Results({str(self.paths.base)!r}): {state}"
 
     def _check(self) -> None:
         if self._is_closed:

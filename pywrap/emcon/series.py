@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 from .hdf5 import Array, ResultError, guarded, open_file, read
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Series:
     """A printed quantity over time."""
 
     times: Array                            #: (n_time) [T]
     labels: NDArray[np.int64]               #: (n_member) of the nodes or elements of the set
     values: Array                           #: (n_time, n_member[, n_comp]), units of the quantity
+
+    def __repr__(self) -> str:
+        return f"Series(values of shape {self.values.shape}, {len(self.times)} times)"
 
 
 class HistoryFile:
@@ -30,6 +33,9 @@ class HistoryFile:
     An unfinished row is left out. Raises `ResultError` for a file that is missing, foreign or
     damaged, for a name that it does not have, and after `close`.
     """
+
+    def __repr__(self) -> str:
+        return f"HistoryFile({str(self.path)!r}): {len(self.columns)} columns, {len(self.sets)} sets"
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)

@@ -107,10 +107,10 @@ class Stepper(Queries, Conditions, Meshes):
             return
         try:
             self._begin(Model.from_deck(model, lenient=lenient, **parameters).build)
-        except InputError as problem:
+        except InputError:
             if os.path.exists(model):
                 raise
-            raise MissingFile(str(problem)) from None
+            raise MissingFile(f"{model}: no such file, seen from {os.getcwd()}") from None
 
     def _begin(self, build: Callable[[Handle], None]) -> None:
         """A library model, made by `build` in its handle."""

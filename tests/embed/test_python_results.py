@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -472,3 +473,24 @@ def test_module_runs_from_the_shell(run: Path) -> None:
     missing = emcon("plot", str(run.parent/"nothing"))
     assert missing.returncode == 2 and "Traceback" not in missing.stderr
     assert emcon("summary", str(run)).returncode == 0
+
+
+def test_what_it_is_is_said_in_a_line(run: Path) -> None:
+    """Representations are short, whatever the arrays hold; `dir` has what the package offers."""
+    import emcon
+
+    with emcon.Results(run) as results:
+        assert repr(results).startswith("Results(") and "box.v2.csv" in repr(results)
+    assert "closed" in repr(results)
+    bodies = read_bodies(locate(run))
+    assert bodies is not None and repr(bodies).startswith(f"Bodies({len(bodies.mass)} bodies")
+    same = emcon.compare(run, run)
+    assert repr(same).endswith("largest relative difference 0.00e+00")
+    mesh = emcon.mesh.block((0.0, 0.0), (1.0, 1.0), (2, 2))
+    assert repr(emcon.Model.from_mesh(mesh)).endswith("1 ELSET, 4 SURFACE)")
+    assert repr(emcon.Model("a")) == "Model(1 HEADING)"
+    with emcon.Stepper(PACKAGE.parent/"input_decks"/"tumbling_block.inp") as block:
+        (body,) = block.bodies()
+        assert re.match(r"Body\(72 nodes, mass 0.12, centre \[", repr(body))
+    public = {name for name in dir(emcon) if not name.startswith("_")}
+    assert public == {name for name in emcon.__all__ if not name.startswith("_")}
