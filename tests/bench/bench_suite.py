@@ -67,6 +67,7 @@ WHY = {
     "beamnlmpc": (NEWTON, behind_procedure(TIGHT), None),
     "beamnh": (NEWTON.replace("; to", "; EMCON has the closed form, tests/scenes/test_suite.py; to"),
                behind_procedure(TIGHT), None),
+    "beamog": ("EMCON has the closed form, tests/scenes/test_suite.py", None, None),
     "beampic": ("an iterative solver of CalculiX; with a direct one",
                 lambda text: re.sub("(?i),SOLVER=ITERATIVE CHOLESKY", "", text), None),
     "beamnldy": (DAMPED, undamped("1e-7", "5e-6"), by_increments("1e-7", "5e-6")),

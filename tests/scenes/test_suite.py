@@ -125,6 +125,32 @@ def test_the_brick_of_planestress3():
     assert u[1] == pytest.approx(1.639336e-2, rel=5e-7)
 
 
+@pytest.mark.skipif(not list(calculix_suite.FOLDER.glob("beamog.inp*")),
+                    reason="the decks of CalculiX are not installed")
+def test_the_closed_form_of_beamog(tmp_path):
+    """A bar of eight under forces of 1 in all, of Ogden's law; the deck has them with six digits."""
+    mu, alpha = 3.488, 2.163
+    d1 = 0.1/mu                                              # in place of 0
+
+    def faults(stretch):
+        long, wide = stretch
+        volume = long*wide**2
+        power = (stretch/volume**(1/3))**alpha
+        shear = 2*mu/alpha*2/3*(power[0] - power[1])
+        push = 2/d1*(volume - 1)*volume
+        return np.array([(shear + push)/long - 1, push - shear/2])
+
+    stretch = np.array([1.1, 0.95])
+    for _ in range(20):
+        slope = [(faults(stretch + h) - faults(stretch - h))/2e-6 for h in 1e-6*np.eye(2)]
+        stretch = stretch - np.linalg.solve(np.transpose(slope), faults(stretch))
+    deck = tmp_path/"beamog.inp"
+    deck.write_text(calculix_suite.text_of(next(calculix_suite.FOLDER.glob("beamog.inp*"))), "latin-1")
+    bench_suite.run(deck)
+    told = bench_suite.displacements(deck)
+    assert max(u[2] for u in told[max(told)].values()) == pytest.approx(8*(stretch[0] - 1), rel=1e-6)
+
+
 def test_labels_of_nodes():
     text = "*Node, nset=A\n** first\n7, 0, 0\n3, 1, 0\n*NODE PRINT\nU\n*NODE\n5, 1, 1\n7, 0, 0\n"
     assert calculix_suite.node_labels(text) == [7, 3, 5]
