@@ -9,7 +9,7 @@ module emcon_active_set
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest, motion_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
-   use emcon_softness, only : softness_select, softness_state_t
+   use emcon_softness, only : softness_owes, softness_select, softness_state_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
    use emcon_travel, only : largest_motion, travel_t, travel_to
@@ -222,7 +222,8 @@ contains
    end function is_empty
 
    !> Choose stencils; start from the constraints that acted before and still can, also where the
-   !> step is expected to end.
+   !> step is expected to end. What gives way and stores something acts past an end of its surface
+   !> too: there it gives back.
    subroutine begin_contact(self, system, motion)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -243,7 +244,8 @@ contains
             end if
             call active_set_look(self, system, pair, motion, at_rest(motion%u0))
             self%is_active(first:last) = self%was_active(first:last) &
-               .and. contact%state%is_near .and. contact%state%is_over
+               .and. contact%state%is_near .and. (contact%state%is_over &
+               .or. softness_owes(self%softness, first, last))
             if (.not. (contact%may_leave .and. any(self%is_active(first:last)))) cycle
             call pair_measure(system, pair, motion%x, motion%u0, motion%du)
             self%is_active(first:last) = self%is_active(first:last) &

@@ -13,7 +13,7 @@ module emcon_softness
    implicit none
    private
    public :: softness_state_t, softness_begin_step, softness_select, softness_augment, &
-      softness_stored, softness_depth, softness_pulls, softness_keep
+      softness_stored, softness_depth, softness_pulls, softness_keep, softness_owes
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
@@ -203,6 +203,16 @@ contains
          closure(set%id(k)) = min(set%soft(k)%now, 0.0_wp)*set%soft(k)%share
       end do
    end subroutine softness_keep
+
+   !> Has the step before left constraints `first` to `last` with something stored?
+   pure function softness_owes(self, first, last) result(owes)
+      type(softness_state_t), intent(in) :: self
+      integer, intent(in) :: first, last         !! a range of the constraints
+      logical :: owes(last - first + 1)
+
+      owes = .false.
+      if (self%is_on .and. .not. self%augments) owes = self%closure(first:last) < 0.0_wp
+   end function softness_owes
 
    !> How deep the contacts of `set` have given way: the largest, by the edge of the slave or of the
    !> master, whichever is shorter; of an augmented Lagrangian by that of its tolerance.

@@ -306,7 +306,9 @@ contains
          call note_add(self%reasons, "contact that gives way has made or taken an energy of " // &
             to_text(self%contact_kept, 3) // ", " // &
             to_text(self%contact_kept/self%largest_energy, 3) // " of the largest, which it " // &
-            "should have stored: surfaces that were in each other have parted otherwise")
+            "should have stored: nodes that were in a surface have lost it at an end or a " // &
+            "corner, where TYPE=NODE TO SURFACE of *CONTACT PAIR follows them; " // &
+            "TYPE=NULL SPACE of *CONSTRAINT METHOD stores nothing")
       end if
       if (self%deepest > most_overlap(self)) call note_add(self%reasons, &
          "bodies overlap by " // &
