@@ -268,7 +268,7 @@ def draw_colour_bar(figure: Figure, box: tuple[float, float, float, float], scen
     bar = figure.add_axes(box)
     mappable = matplotlib.cm.ScalarMappable(scale.norm, scale.colours)
     colour_bar = figure.colorbar(mappable, cax=bar, extend=scale.extend, extendfrac=0.04)
-    colour_bar.set_label(scene.label, labelpad=4, linespacing=0.95)
+    colour_bar.set_label(scene.label, labelpad=8, linespacing=0.95)
     colour_bar.outline.set_linewidth(0.5)
     bar.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
     bar.tick_params(direction="in", width=0.5)
@@ -321,7 +321,7 @@ def frame_view(axes: Axes, scene: Scene, view: View, width: float, height: float
     if scene.order is not None:
         axes.set(xticks=[], yticks=[])
         if is_first:
-            _draw_directions(axes, width, height)
+            _draw_directions(axes, scene.position[0], width, height)
         return
     axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10], prune="upper"))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
@@ -334,15 +334,21 @@ def frame_view(axes: Axes, scene: Scene, view: View, width: float, height: float
         axes.tick_params(labelleft=False)
 
 
-def _draw_directions(axes: Axes, width: float, height: float) -> None:
-    """Where x, y and z go, in the lower left corner of a panel [inch]."""
-    middle = 1.3*DIRECTION_LENGTH
+def _draw_directions(axes: Axes, position: Array, width: float, height: float) -> None:
+    """Where x, y and z go, in the corner of a panel [inch] with the fewest nodes (n_node, 2)."""
+    size, room = np.array([width, height]), 2.6*DIRECTION_LENGTH
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    at = (position - low)/(high - low)*size
+    corners = [(x, y) for y in (0.0, height) for x in (0.0, width)]
+    taken = [int(np.all(np.abs(at - corner) < room, axis=1).sum()) for corner in corners]
+    corner = np.array(corners[int(np.argmin(taken))])
+    middle = np.where(corner > 0.0, corner - 1.9*DIRECTION_LENGTH, 1.3*DIRECTION_LENGTH)
     for name, way in zip("xyz", basis()[:2].T):
         for part, text in ((1.0, ""), (1.3, f"${name}$")):
-            x, y = (middle + part*DIRECTION_LENGTH*way[k] for k in (0, 1))
+            x, y = (middle[k] + part*DIRECTION_LENGTH*way[k] for k in (0, 1))
             if text:
                 axes.text(x/width, y/height, text, transform=axes.transAxes, ha="center",
                           va="center", fontsize=8, color=GREY)
             else:
-                axes.plot([middle/width, x/width], [middle/height, y/height], color=GREY,
+                axes.plot([middle[0]/width, x/width], [middle[1]/height, y/height], color=GREY,
                           linewidth=0.8, transform=axes.transAxes)
