@@ -92,7 +92,7 @@ contains
             call quasi_static_hold(self, scene, error)
             return
          end if
-         call free_motion_text(self%system, scene, step%prescribed, text)
+         call free_motion_text(self%system, scene, step%prescribed, text, u=self%state%u)
          if (len(text) > 0) call raise(error, err_analysis, "the static problem is singular: " &
             // text)
       end associate

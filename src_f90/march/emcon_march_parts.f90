@@ -252,7 +252,8 @@ contains
 
       if (.not. self%scheme%row%masses_resist .and. .not. allocated(self%active%holding%text)) then
          call free_motion_text(self%system, scene, &
-            scene%step(self%state%i_step)%prescribed, motion, with_contact=.true.)
+            scene%step(self%state%i_step)%prescribed, motion, with_contact=.true., &
+            u=self%state%u)
          if (len(motion) == 0) return
          call holders_text(self%system, size(scene%x, 2), holders)
          text = text // "; without " // holders // " " // motion

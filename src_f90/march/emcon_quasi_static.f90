@@ -35,7 +35,7 @@ contains
       if (.not. any(self%is_bare)) return
       call body_masses(self%system, mass)
       call free_motion_text(self%system, scene, scene%step(self%state%i_step)%prescribed, text, &
-         with_contact=.true., is_held=mass > 0.0_dp)
+         with_contact=.true., is_held=mass > 0.0_dp, u=self%state%u)
       if (len(text) > 0) call raise(error, err_analysis, "a MASSLESS section has no inertia to " &
          // "hold it, and contact may open: " // text)
    end subroutine quasi_static_hold

@@ -24,14 +24,17 @@ contains
    !> Names the first body that can move as a rigid one, and how, or the first assembly of bodies
    !> tied to each other; empty if none can. Bodies in a contact pair are looked at only
    !> `with_contact`: contact may hold them. `system%space%linear` holds the rows of the step.
-   subroutine free_motion_text(system, scene, prescribed, text, with_contact, is_held)
+   !> A body that has turned is held by its supports as it lies now, with NLGEOM.
+   subroutine free_motion_text(system, scene, prescribed, text, with_contact, is_held, u)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       type(prescribed_t), intent(in) :: prescribed(:)
       character(len=:), allocatable, intent(out) :: text
       logical, intent(in), optional :: with_contact
       logical, intent(in), optional :: is_held(:)        !! (n_body) by something else
+      real(wp), intent(in), optional :: u(:, :)          !! (n_dim, n_node) [L]; absent: at rest
       type(mechanisms_t) :: bodies
+      real(wp) :: x(size(scene%x, 1), size(scene%x, 2))
       type(mechanism_rows_t) :: rows
       integer, allocatable :: assembly(:), order(:), member(:)
       real(dp), allocatable :: z(:, :)
@@ -42,8 +45,12 @@ contains
       text = ""
       contact_holds = .true.
       if (present(with_contact)) contact_holds = .not. with_contact
+      x = scene%x
+      if (present(u)) then
+         if (scene%step(system%i_step)%nlgeom) x = x + u
+      end if
       call mechanism_rows_find(system, prescribed, rows)
-      call mechanisms_find(system, scene, scene%x, rows, contact_holds, &
+      call mechanisms_find(system, scene, x, rows, contact_holds, &
          contact_holds .or. present(is_held), bodies)
       if (present(is_held)) then
          do n = 1, size(is_held)
