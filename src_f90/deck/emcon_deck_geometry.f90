@@ -28,7 +28,7 @@ contains
       do i = 1, size(fault)
          fault(i) = element_shape(scene, i)
       end do
-      call tell(shape_flat, " has no area")
+      call tell(shape_flat, " has no area; check its nodes and their order")
       call tell(shape_clockwise, " is inverted: its nodes run clockwise")
       call tell(shape_folded, " is folded: the angle at a corner is 180 degrees or more")
 

@@ -16,6 +16,8 @@ module emcon_deck_shapes_space
    !> A node beyond a quarter of its edge folds the element at the corner; far off the middle or
    !> beside the straight edge strains are less exact.
    real(wp), parameter :: quarter = 0.25_wp, off_middle = 0.15_wp
+   !> Half a circle stands off its chord by that.
+   real(wp), parameter :: half_circle = 0.5_wp
    !> Coordinates in decks are rounded.
    real(wp), parameter :: rounded = 1.0e-3_wp
    integer, parameter :: is_flat = 1, is_mirrored = 2, is_folded = 3, is_off = 4, is_doubtful = 5
@@ -33,7 +35,7 @@ contains
       do e = 1, size(fault)
          fault(e) = fault_of(scene, e)
       end do
-      call tell(is_flat, " has no volume")
+      call tell(is_flat, " has no volume; check its nodes and their order")
       call tell(is_mirrored, " is inverted: its nodes run as in a mirror, the first face has to " &
          // "run counter-clockwise seen from the other nodes")
       call tell(is_folded, " is folded: its volume is not positive everywhere")
@@ -63,7 +65,8 @@ contains
    pure integer function fault_of(scene, e) result(fault)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e                   !! 1..n_element
-      real(wp) :: x(n_dim, size(scene%element_node, 1)), det(size(scene%element_node, 1)), furthest
+      real(wp) :: x(n_dim, size(scene%element_node, 1)), det(size(scene%element_node, 1))
+      real(wp) :: along, beside
       integer :: i, n
 
       fault = 0
@@ -83,9 +86,10 @@ contains
          end if
          x(:, :n) = x(:, :n)/maxval(abs(x(:, :n)))
          if (n > kind%n_corner) then
-            furthest = furthest_from_middle(kind, x(:, :n))
-            if (furthest > quarter + rounded) fault = is_off
-            if (furthest > off_middle .and. fault == 0) fault = is_doubtful
+            call find_furthest(kind, x(:, :n), along, beside)
+            if (along > quarter + rounded) fault = is_off
+            if ((along > off_middle .or. beside > half_circle) .and. fault == 0) &
+               fault = is_doubtful
          end if
          call find_determinants(kind, x(:, :n), det(:n))
          if (all(det(:n) < -least_volume)) then
@@ -115,28 +119,31 @@ contains
       end do
    end subroutine find_determinants
 
-   !> The largest distance of a node from the middle of its edge, by the edge.
-   pure real(wp) function furthest_from_middle(kind, x) result(furthest)
+   !> The largest distances of nodes from the middles of their edges, by the edge.
+   pure subroutine find_furthest(kind, x, along, beside)
       class(element_kind_t), intent(in) :: kind
       real(wp), intent(in) :: x(:, :)            !! (3, n_node)
+      real(wp), intent(out) :: along             !! the edge
+      real(wp), intent(out) :: beside            !! in any direction
       real(wp), allocatable :: place(:, :)
-      real(wp) :: length
+      real(wp) :: length, off(n_dim)
       integer :: i, k, m
 
       call kind%shape%places(place)
-      furthest = 0.0_wp
+      along = 0.0_wp
+      beside = 0.0_wp
       do m = kind%n_corner + 1, kind%n_node
          do i = 1, kind%n_corner
             do k = 1, i - 1                      ! the edge that it is in the middle of
                if (any(abs(place(:, i) + place(:, k) - 2.0_wp*place(:, m)) > off_middle)) cycle
                length = norm2(x(:, i) - x(:, k))
                if (.not. length > 0.0_wp) cycle
-               furthest = max(furthest, &
-                  abs(dot_product(x(:, m) - 0.5_wp*(x(:, i) + x(:, k)), x(:, i) - x(:, k))) &
-                  /length**2)
+               off = (x(:, m) - 0.5_wp*(x(:, i) + x(:, k)))/length
+               along = max(along, abs(dot_product(off, x(:, i) - x(:, k)))/length)
+               beside = max(beside, norm2(off))
             end do
          end do
       end do
-   end function furthest_from_middle
+   end subroutine find_furthest
 
 end module emcon_deck_shapes_space

@@ -14,6 +14,8 @@ module emcon_deck_sides_plane
    !> A node between two corners beyond a quarter of its side folds the element there; at a quarter
    !> strains at the corner are infinite. Where it is further off the middle, that is told.
    real(wp), parameter :: quarter = 0.25_wp, off_middle = 0.15_wp
+   !> Half a circle stands off its chord by that.
+   real(wp), parameter :: half_circle = 0.5_wp
    !> Coordinates in decks are rounded.
    real(wp), parameter :: rounded = 1.0e-3_wp
 
@@ -25,7 +27,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       logical, dimension(size(scene%element_label)) :: is_bent, is_off, is_folded
-      real(wp) :: furthest
+      real(wp) :: along, beside
       integer :: e
 
       if (.not. has_middles(scene)) return
@@ -36,9 +38,9 @@ contains
       do e = 1, size(is_bent)
          if (scene%kind(scene%element_kind(e))%n_face_node < 3) cycle
          if (scene%element_node(1, e) == 0) cycle
-         furthest = furthest_from_middle(scene, e)
-         is_bent(e) = furthest > 0.5_wp - quarter + rounded
-         is_off(e) = .not. is_bent(e) .and. furthest > off_middle
+         call find_furthest(scene, e, along, beside)
+         is_bent(e) = along > 0.5_wp - quarter + rounded
+         is_off(e) = .not. is_bent(e) .and. (along > off_middle .or. beside > half_circle)
          is_folded(e) = .not. is_bent(e) .and. folds(scene, e)
       end do
       if (any(is_bent)) call tell(is_bent, " has a node outside the middle half of its side, " &
@@ -77,14 +79,17 @@ contains
       has_middles = .false.
    end function has_middles
 
-   !> The largest distance of such a node from the middle of its side, along it, per length.
-   pure real(wp) function furthest_from_middle(scene, e) result(furthest)
+   !> The largest distances of such nodes from the middles of their sides, by their lengths.
+   pure subroutine find_furthest(scene, e, along, beside)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e
-      real(wp) :: way(2), arm(2)
+      real(wp), intent(out) :: along             !! the side
+      real(wp), intent(out) :: beside            !! in any direction
+      real(wp) :: way(2), arm(2), part
       integer :: f
 
-      furthest = 0.0_wp
+      along = 0.0_wp
+      beside = 0.0_wp
       associate (kind => scene%kind(scene%element_kind(e)))
          do f = 1, kind%n_face
             associate (node => scene%element_node(kind%face(f), e))
@@ -93,10 +98,12 @@ contains
             end associate
             arm = arm/maxval(abs(way))
             way = way/maxval(abs(way))
-            furthest = max(furthest, abs(dot_product(arm, way)/dot_product(way, way) - 0.5_wp))
+            part = dot_product(arm, way)/dot_product(way, way)
+            along = max(along, abs(part - 0.5_wp))
+            beside = max(beside, norm2(arm - 0.5_wp*way)/norm2(way))
          end do
       end associate
-   end function furthest_from_middle
+   end subroutine find_furthest
 
    !> Is the area negative at a node or not positive at a point of the quadrature?
    logical function folds(scene, e)

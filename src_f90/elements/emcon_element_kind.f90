@@ -31,6 +31,7 @@ module emcon_element_kind
    contains
       procedure :: face
       procedure :: may_lock
+      procedure :: is_stiff_bent
    end type element_row_t
 
    !> A row with its shape, which a program gives if the row is of a *USER ELEMENT.
@@ -56,6 +57,14 @@ contains
 
       may_lock = self%n_node == self%n_corner .and. .not. (self%has_mean_volume .or. self%has_modes)
    end function may_lock
+
+   !> Do its sides stay straight and resist where it is bent? So do those of elements with nodes at
+   !> their corners alone, unless modes give way.
+   pure logical function is_stiff_bent(self)
+      class(element_row_t), intent(in) :: self
+
+      is_stiff_bent = self%n_node == self%n_corner .and. .not. self%has_modes
+   end function is_stiff_bent
 
    !> Index of the kind called `name` (upper case) in `kind`, 0 if there is none.
    pure integer function find_element_kind(kind, name)

@@ -3,12 +3,13 @@
 !> A run is good if its energy balance closes, nothing is behind a surface and every residual is
 !> within the tolerance. Warnings stand beside that: they do not make a run bad.
 module emcon_verdict
+   use emcon_bent_bodies, only : bent_body_find, bent_body_t
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
    use emcon_look_plane, only : overlap_text
-   use emcon_march, only : increment_t, march_t
+   use emcon_march, only : increment_t, march_is_done, march_t
    use emcon_scene, only : scene_t
    use emcon_small_range, only : small_limit, small_range_init, small_range_t, small_range_widen
    use emcon_solid, only : solid_t
@@ -170,7 +171,27 @@ contains
       call follow_overlaps(self, scene, march, increment)
       if (size(self%small%section) > 0) call follow_linear(self, scene, march)
       call follow_energy(self, march)
+      if (march_is_done(march)) call follow_bending(self, scene, march)
    end subroutine verdict_update
+
+   !> A body that is bent at the end of a step though its elements are too stiff for it.
+   subroutine follow_bending(self, scene, march)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(bent_body_t) :: found
+      character(len=:), allocatable :: text
+      integer :: i
+
+      call bent_body_find(march, scene, self%largest_energy, found)
+      if (found%body == 0) return
+      text = "the body of element " // to_text(found%label) // " is bent"
+      do i = 1, self%warnings%n
+         if (index(self%warnings%item(i)%text, text) == 1) return
+      end do
+      call add_warning(self, text // ", which elements with nodes at their corners alone resist: " &
+         // to_text(found%percent, 2) // " % of its strain energy is in that; " // found%advice)
+   end subroutine follow_bending
 
    !> Bodies in each other: the deepest overlap. Of those that no pair brings together a warning
    !> tells, for the first time of two of them.

@@ -1,6 +1,7 @@
 !> What a run will cost, by its first increments: a quarter of a second of them, or three.
 module emcon_probe
    use, intrinsic :: iso_c_binding, only : c_int
+   use emcon_bent_bodies, only : bent_body_find, bent_body_t
    use emcon_errors, only : error_t
    use emcon_files, only : file_remove
    use emcon_kinds, only : dp, int64, wp
@@ -56,6 +57,7 @@ contains
       call open_files(recorder, stepper, base, has_files)
       call go(stepper, recorder, has_files, probe, error)
       call remove_files(recorder, base, has_files, probe%ended)
+      if (probe%n > 0 .and. .not. allocated(error)) call advise_bending(stepper, rows)
       if (allocated(error)) then
          call row_put(row, "failure", error%message, " increment " // to_text(probe%n + 1) // &
             " of the probe fails: #")
@@ -66,6 +68,22 @@ contains
       end if
       call rows_add(rows, row)
    end subroutine probe_cost
+
+   !> A body that the probe has bent, of elements that are too stiff for it.
+   subroutine advise_bending(stepper, rows)
+      type(stepper_t), intent(in) :: stepper
+      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(bent_body_t) :: found
+      type(report_row_t) :: row
+
+      call bent_body_find(stepper%march, stepper%scene, stepper%verdict%largest_energy, found)
+      if (found%body == 0) return
+      call row_begin(row, "advice", "body")
+      call row_put(row, "body", found%body, " #")
+      call row_put(row, "bending_percent", found%percent, " is bent, which elements with nodes " &
+         // "at their corners alone resist: # % of its strain energy is in that; " // found%advice)
+      call rows_add(rows, row)
+   end subroutine advise_bending
 
    !> Make increments, and record them as a run would, until there are enough.
    subroutine go(stepper, recorder, has_files, probe, error)

@@ -6,7 +6,7 @@ module emcon_locking
    use emcon_solid, only : solid_t
    implicit none
    private
-   public :: locking_ratio, locking_element, locking_advice, strainless_element
+   public :: locking_ratio, locking_element, locking_advice, bending_advice, strainless_element
 
    !> Elements with nodes at their corners alone lock above this ratio of Poisson; with incompatible
    !> modes they do at large strains, above the other.
@@ -27,6 +27,18 @@ contains
       if (solid%is_single) text = in_space
       if (solid%is_axial) text = of_rings
    end function locking_advice
+
+   !> What to take in place of elements of `solid` that are too stiff where they bend.
+   pure function bending_advice(solid) result(text)
+      type(solid_t), intent(in) :: solid
+      character(len=:), allocatable :: text
+
+      text = "CPE4I, CPE6 or CPE8R"
+      if (all(solid%is_thin)) text = "CPS4I, CPS6 or CPS8R"
+      if (solid%is_single) text = "C3D8I, C3D10 or C3D20R"
+      if (solid%is_axial) text = "CAX6 or CAX8R"
+      text = "take " // text // ", or more elements across"
+   end function bending_advice
 
    !> The ratio of Poisson of element `e` if it locks, else 0.
    pure real(wp) function locking_ratio(solid, e) result(ratio)

@@ -49,6 +49,7 @@ module emcon_solid
       !> these, if there are thin ones, the same in plane stress
       type(law_box_t), allocatable :: law(:)
       logical, allocatable :: may_lock(:)                !! (n_element) at small changes of volume
+      logical, allocatable :: is_stiff_bent(:)           !! (n_element) where it bends
       logical, allocatable :: has_mean(:)                !! (n_element) volume resists in the mean
       type(law_box_t), allocatable :: rest(:)            !! like `law`, without U, for these
       type(host_law_t), allocatable :: given(:)         !! like `law`, or one in its place
@@ -213,7 +214,7 @@ contains
          self%is_rigid(scene%rigid(k)%element) = .true.
       end do
       allocate(self%is_thin(self%n_element), self%has_mean(self%n_element), &
-         self%may_lock(self%n_element), &
+         self%may_lock(self%n_element), self%is_stiff_bent(self%n_element), &
          self%has_inertia(self%n_element), self%is_linear(self%n_element), &
          self%is_corotated(self%n_element))
       do e = 1, self%n_element
@@ -224,6 +225,7 @@ contains
             self%has_mean(e) = kind%has_mean_volume
             ! Modes give way to a change of volume that is linear in the displacements.
             self%may_lock(e) = kind%may_lock() .or. (kind%has_modes .and. any(scene%step%nlgeom))
+            self%is_stiff_bent(e) = kind%is_stiff_bent() .and. is_free
             self%has_inertia(e) = .not. section%is_massless
             self%is_linear(e) = section%kinematics == kinematics_linear .and. is_free
             self%is_corotated(e) = section%kinematics == kinematics_corotated .and. is_free
