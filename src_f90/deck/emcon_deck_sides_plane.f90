@@ -40,8 +40,9 @@ contains
          if (scene%element_node(1, e) == 0) cycle
          call find_furthest(scene, e, along, beside)
          is_bent(e) = along > 0.5_wp - quarter + rounded
-         is_off(e) = .not. is_bent(e) .and. (along > off_middle .or. beside > half_circle)
          is_folded(e) = .not. is_bent(e) .and. folds(scene, e)
+         is_off(e) = .not. (is_bent(e) .or. is_folded(e)) .and. (along > off_middle .or. &
+            beside > half_circle)
       end do
       if (any(is_bent)) call tell(is_bent, " has a node outside the middle half of its side, " &
          // "where the element folds; put it into the middle")

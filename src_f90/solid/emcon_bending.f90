@@ -55,7 +55,7 @@ contains
       integer, intent(in) :: body(:)             !! (n_node) 1 to n_body, 0: none
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
-      logical, intent(in) :: nlgeom
+      logical, intent(in) :: nlgeom              !! .false.: small strains
       type(moduli_t) :: moduli(size(solid%law))
       type(plate_t) :: plate
       real(wp) :: curve(n_axis, n_axis)
@@ -77,7 +77,8 @@ contains
             if (.not. solid%is_stiff_bent(e)) cycle
             call find_curvature(self, solid, e, nlgeom, curve)
             call take_plate(curve, plate)
-            call add_missed(self, solid, e, x, plate, own, self%missed(b))
+            if (maxval(abs(plate%bend)) > 0.0_wp) call add_missed(self, solid, e, x, plate, own, &
+               self%missed(b))
          end associate
       end do
    end subroutine bending_measure
