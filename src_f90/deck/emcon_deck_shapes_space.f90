@@ -88,8 +88,8 @@ contains
          if (n > kind%n_corner) then
             call find_furthest(kind, x(:, :n), along, beside)
             if (along > quarter + rounded) fault = is_off
-            if ((along > off_middle .or. beside > half_circle) .and. fault == 0) &
-               fault = is_doubtful
+            if (fault == 0) fault = merge(is_doubtful, 0, along > off_middle &
+               .or. beside > half_circle)
          end if
          call find_determinants(kind, x(:, :n), det(:n))
          if (all(det(:n) < -least_volume)) then

@@ -20,7 +20,7 @@ module emcon_bent_bodies
    end type bent_body_t
 
    !> Of the strain energy that part is told: the body is so much too stiff.
-   real(wp), parameter :: told_part = 0.1_wp
+   real(wp), parameter :: told_part = 0.2_wp
    !> Strain energies below that part of the largest energy of a run are round-off.
    real(wp), parameter :: rounding = sqrt(epsilon(1.0_wp))
 

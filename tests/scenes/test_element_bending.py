@@ -101,7 +101,7 @@ def drawn(mesh, held, end, dofs, axis, load, nlgeom=", NLGEOM"):
 
 @pytest.mark.parametrize("nlgeom", ["", ", NLGEOM"])
 @pytest.mark.parametrize("kind", ["CPE4", "CPS4"])
-@pytest.mark.parametrize("n", [25, 50, 100])
+@pytest.mark.parametrize("n", [12, 25, 50])
 def test_part_that_resists_bending(kind, n, nlgeom, runs):
     """One element across, of length l and height 1: against the closed form; clamp and load are a few
     parts in a hundred off."""
@@ -114,7 +114,7 @@ def test_part_that_resists_bending(kind, n, nlgeom, runs):
 
 
 @pytest.mark.parametrize(("kind", "cells", "is_told"), [
-    ("CPE3", (50, 1), True), ("CPE4", (100, 2), True), ("CPE4", (200, 4), False), ("CPE4H", (10, 1), True),
+    ("CPE3", (50, 1), True), ("CPE3", (100, 2), True), ("CPE4", (100, 2), False), ("CPE4H", (10, 1), True),
     ("CPE4I", (50, 1), False), ("CPE6", (50, 1), False), ("CPE8R", (50, 1), False), ("CAX4", (50, 1), True),
     ("C3D4", (50, 1, 1), True), ("C3D8", (50, 1, 1), True), ("C3D8H", (10, 1, 1), True),
     ("C3D8I", (50, 1, 1), False), ("C3D10", (20, 1, 1), False)])
