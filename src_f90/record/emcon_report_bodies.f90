@@ -25,6 +25,8 @@ module emcon_report_bodies
       integer :: n_unknown = 0                   !! of the present step
       integer :: kind = 0                        !! of its elements; < 0: several
       integer :: law = 0                         !! code of its law; < 0: several
+      real(wp), allocatable :: low(:), high(:)   !! (n_dim) corners of the box around it [L]
+      real(wp) :: apart = huge(1.0_wp)           !! two nodes of an element, the least distance [L]
       real(wp) :: mass = 0.0_wp                  !! [M]
       real(wp), allocatable :: center(:)         !! (n_dim) of mass [L]
       !> (1 or 3) about the axes through the centre: z in the plane, x, y and z [M L^2]
@@ -76,6 +78,7 @@ contains
       if (solid%is_linear(e)) body%n_linear = body%n_linear + 1
       if (solid%is_corotated(e)) body%n_corotated = body%n_corotated + 1
       if (.not. solid%has_inertia(e)) body%n_static = body%n_static + 1
+      call add_place(body, scene, e)
       call unite(body%kind, scene%element_kind(e))
       associate (material => scene%material(scene%section(scene%element_section(e))%material))
          call unite(body%law, material%law)
@@ -92,6 +95,26 @@ contains
       body%speed = max(body%speed, speed)
       body%transit = min(body%transit, shortest(scene, e)/speed)
    end subroutine add_element
+
+   !> The box and the least distance of nodes, with those of an element.
+   pure subroutine add_place(body, scene, e)
+      type(body_t), intent(inout) :: body
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: e
+      integer :: i
+
+      associate (node => scene%element_node(:, e))
+         if (.not. allocated(body%low)) then
+            body%low = scene%x(:, node(1))
+            body%high = body%low
+         end if
+         do i = 1, count(node > 0)
+            body%low = min(body%low, scene%x(:, node(i)))
+            body%high = max(body%high, scene%x(:, node(i)))
+         end do
+      end associate
+      body%apart = min(body%apart, shortest(scene, e))
+   end subroutine add_place
 
    !> One code for all, or < 0 for several.
    pure subroutine unite(code, other)
@@ -189,6 +212,7 @@ contains
          call row_put(row, "law", name, ", #")
          call name_kinematics(body(i), name)
          call row_put(row, "kinematics", name, ", #")
+         call put_place(body(i), row)
          call row_put(row, "mass", body(i)%mass, ", mass #")
          if (body(i)%mass > 0.0_wp) call put_inertia(body(i), row)
          if (body(i)%speed > 0.0_wp .and. body(i)%n_rigid < body(i)%n_element) then
@@ -198,6 +222,24 @@ contains
          call rows_add(rows, row)
       end do
    end subroutine bodies_rows
+
+   subroutine put_place(body, row)
+      type(body_t), intent(in) :: body
+      type(report_row_t), intent(inout) :: row
+      character(len=*), parameter :: axes = "xyz"
+      integer :: a
+
+      if (.not. allocated(body%low)) return
+      do a = 1, size(body%low)
+         call row_put(row, "low_" // axes(a:a), body%low(a), &
+            trim(merge(", from #", " #      ", a == 1)))
+      end do
+      do a = 1, size(body%high)
+         call row_put(row, "high_" // axes(a:a), body%high(a), &
+            trim(merge(" to #", " #   ", a == 1)))
+      end do
+      call row_put(row, "smallest_distance", body%apart, ", smallest distance of nodes #")
+   end subroutine put_place
 
    subroutine put_inertia(body, row)
       type(body_t), intent(in) :: body

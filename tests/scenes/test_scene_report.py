@@ -31,6 +31,8 @@ def test_bodies_are_those_of_the_deck(ring):
     assert math.isclose(block["center_x"], 5, rel_tol=1e-8)
     assert math.isclose(block["center_y"], -2.5, rel_tol=1e-8)
     assert math.isclose(block["inertia"], 3*(60**2 + 5**2)/12, rel_tol=1e-8)
+    box = [block[f"{side}_{axis}"] for side in ("low", "high") for axis in "xy"]
+    assert box == [-25, -5, 35, 0] and math.isclose(block["smallest_distance"], 1, rel_tol=1e-8)
     modulus = block["wave_speed"]**2*0.01
     assert math.isclose(modulus, 1000*annulus["wave_speed"]**2*0.01, rel_tol=1e-7)
     assert math.isclose(block["shortest_transit"]*block["wave_speed"], 1, rel_tol=1e-8)
