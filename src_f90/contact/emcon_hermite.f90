@@ -22,7 +22,8 @@ module emcon_hermite
    private
    public :: hermite_curve_t, hermite_point_t, hermite_stencil_t, hermite_weights_t
    public :: hermite_closest, hermite_curve, hermite_point, hermite_weights
-   public :: joined_pieces, piece_before, piece_after
+   public :: hermite_way
+   public :: joined_pieces, piece_before, piece_after, at_end
 
    !> Which part of the chain a curve is made of: the chosen edge and what is joined to it, or the
    !> edge before or after it alone.
@@ -281,6 +282,17 @@ contains
 
       held = max(-2.0_wp, min(3.0_wp, s))
    end function held
+
+   !> Reference length from node 3 to the place `s`, < 0 before it; over `joined_pieces`.
+   pure real(wp) function hermite_way(curve, s) result(way)
+      type(hermite_curve_t), intent(in) :: curve
+      real(wp), intent(in) :: s                  !! place on the curve
+
+      associate (l => curve%length)
+         way = l(3)*s + (l(curve%first) - l(3))*min(s, 0.0_wp) &
+            - (l(curve%last) - l(3))*min(1.0_wp - s, 0.0_wp)
+      end associate
+   end function hermite_way
 
    pure integer function piece_of(curve, e)
       type(hermite_curve_t), intent(in) :: curve

@@ -11,12 +11,12 @@
 !> Source: docs/theory.md, eq. (14b). Sign: gap > 0 is open.
 module emcon_hermite_gap_value
    use emcon_hermite, only : hermite_closest, hermite_curve, hermite_curve_t, hermite_point, &
-      hermite_point_t, hermite_stencil_t, joined_pieces, piece_after, piece_before
+      hermite_point_t, hermite_stencil_t, hermite_way, joined_pieces, piece_after, piece_before
    use emcon_kinds, only : wp
    use emcon_rounded, only : rounded_negative
    implicit none
    private
-   public :: hermite_begin, hermite_gap_value, hermite_roots
+   public :: hermite_begin, hermite_gap_value, hermite_roots, hermite_slip_value, hermite_stretch
    public :: slave
 
    !> Local numbers of the slave node and of the first node of the chosen edge.
@@ -142,6 +142,38 @@ contains
       root(2) = root(1)
       call hermite_closest(curve, edge + motion, b + way, root(2), is_found)
    end subroutine hermite_roots
+
+   !> How far the closest point slides over a step: docs/theory.md, eq. (14k).
+   pure subroutine hermite_slip_value(stencil, x0, dx, s, slip, is_found)
+      type(hermite_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: x0(:, :), dx(:, :)   !! (2, 3 to 7) as in `hermite_roots` [L]
+      real(wp), intent(in) :: s                  !! where on the curve they are looked for
+      real(wp), intent(out) :: slip              !! > 0 along the chain [L]
+      logical, intent(out) :: is_found           !! .false.: no unique closest points
+      type(hermite_curve_t) :: curve
+      real(wp) :: root(2)
+
+      slip = 0.0_wp
+      curve = hermite_curve(stencil, joined_pieces)
+      call hermite_roots(stencil, curve, x0, dx, s, root, is_found)
+      if (.not. is_found) return
+      slip = hermite_stretch(stencil, curve, x0, root(1)) &
+         *(hermite_way(curve, root(2)) - hermite_way(curve, root(1)))
+   end subroutine hermite_slip_value
+
+   !> Length of the curve at `s` by its reference length.
+   pure real(wp) function hermite_stretch(stencil, curve, x, s) result(stretch)
+      type(hermite_stencil_t), intent(in) :: stencil
+      type(hermite_curve_t), intent(in) :: curve
+      real(wp), intent(in) :: x(:, :)            !! (2, 3 to 7) as in `hermite_begin` [L]
+      real(wp), intent(in) :: s                  !! place on the curve
+      type(hermite_point_t) :: p
+      real(wp) :: edge(2, 5), b(2)
+
+      call gather(stencil, x, edge, b)
+      p = hermite_point(curve, edge, s)
+      stretch = sqrt(dot_product(p%tangent, p%tangent))
+   end function hermite_stretch
 
    pure real(wp) function cross(a, b)
       real(wp), intent(in) :: a(2), b(2)

@@ -7,7 +7,7 @@ module emcon_nts
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_hermite_gap_value, only : hermite_gap_value
+   use emcon_hermite_gap_value, only : hermite_gap_value, hermite_slip_value
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
       smoothing_none
    use emcon_kinds, only : wp
@@ -331,15 +331,27 @@ contains
       end do
    end subroutine nts_evaluate
 
-   !> As `contact_t` has it: by the places on the line of the edge at both ends of the step.
+   !> As `contact_t` has it: by the places on the line of the edge at both ends of the step, or on
+   !> the smoothed surface, if that has a closest point at both.
    pure real(wp) function nts_slip(self, i, x, u0, du) result(slip)
       class(nts_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), dimension(size(x, 1), most_nodes) :: local, dlocal
       integer :: k, n
+      logical :: is_found
 
       slip = 0.0_wp
       if (self%edge(i) == 0) return
+      if (self%smoothing == smoothing_hermite) then
+         associate (smooth => self%smooth(i))
+            n = smooth%n
+            call stencil_gather(x, u0, du, n, smooth%node, local, dlocal)
+            call hermite_slip_value(smooth%curve, local(:, :n), dlocal(:, :n), smooth%place(1), &
+               slip, is_found)
+         end associate
+         if (is_found) return
+      end if
       n = 1
       if (self%other(i) > 0) n = size(self%polygon, 1)
       do k = 1, n

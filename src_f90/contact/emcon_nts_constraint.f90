@@ -10,8 +10,9 @@ module emcon_nts_constraint
    use emcon_dgrad15, only : dg15_t => dg_t
    use emcon_dgrad15_first, only : dg15_first_t => dg_t
    use emcon_dgrad_wide, only : change_t
-   use emcon_hermite_gap, only : hermite_gap
-   use emcon_hermite_gap_first, only : hermite_gap_first => hermite_gap
+   use emcon_hermite_gap, only : hermite_gap, hermite_slip
+   use emcon_hermite_gap_first, only : hermite_gap_first => hermite_gap, &
+      hermite_slip_first => hermite_slip
    use emcon_kinds, only : wp
    use emcon_nts_gap, only : nts_gap
    use emcon_nts_gap_first, only : nts_gap_first => nts_gap
@@ -137,8 +138,43 @@ contains
             call take_gap(change_t(gap%f0 - target, gap%f1 - target, gap%df), gap%g, gap%c, item)
             item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
          end if
+         if (item%rubs) call take_slip(smooth, local(:, :n), dlocal(:, :n), item)
       end associate
    end subroutine smooth_constraint
+
+   !> Slip along a smoothed surface that has a closest point.
+   pure subroutine take_slip(smooth, local, dlocal, item)
+      type(smooth_stencil_t), intent(in) :: smooth
+      real(wp), intent(in) :: local(:, :), dlocal(:, :)   !! (n_dim, n) of its nodes [L]
+      type(condition_t), intent(inout) :: item            !! with these nodes
+      type(dg15_t) :: slip
+      type(dg15_first_t) :: first
+
+      call condition_resize_slip(item)
+      if (item%leaves_second) then
+         call hermite_slip_first(smooth%curve, local, dlocal, smooth%place(1), first)
+         item%slip = first%df
+         call take_directions(first%g, first%c, item)
+      else
+         call hermite_slip(smooth%curve, local, dlocal, smooth%place(1), slip)
+         item%slip = slip%df
+         call take_directions(slip%g, slip%c, item)
+         associate (n => size(local))
+            item%ht(:n, :n) = slip%h(:n, :n)
+         end associate
+      end if
+   end subroutine take_slip
+
+   !> The directions of slip as those of a condition.
+   pure subroutine take_directions(g, c, item)
+      real(wp), intent(in) :: g(:), c(:)         !! discrete gradient, and gradient at the end
+      type(condition_t), intent(inout) :: item
+
+      associate (n => item%n_node, n_dim => size(item%t, 1))
+         item%t(:, :n) = reshape(g(:n_dim*n), [n_dim, n])
+         item%t1(:, :n) = reshape(c(:n_dim*n), [n_dim, n])
+      end associate
+   end subroutine take_directions
 
    !> A gap and its first derivatives as those of a constraint.
    pure subroutine take_gap(change, g, c, item)

@@ -5,8 +5,8 @@ module test_hermite_gap
    use emcon_errors, only : error_t
    use emcon_hermite, only : hermite_curve, hermite_point, hermite_point_t, hermite_stencil_t, &
       joined_pieces
-   use emcon_hermite_gap, only : hermite_gap
-   use emcon_hermite_gap_value, only : hermite_begin, hermite_gap_value
+   use emcon_hermite_gap, only : hermite_gap, hermite_slip
+   use emcon_hermite_gap_value, only : hermite_begin, hermite_gap_value, hermite_slip_value
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
    use random_draws, only : draw_random
@@ -50,7 +50,10 @@ contains
          test_case_t("tiny steps", test_tiny), &
          test_case_t("momenta", test_momenta), &
          test_case_t("gradient and second derivatives", test_derivatives), &
-         test_case_t("rigid motions leave the gap", test_rigid)]
+         test_case_t("rigid motions leave the gap", test_rigid), &
+         test_case_t("slip along a line is its length", test_slip_of_line), &
+         test_case_t("slip: work, value, rigid motions", test_slip), &
+         test_case_t("slip: gradient and second derivatives", test_slip_derivatives)]
    end subroutine collect_hermite_gap
 
    !> Stencil over the nodes of `flat`, with its distances as reference lengths.
@@ -509,5 +512,82 @@ contains
          call check_near(error, a%f1, a%f0, tol, 20.0_wp, "values")
       end do
    end subroutine test_rigid
+
+   !> Over nodes between edges of different lengths, all stretched alike, and at any angle. The
+   !> chain goes to the left.
+   subroutine test_slip_of_line(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(hermite_stencil_t) :: stencil
+      real(wp) :: x0(2, 7), dx(2, 7), s(3)
+      type(dg_t) :: slip
+      integer :: i
+
+      stencil = stencil_of(1)
+      do i = 1, 20
+         x0 = 1.3_wp*flat
+         x0(1, 1) = -0.2_wp + 0.08_wp*real(i, wp)
+         dx = 0.0_wp
+         dx(1, 1) = merge(-1.0_wp, 1.0_wp, i > 10)
+         x0 = turned(0.3_wp*real(i, wp), x0)
+         call hermite_begin(stencil, x0, s)
+         call hermite_slip(stencil, x0, turned(0.3_wp*real(i, wp), dx), s(1), slip)
+         call check_near(error, slip%df, -dx(1, 1), tol, 1.0_wp, "length")
+      end do
+   end subroutine test_slip_of_line
+
+   subroutine test_slip(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(hermite_stencil_t) :: stencil
+      real(wp) :: x0(2, 7), dx(2, 7), s(3), g(2, 7), mid(2, 7), value
+      type(dg_t) :: slip
+      integer :: i, n_passed
+      logical :: is_found
+
+      n_passed = 0
+      do i = 1, 500
+         call draw_case(i, stencil, x0, dx, s)
+         call hermite_slip(stencil, x0, dx, s(1), slip)
+         call hermite_slip_value(stencil, x0, dx, s(1), value, is_found)
+         call check_true(error, is_found, "found")
+         g = reshape(slip%g(:14), [2, 7])
+         mid = x0 + 0.5_wp*dx
+         call check_near(error, sum(g*dx), value, tol, maxval(abs(g)), "T.D, and its value")
+         call check_near(error, [slip%g(15), slip%c(15)], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, &
+            "the place is no variable")
+         call check_near(error, sum(g, dim=2), [0.0_wp, 0.0_wp], tol, sum(abs(g)), "linear")
+         call check_near(error, sum(mid(1, :)*g(2, :) - mid(2, :)*g(1, :)), 0.0_wp, tol, &
+            sum(abs(g))*maxval(abs(mid)), "angular")
+         if (abs(value) > 0.5_wp) n_passed = n_passed + 1
+         dx = turned(0.03_wp*real(i, wp), x0) + 5.0_wp - x0
+         call hermite_slip_value(stencil, x0, dx, s(1), value, is_found)
+         call check_near(error, value, 0.0_wp, tol, 20.0_wp, "all move")
+      end do
+      call check_true(error, n_passed > 50, "long ways")
+   end subroutine test_slip
+
+   !> As of the gap, but that the rate of slip changes where lengths of edges do, within `step`.
+   subroutine test_slip_derivatives(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(hermite_stencil_t) :: stencil
+      real(wp) :: x0(2, 7), dx(2, 7), s(3), way(2, 7), step
+      type(dg_t) :: slip, up, down
+      integer :: i, j, k
+
+      step = eps**(1.0_wp/3.0_wp)
+      do i = 1, 20*n_kind
+         call draw_case(i, stencil, x0, dx, s)
+         call hermite_slip(stencil, x0, dx, s(1), slip)
+         do j = 1, 14
+            way = reshape([(merge(step, 0.0_wp, k == j), k=1, 14)], [2, 7])
+            call hermite_slip(stencil, x0, dx + way, s(1), up)
+            call hermite_slip(stencil, x0, dx - way, s(1), down)
+            if (maxval(abs(up%c - down%c)) > 1.0e3_wp*step) cycle
+            call check_near(error, slip%c(j), (up%df - down%df)/(2.0_wp*step), 10.0_wp*step, &
+               maxval(abs(slip%c)), "gradient")
+            call check_near(error, slip%h(:14, j), (up%g(:14) - down%g(:14))/(2.0_wp*step), &
+               10.0_wp*step, maxval(abs(slip%h)), "column " // to_text(j))
+         end do
+      end do
+   end subroutine test_slip_derivatives
 
 end module test_hermite_gap
