@@ -67,17 +67,16 @@ contains
       is_meant = is_meant .and. .not. is_given
    end subroutine leave_joined
 
-   !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those that are
-   !> prescribed in such a step, of rigid bodies, in ties and equations, or given mass or forces,
-   !> and those of elements that would keep none, and those that others would not hold. And all
-   !> nodes that have none anyway.
+   !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those of surfaces
+   !> that rub, those that are prescribed in such a step, of rigid bodies, in ties and equations, or
+   !> given mass or forces, and those of elements that would keep none, and those that others would
+   !> not hold. And all nodes that have none anyway.
    pure subroutine massless_find(scene, solid, is_given, is_bare, is_massless)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: is_given(:)         !! (n_node) mass or forces
       logical, intent(in) :: is_bare(:)          !! (n_node) those of `massless_bare`
       logical, intent(out) :: is_massless(:)     !! (n_node)
-      integer, allocatable :: edge(:, :)
       integer :: i
 
       is_massless = .false.
@@ -85,11 +84,13 @@ contains
          scene%step%scheme%masses_resist)) return
       do i = 1, size(scene%pair)
          if (scene%pair(i)%initiation == initiation_persistent) cycle
-         associate (surface => scene%surface(scene%pair(i)%slave))
-            call surface_edges(scene, surface, edge)
-            is_massless([edge]) = .true.
-            if (surface%is_nodal) is_massless(surface%node) = .true.
-         end associate
+         call mark_surface(scene, scene%pair(i)%slave, .true., is_massless)
+      end do
+      ! With friction what has no mass would balance without a minimum principle.
+      do i = 1, size(scene%pair)
+         if (.not. scene%pair(i)%friction > 0.0_wp) cycle
+         call mark_surface(scene, scene%pair(i)%slave, .false., is_massless)
+         call mark_surface(scene, scene%pair(i)%master, .false., is_massless)
       end do
       do i = 1, size(scene%step)
          if (.not. scene%step(i)%scheme%masses_resist) cycle
@@ -100,6 +101,22 @@ contains
       call keep_swinging(solid, size(scene%x, 1), is_massless)
       is_massless = is_massless .or. is_bare
    end subroutine massless_find
+
+   !> Say of the nodes of surface `k`, if there is one, that they have no mass, or that they do.
+   pure subroutine mark_surface(scene, k, mark, is_massless)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: k
+      logical, intent(in) :: mark
+      logical, intent(inout) :: is_massless(:)   !! (n_node)
+      integer, allocatable :: edge(:, :)
+
+      if (k == 0) return
+      associate (surface => scene%surface(k))
+         call surface_edges(scene, surface, edge)
+         is_massless([edge]) = mark
+         if (surface%is_nodal) is_massless(surface%node) = mark
+      end associate
+   end subroutine mark_surface
 
    !> Leave the nodes of each element that would keep no mass theirs.
    pure subroutine keep_one(solid, is_massless)
