@@ -35,6 +35,7 @@ module emcon_friction
       logical, allocatable :: is_idle(:)         !! (n_constraint) others hold its slip
       logical, allocatable :: is_needed(:)       !! (n_constraint) others hold its slip but nearly
       logical, allocatable :: has_turned(:)      !! (n_constraint) from one slide to the other
+      logical, allocatable :: knows_limit(:)     !! (n_constraint) of mu: see emcon_friction_limit
       integer, allocatable :: tried(:, :)        !! (n_constraint, sets) ways of the sets tried
    end type friction_t
 
@@ -55,7 +56,7 @@ contains
       allocate(self%mu(n), self%tau(n), self%tau0(n), self%lead(n), source=0.0_wp)
       allocate(self%way(n), self%way0(n), source=touch_sticks)
       allocate(self%is_candidate(n), self%is_idle(n), self%is_needed(n), self%has_turned(n), &
-         source=.false.)
+         self%knows_limit(n), source=.false.)
       allocate(self%tried(n, merge(n_set, 0, self%is_on)), source=0)
       if (.not. self%is_on) return
       do i = 1, size(system%contact)

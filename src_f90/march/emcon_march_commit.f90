@@ -6,6 +6,7 @@ module emcon_march_commit
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
    use emcon_friction, only : friction_grip, friction_missed, friction_work
+   use emcon_friction_limit, only : friction_limit_tell
    use emcon_holding, only : holding_t
    use emcon_keeping, only : keeping_commit
    use emcon_kinds, only : wp
@@ -76,6 +77,8 @@ contains
          if (self%newton%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             trim(correction_reason(self%newton%correction)) // ": solved as a saddle point")
          call tell_gaps(self, h, increment)
+         call friction_limit_tell(self, scene, increment, error)
+         if (allocated(error)) return
          increment%is_guarded = increment%is_guarded .or. &
             any(set%id > system%first_constraint(system%n_pair + 1))
          associate (reached => self%newton%convergence)

@@ -1,0 +1,171 @@
+!> Up to which coefficient of friction a contact by itself has one solution in a step.
+!>
+!> Where a contact slides its force lam, along g - mu sigma T, changes its gap by
+!> lam (Wnn - mu sigma Wnt), with the flexibility W of the step without contacts: from
+!> mu = Wnn/|Wnt| on it is closed by being pushed open. Source: docs/theory.md, eq. (14l).
+module emcon_friction_limit
+   use emcon_constraint, only : condition_t
+   use emcon_constraints, only : constraint_place, constraint_set_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_march_types, only : increment_t, march_t
+   use emcon_numbering, only : numbering_t
+   use emcon_pose, only : pose_is_equilibrium
+   use emcon_scene, only : scene_t
+   use emcon_solver_registry, only : solver_create
+   use emcon_sparse_solver, only : matrix_general, sparse_solver_t
+   use emcon_system, only : system_t
+   use emcon_text, only : note_add, to_text
+   implicit none
+   private
+   public :: friction_limit_find, friction_limit_tell
+
+   !> So many contacts are looked at, those that are pushed most.
+   integer, parameter :: most_contacts = 16
+   !> A gap changes with friction if it does so by more than this part of what its own push does.
+   real(wp), parameter :: depends = sqrt(epsilon(1.0_wp))
+
+contains
+
+   !> A note where pairs rub for the first time with a coefficient above the limit of a contact.
+   !> Not in statics, where bodies may be free without contacts.
+   subroutine friction_limit_tell(march, scene, increment, error)
+      type(march_t), intent(inout) :: march
+      type(scene_t), intent(in) :: scene
+      type(increment_t), intent(inout) :: increment
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: solver
+      real(wp) :: limit(most_contacts)
+      integer :: list(most_contacts), n, worst, pair, i
+
+      if (.not. march%active%friction%is_on .or. pose_is_equilibrium(march%motion%pose)) return
+      call choose(march, list, n)
+      if (n == 0) return
+      associate (correction => march%newton%correction)
+         call solver_create(correction%choice, matrix_general, solver, correction%given)
+      end associate
+      call friction_limit_find(march%system, march%active%set, list(:n), solver, limit(:n), error)
+      call solver%free()
+      if (allocated(error)) return
+      associate (id => march%active%set%id(list(:n)), mu => march%active%friction%mu)
+         worst = maxloc(mu(id)/limit(:n), 1)
+         if (.not. mu(id(worst)) > limit(worst)) return
+         call constraint_place(march%system, id(worst), pair, i)
+         call note_add(increment%notes, "the coefficient of friction " // to_text(mu(id(worst))) &
+            // " is above " // to_text(limit(worst), 4) // ", up to which the contact of slave " &
+            // "node " // to_text(scene%node_label(march%system%contact(pair)%contact%node(i))) &
+            // " by itself has one solution in an increment: there may be several")
+      end associate
+   end subroutine friction_limit_tell
+
+   !> What is pushed most of the pairs that rub for the first time, which they have done from here
+   !> on.
+   subroutine choose(march, list, n)
+      type(march_t), intent(inout) :: march
+      integer, intent(out) :: list(:)            !! places in the set
+      integer, intent(out) :: n                  !! so many of them
+      logical :: is_new(march%active%set%n)
+      integer :: k, pair, i
+
+      associate (set => march%active%set, known => march%active%friction%knows_limit)
+         do k = 1, set%n
+            is_new(k) = set%item(k)%rubs
+            if (is_new(k)) is_new(k) = .not. known(set%id(k))
+         end do
+         n = min(size(list), count(is_new))
+         do k = 1, n
+            list(k) = maxloc(set%lam(:set%n), 1, is_new)
+            is_new(list(k)) = .false.
+         end do
+         do k = 1, n
+            call constraint_place(march%system, set%id(list(k)), pair, i)
+            known(march%system%first_constraint(pair) + 1:march%system%first_constraint(pair + 1)) &
+               = .true.
+         end do
+      end associate
+   end subroutine choose
+
+   !> The limits of contacts that rub, each by itself with what always holds; where nothing moves
+   !> without contacts there are none.
+   subroutine friction_limit_find(system, set, list, solver, limit, error)
+      type(system_t), intent(in) :: system       !! with the matrix of the step
+      type(constraint_set_t), intent(in) :: set  !! of the step
+      integer, intent(in) :: list(:)             !! (n) places in the set
+      class(sparse_solver_t), intent(inout) :: solver   !! of general matrices
+      real(wp), intent(out) :: limit(:)          !! (n) huge: none
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: held(system%space%numbering%n_unknown, set%n_held)
+      real(wp), dimension(system%space%numbering%n_unknown) :: normal, along, row
+      integer :: k
+
+      limit = huge(limit)
+      call solver%analyse(system%matrix, error)
+      if (.not. allocated(error)) call solver%factorise(system%matrix%value, error)
+      if (allocated(error) .or. solver%is_singular) return
+      associate (numbering => system%space%numbering)
+         do k = 1, set%n_held
+            call solver%solve(on_unknowns(numbering, set%item(k), set%item(k)%g), held(:, k), error)
+            if (allocated(error)) return
+         end do
+         do k = 1, size(list)
+            associate (item => set%item(list(k)))
+               call solver%solve(on_unknowns(numbering, item, item%g), normal, error)
+               if (.not. allocated(error)) call solver%solve(on_unknowns(numbering, item, item%t), &
+                  along, error)
+               if (allocated(error)) return
+               call hold(numbering, set, held, normal)
+               call hold(numbering, set, held, along)
+               row = on_unknowns(numbering, item, item%c)
+               associate (wnn => dot_product(row, normal), wnt => abs(dot_product(row, along)))
+                  if (wnn > 0.0_wp .and. wnt > depends*wnn) limit(k) = wnn/wnt
+               end associate
+            end associate
+         end do
+      end associate
+   end subroutine friction_limit_find
+
+   !> What moves under a force by `way` does so with what always holds.
+   subroutine hold(numbering, set, held, way)
+      type(numbering_t), intent(in) :: numbering
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: held(:, :)         !! (n_unknown, n_held) under the forces of these
+      real(wp), intent(inout) :: way(:)          !! (n_unknown)
+      real(dp) :: matrix(set%n_held, set%n_held), rate(set%n_held, 1), force(set%n_held, 1)
+      logical :: is_singular
+      integer :: k
+
+      if (set%n_held == 0) return
+      do k = 1, set%n_held
+         associate (row => on_unknowns(numbering, set%item(k), set%item(k)%c))
+            matrix(k, :) = real(matmul(row, held), dp)
+            rate(k, 1) = real(dot_product(row, way), dp)
+         end associate
+      end do
+      call dense_solve(matrix, rate, force, is_singular)
+      way = way - matmul(held, real(force(:, 1), wp))
+   end subroutine hold
+
+   !> Derivatives by the nodes of a condition as those by the unknowns.
+   pure function on_unknowns(numbering, item, part) result(row)
+      type(numbering_t), intent(in) :: numbering
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: part(:, :)         !! (n_dim, >= n_node)
+      real(wp) :: row(numbering%n_unknown)
+      integer :: i, a, t
+
+      row = 0.0_wp
+      do i = 1, item%n_node
+         do a = 1, size(part, 1)
+            associate (dof => size(part, 1)*(item%node(i) - 1) + a)
+               do t = numbering%start(dof) + 1, numbering%start(dof + 1)
+                  associate (column => numbering%column(t))
+                     if (column > 0) row(column) = row(column) + numbering%weight(t)*part(a, i)
+                  end associate
+               end do
+            end associate
+         end do
+      end do
+   end function on_unknowns
+
+end module emcon_friction_limit
