@@ -2,11 +2,11 @@
 module emcon_deck_friction
    use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line
    use emcon_deck_reader, only : card_error, card_t, reader_t
-   use emcon_diagnostics, only : add_error
-   use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite
+   use emcon_diagnostics, only : add_error, add_warning
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_steps, only : initiation_admissible, initiation_persistent, method_null_space, &
-      method_saddle_point, step_t
+   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
+      method_null_space, method_saddle_point, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -42,8 +42,8 @@ contains
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
    end subroutine read_friction
 
-   !> Friction is along the edges of polygons, in steps whose scheme has its forces along discrete
-   !> gradients or which are static, and which hold contact exactly.
+   !> Friction is in steps whose scheme has its forces along discrete gradients or which are static,
+   !> and which hold contact exactly.
    subroutine check_friction(reader, pair, step)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair(:)
@@ -52,15 +52,16 @@ contains
 
       do i = 1, size(pair)
          if (.not. pair(i)%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-         if (pair(i)%slave == pair(i)%master .and. pair(i)%slave > 0) then
-            call refuse(reader, pair(i), "a surface in contact with itself; name two surfaces")
-         end if
          if (pair(i)%restitution < 1.0_wp) call refuse(reader, pair(i), &
             "RESTITUTION below 1: velocities would " &
             // "jump along the surface too; use RESTITUTION=1")
          do k = 1, size(step)
             call check_step(reader, pair(i), step(k), k)
          end do
+         if (any(step%initiation == initiation_massless .and. step%scheme%masses_resist)) then
+            call add_warning(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
+               // "has *FRICTION: both surfaces keep their mass, and hold gaps as PERSISTENT does")
+         end if
       end do
    end subroutine check_friction
 
@@ -70,13 +71,7 @@ contains
       type(contact_pair_t), intent(in) :: pair
       type(step_t), intent(in) :: step
       integer, intent(in) :: k                   !! its number
-      type(contact_options_t) :: options
 
-      options = step%contact
-      if (pair%has_options) options = pair%options
-      if (options%smoothing == smoothing_hermite) call refuse(reader, pair, &
-            "*SURFACE SMOOTHING of " &
-         // "step " // to_text(k) // "; use SMOOTHING=NONE")
       if (step%scheme%masses_resist .and. .not. step%scheme%takes_damping) then
          call refuse(reader, pair, "SCHEME=" // trim(step%scheme%word) // " of step " // &
             to_text(k) // &
@@ -84,10 +79,9 @@ contains
          if (step%scheme%is_explicit) return
       end if
       if (step%scheme%masses_resist .and. all(step%initiation /= [initiation_persistent, &
-         initiation_admissible])) then
-         call refuse(reader, pair, "*CONTACT INITIATION of step " // to_text(k) // &
-            " but TYPE=PERSISTENT or ADMISSIBLE: jumps of velocities and surfaces without " &
-            // "mass have no friction")
+         initiation_admissible, initiation_massless])) then
+         call refuse(reader, pair, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE of step " // &
+            to_text(k) // ": jumps of velocities have no friction")
       end if
       if (.not. any(step%constraint_method == [method_null_space, method_saddle_point])) then
          call refuse(reader, pair, "contact that gives way, in step " // to_text(k) // "; use " // &

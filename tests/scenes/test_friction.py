@@ -1,15 +1,18 @@
 """`*FRICTION`: Coulomb's law for nodes on edges, with what it takes in the ledger."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from friction_scenes import (
     NODES,
     WEIGHT,
+    G,
     balance,
     belt_way,
     block_on_floor,
+    make_rigid,
     on_spring,
     partial_slip,
     polygon,
@@ -22,13 +25,14 @@ from friction_scenes import (
     way,
 )
 from plain_scenes import BOTH, ONE, Scene
-from scene_tools import run_deck
+from scene_tools import DECKS, Deck, run_deck, run_one_sided
 from test_contact_output import restart
 from test_segments import with_profile
 
 
-def obeys(run, scale=0.0, law=1e-9):
-    """Energy is lost to friction alone, in no step made by it, and its law holds."""
+def obeys(run, scale=0.0, law=1e-9, overlaps=False):
+    """Energy is lost to friction alone, in no step made by it, and its law holds; with `overlaps`
+    bodies may, as nodes of one side do, and means of gaps."""
     history = run.history
     assert balance(history, scale) < 1e-12
     assert (np.diff(history["friction_loss"]) >= -1e-15*max(scale, history["kinetic"].max())).all()
@@ -38,7 +42,16 @@ def obeys(run, scale=0.0, law=1e-9):
     assert run.verdict["law_violation"] <= law
     assert run.verdict["friction_loss"] == pytest.approx(history["friction_loss"][-1], rel=1e-8,
                                                          abs=1e-13*scale)
-    assert run.verdict["verdict"] == "good"
+    if overlaps:
+        assert all(reason.startswith("bodies overlap") for reason in run.verdict["reasons"])
+    else:
+        assert run.verdict["verdict"] == "good"
+
+
+def keeps_momenta(run):
+    for name in ("px", "py", "lz"):
+        change = np.abs(run.history[name] - run.history[name][0]).max()
+        assert change < 1e-13*np.abs(run.history["lz"][0])
 
 
 # ---- sliding to rest ----------------------------------------------------------------------------
@@ -294,9 +307,7 @@ def test_a_ring_keeps_momenta_and_pays_for_friction(mu, tmp_path):
         obeys(run)
         history = run.history
         assert history["friction_loss"][-1] > 0.05*history["kinetic"][0]
-        scale = np.abs(history["lz"][0])
-        for name in ("px", "py", "lz"):
-            assert np.abs(history[name] - history[name][0]).max() < 1e-13*scale
+        keeps_momenta(run)
     for name in ("kinetic", "friction_loss", "strain"):
         assert np.allclose(runs[0].history[name], runs[1].history[name], rtol=1e-9, atol=1e-11)
     assert (runs[0].history["newton"] == runs[1].history["newton"]).all()
@@ -319,9 +330,7 @@ def test_a_ring_by_integrated_gaps(mu, more, tmp_path):
     for run in runs:
         obeys(run)
         assert run.history["friction_loss"][-1] > 0.05*run.history["kinetic"][0]
-        for name in ("px", "py", "lz"):
-            change = np.abs(run.history[name] - run.history[name][0]).max()
-            assert change < 1e-13*np.abs(run.history["lz"][0])
+        keeps_momenta(run)
     for name in ("kinetic", "friction_loss", "strain"):
         assert np.allclose(runs[0].history[name], runs[1].history[name], rtol=1e-9, atol=1e-11)
 
@@ -371,6 +380,92 @@ def test_a_damped_block_slides_to_rest_by_integrated_gaps(more, tmp_path):
     obeys(run)
     assert way(run, 15)[-1] == pytest.approx(2/3, abs=2e-4)
     assert run.history["newton"].max() <= 6 and run.history["cuts"].sum() == 0
+
+# ---- a surface with itself ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("more", [{"sides": "BOTH", **NODES}, {"sides": "ONE", **NODES},
+                                  {"formulation": "SEGMENT"}, {"formulation": "MORTAR"}])
+def test_a_strip_that_rubs_itself(more, tmp_path):
+    """The hairpin whose legs fly together: momenta, energy and law; null space and saddle point."""
+    deck = rubbing(Deck.read(DECKS / "self_contact.inp"), 0.5, "FRICTIONLESS")
+    runs = [run_one_sided(deck, tmp_path/method, t_end=0.6, method=method, **more)
+            for method in ("NULL SPACE", "SADDLE POINT")]
+    for run in runs:
+        obeys(run, overlaps=more.get("sides") != "BOTH")
+        keeps_momenta(run)
+        assert run.history["friction_loss"][-1] > 1e-4*run.history["kinetic"][0]
+    for name in ("kinetic", "friction_loss", "strain"):
+        assert np.allclose(runs[0].history[name], runs[1].history[name], rtol=1e-9, atol=1e-11)
+
+
+# ---- smoothed surfaces --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR"])
+def test_a_rigid_block_slides_on_a_smoothed_floor(formulation, tmp_path):
+    """A smoothed flat is flat: the way of the polygon, to round-off."""
+    deck = block_on_floor(0.02, 0.72, 0.3, v0=2.0, rigid=True)
+    moved = []
+    for smoothing in ("NONE", "HERMITE"):
+        smooth = Deck(deck.text())
+        smooth.insert(f"*SURFACE SMOOTHING, TYPE={smoothing}", before="*CONSTRAINT METHOD")
+        run = run_deck(smooth, tmp_path/smoothing, formulation=formulation)
+        obeys(run)
+        moved.append(way(run, 15))
+    assert np.abs(moved[1] - moved[0]).max() < 1e-12
+
+
+@pytest.mark.parametrize("more", [{"formulation": "NODE TO SURFACE"},
+                                  {"formulation": "MORTAR", "normal": "EDGE"}])
+@pytest.mark.parametrize("mu", [0.2, 0.8])
+def test_a_ring_on_a_smoothed_surface(mu, more, tmp_path):
+    runs = [run_deck(ring(mu), tmp_path/method, h=0.02, t_end=0.6, method=method,
+                     smoothing="HERMITE", **more) for method in ("NULL SPACE", "SADDLE POINT")]
+    for run in runs:
+        obeys(run)
+        keeps_momenta(run)
+        assert run.history["friction_loss"][-1] > 0.05*run.history["kinetic"][0]
+    for name in ("kinetic", "friction_loss", "strain"):
+        assert np.allclose(runs[0].history[name], runs[1].history[name], rtol=1e-9, atol=1e-11)
+
+
+# ---- mass, and the limit of one solution --------------------------------------------------------
+
+
+def test_what_rubs_keeps_its_mass(tmp_path):
+    """A step without mass at the surfaces is for other pairs: the run is that of PERSISTENT."""
+    runs = [run_deck(ring(0.8), tmp_path/word, **NODES, h=0.02, t_end=0.3, initiation=word)
+            for word in ("PERSISTENT", "MASSLESS")]
+    assert "both surfaces keep their mass" in runs[1].log
+    assert runs[0].digits() == runs[1].digits()
+
+
+@pytest.mark.parametrize("angle", [30, math.degrees(math.atan(2)), 75])
+def test_the_limit_of_a_rod(angle, tmp_path):
+    """A rigid rod that touches with one corner at (x, y) from its centre: (r^2 + x^2)/|x y|, r the
+    radius of gyration; for a thin one 4/3 at least."""
+    length, thick, turn = 2.0, 0.02, math.radians(angle)
+    c, s = math.cos(turn), math.sin(turn)
+    y = 0.5*(length*s + thick*c)
+    x = -0.5*(length*c - thick*s)
+
+    def rod(p, q):
+        return c*(p - length/2) - s*(q - thick/2), s*(p - length/2) + c*(q - thick/2) + y
+
+    limit = ((length**2 + thick**2)/12 + x**2)/abs(x*y)
+    told = []
+    for mu in (0.98*limit, 1.02*limit):
+        scene = Scene(1e-5, 2e-5, gravity=G)
+        scene.block("ROD", (0, 0), (length, thick), (10, 1), stiffness=1e3, shape=rod,
+                    velocity=(0.0, -1e-3))
+        scene.block("FLOOR", (-3, -1), (6, 1), (4, 1), stiffness=1e3)
+        scene.hold("FLOOR", lambda x, y: True)
+        scene.pairs = [("ROD", "FLOOR")]
+        make_rigid(scene, "ROD", (0, y), (0.0, -1e-3))
+        run = run_deck(rubbing(scene.deck(ONE), mu), tmp_path/f"{mu}", **NODES)
+        told += re.findall(r"is above (\S+), up to which", run.log)
+    assert len(told) == 1 and float(told[0]) == pytest.approx(limit, rel=2e-3)
 
 
 def test_a_restart_has_the_same_bits(tmp_path):
