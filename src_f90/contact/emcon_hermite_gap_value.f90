@@ -151,14 +151,14 @@ contains
       real(wp), intent(out) :: slip              !! > 0 along the chain [L]
       logical, intent(out) :: is_found           !! .false.: no unique closest points
       type(hermite_curve_t) :: curve
-      real(wp) :: root(2)
+      real(wp) :: root(0:1)
 
       slip = 0.0_wp
       curve = hermite_curve(stencil, joined_pieces)
       call hermite_roots(stencil, curve, x0, dx, s, root, is_found)
       if (.not. is_found) return
-      slip = hermite_stretch(stencil, curve, x0, root(1)) &
-         *(hermite_way(curve, root(2)) - hermite_way(curve, root(1)))
+      slip = hermite_stretch(stencil, curve, x0, root(0)) &
+         *(hermite_way(curve, root(1)) - hermite_way(curve, root(0)))
    end subroutine hermite_slip_value
 
    !> Length of the curve at `s` by its reference length.

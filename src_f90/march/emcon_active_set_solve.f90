@@ -56,8 +56,8 @@ contains
          status = step_not_held
          if (allocated(self%holding%text)) return
          self%before = motion%du
-         newton%looks_early = self%masses_resist .and. .not. self%only_adds &
-            .and. self%n_early < most_early
+         newton%looks_early = (self%masses_resist .or. self%friction%is_on) .and. .not. &
+            (self%only_adds .or. self%holding%is_needed) .and. self%n_early < most_early
          call solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
          call keep_multipliers(self)
