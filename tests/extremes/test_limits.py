@@ -2,16 +2,18 @@
 
 import sys
 
+import h5py
 import numpy as np
 import pytest
 from emcon import Stepper
-from scene_tools import EPSILON, ROOT
+from scene_tools import EPSILON, ROOT, run_deck
 
 sys.path[:0] = [str(ROOT / "tests" / "bench"), str(ROOT / "tests" / "scenes")]
 from extremes import ROWS, text_of  # noqa: E402
 from limits.common import HOLDS, SILENT, run_case  # noqa: E402
 from limits.conditions import condition, conditions, matrices  # noqa: E402
 from limits.impacts import NODES, stiffer  # noqa: E402
+from limits.seen import energies, energy_seen, overlap_seen, sections  # noqa: E402
 
 CASES = [pytest.param(row, k, id=f"{row.name}-{text_of(row.values[k]).replace(' ', '-')}")
          for row in ROWS for k in row.tested()]
@@ -23,6 +25,49 @@ def test_holds_or_says_why_not(row, k, tmp_path):
     assert outcome.kind != SILENT, outcome
     assert k >= row.reach or outcome.kind == HOLDS, outcome
     assert outcome.kind == HOLDS or outcome.text, outcome
+
+
+def test_the_grid_holds_where_inertia_counts(tmp_path):
+    """A value of each offset at the smallest ratio that holds."""
+    (row,) = (row for row in ROWS if row.name == "grid")
+    for value in row.values:
+        if value[0] == 1e-8:
+            assert run_case(row, value, tmp_path).kind == HOLDS, value
+
+
+# ---- what is seen from outside
+
+
+def test_energies_of_an_affine_motion():
+    """Against the closed forms, for small strains and for large ones."""
+    x = np.array([[0.0, 0], [2, 0], [2, 1], [0, 1]])
+    cell = np.array([[0, 1, 2, 3]])
+    shear, lame = 100/2.6, 100*0.3/(1.3*0.4)
+    for size in (1e-8, 1e-4, 0.3):
+        grad = size*np.array([[1.0, 0.5], [-0.2, 0.7]])
+        kinetic, strain = energies(x, x @ grad.T, np.full_like(x, 3.0), [(cell, 100.0, 0.5)])
+        assert kinetic == pytest.approx(0.5*0.5*2*18, rel=8*EPSILON)
+        if size < 1e-2:
+            small = 0.5*(grad + grad.T)
+            exact = 2*(shear*(small**2).sum() + 0.5*lame*np.trace(small)**2)
+            assert strain == pytest.approx(exact, rel=10*size)
+        else:
+            f = np.eye(2) + grad
+            log = np.log(np.linalg.det(f))
+            exact = 2*(0.5*shear*((f**2).sum() - 2) - shear*log + 0.5*lame*log**2)
+            assert strain == pytest.approx(exact, rel=64*EPSILON)
+
+
+def test_what_is_seen_is_not_what_is_told(tmp_path):
+    """Frames of which one is spoilt change energy and overlap, whatever the ledger says."""
+    (row,) = (row for row in ROWS if row.name == "gap")
+    run = run_deck(row.deck(1e-2), tmp_path, **row.parameters)
+    assert energy_seen(run) < 1e-12 and overlap_seen(run) < 1e-12
+    assert len(sections(run.file(".inp").read_text())) == 2
+    with h5py.File(run.file(".vtkhdf"), "r+") as file:
+        data = file["VTKHDF"]["PointData"]["displacement"]
+        data[-28:-12, 1] = data[-28:-12, 1] - 0.1
+    assert energy_seen(run) > 1e-2 and overlap_seen(run) > 1e-2
 
 
 # ---- condition numbers

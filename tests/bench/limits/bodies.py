@@ -7,7 +7,13 @@ import numpy as np
 from plain_scenes import AUTO, Scene, below
 from scene_tools import number, run_deck
 
-from .common import Row, energy_error, momentum_error, one_element
+from .common import (
+    Row,
+    energy_error,
+    one_element,
+    with_penetration,
+    with_velocities,
+)
 
 # ---- strain -------------------------------------------------------------------------------------
 
@@ -156,7 +162,7 @@ ROWS = [
         functools.partial(bent, kind="CPE4H"), deflection_error, "deflection by beam theory", bar=0.1,
         reach=7, short=(0, -1)),
     Row("aspect", "length by height of elements that a disc falls on",
-        (1, 1e2, 1e3, 1e4, 1e5), flat_elements, energy_error, "energy", reach=5),
+        (1, 1e2, 1e3, 1e4, 1e5), with_velocities(flat_elements), with_penetration, "energy, overlap", reach=5),
     Row("scale", "rho L^2/(E h^2) of an element in free fall",
         tuple((10.0**k, 0.0) for k in (0, 4, 8, 12, 16, 20, -4, -8, -12, -16, -20)), falling,
         fall_error, "place after ten increments", bar=1e-8, reach=8, short=(0, 5, 7, -1),

@@ -15,6 +15,7 @@ import numpy as np
 from scene_tools import Deck, Run, emcon, overrides
 
 from .conditions import conditions
+from .seen import energy_seen, overlap_seen
 
 HOLDS, TOLD, SILENT = "holds", "told", "silent"
 #: Of the largest energy or momentum: what the scheme promises.
@@ -154,9 +155,15 @@ def energy_error(run, _=None):
     return np.abs(kept - kept[0]).max()/largest
 
 
+#: Lengths are some hundred edges at most: what positions are rounded to, by an edge.
+PLACES = 1e-13
+
+
 def with_penetration(run, _=None):
-    """The same, or the deepest overlap by the edge that the judge saw, where that is more."""
-    return max(energy_error(run), run.verdict["penetration"])
+    """The same, by the ledger and by places and velocities, or the deepest overlap by the edge,
+    that the judge saw or that is seen from outside, where that is more."""
+    return max(energy_error(run), energy_seen(run), run.verdict["penetration"],
+               max(0.0, overlap_seen(run) - PLACES))
 
 
 def momentum_error(run, _=None):
@@ -164,7 +171,18 @@ def momentum_error(run, _=None):
     history = run.history
     size = np.hypot(history["px"], history["py"]).max()
     drift = max(np.abs(history[name] - history[name][0]).max() for name in ("px", "py"))
-    return max(energy_error(run), drift/size if size else 0.0)
+    return max(with_penetration(run), drift/size if size else 0.0)
+
+
+def with_velocities(deck):
+    """`deck`, a function of the value, with velocities in the frames: what `energy_seen` looks at."""
+    def made(value):
+        found = deck(value)
+        for k, (head, lines) in enumerate(found.card):
+            if head.startswith("*NODE FILE") and lines == ["U"]:
+                found.card[k] = (head, ["U, V"])
+        return found
+    return made
 
 
 def one_element(size=1.0, at=(0.0, 0.0), material="*ELASTIC\n100., 0.3\n*DENSITY\n1.", cards="",

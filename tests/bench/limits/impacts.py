@@ -6,7 +6,7 @@ import numpy as np
 from plain_scenes import AUTO, Scene, below
 from scene_tools import number
 
-from .common import EXACT, Row, momentum_error, with_penetration
+from .common import EXACT, Row, momentum_error, with_penetration, with_velocities
 
 # ---- a disc on a block --------------------------------------------------------------------------
 
@@ -32,6 +32,14 @@ def against_heavier(ratio):
     scene = Scene(0.01, 0.6)
     scene.disc("LIGHT", (0.1, 1.01), 0.5, (4, 2), velocity=(0, -1))
     scene.disc("HEAVY", (0, 0), 0.5, (4, 2), stiffness=100.0*ratio, density=ratio)
+    return scene.deck(AUTO)
+
+
+def denser(ratio):
+    """A light disc hits a free one that is so many times as dense, of the same stiffness."""
+    scene = Scene(0.01, 0.6)
+    scene.disc("LIGHT", (0.1, 1.01), 0.5, (4, 2), velocity=(0, -1))
+    scene.disc("HEAVY", (0, 0), 0.5, (4, 2), density=ratio)
     return scene.deck(AUTO)
 
 
@@ -165,11 +173,13 @@ def stir(run, _):
 
 
 NODES = {"formulation": "NODE TO SURFACE"}
-ROWS = [dataclasses.replace(row, parameters=NODES) for row in (
+ROWS = [dataclasses.replace(row, parameters=NODES, deck=with_velocities(row.deck)) for row in (
     Row("stiffness", "stiffness of a block by that of the disc that falls on it",
         (1, 1e3, 1e6, 1e9, 1e12), stiffer, with_penetration, "energy, overlap", reach=5),
     Row("mass", "mass and stiffness of a disc by those of the one that hits it",
-        (1, 1e3, 1e6, 1e9, 1e12), against_heavier, momentum_error, "energy, momenta", reach=5),
+        (1, 1e3, 1e6, 1e9, 1e12), against_heavier, momentum_error, "energy, momenta, overlap", reach=5),
+    Row("density", "mass of a disc, of the same stiffness, by that of the one that hits it",
+        (1, 1e3, 1e6, 1e9, 1e12), denser, momentum_error, "energy, momenta, overlap", reach=5),
     Row("increment", "h by the time of a wave through an element, an impact in the fifth of ten",
         (1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e1, 1e2, 1e3), in_increments, with_penetration,
         "energy, overlap", reach=8, short=(0, 4, -1)),

@@ -19,7 +19,7 @@ def hopping(n):
     scene.block("FLOOR", (-1, -0.5), (3, 0.5), (1, 1)).hold("FLOOR", lambda *_: True)
     scene.hold("BLOCK", lambda *_: True, axes="1")
     deck = scene.deck(AUTO)
-    deck.replace("*NODE FILE\nU\n*CONTACT FILE", "*NODE FILE, FREQUENCY=100000\nU\n"
+    deck.replace("*NODE FILE\nU\n*CONTACT FILE", "*NODE FILE, FREQUENCY=100000\nU, V\n"
                                                 "*CONTACT FILE, FREQUENCY=100000")
     deck.replace("*CONTACT PRINT, TOTALS", "*CONTACT PRINT, FREQUENCY=100000, TOTALS")
     return deck
