@@ -32,6 +32,7 @@ class Row:
     warns           a pattern of what the log says where the figure is above the bar
     reach           the run holds for the values up to this many: tested
     short           places of the values that the tests try
+    has_matrices    a stepper evaluates its contact: not that with friction
     """
 
     name: str
@@ -47,6 +48,7 @@ class Row:
     short: tuple = (0, -1)
     timeout: float = 1800.0
     why: str = ""
+    has_matrices: bool = True
 
     def tested(self):
         return sorted({k % len(self.values) for k in self.short})
@@ -126,7 +128,7 @@ def run_case(row, value, folder, with_conditions=False):
         kind, text = SILENT, ""
     residual = attained(run, verdict) if run.file(".log").exists() else float("nan")
     ill = None
-    if with_conditions and done.returncode == 0:
+    if with_conditions and row.has_matrices and done.returncode == 0:
         ill = conditions(place / "deck.inp", row.parameters)
     outcome = Outcome(kind, figure, text, residual, ill)
     shutil.rmtree(place)
