@@ -1,7 +1,8 @@
 !> The C functions of the tables of options and laws, and of single kernels, in Fortran. What each
 !> does is said in emcon.h.
 module emcon_model_tables
-   use emcon_dgrad10, only : dg_t
+   use emcon_dgrad8, only : dg_t
+   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
@@ -82,14 +83,23 @@ contains
       real(wp), allocatable, intent(out) :: gap(:)           !! (3)
       real(wp), allocatable, intent(out) :: g(:), c(:)       !! (10)
       real(wp), allocatable, intent(out) :: h(:, :)          !! (10, 10) along rows, as C goes
+      real(wp), dimension(size(x0, 1), size(x0, 2)) :: by_g, by_c
+      real(wp) :: by_h(size(x0), size(x0))
+      integer, parameter :: in_order(5) = [1, 2, 3, 4, 5]
       type(dg_t) :: number
 
       number = nts_gap(x0, dx, merge(4, 0, has_before), merge(5, 0, has_after), &
          spread(spread(rounding, 1, 2), 2, 2))
       gap = [number%f0, number%f1, number%df]
-      allocate(g, source=number%g)
-      allocate(c, source=number%c)
-      allocate(h, source=transpose(number%h))
+      by_g = 0.0_wp
+      by_c = 0.0_wp
+      by_h = 0.0_wp
+      call nodes_add_first(1.0_wp, number%g, in_order, by_g)
+      call nodes_add_first(1.0_wp, number%c, in_order, by_c)
+      call nodes_add_second(1.0_wp, size(x0, 1), number%h, in_order, by_h)
+      allocate(g, source=pack(by_g, .true.))
+      allocate(c, source=pack(by_c, .true.))
+      allocate(h, source=transpose(by_h))
    end subroutine model_node_gap
 
 end module emcon_model_tables

@@ -4,6 +4,7 @@
 module emcon_edge_form
    use emcon_constraint, only : condition_t
    use emcon_contact, only : condition_resize
+   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_dgrad_wide, only : wide_add, wide_add_product, wide_clear, wide_t
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : moment_area, moment_area_xi, moment_cover, moment_gap, &
@@ -22,7 +23,7 @@ module emcon_edge_form
       integer :: n_node = 0
       integer :: n_slave = 0                     !! they come first, the edge's own two before
       integer, allocatable :: node(:)            !! (>= n_node)
-      type(wide_t) :: moment(n_moment)           !! over the coordinates of the nodes
+      type(wide_t) :: moment(n_moment)           !! over the coordinates of nodes 2 to n_node
    end type edge_form_t
 
    !> Which weighted gap a constraint holds: that of one slave node.
@@ -52,7 +53,7 @@ contains
       self%n_slave = n_slave
       self%node(:self%n_node) = node
       do i = 1, n_moment
-         call wide_clear(self%moment(i), 2*self%n_node, leaves_second)
+         call wide_clear(self%moment(i), 2*(self%n_node - 1), leaves_second)
       end do
    end subroutine form_begin
 
@@ -155,7 +156,7 @@ contains
       type(wide_t), intent(inout) :: skew, theta         !! work space
       real(wp) :: sign_skew
 
-      associate (moment => edge%moment, n => 2*edge%n_node, &
+      associate (moment => edge%moment, n => 2*(edge%n_node - 1), &
             leaves_second => edge%moment(1)%n_second == 0)
          call wide_clear(part, n, leaves_second)
          call wide_clear(skew, n, leaves_second)
@@ -184,26 +185,14 @@ contains
       integer, intent(in) :: place(:)
       real(wp), intent(in) :: factor
       type(condition_t), intent(inout) :: item
-      integer :: i, j, a, b, row, column
 
       item%gap0 = item%gap0 + factor*part%f0
       item%gap1 = item%gap1 + factor*part%f1
       item%dgap = item%dgap + factor*part%df
-      do j = 1, size(place)
-         do b = 1, 2
-            column = 2*(place(j) - 1) + b
-            item%g(b, place(j)) = item%g(b, place(j)) + factor*part%g(2*(j - 1) + b)
-            item%c(b, place(j)) = item%c(b, place(j)) + factor*part%c(2*(j - 1) + b)
-            if (item%leaves_second) cycle
-            do i = 1, size(place)
-               do a = 1, 2
-                  row = 2*(place(i) - 1) + a
-                  item%h(row, column) = item%h(row, column) &
-                     + factor*part%h(2*(i - 1) + a, 2*(j - 1) + b)
-               end do
-            end do
-         end do
-      end do
+      call nodes_add_first(factor, part%g, place, item%g)
+      call nodes_add_first(factor, part%c, place, item%c)
+      if (item%leaves_second) return
+      call nodes_add_second(factor, size(item%g, 1), part%h, place, item%h)
    end subroutine add
 
 end module emcon_edge_form

@@ -315,22 +315,22 @@ contains
       integer, intent(in) :: e                   !! slave edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp) :: local(2, n_place), dlocal(2, n_place)
-      integer :: k, i, variable(2*n_place)
+      integer :: k, i, variable(2, 2:n_place)
 
       call begin_form(self, e)
       do k = self%start(e), self%start(e + 1) - 1
          call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
          associate (form => self%form(e), node => self%pair(k)%node)
-            do i = 1, n_place
-               variable(2*i) = 0
-               if (node(i) > 0) variable(2*i) = 2*findloc(form%node(:form%n_node), node(i), 1)
-               variable(2*i - 1) = max(0, variable(2*i) - 1)
+            do i = 2, n_place
+               variable(:, i) = 0
+               if (node(i) > 0) variable(:, i) = 2*findloc(form%node(2:form%n_node), node(i), 1) &
+                  - [1, 0]
             end do
          end associate
          if (self%options%integration == integration_elements) then
-            call add_points(self, e, k, local, dlocal, variable)
+            call add_points(self, e, k, local, dlocal, pack(variable, .true.))
          else
-            call add_segment(self, e, k, local, dlocal, variable)
+            call add_segment(self, e, k, local, dlocal, pack(variable, .true.))
          end if
       end do
    end subroutine mortar_form_edge

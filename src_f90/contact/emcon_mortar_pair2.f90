@@ -1,6 +1,6 @@
 !> Mortar integrals of a pair of edges with 2 master nodes: polygons, segment by segment.
 module emcon_mortar_pair2
-   use emcon_dgrad13, only : dg_add_product_to, dg_add_to, dg_clip, dg_constant, &
+   use emcon_dgrad11, only : dg_add_product_to, dg_add_to, dg_clip, dg_constant, &
       dg_cross, dg_dot, dg_negative_part, dg_root, dg_set_product, dg_set_sum, dg_sqrt, dg_t, &
       dg_variable, difference, difference_t, operator(*), operator(+), operator(-), operator(/)
    use emcon_dgrad_wide, only : change_t, wide_add_part, wide_t
@@ -12,7 +12,7 @@ module emcon_mortar_pair2
    implicit none
    private
 
-   integer, parameter :: n_master = 2, k_root = 13
+   integer, parameter :: n_master = 2, k_root = 11
 
    include "emcon_mortar_pair.inc"
 

@@ -1,6 +1,6 @@
 !> What emcon_mortar_pair4 gives, without second derivatives.
 module emcon_mortar_pair4_first
-   use emcon_dgrad17_first, only : dg_add_product_to, dg_add_to, dg_clip, dg_constant, &
+   use emcon_dgrad15_first, only : dg_add_product_to, dg_add_to, dg_clip, dg_constant, &
       dg_cross, dg_dot, dg_negative_part, dg_root, dg_set_product, dg_set_sum, dg_sqrt, dg_t, &
       dg_variable, difference, difference_t, operator(*), operator(+), operator(-), operator(/)
    use emcon_dgrad_wide, only : change_t, wide_add_part, wide_t
@@ -12,7 +12,7 @@ module emcon_mortar_pair4_first
    implicit none
    private
 
-   integer, parameter :: n_master = 4, k_root = 17
+   integer, parameter :: n_master = 4, k_root = 15
 
    include "emcon_mortar_pair.inc"
 

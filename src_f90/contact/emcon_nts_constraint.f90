@@ -5,10 +5,11 @@
 module emcon_nts_constraint
    use emcon_constraint, only : condition_t
    use emcon_contact, only : condition_resize, condition_resize_slip
-   use emcon_dgrad10, only : dg10_t => dg_t
-   use emcon_dgrad10_first, only : dg10_first_t => dg_t
-   use emcon_dgrad15, only : dg15_t => dg_t
-   use emcon_dgrad15_first, only : dg15_first_t => dg_t
+   use emcon_dgrad8, only : dg8_t => dg_t
+   use emcon_dgrad8_first, only : dg8_first_t => dg_t
+   use emcon_dgrad13, only : dg13_t => dg_t
+   use emcon_dgrad13_first, only : dg13_first_t => dg_t
+   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_dgrad_wide, only : change_t
    use emcon_hermite_gap, only : hermite_gap, hermite_slip
    use emcon_hermite_gap_first, only : hermite_gap_first => hermite_gap, &
@@ -22,6 +23,8 @@ module emcon_nts_constraint
    implicit none
    private
    public :: polygon_constraint, smooth_constraint
+
+   integer, parameter :: in_order(most_nodes) = [1, 2, 3, 4, 5, 6, 7]
 
 contains
 
@@ -64,8 +67,8 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(condition_t), intent(inout) :: item
       real(wp) :: local(2, 5), dlocal(2, 5)
-      type(dg10_t) :: gap
-      type(dg10_first_t) :: first
+      type(dg8_t) :: gap
+      type(dg8_first_t) :: first
 
       associate (n => stencil%n, before => stencil%before, after => stencil%after, &
             rounding => stencil%rounding)
@@ -89,27 +92,22 @@ contains
       type(polygon_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: share
       type(change_t), intent(in) :: change
-      real(wp), intent(in) :: g(:), c(:), h(:, :)
+      real(wp), intent(in) :: g(:), c(:), h(:, :)   !! by the nodes but the first
       type(condition_t), intent(inout) :: item
-      integer :: k, j, at(10)
+      integer :: k, place(size(stencil%node))
 
       item%gap0 = item%gap0 + share*change%f0
       item%gap1 = item%gap1 + share*change%f1
       item%dgap = item%dgap + share*change%df
-      do k = 1, stencil%n
-         at(2*k) = 2*findloc(item%node(:item%n_node), stencil%node(k), 1)
-         at(2*k - 1) = at(2*k) - 1
-         associate (place => at(2*k)/2)
-            item%g(:, place) = item%g(:, place) + share*g(2*k - 1:2*k)
-            item%c(:, place) = item%c(:, place) + share*c(2*k - 1:2*k)
-         end associate
-      end do
-      if (item%leaves_second) return
-      do j = 1, 2*stencil%n
-         do k = 1, 2*stencil%n
-            item%h(at(k), at(j)) = item%h(at(k), at(j)) + share*h(k, j)
+      associate (n => stencil%n)
+         do k = 1, n
+            place(k) = findloc(item%node(:item%n_node), stencil%node(k), 1)
          end do
-      end do
+         call nodes_add_first(share, g, place(:n), item%g)
+         call nodes_add_first(share, c, place(:n), item%c)
+         if (item%leaves_second) return
+         call nodes_add_second(share, size(item%g, 1), h, place(:n), item%h)
+      end associate
    end subroutine add_gap
 
    !> The gap over a smoothed surface; `is_found`: there is a unique closest point.
@@ -120,8 +118,8 @@ contains
       type(condition_t), intent(inout) :: item
       logical, intent(out) :: is_found           !! else `item` is left as it is
       real(wp) :: local(2, most_nodes), dlocal(2, most_nodes)
-      type(dg15_t) :: gap
-      type(dg15_first_t) :: first
+      type(dg13_t) :: gap
+      type(dg13_first_t) :: first
 
       associate (n => smooth%n, curve => smooth%curve, place => smooth%place)
          call stencil_gather(x, u0, du, n, smooth%node, local, dlocal)
@@ -136,7 +134,8 @@ contains
             if (.not. is_found) return
             call begin_constraint(item, x, smooth%node(:n))
             call take_gap(change_t(gap%f0 - target, gap%f1 - target, gap%df), gap%g, gap%c, item)
-            item%h(:2*n, :2*n) = gap%h(:2*n, :2*n)
+            item%h(:size(x, 1)*n, :size(x, 1)*n) = 0.0_wp
+            call nodes_add_second(1.0_wp, size(x, 1), gap%h, in_order(:n), item%h)
          end if
          if (item%rubs) call take_slip(smooth, local(:, :n), dlocal(:, :n), item)
       end associate
@@ -147,8 +146,8 @@ contains
       type(smooth_stencil_t), intent(in) :: smooth
       real(wp), intent(in) :: local(:, :), dlocal(:, :)   !! (n_dim, n) of its nodes [L]
       type(condition_t), intent(inout) :: item            !! with these nodes
-      type(dg15_t) :: slip
-      type(dg15_first_t) :: first
+      type(dg13_t) :: slip
+      type(dg13_first_t) :: first
 
       call condition_resize_slip(item)
       if (item%leaves_second) then
@@ -159,35 +158,38 @@ contains
          call hermite_slip(smooth%curve, local, dlocal, smooth%place(1), slip)
          item%slip = slip%df
          call take_directions(slip%g, slip%c, item)
-         associate (n => size(local))
-            item%ht(:n, :n) = slip%h(:n, :n)
-         end associate
+         item%ht(:size(local), :size(local)) = 0.0_wp
+         call nodes_add_second(1.0_wp, size(local, 1), slip%h, in_order(:size(local, 2)), item%ht)
       end if
    end subroutine take_slip
 
    !> The directions of slip as those of a condition.
    pure subroutine take_directions(g, c, item)
-      real(wp), intent(in) :: g(:), c(:)         !! discrete gradient, and gradient at the end
+      real(wp), intent(in) :: g(:), c(:)         !! by the nodes but the first
       type(condition_t), intent(inout) :: item
 
-      associate (n => item%n_node, n_dim => size(item%t, 1))
-         item%t(:, :n) = reshape(g(:n_dim*n), [n_dim, n])
-         item%t1(:, :n) = reshape(c(:n_dim*n), [n_dim, n])
+      associate (n => item%n_node)
+         item%t(:, :n) = 0.0_wp
+         item%t1(:, :n) = 0.0_wp
+         call nodes_add_first(1.0_wp, g, in_order(:n), item%t)
+         call nodes_add_first(1.0_wp, c, in_order(:n), item%t1)
       end associate
    end subroutine take_directions
 
    !> A gap and its first derivatives as those of a constraint.
    pure subroutine take_gap(change, g, c, item)
       type(change_t), intent(in) :: change
-      real(wp), intent(in) :: g(:), c(:)
+      real(wp), intent(in) :: g(:), c(:)         !! by the nodes but the first
       type(condition_t), intent(inout) :: item
 
       item%gap0 = change%f0
       item%gap1 = change%f1
       item%dgap = change%df
-      associate (n => item%n_node, n_dim => size(item%g, 1))
-         item%g(:, :n) = reshape(g(:n_dim*n), [n_dim, n])
-         item%c(:, :n) = reshape(c(:n_dim*n), [n_dim, n])
+      associate (n => item%n_node)
+         item%g(:, :n) = 0.0_wp
+         item%c(:, :n) = 0.0_wp
+         call nodes_add_first(1.0_wp, g, in_order(:n), item%g)
+         call nodes_add_first(1.0_wp, c, in_order(:n), item%c)
       end associate
    end subroutine take_gap
 

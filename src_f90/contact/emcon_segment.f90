@@ -5,7 +5,7 @@
 !> Source: docs/theory.md, eq. (15i); paper, section 2 ("several extensions").
 module emcon_segment
    use emcon_constraint, only : condition_t
-   use emcon_dgrad10, only : dg_dot, dg_sqrt, dg_t, difference
+   use emcon_dgrad8, only : dg_dot, dg_sqrt, dg_t, difference
    use emcon_dgrad_wide, only : change_t, wide_add, wide_add_part, wide_add_product, wide_clear
    use emcon_edge_form, only : form_begin
    use emcon_errors, only : error_t
@@ -262,9 +262,9 @@ contains
          length = dg_sqrt(dg_dot(difference(2, 1, local, du(:, node)), &
             difference(2, 1, local, du(:, node))))
       end associate
-      call wide_clear(self%work(1), 2*self%form(e)%n_node, self%leaves_second)
+      call wide_clear(self%work(1), 2*(self%form(e)%n_node - 1), self%leaves_second)
       call wide_add_part(self%work(1), 1.0_wp, &
-         change_t(length%f0, length%f1, length%df), length%g, length%c, length%h, [1, 2, 3, 4])
+         change_t(length%f0, length%f1, length%df), length%g, length%c, length%h, [1, 2])
    end subroutine edge_length
 
    !> Gap of the node `k` of edge `e` into the second work space.
@@ -274,13 +274,13 @@ contains
       integer :: i
 
       associate (form => self%form(e), gap => self%nodal(k))
-         call wide_clear(self%work(2), 2*form%n_node, self%leaves_second)
-         associate (place => [(findloc(form%node(:form%n_node), gap%node(i), 1), &
+         call wide_clear(self%work(2), 2*(form%n_node - 1), self%leaves_second)
+         associate (place => [(findloc(form%node(2:form%n_node), gap%node(i), 1), &
                i = 1, gap%n_node)])
             call wide_add_part(self%work(2), 1.0_wp, change_t(gap%gap0, gap%gap1, gap%dgap), &
                reshape(gap%g(:, :gap%n_node), [2*gap%n_node]), &
                reshape(gap%c(:, :gap%n_node), [2*gap%n_node]), gap%h, &
-               [(2*place((i + 1)/2) - mod(i, 2), i = 1, 2*gap%n_node)])
+               [(max(0, 2*place((i + 1)/2) - mod(i, 2)), i = 1, 2*gap%n_node)])
          end associate
       end associate
    end subroutine spread_gap

@@ -4,8 +4,9 @@
 !> docs/theory.md, eqs. (14e) and (14j). Sign: slip > 0 is towards the last node of the edge.
 module emcon_slip_point
    use emcon_constraint, only : condition_t
-   use emcon_dgrad10, only : dg10_t => dg_t
-   use emcon_dgrad10_first, only : dg10_first_t => dg_t
+   use emcon_dgrad8, only : dg8_t => dg_t
+   use emcon_dgrad8_first, only : dg8_first_t => dg_t
+   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_kinds, only : wp
    use emcon_nts_gap_value, only : first, last, slave
    use emcon_nts_slip, only : nts_slip
@@ -65,8 +66,9 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       type(condition_t), intent(inout) :: item   !! made for slip, with all nodes of the point
       real(wp), dimension(size(x, 1), 3) :: local, dlocal
-      type(dg10_t) :: slip
-      type(dg10_first_t) :: only_first
+      real(wp) :: h(size(local), size(local))
+      type(dg8_t) :: slip
+      type(dg8_first_t) :: only_first
       integer :: j, k, to(4)
 
       call gather(self, x, u0, du, local, dlocal)
@@ -82,9 +84,11 @@ contains
       slip = nts_slip(local, dlocal)
       item%slip = item%slip + self%weight*slip%df
       call add_first(self, to, slip%g, slip%c, item)
+      h = 0.0_wp
+      call nodes_add_second(1.0_wp, size(x, 1), slip%h, [slave, first, last], h)
       do k = 1, size(to)
          do j = 1, size(to)
-            if (min(self%share(k), self%share(j)) > 0.0_wp) call add_second(k, j, slip%h, &
+            if (min(self%share(k), self%share(j)) > 0.0_wp) call add_second(k, j, h, &
                self%weight*self%share(k)*self%share(j), to, item)
          end do
       end do
@@ -94,18 +98,21 @@ contains
    pure subroutine add_first(self, to, g, c, item)
       type(slip_point_t), intent(in) :: self
       integer, intent(in) :: to(:)               !! (4) places of the nodes in the condition
-      real(wp), intent(in) :: g(:), c(:)         !! of the slip, by `place`
+      real(wp), intent(in) :: g(:), c(:)         !! of the slip, by the places but the first
       type(condition_t), intent(inout) :: item
+      real(wp), dimension(size(item%t, 1), maxval(place)) :: by_g, by_c
       real(wp) :: part
-      integer :: k, from, n_dim
+      integer :: k
 
-      n_dim = size(item%t, 1)
+      by_g = 0.0_wp
+      by_c = 0.0_wp
+      call nodes_add_first(1.0_wp, g, [slave, first, last], by_g)
+      call nodes_add_first(1.0_wp, c, [slave, first, last], by_c)
       do k = 1, size(to)
          part = self%weight*self%share(k)
          if (.not. self%share(k) > 0.0_wp) cycle
-         from = n_dim*(place(k) - 1)
-         item%t(:, to(k)) = item%t(:, to(k)) + part*g(from + 1:from + n_dim)
-         item%t1(:, to(k)) = item%t1(:, to(k)) + part*c(from + 1:from + n_dim)
+         item%t(:, to(k)) = item%t(:, to(k)) + part*by_g(:, place(k))
+         item%t1(:, to(k)) = item%t1(:, to(k)) + part*by_c(:, place(k))
       end do
    end subroutine add_first
 

@@ -1,4 +1,4 @@
-!> Discrete-gradient arithmetic over 13 variables: the plane coordinates of six nodes, and the
+!> Discrete-gradient arithmetic over 13 variables: seven nodes in the plane, and the
 !> unknown of an implicit equation (`dg_root`).
 !>
 !> Source: docs/theory.md, section 2.

@@ -1,4 +1,4 @@
-!> Discrete-gradient arithmetic over 15 variables: the plane coordinates of seven nodes, and the
+!> Discrete-gradient arithmetic over 15 variables: eight nodes in the plane, and the
 !> unknown of an implicit equation (`dg_root`).
 !>
 !> Source: docs/theory.md, section 2.

@@ -5,14 +5,14 @@
 program bench_pair
    use, intrinsic :: iso_fortran_env, only : output_unit
    use emcon_chain, only : chain_t
-   use emcon_dgrad10, only : dg10_t => dg_t
-   use emcon_dgrad10_first, only : dg10_first_t => dg_t
+   use emcon_dgrad8, only : dg8_t => dg_t
+   use emcon_dgrad8_first, only : dg8_first_t => dg_t
+   use emcon_dgrad11, only : dg11_t => dg_t
+   use emcon_dgrad11_first, only : dg11_first_t => dg_t
    use emcon_dgrad13, only : dg13_t => dg_t
    use emcon_dgrad13_first, only : dg13_first_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
    use emcon_dgrad15_first, only : dg15_first_t => dg_t
-   use emcon_dgrad17, only : dg17_t => dg_t
-   use emcon_dgrad17_first, only : dg17_first_t => dg_t
    use emcon_gauss, only : gauss_points
    use emcon_hermite, only : hermite_stencil_t
    use emcon_hermite_gap, only : hermite_gap
@@ -134,8 +134,8 @@ contains
       logical, intent(in) :: is_first
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
-      type(dg10_t) :: gap
-      type(dg10_first_t) :: first
+      type(dg8_t) :: gap
+      type(dg8_first_t) :: first
 
       if (is_first) then
          first = nts_gap_first(x0(:, :5), dx(:, :5), 5, 4, sharp)
@@ -151,8 +151,8 @@ contains
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
       type(hermite_stencil_t) :: stencil
-      type(dg15_t) :: gap
-      type(dg15_first_t) :: first
+      type(dg13_t) :: gap
+      type(dg13_first_t) :: first
       real(wp) :: start(3)
       logical :: is_there
 
@@ -170,8 +170,8 @@ contains
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
-      type(dg13_t) :: moment(n_moment)
-      type(dg13_first_t) :: first(n_moment)
+      type(dg11_t) :: moment(n_moment)
+      type(dg11_first_t) :: first(n_moment)
       logical :: is_there
 
       if (is_first) then
@@ -188,8 +188,8 @@ contains
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
-      type(dg17_t) :: moment(n_moment)
-      type(dg17_first_t) :: first(n_moment)
+      type(dg15_t) :: moment(n_moment)
+      type(dg15_first_t) :: first(n_moment)
       logical :: is_there
 
       if (is_first) then
@@ -206,8 +206,8 @@ contains
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       real(wp), intent(inout) :: total
-      type(dg17_t) :: gap, length
-      type(dg17_first_t) :: first(2)
+      type(dg15_t) :: gap, length
+      type(dg15_first_t) :: first(2)
 
       if (is_first) then
          call point_gap_first(stencil, x0, dx, 0.5_wp, first(1), first(2))

@@ -1,7 +1,7 @@
-!> Discrete-gradient numbers over any number of variables, against those over ten.
+!> Discrete-gradient numbers over any number of variables, against those over eleven.
 module test_dgrad_wide
    use check, only : check_near, check_true, test_case_t
-   use emcon_dgrad10, only : dg_constant, dg_sqrt, dg_t, dg_variable, operator(*), operator(+), &
+   use emcon_dgrad11, only : dg_constant, dg_sqrt, dg_t, dg_variable, operator(*), operator(+), &
       operator(/)
    use emcon_dgrad_wide, only : change_t, wide_add, wide_add_part, wide_add_product, wide_clear, &
       wide_constant, wide_t
@@ -15,7 +15,7 @@ module test_dgrad_wide
 
    !> Two sums of products of numbers up to 10, in different order.
    real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
-   integer, parameter :: n_var = 10
+   integer, parameter :: n_var = 11
 
 contains
 

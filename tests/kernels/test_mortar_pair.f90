@@ -2,8 +2,9 @@
 module test_mortar_pair
    use check, only : check_near, check_true, test_case_t
    use emcon_chain, only : chain_t
-   use emcon_dgrad13, only : dg13_t => dg_t
-   use emcon_dgrad17, only : dg17_t => dg_t
+   use emcon_dgrad11, only : dg11_t => dg_t
+   use emcon_dgrad15, only : dg15_t => dg_t
+   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
    use emcon_kinds, only : wp
@@ -108,8 +109,8 @@ contains
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :)
       type(number_t), allocatable, intent(out) :: number(:)
-      type(dg13_t) :: few(n_moment)
-      type(dg17_t) :: many(n_moment)
+      type(dg11_t) :: few(n_moment)
+      type(dg15_t) :: many(n_moment)
       real(wp) :: point(2), weight(2)
       logical :: is_covering
       integer :: i
@@ -138,16 +139,19 @@ contains
    pure subroutine take(f0, f1, df, g, c, h, number)
       real(wp), intent(in) :: f0, f1, df, g(:), c(:), h(:, :)
       type(number_t), intent(inout) :: number
+      integer, parameter :: in_order(n_place) = [1, 2, 3, 4, 5, 6, 7, 8]
       integer :: n
 
-      n = size(g) - 1
+      n = size(g) + 1                             ! coordinates; one variable is the root
       number%f0 = f0
       number%f1 = f1
       number%df = df
-      number%g(:, :n/2) = reshape(g(:n), [2, n/2])
-      number%c(:, :n/2) = reshape(c(:n), [2, n/2])
-      number%h(:n, :n) = h(:n, :n)
-      number%of_root = maxval(abs([g(n + 1), c(n + 1), h(n + 1, :), h(:, n + 1)]))
+      call nodes_add_first(1.0_wp, g, in_order(:n/2), number%g)
+      call nodes_add_first(1.0_wp, c, in_order(:n/2), number%c)
+      call nodes_add_second(1.0_wp, 2, h, in_order(:n/2), number%h)
+      associate (root => size(g))
+         number%of_root = maxval(abs([g(root), c(root), h(root, :), h(:, root)]))
+      end associate
    end subroutine take
 
    !> The same of one configuration, as plain values.

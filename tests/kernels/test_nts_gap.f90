@@ -1,12 +1,13 @@
 !> The node-to-segment gap: closed forms, corners, identity, momenta, derivatives, rigid motions.
 module test_nts_gap
    use check, only : check_near, check_true, test_case_t
-   use emcon_dgrad10, only : dg_t
+   use emcon_dgrad8, only : dg_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_nts_gap, only : nts_gap
+   use emcon_nts_gap, only : nts_gap_of => nts_gap
    use emcon_nts_gap_value, only : nts_gap_value
    use emcon_text, only : to_text
+   use nodal_numbers, only : by_nodes, nodal_t
    use random_draws, only : draw_random
    use referee, only : qp
    use small_scenes, only : shake
@@ -43,6 +44,17 @@ contains
          test_case_t("rigid motions leave the gap", test_rigid), &
          test_case_t("around convex corners", test_around)]
    end subroutine collect_nts_gap
+
+   !> The gap over a step with its derivatives by all five nodes.
+   pure type(nodal_t) function nts_gap(x0, dx, before, after, rounding, goes_around)
+      real(wp), intent(in) :: x0(:, :), dx(:, :), rounding(2, 2)
+      integer, intent(in) :: before, after
+      logical, intent(in), optional :: goes_around
+      type(dg_t) :: a
+
+      a = nts_gap_of(x0, dx, before, after, rounding, goes_around)
+      nts_gap = by_nodes(5, [a%f0, a%f1, a%df], a%g, a%c, a%h)
+   end function nts_gap
 
    !> Distance from a line, whichever neighbours there are, at any angle.
    subroutine test_flat(error)
@@ -196,7 +208,7 @@ contains
    subroutine test_identity(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), gap(2), xi(2), width(2, 2)
-      type(dg_t) :: a
+      type(nodal_t) :: a
       integer :: i, n_crossed
 
       n_crossed = 0
@@ -255,7 +267,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: x0(2, 5), dx(2, 5), expected, g(2, 5)
       real(qp) :: q0(2, 5)
-      type(dg_t) :: a
+      type(nodal_t) :: a
       integer :: k
 
       do k = 0, -minexponent(1.0_wp) - 12, 4
@@ -275,7 +287,7 @@ contains
    subroutine test_momenta(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), mid(2, 5)
-      type(dg_t) :: a
+      type(nodal_t) :: a
       integer :: i
 
       do i = 1, 200
@@ -296,7 +308,7 @@ contains
    subroutine test_derivatives(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: x0(2, 5), dx(2, 5), way(2, 5), step, bound, gap(2), xi, width(2, 2)
-      type(dg_t) :: a, up, down
+      type(nodal_t) :: a, up, down
       integer :: i, k, n, j
 
       step = eps**(1.0_wp/3.0_wp)
@@ -328,7 +340,7 @@ contains
    subroutine test_rigid(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: x0(2, 5), dx(2, 5)
-      type(dg_t) :: a
+      type(nodal_t) :: a
       integer :: i
 
       do i = 1, 100
@@ -344,7 +356,7 @@ contains
    subroutine test_around(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), mid(2, 5), move(2, 5), way(2, 5), gap(2), xi, step
-      type(dg_t) :: a, up, down
+      type(nodal_t) :: a, up, down
       integer :: i, k, j, n_beyond
 
       step = eps**(1.0_wp/3.0_wp)

@@ -1,7 +1,7 @@
-!> Discrete-gradient arithmetic over 10 variables: the plane coordinates of five nodes.
+!> The numbers of emcon_dgrad11 without second derivatives: values and gradients, bit by bit.
 !>
 !> Source: docs/theory.md, section 2.
-module emcon_dgrad10
+module emcon_dgrad11_first
    use emcon_dgrad_series, only : atanh_excess, exp_of, expm1_of, log1p_excess, log1p_of, &
       sinh_ratio
    use emcon_kinds, only : wp
@@ -11,8 +11,8 @@ module emcon_dgrad10
    implicit none
    private
 
-   integer, parameter :: n_var = 10, n_second = n_var
+   integer, parameter :: n_var = 11, n_second = 0
 
    include "emcon_dgrad.inc"
 
-end module emcon_dgrad10
+end module emcon_dgrad11_first

@@ -1,7 +1,7 @@
-!> The numbers of emcon_dgrad10 without second derivatives: values and gradients, bit by bit.
+!> The numbers of emcon_dgrad8 without second derivatives: values and gradients, bit by bit.
 !>
 !> Source: docs/theory.md, section 2.
-module emcon_dgrad10_first
+module emcon_dgrad8_first
    use emcon_dgrad_series, only : atanh_excess, exp_of, expm1_of, log1p_excess, log1p_of, &
       sinh_ratio
    use emcon_kinds, only : wp
@@ -11,8 +11,8 @@ module emcon_dgrad10_first
    implicit none
    private
 
-   integer, parameter :: n_var = 10, n_second = 0
+   integer, parameter :: n_var = 8, n_second = 0
 
    include "emcon_dgrad.inc"
 
-end module emcon_dgrad10_first
+end module emcon_dgrad8_first

@@ -1,7 +1,8 @@
-!> The numbers of emcon_dgrad17 without second derivatives: values and gradients, bit by bit.
+!> Discrete-gradient arithmetic over 11 variables: six nodes in the plane, and the
+!> unknown of an implicit equation (`dg_root`).
 !>
 !> Source: docs/theory.md, section 2.
-module emcon_dgrad17_first
+module emcon_dgrad11
    use emcon_dgrad_series, only : atanh_excess, exp_of, expm1_of, log1p_excess, log1p_of, &
       sinh_ratio
    use emcon_kinds, only : wp
@@ -11,8 +12,8 @@ module emcon_dgrad17_first
    implicit none
    private
 
-   integer, parameter :: n_var = 17, n_second = 0
+   integer, parameter :: n_var = 11, n_second = n_var
 
    include "emcon_dgrad.inc"
 
-end module emcon_dgrad17_first
+end module emcon_dgrad11

@@ -1,8 +1,7 @@
-!> Discrete-gradient arithmetic over 17 variables: the plane coordinates of eight nodes, and the
-!> unknown of an implicit equation (`dg_root`).
+!> Discrete-gradient arithmetic over 8 variables: five nodes in the plane.
 !>
 !> Source: docs/theory.md, section 2.
-module emcon_dgrad17
+module emcon_dgrad8
    use emcon_dgrad_series, only : atanh_excess, exp_of, expm1_of, log1p_excess, log1p_of, &
       sinh_ratio
    use emcon_kinds, only : wp
@@ -12,8 +11,8 @@ module emcon_dgrad17
    implicit none
    private
 
-   integer, parameter :: n_var = 17, n_second = n_var
+   integer, parameter :: n_var = 8, n_second = n_var
 
    include "emcon_dgrad.inc"
 
-end module emcon_dgrad17
+end module emcon_dgrad8
