@@ -5,7 +5,7 @@ module emcon_active_set_update
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_constraints, only : constraints_gives_back
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
-   use emcon_friction, only : friction_close, friction_let_slip, friction_turn
+   use emcon_friction, only : friction_close, friction_turn
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -49,24 +49,14 @@ contains
          return
       end if
       if (self%is_stale .and. status == step_done) status = step_too_far
-      if (self%friction%is_on .and. status == step_done) call go_on_with_friction(self, has_changed)
+      ! Another set has other slips for others to hold.
+      if (has_changed .and. self%friction%is_on .and. status == step_done) &
+         self%friction%is_idle = .false.
       is_done = status /= step_done .or. .not. has_changed
       if (is_done) return
       if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)
       is_done = status /= step_done
    end subroutine active_set_advance
-
-   !> Another set has other slips for others to hold. Where the set stands its friction must not
-   !> push against leads.
-   pure subroutine go_on_with_friction(self, has_changed)
-      type(active_set_t), intent(inout) :: self
-      logical, intent(inout) :: has_changed
-
-      self%friction%is_idle = self%friction%is_idle .and. .not. has_changed
-      if (has_changed) return
-      call friction_let_slip(self%friction, self%set, has_changed)
-      if (has_changed) self%n_tried = 0
-   end subroutine go_on_with_friction
 
    !> The next set, where the present one was seen to change before the step was solved with it. It
    !> was not tried to the end, so that no cycle is told from it; where what follows is no set to

@@ -8,8 +8,8 @@ module emcon_friction
    use emcon_constraint, only : condition_drag, condition_t
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
    use emcon_csr, only : csr_find
-   use emcon_friction_law, only : friction_trial, friction_violation, touch_open, touch_sticks, &
-      touch_t
+   use emcon_friction_law, only : friction_trial, friction_violation, touch_open, touch_rests, &
+      touch_sticks, touch_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : pose_is_equilibrium, pose_way
@@ -17,8 +17,8 @@ module emcon_friction
    implicit none
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_idle, &
-      friction_keep, friction_turn, friction_close, friction_let_slip, friction_work, &
-      friction_missed, friction_grip
+      friction_keep, friction_turn, friction_close, friction_work, friction_missed, friction_grip, &
+      friction_slides
 
    !> Forces that differ by less than this part of the largest push are one.
    real(wp), parameter :: tied = 5.0e4_wp*epsilon(1.0_wp)
@@ -26,7 +26,7 @@ module emcon_friction
    type :: friction_t
       logical :: is_on = .false.                 !! some contact rubs; else nothing is allocated
       real(wp), allocatable :: mu(:)             !! (n_constraint)
-      !> (n_constraint) of what acts: `touch_sticks`, or the sign of its slip
+      !> (n_constraint) of what acts: a way of emcon_friction_law
       integer, allocatable :: way(:)
       integer, allocatable :: way0(:)            !! (n_constraint) at the end of the step before
       real(wp), allocatable :: tau(:), tau0(:)   !! (n_constraint) friction, to start from
@@ -121,14 +121,40 @@ contains
          associate (item => set%item(k), id => set%id(k))
             item%rubs = self%mu(id) > 0.0_wp
             if (.not. item%rubs) cycle
-            item%lead = self%lead(id)
-            item%tilt = self%mu(id)*self%way(id)
-            sticks(k) = self%way(id) == touch_sticks .and. .not. self%is_idle(id)
+            item%lead = slip_held(self, id)
+            item%tilt = self%mu(id)*friction_slides(self, id)
+            sticks(k) = holds(self, id)
          end associate
       end do
       call constraints_stick(set, pack([(k, k = 1, set%n)], sticks), &
          pack(self%tau(set%id), sticks), pack(self%is_needed(set%id), sticks))
    end subroutine friction_select
+
+   !> The direction in which contact `id` slides by the law: 0 where it does not.
+   pure integer function friction_slides(self, id) result(way)
+      type(friction_t), intent(in) :: self
+      integer, intent(in) :: id                  !! from 1
+
+      way = self%way(id)
+      if (abs(way) /= 1) way = 0
+   end function friction_slides
+
+   !> Does contact `id` hold its slip by itself?
+   pure logical function holds(self, id)
+      type(friction_t), intent(in) :: self
+      integer, intent(in) :: id                  !! from 1
+
+      holds = any(self%way(id) == [touch_sticks, touch_rests]) .and. .not. self%is_idle(id)
+   end function holds
+
+   !> The slip at which it would [L].
+   pure real(wp) function slip_held(self, id)
+      type(friction_t), intent(in) :: self
+      integer, intent(in) :: id                  !! from 1
+
+      slip_held = self%lead(id)
+      if (self%way(id) == touch_rests) slip_held = 0.0_wp
+   end function slip_held
 
    !> What sticks by the rows `row` of the set, past its conditions, does so by what holds others.
    pure subroutine friction_idle(self, set, row)
@@ -163,13 +189,13 @@ contains
       stiffness = stiffness_at(system, set%item(k))
       tie = tied*maxval(abs(set%lam(set%n_held + 1:set%n)))
       associate (id => set%id(k), item => set%item(k), lam => set%lam)
-         at = touch_t(max(0.0_wp, lam(k)), condition_drag(item, lam(k)), 0.0_wp, &
-            item%slip - item%lead)
-         ! Where slip is held the solution has none, but for round-off.
-         if (self%way(id) == touch_sticks .and. .not. self%is_idle(id)) at%slip = 0.0_wp
+         at = touch_t(max(0.0_wp, lam(k)), condition_drag(item, lam(k)), 0.0_wp, item%slip, &
+            self%lead(id))
+         ! Where slip is held the solution has no other, but for round-off.
+         if (holds(self, id)) at%slip = slip_held(self, id)
          if (self%is_idle(id) .and. .not. self%is_needed(id)) then
             ! Others do not hold it: it does so itself before it may slide.
-            turns = stiffness*abs(at%slip) > tie
+            turns = stiffness*abs(at%slip - slip_held(self, id)) > tie
             self%is_needed(id) = turns
             return
          end if
@@ -203,33 +229,12 @@ contains
          end if
          self%is_candidate(id) = .true.
          at%gap = min(gap, -tiny(gap))
-         at%slip = contact%slip(i, motion%x, motion%u0, motion%du) - self%lead(id)
+         at%slip = contact%slip(i, motion%x, motion%u0, motion%du)
+         at%lead = self%lead(id)
          self%way(id) = friction_trial(touch_open, at, self%mu(id), 1.0_wp, 0.0_wp)
          if (self%way(id) == touch_open) self%way(id) = touch_sticks
       end associate
    end subroutine friction_close
-
-   !> A lead against which friction pushes would make energy: such contacts have none from here on.
-   pure subroutine friction_let_slip(self, set, has_changed)
-      type(friction_t), intent(inout) :: self
-      type(constraint_set_t), intent(in) :: set  !! of a set that stands
-      logical, intent(out) :: has_changed        !! the step is to be solved again
-      real(wp) :: noise
-      integer :: k
-
-      has_changed = .false.
-      if (.not. self%is_on .or. set%n == set%n_held) return
-      noise = tied*maxval(abs(set%lam(set%n_held + 1:set%n)))
-      do k = set%n_held + 1, set%n
-         associate (item => set%item(k), lead => self%lead(set%id(k)))
-            if (.not. item%rubs) cycle
-            if (.not. condition_drag(item, set%lam(k))*sign(1.0_wp, lead) < -noise) cycle
-            if (.not. abs(lead) > 0.0_wp) cycle
-            lead = 0.0_wp
-            has_changed = .true.
-         end associate
-      end do
-   end subroutine friction_let_slip
 
    !> The work that friction at condition `k` takes.
    pure real(wp) function friction_work(set, k) result(work)
@@ -267,8 +272,8 @@ contains
       do k = set%n_held + 1, set%n
          associate (item => set%item(k))
             if (.not. item%rubs) cycle
-            at = touch_t(set%lam(k), condition_drag(item, set%lam(k)), set%defect(k), &
-               item%slip - item%lead)
+            at = touch_t(set%lam(k), condition_drag(item, set%lam(k)), set%defect(k), item%slip, &
+               self%lead(set%id(k)))
             missed = max(missed, friction_violation(at, self%mu(set%id(k)), &
                stiffness_at(system, item))/largest)
          end associate

@@ -5,7 +5,7 @@ module emcon_march_commit
    use emcon_correction, only : correction_reason
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
-   use emcon_friction, only : friction_grip, friction_missed, friction_work
+   use emcon_friction, only : friction_grip, friction_missed, friction_slides, friction_work
    use emcon_friction_limit, only : friction_limit_tell
    use emcon_holding, only : holding_t
    use emcon_keeping, only : keeping_commit
@@ -211,7 +211,7 @@ contains
             if (set%is_stored .and. k > set%n_held) state%is_active(set%id(k)) = &
                set%soft(k)%now < 0.0_wp
             if (.not. set%item(k)%rubs) cycle
-            state%sliding(set%id(k)) = self%active%friction%way(set%id(k))
+            state%sliding(set%id(k)) = friction_slides(self%active%friction, set%id(k))
             state%drag(set%id(k)) = condition_drag(set%item(k), set%lam(k))
             state%slip(set%id(k)) = state%slip(set%id(k)) + set%item(k)%slip
             state%slip_path(set%id(k)) = state%slip_path(set%id(k)) + abs(set%item(k)%slip)

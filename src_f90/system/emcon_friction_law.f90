@@ -3,16 +3,19 @@
 !> Over a step it takes lam >= 0, g >= 0, lam g = 0 and |tau| <= mu lam, with tau = mu lam where
 !> s > 0 and tau = -mu lam where s < 0. With any stiffness c > 0 that is lam = max(0, lam - c g) and
 !> tau = clip(tau + c s, -mu lam, mu lam), whose right sides are the trial: where it lies tells in
-!> which way the law holds. Source: docs/theory.md, eqs. (14f) and (14g).
+!> which way the law holds. A slip a that is led to shifts the law: it sticks at a if tau pushes
+!> against that slip, at none if it pushes the other way, and is free in between, tau = 0, so that
+!> tau s is never negative. Source: docs/theory.md, eqs. (14f), (14g) and (14k).
 module emcon_friction_law
    use emcon_kinds, only : wp
    implicit none
    private
    public :: touch_t, friction_trial, friction_violation
-   public :: touch_open, touch_sticks
+   public :: touch_open, touch_sticks, touch_free, touch_rests
 
-   !> Ways in which the law holds; where it slides the way is the sign of slip, -1 or 1.
-   integer, parameter :: touch_open = 2, touch_sticks = 0
+   !> Ways in which the law holds; where it slides the way is the sign of slip, -1 or 1. It sticks
+   !> at the slip that is led to; it is free before that, or rests where it was at the start.
+   integer, parameter :: touch_open = 2, touch_sticks = 0, touch_free = 3, touch_rests = 4
 
    !> Forces and ways at one place.
    type :: touch_t
@@ -20,6 +23,7 @@ module emcon_friction_law
       real(wp) :: tau = 0.0_wp                   !! friction, against slip [M L/T^2]
       real(wp) :: gap = 0.0_wp                   !! g, above the one to hold [L]
       real(wp) :: slip = 0.0_wp                  !! s [L]
+      real(wp) :: lead = 0.0_wp                  !! a [L]
    end type touch_t
 
 contains
@@ -43,21 +47,53 @@ contains
       end if
       drag = at%tau + stiffness*at%slip
       most = mu*max(0.0_wp, push)
+      if (abs(at%lead) > 0.0_wp) then
+         next = lead_trial(was, drag, most, stiffness*at%lead, tie)
+         return
+      end if
       next = touch_sticks
       way = merge(1, -1, drag > 0.0_wp)
       if (abs(drag) > most) next = way
       if (abs(abs(drag) - most) <= tie .and. (was == touch_sticks .or. was == way)) next = was
    end function friction_trial
 
+   !> The same of what is led to a slip: five ways in a row, from slide to slide. What does not hold
+   !> its slip holds it first, on the way to others: bodies that stop as a whole are softer than c.
+   pure integer function lead_trial(was, drag, most, lead, tie) result(next)
+      integer, intent(in) :: was
+      real(wp), intent(in) :: drag               !! tau + c s [M L/T^2]
+      real(wp), intent(in) :: most               !! mu lam, >= 0 [M L/T^2]
+      real(wp), intent(in) :: lead               !! c a, not 0 [M L/T^2]
+      real(wp), intent(in) :: tie
+      real(wp) :: along, bound(4)
+      integer :: way(5), side, k, place
+
+      side = merge(1, -1, lead > 0.0_wp)
+      along = side*drag
+      bound = [-most, 0.0_wp, abs(lead), abs(lead) + most]
+      way = [-side, touch_rests, touch_free, touch_sticks, side]
+      place = 1 + count(along > bound)
+      if (was == side) place = max(place, 4)
+      if (was == touch_free) place = max(2, min(place, 4))
+      if (was == -side) place = min(place, 2)
+      next = way(place)
+      do k = 1, 4
+         if (abs(along - bound(k)) <= tie .and. any(was == way(k:k + 1))) next = was
+      end do
+   end function lead_trial
+
    !> How far the law is missed, as a force.
    pure real(wp) function friction_violation(at, mu, stiffness) result(missed)
       type(touch_t), intent(in) :: at
       real(wp), intent(in) :: mu, stiffness      !! as in `friction_trial`
-      real(wp) :: most
+      real(wp) :: most, along, drag
 
       most = mu*max(0.0_wp, at%lam)
+      along = sign(1.0_wp, at%lead)*(at%tau + stiffness*at%slip)
+      drag = max(0.0_wp, min(most, along - stiffness*abs(at%lead))) &
+         + min(0.0_wp, max(-most, along))
       missed = max(abs(at%lam - max(0.0_wp, at%lam - stiffness*at%gap)), &
-         abs(at%tau - max(-most, min(most, at%tau + stiffness*at%slip))))
+         abs(at%tau - sign(1.0_wp, at%lead)*drag))
    end function friction_violation
 
 end module emcon_friction_law

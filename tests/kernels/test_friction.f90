@@ -5,8 +5,8 @@ module test_friction
    use emcon_constraint, only : condition_drag, condition_force, condition_t
    use emcon_contact, only : condition_include, condition_resize, condition_resize_slip
    use emcon_errors, only : error_t
-   use emcon_friction_law, only : friction_trial, friction_violation, touch_open, touch_sticks, &
-      touch_t
+   use emcon_friction_law, only : friction_trial, friction_violation, touch_free, touch_open, &
+      touch_rests, touch_sticks, touch_t
    use emcon_friction_solve, only : friction_problem_t, friction_solve
    use emcon_kinds, only : dp, wp
    use emcon_lemke, only : lemke_solve
@@ -30,6 +30,8 @@ contains
       tests = [ &
          test_case_t("trials: where the law holds next", test_trial), &
          test_case_t("violation of the law", test_violation), &
+         test_case_t("trials of what is led to a slip", test_led_trial), &
+         test_case_t("the law of what is led to a slip", test_led), &
          test_case_t("slip: work, rigid motions, differences", test_slip), &
          test_case_t("mean slip of points of an edge", test_points), &
          test_case_t("slip along an edge, and of the force", test_along), &
@@ -63,6 +65,74 @@ contains
          friction_violation(touch_t(gap=-0.25_wp), 0.5_wp, 2.0_wp)], &
          [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp], tol, 1.0_wp, "missed")
    end subroutine test_violation
+
+   !> Each way, and where it leads to next; what slides or is free holds its slip on the way. The
+   !> same the other way round.
+   subroutine test_led_trial(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp, lam = 2.0_wp, a = 0.5_wp
+      integer, parameter :: n = 12
+      integer, parameter :: was(n) = [touch_open, touch_open, touch_open, touch_open, touch_open, &
+         touch_sticks, touch_sticks, touch_rests, touch_free, touch_free, 1, -1]
+      real(wp), parameter :: tau(n) = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -0.2_wp, 1.1_wp, &
+         0.2_wp, 0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
+      real(wp), parameter :: slip(n) = [-0.6_wp, -0.1_wp, 0.3_wp, 0.6_wp, 0.8_wp, a, a, 0.0_wp, &
+         1.5_wp, -1.5_wp, -2.0_wp, 2.0_wp]
+      integer, parameter :: expected(n) = [-1, touch_rests, touch_free, touch_sticks, 1, &
+         touch_free, 1, touch_free, touch_sticks, touch_rests, touch_sticks, touch_rests]
+      integer :: next(n), side, k
+
+      do side = -1, 1, 2
+         do k = 1, n
+            next(k) = friction_trial(turned(was(k)), touch_t(lam, side*tau(k), 0.0_wp, &
+               side*slip(k), side*a), mu, c, 0.0_wp)
+         end do
+         call check_equal(error, next, [(turned(expected(k)), k = 1, n)], "ways")
+      end do
+      call check_equal(error, friction_trial(touch_free, touch_t(lam, 0.0_wp, 0.0_wp, &
+         a + 0.01_wp, a), mu, c, 0.05_wp), touch_free, "undecided")
+
+   contains
+
+      pure integer function turned(way)
+         integer, intent(in) :: way
+
+         turned = way
+         if (abs(way) == 1) turned = side*way
+      end function turned
+
+   end subroutine test_led_trial
+
+   !> Friction on the graph misses nothing and takes work; off it, it is missed by the distance.
+   subroutine test_led(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = 0.5_wp, lam = 2.0_wp, a = 0.5_wp
+      real(wp), parameter :: slip(7) = [-0.4_wp, 0.0_wp, 0.0_wp, 0.2_wp, a, a, 0.9_wp]
+      real(wp), parameter :: tau(7) = [-1.0_wp, -0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.7_wp, 1.0_wp]
+      real(wp) :: missed(7), off(4)
+      integer :: k, side
+
+      call check_true(error, all(tau*slip >= 0.0_wp), "work")
+      do side = -1, 1, 2
+         missed = [(friction_violation(touch_t(lam, side*tau(k), 0.0_wp, side*slip(k), side*a), &
+            mu, 4.0_wp), k = 1, 7)]
+         call check_near(error, missed, 0.0_wp*tau, tol, 1.0_wp, "on the graph")
+         off = [friction_violation(at(-0.3_wp, a), mu, 4.0_wp), &
+            friction_violation(at(0.1_wp, 0.2_wp), mu, 4.0_wp), &
+            friction_violation(at(0.3_wp, 0.0_wp), mu, 4.0_wp), &
+            friction_violation(at(0.5_wp, 5.0_wp), mu, 4.0_wp)]
+         call check_near(error, off, [0.3_wp, 0.1_wp, 0.3_wp, 0.5_wp], tol, 1.0_wp, "off it")
+      end do
+
+   contains
+
+      pure type(touch_t) function at(tau, slip)
+         real(wp), intent(in) :: tau, slip
+
+         at = touch_t(lam, side*tau, 0.0_wp, side*slip, side*a)
+      end function at
+
+   end subroutine test_led
 
    !> A node over one polygon, and over the two of a corner, in random motions.
    subroutine test_slip(error)

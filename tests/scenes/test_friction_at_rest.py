@@ -41,9 +41,9 @@ def test_the_floor_is_the_slave(formulation, rigid, tmp_path):
     assert run.history["friction_loss"][-1] == pytest.approx(4.0, rel=5e-3)
 
 
-@pytest.mark.parametrize(("part", "sides", "formulation"), [
-    (0.8, ONE, "MORTAR"), (1.2, ONE, "MORTAR"), (0.8, BOTH, "NODE TO SURFACE"),
-    (2.5, BOTH, "NODE TO SURFACE")])
+@pytest.mark.parametrize(("sides", "formulation"),
+                         [(ONE, "MORTAR"), (BOTH, "NODE TO SURFACE")])
+@pytest.mark.parametrize("part", [0.8, 1.2, 6.0])
 def test_an_arch(part, sides, formulation, tmp_path):
     """It stands by friction where a line of thrust has room in all cones, and else gives way."""
     run = run_deck(arch(part*arch_needs(), sides), tmp_path, formulation=formulation)
@@ -52,6 +52,7 @@ def test_an_arch(part, sides, formulation, tmp_path):
     if part > 1:
         assert run.verdict["verdict"] == "good"
         assert u[-1] < 2e-3 and u[-1] < 1.05*u[len(u)//2]
+        assert run.history["cuts"].sum() < 10
     else:
         assert u[-1] > 0.05 and u[-1] > 3*u[len(u)//2]
 
@@ -64,7 +65,8 @@ def test_a_stack_on_a_slope(mu, sides, formulation, tmp_path):
     slope = -math.atan(0.2)
     run = run_deck(stack_on_slope(mu, slope, sides=sides), tmp_path, formulation=formulation)
     loses(run)
-    assert run.verdict["verdict"] == "good" and run.history["cuts"].sum() == 0
+    assert run.verdict["verdict"] == "good"
+    assert run.history["cuts"].sum() <= (0 if sides == ONE else 10)
     gone, time = way(run, 2*(5 + 6)*3, slope), run.history["time"]
     later = time > 0.1
     seen = 2*np.polyfit(time[later], gone[later], 2)[0]
