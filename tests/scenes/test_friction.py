@@ -477,3 +477,16 @@ def test_a_restart_has_the_same_bits(tmp_path):
     again = restart(whole, tmp_path/"again")
     assert again.history["friction_loss"][-1] > again.history["friction_loss"][-7] > 0
     assert again.digits() == whole.digits()
+
+
+def test_without_friction_nothing_of_it_runs(tmp_path):
+    """A coefficient of 0 is none: the same bits, corrections and counters, and no law to miss."""
+    runs = []
+    for card in ("", "\n*FRICTION\n0."):
+        deck = Deck.read(DECKS/"ring.inp")
+        deck.replace("NAME=FRICTIONLESS", f"NAME=FRICTIONLESS{card}")
+        runs.append(run_deck(deck, tmp_path/f"{len(runs)}", **NODES, h=0.04, t_end=0.6))
+    assert runs[0].history["active"].any()
+    assert runs[0].digits() == runs[1].digits()
+    assert runs[0].verdict["counts"] == runs[1].verdict["counts"]
+    assert all("law_violation" not in run.verdict for run in runs)
