@@ -5,7 +5,7 @@
 !> tau = clip(tau + c s, -mu lam, mu lam), whose right sides are the trial: where it lies tells in
 !> which way the law holds. A slip a that is led to shifts the law: it sticks at a if tau pushes
 !> against that slip, at none if it pushes the other way, and is free in between, tau = 0, so that
-!> tau s is never negative. Source: docs/theory.md, eqs. (14f), (14g) and (14k).
+!> tau s is never negative. Source: docs/theory.md, eqs. (14f), (14g) and (14m).
 module emcon_friction_law
    use emcon_kinds, only : wp
    implicit none

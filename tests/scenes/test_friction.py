@@ -29,6 +29,8 @@ from scene_tools import DECKS, Deck, run_deck, run_one_sided
 from test_contact_output import restart
 from test_segments import with_profile
 
+EPS = np.finfo(float).eps
+
 
 def obeys(run, scale=0.0, law=1e-9, overlaps=False):
     """Energy is lost to friction alone, in no step made by it, and its law holds; with `overlaps`
@@ -202,7 +204,8 @@ def test_a_block_pulled_against_a_spring(tmp_path):
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 def test_statics_stick_and_slide(formulation, tmp_path):
     """A block moved by little sticks, and its force is linear in the way; moved by much all of it
-    slides, with mu times the pressure. Null space and saddle point to the same digits."""
+    slides, with mu times the pressure. Null space and saddle point to the same digits. Where slip is
+    held it is held to some ten roundings of the shift, and forces work on that."""
     force = {}
     for shift in (0.001, 0.002, 0.05):
         runs = [run_deck(pressed(shift, 0.5), tmp_path/f"{shift}{method[0]}", method=method,
@@ -213,7 +216,7 @@ def test_statics_stick_and_slide(formulation, tmp_path):
             assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] < 1e-9
             assert run.history["newton"].max() <= 8 and run.history["cuts"].sum() == 0
             lost = np.diff(run.history["friction_loss"])
-            assert (lost >= (0 if formulation == "NODE TO SURFACE" else -1e-18)).all()
+            assert (lost >= -16*EPS*shift*np.abs(run.history["pair1_force_x"]).max()).all()
             assert run.history["pair1_force_x"][-1] == pytest.approx(force[shift][0], rel=1e-10)
     assert force[0.002][0] == pytest.approx(2*force[0.001][0], rel=1e-2)
     # Where nodes hold the floor is straight; mean gaps leave edges tilted by a part of the strain.

@@ -20,10 +20,14 @@ from scene_tools import run_deck
 
 
 def loses(run):
-    """Energy goes to friction and damping alone, and the laws are met."""
+    """Energy goes to friction and damping alone, and the laws are met. Where slip is held it is held
+    to some ten roundings of the motion it is a difference of, and forces work on that."""
     assert balance(run.history) < 1e-12 and run.verdict["law_violation"] <= 1e-9
-    largest = (run.history["strain"] + run.history["kinetic"]).max()
-    assert (np.diff(run.history["friction_loss"]) >= -1e-15*largest).all()
+    force = sum(np.hypot(run.history[f"pair{k}_force_x"], run.history[f"pair{k}_force_y"]).max()
+                for k in range(1, 100) if f"pair{k}_force_x" in run.history.dtype.names)
+    motion = np.abs(run.fields()["displacement"]).max()
+    noise = 16*np.finfo(float).eps*motion*force
+    assert (np.diff(run.history["friction_loss"]) >= -noise).all()
 
 
 @pytest.mark.parametrize(("formulation", "rigid"),
