@@ -52,10 +52,27 @@ contains
       self%n_node = size(node)
       self%n_slave = n_slave
       self%node(:self%n_node) = node
+      call put_in_order(self%node(3:n_slave))
+      call put_in_order(self%node(n_slave + 1:self%n_node))
       do i = 1, n_moment
          call wide_clear(self%moment(i), 2*(self%n_node - 1), leaves_second)
       end do
    end subroutine form_begin
+
+   !> Sort a few numbers: sums over nodes do not depend on which pair came first.
+   pure subroutine put_in_order(list)
+      integer, intent(inout) :: list(:)
+      integer :: i, k, value
+
+      do i = 2, size(list)
+         value = list(i)
+         do k = i - 1, 1, -1
+            if (list(k) < value) exit
+            list(k + 1) = list(k)
+         end do
+         list(k + 1) = value
+      end do
+   end subroutine put_in_order
 
    !> Share of the edge's node `side` (1, 2) in the weighted gap and the covered area, at both ends.
    !>

@@ -47,7 +47,7 @@ contains
          found%body = b
          found%label = solid%label(bending%element(b))
          found%percent = 100.0_wp*bending%missed(b)/bending%strain(b)
-         found%advice = bending_advice(solid)
+         found%advice = trim(bending_advice(solid))
          return
       end do
    end subroutine bent_body_find

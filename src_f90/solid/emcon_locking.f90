@@ -15,6 +15,11 @@ module emcon_locking
       in_plane = "it is too stiff in bending and contact; take CPE4H, CPE6 or CPE8R", &
       in_space = "it is too stiff in bending; take C3D8H, C3D10 or C3D20R", &
       of_rings = "it is too stiff in bending; take CAX6 or CAX8R"
+   character(len=*), parameter :: &
+      bent_in_plane = "take CPE4I, CPE6 or CPE8R, or more elements across", &
+      bent_thin = "take CPS4I, CPS6 or CPS8R, or more elements across", &
+      bent_in_space = "take C3D8I, C3D10 or C3D20R, or more elements across", &
+      bent_of_rings = "take CAX6 or CAX8R, or more elements across"
 
 contains
 
@@ -31,13 +36,12 @@ contains
    !> What to take in place of elements of `solid` that are too stiff where they bend.
    pure function bending_advice(solid) result(text)
       type(solid_t), intent(in) :: solid
-      character(len=:), allocatable :: text
+      character(len=len(bent_in_space)) :: text
 
-      text = "CPE4I, CPE6 or CPE8R"
-      if (all(solid%is_thin)) text = "CPS4I, CPS6 or CPS8R"
-      if (solid%is_single) text = "C3D8I, C3D10 or C3D20R"
-      if (solid%is_axial) text = "CAX6 or CAX8R"
-      text = "take " // text // ", or more elements across"
+      text = bent_in_plane
+      if (all(solid%is_thin)) text = bent_thin
+      if (solid%is_single) text = bent_in_space
+      if (solid%is_axial) text = bent_of_rings
    end function bending_advice
 
    !> The ratio of Poisson of element `e` if it locks, else 0.

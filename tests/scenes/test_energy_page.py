@@ -68,8 +68,8 @@ def test_the_bar_by_all_schemes(tmp_path):
         if row[3].startswith("1 + "):
             assert other[3].startswith("1 + "), other
             assert float(other[3][4:]) < 1e-12
-        elif row[0] == "`GENERALIZED ALPHA`" and row[2] == "0.5":
-            # The bar is thrown through the floor: what comes then grows from round-off.
-            assert min(float(row[3]), float(other[3])) > 1.1
+        elif float(row[3]) > 1.1:
+            # The bar is thrown through the floor: how far it gets from there grows from round-off.
+            assert float(other[3]) > 1.1
         else:
             assert float(row[3]) == pytest.approx(float(other[3]), rel=0.01)
