@@ -50,8 +50,9 @@ contains
       end if
       if (self%is_stale .and. status == step_done) status = step_too_far
       ! Another set has other slips for others to hold.
-      if (has_changed .and. self%friction%is_on .and. status == step_done) &
+      if (has_changed .and. self%friction%is_on .and. status == step_done) then
          self%friction%is_idle = .false.
+      end if
       is_done = status /= step_done .or. .not. has_changed
       if (is_done) return
       if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)

@@ -1,4 +1,4 @@
-!> Numbers of the discrete-gradient arithmetic with their derivatives by the coordinates of all nodes.
+!> Numbers of the discrete-gradient arithmetic with their derivatives by all nodes.
 module nodal_numbers
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_kinds, only : wp

@@ -57,7 +57,7 @@ contains
          test_case_t("slip: gradient and second derivatives", test_slip_derivatives)]
    end subroutine collect_hermite_gap
 
-   !> The gap over a step with its derivatives by all seven nodes. The place is none of its variables.
+   !> The gap over a step with its derivatives by all seven nodes, not by the place.
    pure subroutine hermite_gap(stencil, x0, dx, s, gap, is_found)
       type(hermite_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x0(:, :), dx(:, :), s(3)
