@@ -8,8 +8,9 @@ from space_mesh import Block
 
 from .common import Chapter, table
 
-COOK = ("CPE3", "CPE4", "CPE4H", "CPE4I", "CPE6", "CPE8", "CPE8R")
-KINDS = ("CPS3", "CPS4", "CPE4H", "CPE4I", "CPS4I", "CPS6", "CPS8", "CPS8R")
+STRAIN = ("CPE3", "CPE4", "CPE4H", "CPE4I", "CPE6", "CPE8", "CPE8R")
+KINDS = (*STRAIN, "CPS3", "CPS4", "CPS4I", "CPS6", "CPS8", "CPS8R")
+COOK = (*STRAIN, *SOLIDS)
 CELLS = (4, 8, 16, 32)
 
 
@@ -40,24 +41,60 @@ def start_static(runs, mesh, law, loads, nlgeom="", increment=1.0):
 
 # ---- Cook's membrane ----------------------------------------------------------------------------
 
+MEMBRANE = [(0, 0), (48, 44), (48, 60), (0, 44)]
 
-def start_cook(runs):
-    mu, nu = 80.194, 0.4999
+
+def cook_law(nu):
+    mu = 80.194
     bulk = 2*mu*(1 + nu)/(3*(1 - 2*nu))
-    law = f"*HYPERELASTIC, NEO HOOKE\n{mu/2!r}, {2/bulk!r}\n"
-    corners = [(0, 0), (48, 44), (48, 60), (0, 44)]
-    return {(kind, n): start_static(runs, Mesh(kind, n, n, corners), law, {2: 100.0}, ", NLGEOM",
-                                    0.25) for kind in COOK for n in CELLS}
+    return f"*HYPERELASTIC, NEO HOOKE\n{mu/2!r}, {2/bulk!r}\n"
+
+
+def membrane_place(s):
+    """Of a block: its first two axes, one layer as thick as 1."""
+    left, right = np.array([MEMBRANE[0], MEMBRANE[3]]), np.array([MEMBRANE[1], MEMBRANE[2]])
+    ends = (1 - s[:, :1, None])*left + s[:, :1, None]*right
+    return np.column_stack([(1 - s[:, 1:2])*ends[:, 0] + s[:, 1:2]*ends[:, 1], s[:, 2]])
+
+
+def start_layer(runs, kind, n, law):
+    """The membrane as one layer of solids, held across: plane strain. Its corner afterwards."""
+    mesh = Block(kind, (n, n, 1))
+    mesh.x = membrane_place(mesh.grid/np.array(mesh.last))
+    runs.count += 1
+    path = runs.folder/f"elements{runs.count}.inp"
+    held = "".join(f"{k}, 1, 2\n" for k in mesh.on(0, 0)) + "NALL, 3\n"
+    rows = "".join(f"{k}, 2, {100.0*part!r}\n" for k, part in end_shares(mesh)[0].items() if part)
+    path.write_text(mesh.deck(law, f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n*CLOAD\n{rows}"
+                              "*NODE FILE\nU\n*END STEP\n"))
+    corner = mesh.label[mesh.last[0], mesh.last[1], 0] - 1
+    return runs.start(path, lambda deck, folder:
+                      run_deck(deck, folder).fields()["displacement"][-1][corner, 1])
+
+
+def start_cook(runs, nu=0.4999):
+    started, law = {}, cook_law(nu)
+    for kind in COOK:
+        for n in CELLS[:-1] if kind in SOLIDS else CELLS:
+            started[kind, n] = (start_layer(runs, kind, n, law) if kind in SOLIDS else
+                                start_static(runs, Mesh(kind, n, n, MEMBRANE), law, {2: 100.0},
+                                             ", NLGEOM", 0.25))
+    return started
+
+
+def start_soft_cook(runs):
+    return start_cook(runs, 0.3)
 
 
 def cook(started, _):
-    tip = {key: future.result()[1, 1] for key, future in started.items()}
+    tip = {(kind, n): future.result() if kind in SOLIDS else future.result()[1, 1]
+           for (kind, n), future in started.items()}
     a, b, c = (tip["CPE8R", n] for n in CELLS[-3:])
     limit = c - (c - b)**2/((c - b) - (b - a))
     rows = []
     for kind in COOK:
-        error = [abs(tip[kind, n] - limit) for n in CELLS[-2:]]
-        rows.append((kind, *(f"{tip[kind, n]:.3f}" for n in CELLS),
+        error = [abs(tip[kind, n] - limit) for n in CELLS if (kind, n) in tip][-2:]
+        rows.append((kind, *(f"{tip[kind, n]:.3f}" if (kind, n) in tip else "" for n in CELLS),
                      f"{100*(tip[kind, 16]/limit - 1):+.1f} %", f"{np.log2(error[0]/error[1]):.1f}"))
     return [*table(["kind", *(f"{n} x {n}" for n in CELLS), "error of 16 x 16", "order at the end"],
                    rows), "", f"Limit of CPE8R: {limit:.3f}."]
@@ -253,6 +290,7 @@ def frequencies(started, _):
 
 CHAPTERS = [
     Chapter("elements_cook", start_cook, cook),
+    Chapter("elements_soft_cook", start_soft_cook, cook),
     Chapter("elements_beams", start_beams, beams),
     Chapter("elements_space_beams", start_space_beams, space_beams),
     Chapter("elements_elastica", start_elastica, elastica),
