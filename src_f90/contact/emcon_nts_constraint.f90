@@ -168,12 +168,8 @@ contains
       real(wp), intent(in) :: g(:), c(:)         !! by the nodes but the first
       type(condition_t), intent(inout) :: item
 
-      associate (n => item%n_node)
-         item%t(:, :n) = 0.0_wp
-         item%t1(:, :n) = 0.0_wp
-         call nodes_add_first(1.0_wp, g, in_order(:n), item%t)
-         call nodes_add_first(1.0_wp, c, in_order(:n), item%t1)
-      end associate
+      call take_first(g, item%t(:, :item%n_node))
+      call take_first(c, item%t1(:, :item%n_node))
    end subroutine take_directions
 
    !> A gap and its first derivatives as those of a constraint.
@@ -185,13 +181,17 @@ contains
       item%gap0 = change%f0
       item%gap1 = change%f1
       item%dgap = change%df
-      associate (n => item%n_node)
-         item%g(:, :n) = 0.0_wp
-         item%c(:, :n) = 0.0_wp
-         call nodes_add_first(1.0_wp, g, in_order(:n), item%g)
-         call nodes_add_first(1.0_wp, c, in_order(:n), item%c)
-      end associate
+      call take_first(g, item%g(:, :item%n_node))
+      call take_first(c, item%c(:, :item%n_node))
    end subroutine take_gap
+
+   pure subroutine take_first(part, full)
+      real(wp), intent(in) :: part(:)            !! by the nodes but the first
+      real(wp), intent(out) :: full(:, :)        !! (n_dim, n_node)
+
+      full = 0.0_wp
+      call nodes_add_first(1.0_wp, part, in_order(:size(full, 2)), full)
+   end subroutine take_first
 
    !> Nodes and size of a constraint over `node`: slave node, edge, further ones.
    pure subroutine begin_constraint(item, x, node)
