@@ -16,6 +16,9 @@ from embed_tools import WARNINGS, install, need, run  # noqa: E402
 
 SOURCES = ["rods.f90", "pendulum.f90"]
 EPS = np.finfo(float).eps
+#: Of what does not gain any more so many roundings are left at most: `kept_floor` of
+#: emcon_convergence.
+FLOOR = 64
 # Two masses on two rods, the first about a fixed point, under their weight.
 PENDULUM = """*NODE, NSET=ALL
 1, 0., 0.
@@ -130,7 +133,7 @@ def test_rods_keep_their_length_and_do_no_work(program: tuple[Path, dict[str, st
     deck.write_text(text.replace("<method>", method))
     strain, drift, work, n_active = map(float, run(program[0], deck, *arguments.split(),
                                                    env=program[1]).split())
-    assert strain <= 16*EPS                        # Newton's method ends at round-off
+    assert strain <= FLOOR*EPS
     n_step = 500 if not touches else 400
     assert drift <= 4*EPS*work*n_step              # some roundings a step
     assert work > 1                                # it falls
@@ -146,7 +149,7 @@ def test_rods_hold_a_body_in_statics(program: tuple[Path, dict[str, str]], tmp_p
     deck.write_text(text if mass == "1" else text.replace("*GIVEN FORCES\n", ""))
     out = run(program[0], deck, mass, *"1 5  6 4  1 4".split(), env=program[1])
     strain, _, work, _ = map(float, out.split())
-    assert strain <= 16*EPS
+    assert strain <= FLOOR*EPS
     assert 0 < work < 0.1                          # it sags by less than a hundredth
 
 
