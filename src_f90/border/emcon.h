@@ -98,6 +98,7 @@ typedef struct emcon_ledger {
    double contact_energy;     /* what contact by penalty stores, >= 0 */
    double friction_loss;      /* what friction took, >= 0 */
    double pz, lx, ly;         /* 0 in the plane */
+   double contact_damping_loss;   /* what *CONTACT DAMPING took, >= 0 */
 } emcon_ledger;
 
 /* A sparse matrix by rows: row i has the entries row_start[i] to row_start[i + 1] - 1 of `column`

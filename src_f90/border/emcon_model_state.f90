@@ -54,6 +54,7 @@ contains
          ledger%damping_loss = real(from%damping, c_double)
          ledger%contact_energy = real(from%contact_energy, c_double)
          ledger%friction_loss = real(from%friction, c_double)
+         ledger%contact_damping_loss = real(from%contact_damping, c_double)
          p = 0.0_c_double
          l = 0.0_c_double
          p(:size(from%momentum)) = real(from%momentum, c_double)

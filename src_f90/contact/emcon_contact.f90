@@ -4,7 +4,7 @@
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
    use emcon_constraint, only : condition_t, constraint_t
-   use emcon_interactions, only : contact_options_t
+   use emcon_interactions, only : contact_damping_t, contact_options_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : pose_is_equilibrium
@@ -49,6 +49,7 @@ module emcon_contact
       real(wp) :: restitution = 1.0_wp                !! of impacts, 0 to 1
       real(wp) :: friction = 0.0_wp                   !! mu >= 0 of Coulomb's law
       real(wp) :: rebound = 0.0_wp                    !! along the surface, of what sticks, 0 to 1
+      type(contact_damping_t) :: damping              !! of what is near, too
       real(wp) :: reach = 0.0_wp                      !! of the candidate search; 0: search anew [L]
       !> No state changes before a node has moved farther from where the last step began [L].
       real(wp) :: clearance = 0.0_wp

@@ -66,7 +66,7 @@ contains
       call weighted_init(self, scene, pair, error)
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%edge, self%master%edge, scene%u0, &
-         maxval(self%slave%length) + self%offset)
+         maxval(self%slave%length) + (self%offset + pair%damping%clearance))
       self%farthest_start = maxval(self%slave%length)
       allocate(self%start(self%slave%n_edge + 1), source=1)
       allocate(self%pair(0))
@@ -206,7 +206,8 @@ contains
             end if
             call place_edge(self%master%edge(:, m), self%slave%edge(1, e), &
                size(self%slave%edge, 1), corner, motion)
-            if (.not. pair_comes_near(self%slave%length(e), corner, motion)) cycle
+            if (.not. pair_comes_near(self%slave%length(e) + self%damping%clearance, corner, &
+               motion)) cycle
             call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
                is_wide, self%master_corner)
             if (is_wide) stencil%rounding = self%rounding*chain_shorter(self%master, m)

@@ -71,7 +71,10 @@ contains
       self%deepest_start = touch_tol
       self%slack = pair%slack
       self%restitution = pair%restitution
-      if (.not. pair%slack > 0.0_wp) self%friction = pair%friction
+      if (.not. pair%slack > 0.0_wp) then
+         self%friction = pair%friction
+         self%damping = pair%damping
+      end if
       self%rebound = pair%rebound
    end subroutine nts_init
 

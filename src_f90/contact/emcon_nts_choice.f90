@@ -86,7 +86,7 @@ contains
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
          call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%edge, &
-            scene%u0, self%offset)
+            scene%u0, self%offset + pair%damping%clearance)
       end associate
    end subroutine choice_init
 

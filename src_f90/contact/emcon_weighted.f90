@@ -37,7 +37,7 @@ module emcon_weighted
       type(edge_form_t), allocatable :: form(:)       !! (n_edge)
       logical, allocatable :: is_formed(:)            !! (n_edge)
       logical :: leaves_second = .false.              !! of `form`: no second derivatives
-      type(slip_list_t), allocatable :: slide(:)      !! (n_constraint) with friction: of the step
+      type(slip_list_t), allocatable :: slide(:)      !! (n_constraint) if it counts: of the step
       type(wide_t) :: work(3)
    contains
       procedure :: measure => weighted_measure
@@ -109,6 +109,7 @@ contains
       self%restitution = pair%restitution
       self%friction = pair%friction
       self%rebound = pair%rebound
+      self%damping = pair%damping
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_edge), self%slide(n))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)
@@ -137,7 +138,7 @@ contains
       type(slip_point_t), parameter :: nothing(0) = slip_point_t()
       integer :: i
 
-      if (.not. self%friction > 0.0_wp) return
+      if (.not. (self%friction > 0.0_wp .or. self%damping%tangent > 0.0_wp)) return
       do i = 1, self%n_constraint
          self%slide(i)%point = nothing
          call self%choose_slip(i, x, u0, du, self%slide(i))

@@ -1,5 +1,6 @@
-!> *SURFACE INTERACTION, *SURFACE BEHAVIOR, *FRICTION and *CONTACT PAIR.
+!> *SURFACE INTERACTION with the cards of it, and *CONTACT PAIR.
 module emcon_deck_contact
+   use emcon_deck_contact_damping, only : read_contact_damping
    use emcon_deck_contact_settings, only : read_pair_initiation
    use emcon_deck_fields, only : data_error, data_open, data_t, next_line, refuse_lines
    use emcon_deck_friction, only : read_friction
@@ -21,7 +22,8 @@ module emcon_deck_contact
 
 contains
 
-   !> The surface interactions: names, pads, restitution and friction. All mean hard contact.
+   !> The surface interactions: names, pads, restitution, friction and damping. All mean hard
+   !> contact.
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
@@ -30,6 +32,7 @@ contains
       allocate(reader%interaction(size(reader%card)))
       allocate(reader%pad(size(reader%card)), reader%friction(size(reader%card)), source=0.0_wp)
       allocate(reader%rebound(size(reader%card)), source=0.0_wp)
+      allocate(reader%damping(size(reader%card)))
       allocate(reader%restitution(size(reader%card)), source=1.0_wp)
       n = 0
       do i = 1, size(reader%card)
@@ -44,10 +47,12 @@ contains
                   reader%pad(n))
                call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is left " &
                   // "of the velocity at which bodies meet", reader%restitution(n))
-            case ("SURFACEBEHAVIOR", "FRICTION")
+            case ("SURFACEBEHAVIOR", "FRICTION", "CONTACTDAMPING")
                if (n == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
-               if (card%name == "FRICTION") then
+               if (card%name == "CONTACTDAMPING") then
+                  call read_contact_damping(reader, card, reader%damping(max(1, n)))
+               else if (card%name == "FRICTION") then
                   call read_friction(reader, card, reader%friction(max(1, n)))
                   call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                      // "left of the velocity along the surface of what sticks", &
@@ -63,6 +68,7 @@ contains
       reader%friction = reader%friction(:n)
       reader%rebound = reader%rebound(:n)
       reader%restitution = reader%restitution(:n)
+      reader%damping = reader%damping(:n)
    end subroutine read_interactions
 
    !> The value of a parameter, 0 or more; of RESTITUTION up to 1.
@@ -327,11 +333,12 @@ contains
          pair(i)%restitution = of_card%restitution
          pair(i)%friction = of_card%friction
          pair(i)%rebound = of_card%rebound
+         pair(i)%damping = of_card%damping
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
 
-   !> INTERACTION= of a card: the thickness of its pad, restitution, and friction.
+   !> INTERACTION= of a card: the thickness of its pad, restitution, friction, damping.
    subroutine read_interaction(reader, card, pair, of_card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -350,6 +357,7 @@ contains
          of_card%restitution = reader%restitution(i)
          of_card%friction = reader%friction(i)
          of_card%rebound = reader%rebound(i)
+         of_card%damping = reader%damping(i)
       end do
       if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))

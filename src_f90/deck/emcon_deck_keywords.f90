@@ -73,6 +73,7 @@ module emcon_deck_keywords
          // "!PENALTY,!AUGMENTEDLAGRANGE"), &
       keyword_t("FRICTION", in_model, "RESTITUTION=,~SLIPTOLERANCE,!ROUGH,!LAGRANGE," &
          // "!DEPENDENCIES:0"), &
+      keyword_t("CONTACT DAMPING", in_model, "DEFINITION=,TANGENTFRACTION="), &
       keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,SIDES=,GUARD=," &
          // "ADJUST=,INITIATION=,!SMALLSLIDING,!TIED"), &
       keyword_t("CONTACT", in_model, has_data=.false.), &
@@ -161,7 +162,6 @@ module emcon_deck_keywords
       keyword_t("CONTACT EXCLUSIONS", in_both, "", "list what touches by *CONTACT INCLUSIONS"), &
       keyword_t("CONTACT FORMULATION", in_both, "", "all with all holds the nodes of both sides"), &
       keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
-      keyword_t("CONTACT DAMPING", in_model, "", "contact is enforced exactly, without damping"), &
       keyword_t("CHANGE FRICTION", in_step, "", "there is no friction"), &
       keyword_t("MODEL CHANGE", in_step, "", "pairs and elements stay for the whole run"), &
       keyword_t("DSLOAD", in_step, "", "use *DLOAD with element faces"), &

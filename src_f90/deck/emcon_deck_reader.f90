@@ -3,6 +3,7 @@ module emcon_deck_reader
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_labels, only : label_map_t
    use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted, suggestion
+   use emcon_interactions, only : contact_damping_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : named_set_t
    use emcon_origin, only : origin_t
@@ -61,6 +62,7 @@ module emcon_deck_reader
       real(wp), allocatable :: restitution(:)            !! RESTITUTION of each
       real(wp), allocatable :: friction(:)               !! coefficient of each
       real(wp), allocatable :: rebound(:)                !! RESTITUTION of its *FRICTION
+      type(contact_damping_t), allocatable :: damping(:) !! its *CONTACT DAMPING
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
 

@@ -6,6 +6,7 @@ module emcon_deck_step
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_conditions, only : conditions_carry, conditions_init, conditions_store, &
       conditions_t
+   use emcon_deck_contact_damping, only : check_contact_damping
    use emcon_deck_contact_settings, only : check_massless, check_restitution, check_statics, &
       pairs_ask, read_controls, read_initiation, read_interference
    use emcon_deck_damping, only : check_damping
@@ -88,6 +89,7 @@ contains
       call check_softness(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
       call check_friction(reader, scene%pair, scene%step)
+      call check_contact_damping(reader, scene%pair, scene%step)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
       end if

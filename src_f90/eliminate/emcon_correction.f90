@@ -44,6 +44,7 @@ module emcon_correction
       type(csr_t) :: merged                      !! N with constraints
       integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
       integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
+      integer, allocatable :: damped_start(:), damped_column(:)   !! and of what is damped
       type(null_space_t) :: null_space
       type(kept_factor_t) :: kept                !! over increments
       type(saddle_point_t) :: saddle_point
@@ -103,6 +104,8 @@ contains
       self%knows_multipliers = .true.
       if (set%n == 0) then
          self%fell_back = .false.
+         if (set%damped%n == 0) return
+         if (.not. has_pattern(self, set)) call take_pattern(self, set)
          return
       end if
       if (allocated(set%soft)) then
@@ -167,7 +170,19 @@ contains
          .and. size(self%column) == n
       if (has_pattern) has_pattern = all(self%row_start == set%force_rows%row_start)
       if (has_pattern) has_pattern = all(self%column == set%force_rows%column(:n))
+      if (has_pattern) has_pattern = is_same(self%damped_start, set%damped%row_start)
+      if (has_pattern) has_pattern = is_same(self%damped_column, set%damped%column)
    end function has_pattern
+
+   !> The two lists are one, or none is there.
+   pure logical function is_same(a, b)
+      integer, allocatable, intent(in) :: a(:), b(:)
+
+      is_same = allocated(a) .eqv. allocated(b)
+      if (.not. (is_same .and. allocated(a))) return
+      is_same = size(a) == size(b)
+      if (is_same) is_same = all(a == b)
+   end function is_same
 
    !> Entries of N with the constraints, at most: those of a constraint meet in pairs.
    pure integer function n_merged(system, set)
@@ -178,6 +193,10 @@ contains
          n_merged = size(system%matrix%column) &
             + sum((start(2:set%n_row + 1) - start(:set%n_row))**2)
       end associate
+      if (set%damped%n == 0) return
+      associate (start => set%damped%row_start)
+         n_merged = n_merged + sum((start(2:) - start(:set%damped%n))**2)
+      end associate
    end function n_merged
 
    !> The layout is for these constraints from here on; that of matrices waits until it is wanted.
@@ -187,6 +206,11 @@ contains
 
       self%row_start = set%force_rows%row_start
       self%column = set%force_rows%column(:set%force_rows%row_start(set%n_row + 1))
+      if (allocated(self%damped_start)) deallocate(self%damped_start, self%damped_column)
+      if (set%damped%n > 0) then
+         self%damped_start = set%damped%row_start
+         self%damped_column = set%damped%column
+      end if
       self%is_merged = .false.
       self%has_saddle_point = .false.
    end subroutine take_pattern
@@ -199,26 +223,20 @@ contains
       type(constraint_set_t), intent(in) :: set
       logical, intent(out) :: is_singular        !! there is no factor to solve with
       type(error_t), allocatable, intent(out) :: error
-      integer :: k
 
       self%n_factorisation = self%n_factorisation + 1
       if (.not. allocated(self%solver)) call make_solvers(self)
-      if (set%n == 0) then
-         call factorise_free(self, system, is_singular, error)
+      if (set%n == 0 .and. set%damped%n == 0) then
+         call factorise_free(self, system, system%matrix, system%is_symmetric, is_singular, error)
          return
       end if
       is_singular = .true.
       if (self%n_redundant > 0) return
-      call stopwatch_start(self%clock)
-      if (.not. self%is_merged) call constraints_merge_pattern(set, system%matrix, self%merged, &
-         self%slot)
-      self%is_merged = .true.
-      self%merged%value = 0.0_dp
-      do k = 1, size(self%slot)
-         self%merged%value(self%slot(k)) = system%matrix%value(k)
-      end do
-      call constraints_add_curvature(set, system%space%numbering, self%merged)
-      call stopwatch_stop(self%clock)
+      call merge_all(self, system, set)
+      if (set%n == 0) then
+         call factorise_free(self, system, self%merged, .false., is_singular, error)
+         return
+      end if
       self%is_reduced = self%method == method_null_space .and. .not. allocated(set%soft)
       self%obstacle = obstacle_none
       if (self%is_reduced) then
@@ -237,19 +255,40 @@ contains
       call saddle_point_factorise(self%saddle_point, set, self%merged, is_singular, error)
    end subroutine correction_factorise
 
-   !> Factorise the matrix as it is; a symmetric one that is not definite like any other.
-   subroutine factorise_free(self, system, is_singular, error)
+   !> The tangent of the system with what constraints and damping add to it.
+   subroutine merge_all(self, system, set)
       type(correction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      call stopwatch_start(self%clock)
+      if (.not. self%is_merged) call constraints_merge_pattern(set, system%matrix, self%merged, &
+         self%slot)
+      self%is_merged = .true.
+      self%merged%value = 0.0_dp
+      do k = 1, size(self%slot)
+         self%merged%value(self%slot(k)) = system%matrix%value(k)
+      end do
+      call constraints_add_curvature(set, system%space%numbering, self%merged)
+      call stopwatch_stop(self%clock)
+   end subroutine merge_all
+
+   !> Factorise a matrix as it is; a symmetric one that is not definite like any other.
+   subroutine factorise_free(self, system, matrix, is_symmetric, is_singular, error)
+      type(correction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(csr_t), intent(in) :: matrix          !! of the system, or with what is damped
+      logical, intent(in) :: is_symmetric
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
 
       is_singular = .true.
       self%is_definite = .false.
-      if (system%is_symmetric) then
-         call self%definite_solver%analyse(system%matrix, error)
+      if (is_symmetric) then
+         call self%definite_solver%analyse(matrix, error)
          if (.not. allocated(error)) call solver_renew(self%definite_solver, &
-            system%matrix%value, error)
+            matrix%value, error)
          if (allocated(error)) return
          self%is_definite = .not. self%definite_solver%is_singular
       end if
@@ -257,9 +296,8 @@ contains
       if (self%is_definite) return
       ! Minimum degree fills matrices of tied pieces by a quarter more than the pieces need.
       self%solver%seeks_less_fill = system%space%numbering%n_dependent > 0
-      call self%solver%analyse(system%matrix, error)
-      if (.not. allocated(error)) call solver_renew(self%solver, system%matrix%value, &
-         error)
+      call self%solver%analyse(matrix, error)
+      if (.not. allocated(error)) call solver_renew(self%solver, matrix%value, error)
       is_singular = self%solver%is_singular
    end subroutine factorise_free
 

@@ -3,6 +3,8 @@
 module emcon_active_set
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_gives_back, &
       constraints_select
+   use emcon_dashpots, only : dashpots_idle, dashpots_look, dashpots_restart, dashpots_select, &
+      dashpots_t
    use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
    use emcon_gaps, only : pair_measure, pair_search
    use emcon_holding, only : holding_forget, holding_t
@@ -77,6 +79,7 @@ module emcon_active_set
       real(wp) :: left(0:1) = 0.0_wp
       type(friction_t) :: friction               !! what sticks, what slides
       type(softness_state_t) :: softness         !! how stiff contacts are that give way
+      type(dashpots_t) :: dashpots               !! what is damped
       type(holding_t) :: holding                 !! bodies that contact alone holds, in statics
       type(travel_t) :: travel                   !! of all nodes, over the steps
       type(outlook_t), allocatable :: outlook(:) !! (n_contact)
@@ -169,6 +172,7 @@ contains
       self%n_stale = 0
       self%n_early = 0
       self%softness%n_augmentation = 0
+      call dashpots_restart(self%dashpots)
       self%only_adds = .false.
       self%one_by_one = .false.
       self%comes_and_goes = .false.
@@ -263,9 +267,10 @@ contains
       integer :: k, pair, i
 
       call remember(self)
-      if (self%set%n == 0 .and. .not. any(self%is_active)) return
+      if (self%set%n == 0 .and. .not. (any(self%is_active) .or. self%dashpots%is_on)) return
       call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
       if (.not. knows_gaps()) call measure_all(self, system, motion)
+      if (self%dashpots%is_on) call select_damped(self, system)
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
          call constraint_place(system, self%set%id(k), pair, i)
@@ -298,6 +303,22 @@ contains
       end function knows_gaps
 
    end subroutine active_set_select
+
+   !> What is damped beside the set, by the gaps as they were measured.
+   subroutine select_damped(self, system)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      logical :: grows
+      integer :: k
+
+      grows = .false.
+      do k = 1, size(system%contact)
+         if (dashpots_idle(self%dashpots, system%contact(k)%contact)) cycle
+         if (.not. is_empty(self, system, k)) call dashpots_look(self%dashpots, system, k, &
+            self%is_active, grows)
+      end do
+      call dashpots_select(self%dashpots, system, self%is_active, self%set)
+   end subroutine select_damped
 
    !> Measure the gaps of all contacts that something is near.
    subroutine measure_all(self, system, motion)

@@ -5,6 +5,7 @@ module emcon_active_set_update
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_constraints, only : constraints_gives_back
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
+   use emcon_dashpots, only : dashpots_idle, dashpots_look
    use emcon_friction, only : friction_close, friction_turn
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -38,9 +39,9 @@ contains
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: is_done            !! else solve the step again with the next set
       integer, intent(out) :: status                     !! one of the `step_` codes
-      logical :: has_changed
+      logical :: has_changed, has_more
 
-      call update(self, system, motion, has_changed, status)
+      call update(self, system, motion, has_changed, status, has_more)
       if (self%is_stale .and. self%n_stale < most_stale) then
          self%n_stale = self%n_stale + 1
          self%n_tried = 0
@@ -50,11 +51,14 @@ contains
       end if
       if (self%is_stale .and. status == step_done) status = step_too_far
       ! Another set has other slips for others to hold.
+      has_changed = has_changed .or. has_more
       if (has_changed .and. self%friction%is_on .and. status == step_done) then
          self%friction%is_idle = .false.
       end if
       is_done = status /= step_done .or. .not. has_changed
       if (is_done) return
+      ! What is damped only grows within a step: the same contacts beside more of it are no cycle.
+      if (has_more) self%n_tried = 0
       if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)
       is_done = status /= step_done
    end subroutine active_set_advance
@@ -66,15 +70,15 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      logical :: before(size(self%is_active)), has_changed
+      logical :: before(size(self%is_active)), has_changed, has_more
       integer :: way(size(self%friction%way)), status
 
       before = self%is_active
       way = self%friction%way
-      call update(self, system, motion, has_changed, status)
+      call update(self, system, motion, has_changed, status, has_more)
       self%n_tried = self%n_tried - 1
       self%n_early = self%n_early + 1
-      if (status == step_done .and. has_changed) return
+      if (status == step_done .and. (has_changed .or. has_more)) return
       self%is_active = before
       self%friction%way = way
       self%n_early = most_early
@@ -83,18 +87,20 @@ contains
    !> The next set, from the gaps and multipliers of the converged one. Of the conditions gap >= 0,
    !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does
    !> not is taken in where gap < 0.
-   subroutine update(self, system, motion, has_changed, status)
+   subroutine update(self, system, motion, has_changed, status, has_more)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: has_changed
       integer, intent(out) :: status             !! one of the `step_` codes
+      logical, intent(out) :: has_more           !! of what is damped
       logical :: changes, turns
       type(choice_t) :: choice
       integer :: pair, i, id, k
 
       status = step_done
       has_changed = .false.
+      has_more = .false.
       self%is_stale = .false.
       k = count(self%is_active(:system%first_constraint(1)))
       call active_set_pass(self, system, motion)
@@ -104,6 +110,8 @@ contains
             if (self%outlook(pair)%passes .and. .not. any(self%is_active( &
                system%first_constraint(pair) + 1:system%first_constraint(pair + 1)))) cycle
             call active_set_look(self, system, pair, motion, motion%du)
+            if (.not. dashpots_idle(self%dashpots, contact)) call dashpots_look(self%dashpots, &
+               system, pair, self%is_active, has_more)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then

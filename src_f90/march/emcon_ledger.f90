@@ -29,6 +29,7 @@ module emcon_ledger
       real(wp) :: decay = 0.0_wp                 !! taken by the scheme, since the start
       real(wp) :: damping = 0.0_wp               !! taken by damped materials, since the start
       real(wp) :: friction = 0.0_wp              !! taken by friction, since the start, >= 0
+      real(wp) :: contact_damping = 0.0_wp       !! taken between surfaces, since the start, >= 0
       real(wp) :: contact_energy = 0.0_wp        !! that contact by penalty stores
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]

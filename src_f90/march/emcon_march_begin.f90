@@ -7,6 +7,7 @@ module emcon_march_begin
    use emcon_explicit, only : explicit_prepare
    use emcon_factor_base, only : factor_base_t
    use emcon_holding, only : holding_begin, holding_t
+   use emcon_dashpots, only : dashpots_begin_step
    use emcon_host, only : host_find_solver
    use emcon_host_scheme, only : host_scheme_find
    use emcon_interactions, only : contact_options_t
@@ -194,6 +195,8 @@ contains
          end do
          call softness_begin_step(self%active%softness, self%system, scene, step, error)
          if (allocated(error)) return
+         call dashpots_begin_step(self%active%dashpots, self%active%set, self%system, &
+            scene, step)
          call begin_overclosure(self, scene, step)
          call begin_massless(self, scene, step, error)
          if (allocated(error)) return

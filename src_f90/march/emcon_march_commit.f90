@@ -3,6 +3,7 @@ module emcon_march_commit
    use emcon_constraint, only : condition_drag
    use emcon_constraints, only : constraints_force
    use emcon_correction, only : correction_reason
+   use emcon_dashpots, only : dashpots_work
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
    use emcon_friction, only : friction_grip, friction_missed, friction_slides, friction_work
@@ -353,6 +354,7 @@ contains
             contact_work = contact_work + friction
          end if
          self%ledger%friction = self%ledger%friction + friction
+         self%ledger%contact_damping = self%ledger%contact_damping + dashpots_work(set)
          self%ledger%contact_work = self%ledger%contact_work + contact_work
          call book_stored(self)
          call terms_decay(self%system%term, decay, damping)

@@ -146,7 +146,7 @@ contains
 
       associate (keeping => self%newton%keeping, correction => self%newton%correction)
          keeping%is_allowed = keeping%is_wanted .and. self%scheme%row%masses_resist .and. &
-            .not. self%active%friction%is_on .and. &
+            .not. (self%active%friction%is_on .or. self%active%dashpots%is_on) .and. &
             (correction%method == method_null_space .or. self%system%n_constraint == 0)
          call keeping_step(keeping, correction, self%state%base, part%start, part%h, &
             self%state%increment, is_lost)

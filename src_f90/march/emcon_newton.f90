@@ -4,13 +4,14 @@
 !> eq. (25), so that no unit and no absolute size enters.
 module emcon_newton
    use emcon_constraint, only : condition_rate, condition_slip_rate
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
-      constraints_rows, constraints_take_hold
+   use emcon_constraints, only : constraint_set_t, constraints_add_forces, constraints_evaluate, &
+      constraints_force, constraints_push, constraints_rows, constraints_take_hold
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t, correction_ticks
+   use emcon_damped, only : damped_add_forces
    use emcon_early_look, only : early_enough, early_look
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_keeping, only : keeping_begin, keeping_break_off, keeping_correct, keeping_give_up, &
@@ -26,7 +27,7 @@ module emcon_newton
    use emcon_pose, only : pose_is_equilibrium
    use emcon_system, only : system_respond, system_tangent_times, system_t
    use emcon_term, only : role_external, role_inertia
-   use emcon_vectors, only : vector_sum
+   use emcon_vectors, only : vector_sum, vector_zero
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
@@ -459,7 +460,7 @@ contains
       end do
       status = newton_converged
       call phase_enter(system%phases, phase_gaps, left)
-      if (set%n > 0) then
+      if (constraints_push(set)) then
          leaves_second = .not. with_tangent
          if (self%convergence%is_kept) leaves_second = .not. (keeping_looks(self%keeping) .and. &
             kept_factor_has_room(self%correction%kept, set%n, size(system%matrix%column)))
@@ -481,7 +482,7 @@ contains
       logical, intent(out) :: is_rounding        !! nothing but round-off is left
       integer :: k, left
 
-      call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
+      call pick_residual(self, system, set)
       call phase_enter(system%phases, phase_eliminate, left)
       call correction_multipliers(self%correction, system, set, self%residual)
       call constraints_take_hold(set)
@@ -492,7 +493,7 @@ contains
       else
          call constraints_force(set, 1, self%contact)
       end if
-      if (set%n > 0) then
+      if (constraints_push(set)) then
          call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, &
             self%left)
          call pick_unknowns(system%space%numbering, self%left, self%residual)
@@ -513,6 +514,22 @@ contains
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
 
+   !> The residual without the forces of constraints, which what is damped has a part in.
+   subroutine pick_residual(self, system, set)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+
+      if (set%damped%n == 0) then
+         call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
+         return
+      end if
+      call vector_zero(size(self%contact), self%contact)
+      call damped_add_forces(set%damped, self%contact)
+      call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, self%left)
+      call pick_unknowns(system%space%numbering, self%left, self%residual)
+   end subroutine pick_residual
+
    !> What multipliers under way lack is measured as the residual is.
    subroutine measure_lack(self, system, set, norm, is_rounding)
       type(newton_t), intent(inout) :: self
@@ -524,7 +541,8 @@ contains
 
       lam = set%lam
       set%lam = set%soft%lack
-      call constraints_force(set, 1, self%left)
+      call vector_zero(size(self%left), self%left)
+      call constraints_add_forces(set, 1, self%left)
       set%lam = lam
       call pick_unknowns(system%space%numbering, self%left, self%scale)
       norm = max(norm, relative_size(self%scale, self%forces))

@@ -40,35 +40,44 @@ contains
       allocate(self%area(system%n_constraint), source=0.0_wp)
    end subroutine pair_record_init
 
-   !> Take over the constraints that acted in the step to `u`. Their forces act at u - lag du: half
-   !> a step back for discrete gradients, at the end (0) in statics.
+   !> Take over the constraints that acted in the step to `u`, and what was damped. Their forces act
+   !> at u - lag du: half a step back for discrete gradients, at the end (0) in statics.
    subroutine pair_record_measure(self, system, set, x, u, du, lag)
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (n_dim, n_node)
       real(wp), intent(in) :: lag                !! 0 or 1/2
-      integer :: k, first, last
+      integer :: k, first, last, from, to
 
       self%total = pair_total_t()
       last = set%n_held
+      to = 0
       do k = 1, size(system%contact)
          first = last + 1
          last = count(set%id <= system%first_constraint(k + 1))
-         associate (total => self%total(abs(system%contact(k)%of_pair)))
+         from = to + 1
+         if (set%damped%n > 0) to = count(set%damped%id <= system%first_constraint(k + 1))
+         associate (total => self%total(abs(system%contact(k)%of_pair)), &
+               damped => set%damped, before => system%first_constraint(k), &
+               n => system%first_constraint(k + 1))
+            total%n_active = total%n_active + max(0, last - first + 1)
             if (system%contact(k)%of_pair < 0) call exchange_sides(total)
             call add_up(total, set%item(first:last), set%lam(first:last), x, u, du, lag)
+            if (to >= from) call add_up(total, damped%item(from:to), damped%dashpot(from:to)%push, &
+               x, u, du, lag)
             if (system%contact(k)%of_pair < 0) call exchange_sides(total)
-         end associate
-         if (last < first) then
-            associate (before => system%first_constraint(k), n => system%first_constraint(k + 1))
+            if (last >= first .or. to >= from) then
+               call measure_nodes(self, system, k, set, [first, last], [from, to])
+            else
                self%force(:, before + 1:n) = 0.0_wp
+            end if
+            if (last >= first) then
+               call measure_areas(self, system, k, set%id(first:last), x, u)
+            else
                self%area(before + 1:n) = 0.0_wp
-            end associate
-         else
-            call measure_nodes(self, system, k, set%item(first:last), set%lam(first:last))
-            call measure_areas(self, system, k, set%id(first:last), x, u)
-         end if
+            end if
+         end associate
       end do
    end subroutine pair_record_measure
 
@@ -90,7 +99,6 @@ contains
       real(wp) :: place(size(x, 1)), force(size(x, 1)), both(size(total%slave))
       integer :: k, i
 
-      total%n_active = total%n_active + size(item)
       do k = 1, size(item)
          do i = 1, item(k)%n_node
             associate (node => item(k)%node(i))
@@ -108,12 +116,12 @@ contains
    end subroutine add_up
 
    !> Forces of contact `k` on its slave nodes.
-   subroutine measure_nodes(self, system, k, item, lam)
+   subroutine measure_nodes(self, system, k, set, own, damped)
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       integer, intent(in) :: k
-      type(condition_t), intent(in) :: item(:)
-      real(wp), intent(in) :: lam(:)
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: own(2), damped(2)   !! first and last of it in the set, of what is damped
       real(wp) :: force(size(self%force, 1), size(system%space%body))
       integer :: j, i, first
 
@@ -124,11 +132,11 @@ contains
             force(:, node(i)) = 0.0_wp
             if (twin(i) > 0) force(:, twin(i)) = 0.0_wp
          end do
-         do j = 1, size(item)
-            do i = 1, item(j)%n_slave
-               force(:, item(j)%node(i)) = force(:, item(j)%node(i)) &
-                  + condition_force(item(j), lam(j), i)
-            end do
+         do j = own(1), own(2)
+            call add_forces(set%item(j), set%lam(j))
+         end do
+         do j = damped(1), damped(2)
+            call add_forces(set%damped%item(j), set%damped%dashpot(j)%push)
          end do
          do i = 1, size(node)
             self%force(:, first + i) = force(:, node(i))
@@ -138,6 +146,19 @@ contains
             force(:, twin(i)) = 0.0_wp
          end do
       end associate
+
+   contains
+
+      subroutine add_forces(item, lam)
+         type(condition_t), intent(in) :: item
+         real(wp), intent(in) :: lam             !! its multiplier, or push [M L/T^2]
+         integer :: m
+
+         do m = 1, item%n_slave
+            force(:, item%node(m)) = force(:, item%node(m)) + condition_force(item, lam, m)
+         end do
+      end subroutine add_forces
+
    end subroutine measure_nodes
 
    !> Areas of all multipliers of contact `k`, and the length over which it acts.

@@ -3,8 +3,9 @@
 !> A pair that is held in both orders, or watched by guards, is one here. Forces are those on the
 !> surface that the deck names first.
 module emcon_pair_sums
-   use emcon_constraint, only : condition_drag, condition_force
+   use emcon_constraint, only : condition_drag, condition_force, condition_t
    use emcon_constraints, only : constraint_set_t
+   use emcon_damped, only : damped_work
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -17,6 +18,7 @@ module emcon_pair_sums
    type :: pair_sum_t
       real(wp) :: impulse(3) = 0.0_wp            !! on the first surface, in dynamic steps [M L/T]
       real(wp) :: friction = 0.0_wp              !! work that it has taken, >= 0 [M L^2/T^2]
+      real(wp) :: damping = 0.0_wp               !! the same of damping, >= 0 [M L^2/T^2]
       real(wp) :: duration = 0.0_wp              !! of force between the surfaces, in these [T]
       ! of the increment, in statics of its last part:
       real(wp) :: push(3) = 0.0_wp               !! force by time [M L/T]
@@ -72,7 +74,7 @@ contains
       sum%moment = 0.0_wp
    end subroutine pair_sums_begin
 
-   !> Add the constraints that acted over `motion`, of the size `h`.
+   !> Add the constraints that acted over `motion`, of the size `h`, and what was damped.
    pure subroutine pair_sums_add(self, system, set, motion, h, masses_resist)
       type(pair_sums_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -81,7 +83,7 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: masses_resist       !! forces are means over the motion, else its end
       real(wp) :: part
-      integer :: k, i, contact, p
+      integer :: k, contact, p
 
       if (size(self%sum) == 0) return
       if (.not. masses_resist) call pair_sums_begin(self%sum)
@@ -95,20 +97,40 @@ contains
          end do
          p = abs(self%of_pair(contact))
          associate (item => set%item(k))
-            do i = 1, item%n_slave
-               call add(self%sum(p), h*condition_force(item, set%lam(k), i), &
-                  motion%x(:, item%node(i)) + (motion%u0(:, item%node(i)) &
-                  + part*motion%du(:, item%node(i))), self%of_pair(contact) > 0)
-            end do
+            call add_forces(self%sum(p), item, set%lam(k), self%of_pair(contact) > 0)
             if (item%rubs) self%sum(p)%friction = self%sum(p)%friction &
                + condition_drag(item, set%lam(k))*item%slip
          end associate
          self%sum(p)%is_pressed = self%sum(p)%is_pressed .or. abs(set%lam(k)) > 0.0_wp
       end do
+      contact = 1
+      do k = 1, set%damped%n
+         do while (set%damped%id(k) > system%first_constraint(contact + 1))
+            contact = contact + 1
+         end do
+         p = abs(self%of_pair(contact))
+         call add_forces(self%sum(p), set%damped%item(k), set%damped%dashpot(k)%push, &
+            self%of_pair(contact) > 0)
+         self%sum(p)%damping = self%sum(p)%damping + damped_work(set%damped, k)
+      end do
       if (.not. masses_resist) return
       where (self%sum%is_pressed) self%sum%duration = self%sum%duration + h
 
    contains
+
+      !> Add the forces of a condition on its slave side.
+      pure subroutine add_forces(sum, item, lam, is_first)
+         type(pair_sum_t), intent(inout) :: sum
+         type(condition_t), intent(in) :: item
+         real(wp), intent(in) :: lam             !! its multiplier, or push [M L/T^2]
+         logical, intent(in) :: is_first         !! its slave side is the first surface
+         integer :: i
+
+         do i = 1, item%n_slave
+            call add(sum, h*condition_force(item, lam, i), motion%x(:, item%node(i)) &
+               + (motion%u0(:, item%node(i)) + part*motion%du(:, item%node(i))), is_first)
+         end do
+      end subroutine add_forces
 
       !> Add `push` on a node at `place`.
       pure subroutine add(sum, push, place, is_first)

@@ -284,7 +284,8 @@ contains
    pure real(wp) function kept_by(ledger) result(kept)
       type(ledger_t), intent(in) :: ledger
 
-      kept = ledger%total - ledger%contact_work + ledger%decay + ledger%damping + ledger%friction
+      kept = ledger%total - ledger%contact_work + ledger%decay + ledger%damping + ledger%friction &
+         + ledger%contact_damping
    end function kept_by
 
    !> Count a warning, and keep it if it is another one than those before.
@@ -489,6 +490,8 @@ contains
       if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction took an energy of " // &
          to_text(ledger%friction, 9) // "; its law is met to " // to_text(self%law_missed, 3) // &
          " of the largest force")
+      if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "the damping between " // &
+         "surfaces took an energy of " // to_text(ledger%contact_damping, 9))
       if (self%give > 0.0_wp) call note_add(lines, "contact gave way by " // &
          to_text(self%give, 3) // " of an edge at time " // to_text(self%give_time, 9) // &
          "; it stores an energy of " // to_text(ledger%contact_energy, 9))

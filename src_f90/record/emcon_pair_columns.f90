@@ -1,5 +1,5 @@
 !> Columns of the history for each pair of surfaces: force, impulse, where it acts, for how long,
-!> and what friction took.
+!> and what friction and damping took.
 module emcon_pair_columns
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_history, only : column_t
@@ -14,8 +14,8 @@ module emcon_pair_columns
    !> Of these each has a column for each direction.
    character(len=*), parameter :: vectors(3) = [character(len=8) :: "force", "impulse", "center"]
    character(len=*), parameter :: directions = "xyz"
-   character(len=*), parameter :: numbers(*) = [character(len=13) :: "duration", "active", &
-      "friction_loss"]
+   character(len=*), parameter :: numbers(*) = [character(len=20) :: "duration", "active", &
+      "friction_loss", "contact_damping_loss"]
 
 contains
 
@@ -68,7 +68,8 @@ contains
             vector = reshape([pair_force(sum(p)), sum(p)%impulse, pair_center(sum(p), &
                ieee_value(1.0_wp, ieee_quiet_nan))], shape(vector))
             values(n*(p - 1) + 1:n*p) = real([reshape(vector(:n_dim, :), [size(vectors)*n_dim]), &
-               sum(p)%duration, real(active(p), wp), sum(p)%friction], dp)
+               sum(p)%duration, real(active(p), wp), sum(p)%friction, &
+               sum(p)%damping], dp)
          end do
       end associate
    end function pair_values

@@ -30,11 +30,12 @@ module emcon_recorder
    integer, parameter :: default_frames = 100
 
    !> Columns of all runs, but momenta: these stand between.
-   type(column_t), parameter :: energies(14) = [column_t("increment", .true.), column_t("time"), &
+   type(column_t), parameter :: energies(15) = [column_t("increment", .true.), column_t("time"), &
       column_t("h"), column_t("kinetic"), column_t("strain"), column_t("external_work"), &
       column_t("contact_work"), column_t("stabilization"), &
       column_t("restitution_loss"), column_t("scheme_loss"), column_t("damping_loss"), &
-      column_t("friction_loss"), column_t("contact_energy"), column_t("total")]
+      column_t("friction_loss"), column_t("contact_damping_loss"), column_t("contact_energy"), &
+      column_t("total")]
    type(column_t), parameter :: efforts(6) = [column_t("active", .true.), &
       column_t("newton", .true.), column_t("cuts", .true.), column_t("penetration"), &
       column_t("stand_off"), column_t("cpu")]
@@ -221,7 +222,7 @@ contains
             real(ledger%strain, dp), real(ledger%external_work, dp), &
             real(ledger%contact_work, dp), real(ledger%stabilization, dp), &
             real(ledger%restitution, dp), real(ledger%decay, dp), real(ledger%damping, dp), &
-            real(ledger%friction, dp), &
+            real(ledger%friction, dp), real(ledger%contact_damping, dp), &
             real(ledger%contact_energy, dp), real(ledger%total, dp), &
             real(ledger%momentum, dp), &
             real(ledger%angular, dp), &

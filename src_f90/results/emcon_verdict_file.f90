@@ -85,6 +85,7 @@ contains
          call json_number(line, "scheme_loss", ledger%decay)
          call json_number(line, "damping_loss", ledger%damping)
          call json_number(line, "friction_loss", ledger%friction)
+         call json_number(line, "contact_damping_loss", ledger%contact_damping)
          call json_number(line, "contact_energy", ledger%contact_energy)
          call json_number(line, "total", ledger%total)
       end associate

@@ -4,7 +4,7 @@ module emcon_interactions
    use emcon_origin, only : origin_t
    implicit none
    private
-   public :: contact_pair_t, contact_options_t
+   public :: contact_pair_t, contact_options_t, contact_damping_t
    public :: formulation_nts, formulation_segment, formulation_mortar
    public :: integration_segments, integration_elements
    public :: multiplier_standard, multiplier_dual
@@ -28,6 +28,15 @@ module emcon_interactions
       real(wp) :: smoothing_angle = 60.0_wp          !! [degrees]
    end type contact_options_t
 
+   !> *CONTACT DAMPING: a pressure against the rate at which surfaces approach, part or slide. Of
+   !> slave surfaces made of nodes, which have no area, it is a force.
+   type :: contact_damping_t
+      real(wp) :: coefficient = 0.0_wp               !! pressure by velocity, >= 0 [M/(L^2 T)]
+      real(wp) :: clearance = 0.0_wp                 !! from which on there is none, >= 0 [L]
+      real(wp) :: flat = 0.0_wp                      !! part of it up to which it is constant, 0 to 1
+      real(wp) :: tangent = 0.0_wp                   !! part of it along the surface, >= 0
+   end type contact_damping_t
+
    type :: contact_pair_t
       type(origin_t) :: origin
       integer :: slave = 0                           !! index into `scene_t%surface`
@@ -45,6 +54,7 @@ module emcon_interactions
       real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
       real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0
       real(wp) :: rebound = 0.0_wp                   !! along the surface, of what sticks, 0 to 1
+      type(contact_damping_t) :: damping
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
       real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
       integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given

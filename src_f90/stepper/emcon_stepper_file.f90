@@ -307,6 +307,12 @@ contains
       else
          ledger%friction = 0.0_wp
       end if
+      if (restart_offers(restart, "contact_damping", &
+         is_written=abs(ledger%contact_damping) > 0.0_wp)) then
+         call restart_exchange(restart, "contact_damping", ledger%contact_damping)
+      else
+         ledger%contact_damping = 0.0_wp
+      end if
       if (restart_offers(restart, "stored", is_written=ledger%contact_energy > 0.0_wp)) then
          call restart_exchange(restart, "stored", ledger%contact_energy)
       else
@@ -348,9 +354,14 @@ contains
          call restart_exchange(restart, "pair_sum", sums%sum(k)%weight)
          call restart_exchange(restart, "pair_sum", sums%sum(k)%moment)
       end do
-      if (.not. restart_offers(restart, "pair_friction", any(sums%sum%friction > 0.0_wp))) return
+      if (restart_offers(restart, "pair_friction", any(sums%sum%friction > 0.0_wp))) then
+         do k = 1, size(sums%sum)
+            call restart_exchange(restart, "pair_friction", sums%sum(k)%friction)
+         end do
+      end if
+      if (.not. restart_offers(restart, "pair_damping", any(sums%sum%damping > 0.0_wp))) return
       do k = 1, size(sums%sum)
-         call restart_exchange(restart, "pair_friction", sums%sum(k)%friction)
+         call restart_exchange(restart, "pair_damping", sums%sum(k)%damping)
       end do
    end subroutine exchange_sums
 

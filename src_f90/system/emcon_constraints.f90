@@ -8,6 +8,8 @@ module emcon_constraints
    use emcon_constraint, only : condition_drag, condition_force, condition_push, condition_t, &
       constraint_t
    use emcon_csr, only : csr_find, csr_t
+   use emcon_damped, only : damped_add_forces, damped_evaluate, damped_rows, damped_stiffness, &
+      damped_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
@@ -19,6 +21,7 @@ module emcon_constraints
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
    public :: constraints_add_curvature, constraints_force, constraints_merge_pattern
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
+   public :: constraints_push, constraints_add_forces
    public :: constraint_place, constraint_dof
 
    !> Which constraints act, and the linearised set on the unknowns.
@@ -39,6 +42,7 @@ module emcon_constraints
       logical :: is_stored = .false.             !! by discrete gradients of what these store
       !> Their multipliers are on the way to what the gaps say, as unknowns of a solve
       logical :: is_under_way = .false.
+      type(damped_t) :: damped                   !! conditions that are damped, of these and others
       !> Conditions that stick have a second row, behind all others: of slip, whose multiplier is
       !> their friction. `n_row` rows, multipliers and defects.
       integer :: n_row = 0
@@ -121,19 +125,29 @@ contains
       if (pair > 0) i = id - system%first_constraint(pair)
    end subroutine constraint_place
 
-   !> Values and derivatives of all active constraints over a motion.
+   !> Is there anything that may push?
+   pure logical function constraints_push(self) result(push)
+      type(constraint_set_t), intent(in) :: self
+
+      push = self%n > 0 .or. self%damped%n > 0
+   end function constraints_push
+
+   !> Values and derivatives of all active constraints over a motion, and of what is damped.
    subroutine constraints_evaluate(self, system, motion, leaves_second)
       type(constraint_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(in), optional :: leaves_second       !! no second derivatives
       integer :: k, last, before
+      logical :: leaves
 
+      leaves = .false.
+      if (present(leaves_second)) leaves = leaves_second
+      if (self%damped%n > 0) call damped_evaluate(self%damped, system, motion, leaves)
       if (self%n == 0) return
       self%n_linear = count(self%id <= system%space%linear%n)
       self%n_held = count(self%id <= system%first_constraint(1))
-      self%item%leaves_second = .false.
-      if (present(leaves_second)) self%item%leaves_second = leaves_second
+      self%item%leaves_second = leaves
       last = 0
       before = 0
       do k = 1, size(system%held)
@@ -233,6 +247,7 @@ contains
       end do
       self%gap_rows%row_start = self%force_rows%row_start
       self%gap_rows%column = self%force_rows%column
+      call damped_rows(self%damped, numbering)
    end subroutine constraints_rows
 
    !> So many unknowns a condition stands on, at most.
@@ -333,11 +348,12 @@ contains
       type(csr_t), intent(in) :: base
       type(csr_t), intent(out) :: merged
       integer, allocatable, intent(out) :: slot(:)       !! (entries of `base`)
-      integer, allocatable :: user_start(:), user(:)
+      integer, allocatable :: row_start(:), column(:), user_start(:), user(:)
       integer :: i, j, k, l, n, pass
       integer, allocatable :: seen(:)
 
-      call list_rows(self%force_rows, self%n_linear + 1, user_start, user)
+      call curved_rows(self, row_start, column)
+      call list_rows(row_start, column, base%n_row, user_start, user)
       allocate(seen(base%n_row), slot(size(base%column)))
       merged%n_row = base%n_row
       merged%n_col = base%n_col
@@ -350,11 +366,9 @@ contains
                call add_column(base%column(k))
             end do
             do l = user_start(i), user_start(i + 1) - 1
-               associate (rows => self%force_rows, row => user(l))
-                  do k = rows%row_start(row) + 1, rows%row_start(row + 1)
-                     call add_column(rows%column(k))
-                  end do
-               end associate
+               do k = row_start(user(l)) + 1, row_start(user(l) + 1)
+                  call add_column(column(k))
+               end do
             end do
             if (pass == 2 .and. user_start(i + 1) > user_start(i)) then
                associate (part => merged%column(merged%row_start(i) + 1:n))
@@ -378,44 +392,61 @@ contains
 
    contains
 
-      subroutine add_column(column)
-         integer, intent(in) :: column
+      subroutine add_column(met)
+         integer, intent(in) :: met
 
-         if (seen(column + 1) == i) return
-         seen(column + 1) = i
+         if (seen(met + 1) == i) return
+         seen(met + 1) = i
          n = n + 1
-         if (pass == 2) merged%column(n) = column
+         if (pass == 2) merged%column(n) = met
       end subroutine add_column
 
    end subroutine constraints_merge_pattern
 
-   !> For each unknown the rows that it occurs in, from the `first` one on.
-   pure subroutine list_rows(rows, first, user_start, user)
-      type(csr_t), intent(in) :: rows
-      integer, intent(in) :: first
-      integer, allocatable, intent(out) :: user_start(:), user(:)
-      integer :: i, k, place(rows%n_col)
+   !> The unknowns of what has a part in the tangent: constraints with curvature, and what is damped.
+   pure subroutine curved_rows(self, row_start, column)
+      type(constraint_set_t), intent(in) :: self
+      integer, allocatable, intent(out) :: row_start(:)    !! (rows + 1)
+      integer, allocatable, intent(out) :: column(:)       !! from 0
 
-      allocate(user_start(rows%n_col + 1), source=0)
-      allocate(user(rows%row_start(rows%n_row + 1)))
-      do k = rows%row_start(first) + 1, size(user)
-         user_start(rows%column(k) + 2) = user_start(rows%column(k) + 2) + 1
+      associate (start => self%force_rows%row_start(self%n_linear + 1:self%n_row + 1), &
+            damped => self%damped)
+         row_start = start - start(1)
+         column = self%force_rows%column(start(1) + 1:start(size(start)))
+         if (damped%n == 0) return
+         row_start = [row_start, size(column) + damped%row_start(2:)]
+         column = [column, damped%column]
+      end associate
+   end subroutine curved_rows
+
+   !> For each of `n` unknowns the rows that it occurs in.
+   pure subroutine list_rows(row_start, column, n, user_start, user)
+      integer, intent(in) :: row_start(:)        !! (rows + 1)
+      integer, intent(in) :: column(:)           !! from 0
+      integer, intent(in) :: n
+      integer, allocatable, intent(out) :: user_start(:), user(:)
+      integer :: i, k, place(n)
+
+      allocate(user_start(n + 1), source=0)
+      allocate(user(size(column)))
+      do k = 1, size(column)
+         user_start(column(k) + 2) = user_start(column(k) + 2) + 1
       end do
       user_start(1) = 1
-      do i = 1, rows%n_col
+      do i = 1, n
          user_start(i + 1) = user_start(i + 1) + user_start(i)
          place(i) = user_start(i)
       end do
-      do i = first, rows%n_row
-         do k = rows%row_start(i) + 1, rows%row_start(i + 1)
-            user(place(rows%column(k) + 1)) = i
-            place(rows%column(k) + 1) = place(rows%column(k) + 1) + 1
+      do i = 1, size(row_start) - 1
+         do k = row_start(i) + 1, row_start(i + 1)
+            user(place(column(k) + 1)) = i
+            place(column(k) + 1) = place(column(k) + 1) + 1
          end do
       end do
    end subroutine list_rows
 
-   !> Forces lam_k g_k on all nodes of the constraints from the `first` one on, and with `magnitude`
-   !> the sum of their sizes.
+   !> Forces lam_k g_k on all nodes of the constraints from the `first` one on, and those of what is
+   !> damped; with `magnitude` the sum of their sizes.
    pure subroutine constraints_force(self, first, force, magnitude)
       type(constraint_set_t), intent(in) :: self
       integer, intent(in) :: first               !! place in the set, from 1
@@ -423,10 +454,12 @@ contains
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (2, n_node), added to
 
       call vector_zero(size(force), force)
-      if (first <= self%n) call add_forces(self, first, force, magnitude)
+      if (first <= self%n) call constraints_add_forces(self, first, force, magnitude)
+      call damped_add_forces(self%damped, force, magnitude)
    end subroutine constraints_force
 
-   pure subroutine add_forces(self, first, force, magnitude)
+   !> Add the forces lam_k g_k alone.
+   pure subroutine constraints_add_forces(self, first, force, magnitude)
       type(constraint_set_t), intent(in) :: self
       integer, intent(in) :: first
       real(wp), intent(inout), contiguous :: force(:, :)
@@ -442,9 +475,10 @@ contains
             if (present(magnitude)) magnitude(:, node) = magnitude(:, node) + abs(part)
          end do
       end do
-   end subroutine add_forces
+   end subroutine constraints_add_forces
 
-   !> Subtract the sum of lam_k d(discrete gradient of gap_k)/d q1 from the matrix `merged`.
+   !> Subtract the sum of lam_k d(discrete gradient of gap_k)/d q1 from the matrix `merged`, and the
+   !> derivatives of the forces of what is damped.
    subroutine constraints_add_curvature(self, numbering, merged)
       type(constraint_set_t), intent(in) :: self
       type(numbering_t), intent(in) :: numbering
@@ -464,8 +498,25 @@ contains
             end do
          end associate
       end do
+      do k = 1, self%damped%n
+         call add_stiffness(self%damped%item(k), damped_stiffness(self%damped, k))
+      end do
 
    contains
+
+      !> What forces fall by is added.
+      subroutine add_stiffness(item, stiffness)
+         type(condition_t), intent(in) :: item
+         real(wp), intent(in) :: stiffness(:, :)
+         integer :: i, j
+
+         do j = 1, size(stiffness, 2)
+            do i = 1, size(stiffness, 1)
+               call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), &
+                  -stiffness(i, j))
+            end do
+         end do
+      end subroutine add_stiffness
 
       !> Friction pushes against slip: the same of -`tau` times it.
       subroutine subtract_friction(item, tau)

@@ -1,0 +1,94 @@
+!> Viscous damping between surfaces, at one place of contact. It knows no mechanics.
+!>
+!> The pressure is mu(g) times the rate at which the gap g changes, mu a given value up to a part of
+!> a clearance, from there on falling linearly to 0 at the clearance. Over a step it is the mean of
+!> mu over the way of the gap: the impulse is then a function of where the gap begins and ends, and
+!> the work is never positive. Source: docs/theory.md, eqs. (14n) to (14q).
+module emcon_dashpot_law
+   use emcon_interactions, only : contact_damping_t
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: dashpot_at, dashpot_mean, dashpot_mean_slope
+
+contains
+
+   !> mu at the gap `gap`.
+   pure real(wp) function dashpot_at(law, gap) result(mu)
+      type(contact_damping_t), intent(in) :: law
+      real(wp), intent(in) :: gap                !! [L]
+
+      if (gap <= law%flat*law%clearance) then
+         mu = law%coefficient
+      else if (gap < law%clearance) then
+         mu = law%coefficient*((law%clearance - gap)/((1.0_wp - law%flat)*law%clearance))
+      else
+         mu = 0.0_wp
+      end if
+   end function dashpot_at
+
+   !> The mean of mu over the way from `gap` by `way`, >= 0; its derivative by the end of the way,
+   !> times the way, is mu there less it.
+   pure real(wp) function dashpot_mean(law, gap, way) result(mean)
+      type(contact_damping_t), intent(in) :: law
+      real(wp), intent(in) :: gap, way           !! [L]
+      real(wp) :: low, high, from, to
+
+      low = min(gap, gap + way)
+      high = max(gap, gap + way)
+      if (.not. high > low) then
+         mean = dashpot_at(law, gap)
+         return
+      end if
+      call falling_part(law, low, high, from, to)
+      mean = law%coefficient*((from - low)/(high - low)) &
+         + 0.5_wp*(dashpot_at(law, from) + dashpot_at(law, to))*((to - from)/(high - low))
+   end function dashpot_mean
+
+   !> The derivative of the mean by the end of the way: that of mu, weighted by the part of the way.
+   pure real(wp) function dashpot_mean_slope(law, gap, way) result(slope)
+      type(contact_damping_t), intent(in) :: law
+      real(wp), intent(in) :: gap, way           !! [L]
+      real(wp) :: from, to, part(2)
+
+      slope = 0.0_wp
+      if (.not. law%clearance > 0.0_wp) then
+         if (passes(0.0_wp)) slope = -law%coefficient*(abs(gap)/way**2)
+         return
+      end if
+      if (.not. law%flat < 1.0_wp) then
+         if (passes(law%clearance)) slope = -law%coefficient*(abs(law%clearance - gap)/way**2)
+         return
+      end if
+      if (.not. abs(way) > 0.0_wp) then
+         if (gap > law%flat*law%clearance .and. gap < law%clearance) slope = -0.5_wp*law%coefficient &
+            /((1.0_wp - law%flat)*law%clearance)
+         return
+      end if
+      call falling_part(law, min(gap, gap + way), max(gap, gap + way), from, to)
+      part = min(1.0_wp, max(0.0_wp, ([from, to] - gap)/way))
+      slope = -0.5_wp*abs(part(2) - part(1))*(part(1) + part(2))*law%coefficient &
+         /((1.0_wp - law%flat)*law%clearance)
+
+   contains
+
+      !> Does the way lead over `place`, where mu falls at once?
+      pure logical function passes(place)
+         real(wp), intent(in) :: place
+
+         passes = (gap < place .neqv. gap + way < place) .and. abs(way) > 0.0_wp
+      end function passes
+
+   end function dashpot_mean_slope
+
+   !> The part of the way from `low` up to `high` on which mu falls, or is 0 from `to` on.
+   pure subroutine falling_part(law, low, high, from, to)
+      type(contact_damping_t), intent(in) :: law
+      real(wp), intent(in) :: low, high          !! low < high [L]
+      real(wp), intent(out) :: from, to          !! low <= from <= to <= high [L]
+
+      from = min(high, max(low, law%flat*law%clearance))
+      to = min(high, max(from, law%clearance))
+   end subroutine falling_part
+
+end module emcon_dashpot_law
