@@ -23,7 +23,7 @@ _EFFORT = ("increment", "h", "newton", "cuts", "penetration", "cpu", "time")
 #: Columns that are measured by one scale, the largest of them.
 _FAMILIES = (("kinetic", "strain", "external_work", "contact_work", "stabilization",
               "restitution_loss", "scheme_loss", "damping_loss", "friction_loss",
-              "contact_energy", "total"),
+              "contact_damping_loss", "contact_energy", "total"),
              ("px", "py"))
 _NO_SERIES = ("RUN",)
 

@@ -390,7 +390,9 @@ class Model(Cards):
     def interaction(self, name: str, *, friction: Number | None = None,
                     friction_restitution: Number | None = None,
                     pad_thickness: Number | None = None,
-                    restitution: Number | None = None) -> Model:
+                    restitution: Number | None = None,
+                    damping: Number | Sequence[Number] | None = None,
+                    tangent_fraction: Number | None = None) -> Model:
         """`*SURFACE INTERACTION` with hard contact.
 
         friction        coefficient of Coulomb's law, 0 or more; default 0
@@ -400,7 +402,13 @@ class Model(Cards):
                         as thick as a radius is a circle
         restitution     0 to 1: the part of the velocity at which nodes with mass meet that is
                         left afterwards; default 1
+        damping         pressure by relative velocity [M/(L^2 T)]; or this, the clearance from
+                        which on there is none [L] and the part of that, 0 to 1, up to which it
+                        does not fall; default none
+        tangent_fraction   the part of it, 0 or more, against slip; default 0
         """
+        if damping is None and tangent_fraction is not None:
+            raise InputError("tangent_fraction is a part of damping: give damping too")
         if friction is None and friction_restitution is not None:
             raise InputError("friction_restitution is of what sticks: give friction too")
         text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness,
@@ -408,6 +416,10 @@ class Model(Cards):
         text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})
         if friction is not None:
             text += card("FRICTION", {"RESTITUTION": friction_restitution}, rows=[(friction,)])
+        if damping is not None:
+            row = tuple(damping) if isinstance(damping, Sequence) else (damping,)
+            text += card("CONTACT DAMPING", {"DEFINITION": "DAMPING COEFFICIENT",
+                                             "TANGENT FRACTION": tangent_fraction}, rows=[row])
         self._add(text)
         return self
 

@@ -182,7 +182,7 @@ def asked_losses(history: NDArray[np.void]) -> Array:
     """Energy that friction, damping and restitution took so far (n_row) [M L^2/T^2]."""
     columns = history.dtype.names or ()
     taken: Array = np.zeros(len(history))
-    for name in ("friction_loss", "damping_loss", "restitution_loss"):
+    for name in ("friction_loss", "damping_loss", "contact_damping_loss", "restitution_loss"):
         if name in columns:
             taken = taken + history[name]
     return taken

@@ -437,19 +437,20 @@ class Stepper(Queries, Conditions, Meshes):
         """`energies` and `momenta` together."""
         names = ("kinetic", "strain", "potential", "external_work", "contact_work",
                  "stabilization", "restitution_loss", "scheme_loss", "damping_loss",
-                 "friction_loss", "contact_energy", "total", *_MOMENTA[self.n_dim])
+                 "friction_loss", "contact_damping_loss", "contact_energy", "total",
+                 *_MOMENTA[self.n_dim])
         found = structure("emcon_ledger", self._handle.call(_core.emcon_get_ledger))
         return {name: found[name] for name in names}
 
     def energies(self) -> dict[str, float]:
         """Energies and works [M L^2/T^2]: kinetic, strain, potential, external_work, contact_work,
         stabilization, restitution_loss, scheme_loss, damping_loss, friction_loss,
-        contact_energy, total.
+        contact_damping_loss, contact_energy, total.
 
         `potential` is that of given forces; total = kinetic + strain + potential
         + contact_energy - external_work.
         """
-        return dict(list(self.ledger.items())[:12])
+        return dict(list(self.ledger.items())[:13])
 
     def momenta(self) -> dict[str, float]:
         """px, py [M L/T] and lz about the origin [M L^2/T]; of each body: `body_momenta`.

@@ -9,8 +9,8 @@ module emcon_deck_contact
       option_name, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : add_error, quoted, suggestion
-   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
-      formulation_segment
+   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_mortar, &
+      formulation_nts, formulation_segment
    use emcon_kinds, only : wp
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
@@ -52,6 +52,7 @@ contains
                   "there is no *SURFACE INTERACTION before")
                if (card%name == "CONTACTDAMPING") then
                   call read_contact_damping(reader, card, reader%damping(max(1, n)))
+                  if (n == 0) reader%damping(1) = contact_damping_t()
                else if (card%name == "FRICTION") then
                   call read_friction(reader, card, reader%friction(max(1, n)))
                   call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &

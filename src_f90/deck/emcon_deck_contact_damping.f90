@@ -22,10 +22,11 @@ contains
       type(contact_damping_t), intent(inout) :: damping
       type(data_t) :: data
       integer :: n
+      logical :: is_known, is_number
 
       damping = contact_damping_t()
-      call read_definition(reader, card)
-      call read_tangent(reader, card, damping%tangent)
+      call read_definition(reader, card, is_known)
+      call read_tangent(reader, card, damping%tangent, is_number)
       call data_open(data, card)
       n = 0
       do while (next_line(reader, data))
@@ -41,17 +42,20 @@ contains
          if (data%ok) call check_line(reader, data, damping)
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
+      if (.not. (is_known .and. is_number)) damping = contact_damping_t()
    end subroutine read_contact_damping
 
    !> DEFINITION of a card: what it is without.
-   subroutine read_definition(reader, card)
+   subroutine read_definition(reader, card, is_known)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      logical, intent(out) :: is_known           !! else it is refused
       character(len=*), parameter :: known = "DAMPING COEFFICIENT"
 
+      is_known = .false.
       select case (option_name(card, "DEFINITION"))
       case ("", "DAMPINGCOEFFICIENT")
-         continue
+         is_known = .true.
       case ("CRITICALDAMPINGFRACTION")
          call refuse_option(reader, card, "DEFINITION", known, &
             "what is critical is by a contact stiffness, and contact that is held exactly has none")
@@ -61,13 +65,14 @@ contains
    end subroutine read_definition
 
    !> TANGENT FRACTION of a card; 0 where it is absent.
-   subroutine read_tangent(reader, card, tangent)
+   subroutine read_tangent(reader, card, tangent, is_ok)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       real(wp), intent(inout) :: tangent
+      logical, intent(out) :: is_ok              !! else it is refused
       real(wp) :: number
-      logical :: is_ok
 
+      is_ok = .true.
       if (.not. has_option(card, "TANGENTFRACTION")) return
       call read_real(option_name(card, "TANGENTFRACTION"), number, is_ok)
       if (is_ok) is_ok = number >= 0.0_wp

@@ -162,7 +162,7 @@ module emcon_deck_keywords
       keyword_t("CONTACT EXCLUSIONS", in_both, "", "list what touches by *CONTACT INCLUSIONS"), &
       keyword_t("CONTACT FORMULATION", in_both, "", "all with all holds the nodes of both sides"), &
       keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
-      keyword_t("CHANGE FRICTION", in_step, "", "there is no friction"), &
+      keyword_t("CHANGE FRICTION", in_step, "", "friction is that of its interaction"), &
       keyword_t("MODEL CHANGE", in_step, "", "pairs and elements stay for the whole run"), &
       keyword_t("DSLOAD", in_step, "", "use *DLOAD with element faces"), &
       keyword_t("BASE MOTION", in_step, "", "use *BOUNDARY with an amplitude"), &

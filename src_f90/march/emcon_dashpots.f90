@@ -13,6 +13,9 @@ module emcon_dashpots
    public :: dashpots_t, dashpots_begin_step, dashpots_restart, dashpots_look, dashpots_select, &
       dashpots_work, dashpots_idle
 
+   !> A gap of less than this fraction of an edge is round-off.
+   real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
+
    type :: dashpots_t
       logical :: is_on = .false.                 !! some pair is damped, in this step
       real(wp), allocatable :: area(:)           !! (n_constraint) of contacts that are [L^2]
@@ -95,9 +98,19 @@ contains
          comes_near = gap%is_near .and. gap%is_over .and. .not. (gap%is_arriving .or. &
             gap%is_leaving)
          comes_near = comes_near .and. gap%gap0 >= -contact%deepest_start*gap%size .and. &
-            min(gap%gap0, gap%gap1) < contact%damping%clearance
+            (min(gap%gap0, gap%gap1) < contact%damping%clearance .or. touches(contact, i))
       end associate
    end function comes_near
+
+   !> Without a clearance, is the gap of constraint `i` none but for round-off? It need not act: of a
+   !> rigid body a few nodes hold all.
+   pure logical function touches(contact, i)
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i
+
+      touches = .not. (contact%damping%clearance > 0.0_wp .or. contact%gives_way) .and. &
+         contact%state(i)%gap0 <= touch_tol*contact%state(i)%size
+   end function touches
 
    !> Let what is near be damped beside `set`. What contact holds exactly is closed, whatever gap
    !> that leaves.
@@ -121,7 +134,8 @@ contains
             dashpot(j)%law = contact%damping
             dashpot(j)%area = contact%share(i)*self%area(id(j))
             dashpot(j)%gap = contact%state(i)%gap0
-            dashpot(j)%is_closed = is_active(id(j)) .and. .not. contact%gives_way
+            dashpot(j)%is_closed = (is_active(id(j)) .and. .not. contact%gives_way) .or. &
+               touches(contact, i)
          end associate
       end do
       call damped_select(set%damped, id, dashpot)

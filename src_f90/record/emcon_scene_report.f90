@@ -104,6 +104,14 @@ contains
       how = "both"
       if (.not. pair%both_sides) how = "one"
       call row_put(row, "sides", how, "")
+      if (pair%friction > 0.0_wp) call row_put(row, "friction", pair%friction, ", friction #")
+      associate (damping => pair%damping)
+         if (.not. damping%coefficient > 0.0_wp) return
+         call row_put(row, "damping", damping%coefficient, ", damping #")
+         call row_put(row, "damping_clearance", damping%clearance, " up to a clearance of #")
+         call row_put(row, "damping_flat", damping%flat, "")
+         call row_put(row, "tangent_fraction", damping%tangent, ", # of it against slip")
+      end associate
    end subroutine describe_pair
 
    !> A row for each tie.

@@ -23,6 +23,7 @@ DIMENSION = {
     "scheme_loss": (2, 1, -2),
     "damping_loss": (2, 1, -2),
     "friction_loss": (2, 1, -2),
+    "contact_damping_loss": (2, 1, -2),
     "contact_energy": (2, 1, -2),
     "total": (2, 1, -2),
     "px": (1, 1, -1),

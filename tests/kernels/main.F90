@@ -23,6 +23,8 @@ program main
    use test_corotated, only : collect_corotated
    use test_critical_step, only : collect_critical_step
    use test_csr, only : collect_csr
+   use test_damped, only : collect_damped
+   use test_dashpot_law, only : collect_dashpot_law
    use test_dgrad, only : collect_dgrad
    use test_dgrad_near, only : collect_dgrad_near
    use test_dgrad_series, only : collect_dgrad_series
@@ -134,6 +136,7 @@ program main
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("friction", collect_friction)
+   call run("dashpot_law", collect_dashpot_law)
    call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)
    call run("dgrad_near", collect_dgrad_near)
@@ -168,6 +171,7 @@ program main
    call run("hermite_gap", collect_hermite_gap)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar", collect_mortar)
+   call run("damped", collect_damped)
    call run("tie", collect_tie)
    call run("tie_partner", collect_tie_partner)
    call run("tie_balance", collect_tie_balance)

@@ -29,11 +29,11 @@ def balance(history, scale=0.0):
 
 
 def block_over_floor(h, t_end, *, height=0.0, velocity=(0.0, 0.0), gravity=0.0, cells=(4, 2),
-                     rigid=True, sides=ONE, stiffness=2e4):
+                     rigid=True, sides=ONE, stiffness=2e4, floor=((-2, -1), (8, 1), (7, 1))):
     """A block of 2 by 1 whose bottom is above a floor that is held."""
     scene = Scene(h, t_end, gravity=gravity)
     scene.block("BLOCK", (0, height), (2, 1), cells, stiffness=stiffness, velocity=velocity)
-    scene.block("FLOOR", (-2, -1), (8, 1), (7, 1), stiffness=stiffness)
+    scene.block("FLOOR", *floor, stiffness=stiffness)
     scene.hold("FLOOR", lambda x, y: True)
     scene.side("BOTTOM", "BLOCK", lambda x, y: y < height + 1e-9)
     scene.side("TOP", "FLOOR", lambda x, y: y > -1e-9)
