@@ -96,9 +96,10 @@ contains
       if (damping%clearance < 0.0_wp) call data_error(reader, data, "the clearance " // &
          to_text(damping%clearance) // " is negative")
       if (damping%flat < 0.0_wp .or. damping%flat > 1.0_wp) call data_error(reader, data, &
-         "the fraction of the clearance " // to_text(damping%flat) // " is not a number from 0 to 1")
-      if (data%n > 3) call data_error(reader, data, "a coefficient, a clearance and a fraction " // &
-         "of it are read; leave out what stands behind them")
+         "the fraction of the clearance " // to_text(damping%flat) // " is not a number from 0 " &
+         // "to 1")
+      if (data%n > 3) call data_error(reader, data, "a coefficient, a clearance and a fraction " &
+         // "of it are read; leave out what stands behind them")
       if (.not. data%ok) damping = contact_damping_t()
    end subroutine check_line
 
@@ -114,8 +115,8 @@ contains
          if (.not. pair(i)%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
          do k = 1, size(step)
             if (.not. step(k)%scheme%masses_resist .or. step(k)%scheme%takes_damping) cycle
-            call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " // &
-               "has *CONTACT DAMPING, which does not go with SCHEME=" // &
+            call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
+               // "has *CONTACT DAMPING, which does not go with SCHEME=" // &
                trim(step(k)%scheme%word) // " of step " // to_text(k) // &
                "; use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
             exit
@@ -125,7 +126,8 @@ contains
             cycle
          end if
          if (any(step%initiation == initiation_massless .and. step%scheme%masses_resist)) call &
-            warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as PERSISTENT does")
+            warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as " // &
+            "PERSISTENT does")
          if (pair(i)%damping%clearance > 0.0_wp .or. pair(i)%damping%tangent > 0.0_wp) cycle
          if (.not. any(step%constraint_method == method_penalty)) call warn(pair(i), &
             "damps nothing: what contact holds exactly does not move along its normal; give a " // &
@@ -138,8 +140,8 @@ contains
          type(contact_pair_t), intent(in) :: of_pair
          character(len=*), intent(in) :: what
 
-         call add_warning(reader%log, of_pair%origin, "*CONTACT PAIR: the *CONTACT DAMPING of its " &
-            // "surface interaction " // what)
+         call add_warning(reader%log, of_pair%origin, "*CONTACT PAIR: the *CONTACT DAMPING of " &
+            // "its surface interaction " // what)
       end subroutine warn
 
    end subroutine check_contact_damping

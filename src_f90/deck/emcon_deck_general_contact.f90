@@ -204,8 +204,7 @@ contains
    end subroutine find_exterior
 
    !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions
-   !> mean the same, hard contact; pads, restitution, friction and damping are of
-   !> pairs only.
+   !> mean the same, hard contact; pads, restitution, friction and damping are of pairs only.
    subroutine check_properties(reader, card, scene)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -238,9 +237,9 @@ contains
             if (reader%friction(i) > 0.0_wp) call data_error(reader, data, "the surface " // &
                "interaction " // quoted(name) // " has *FRICTION, which is of pairs only; " // &
                "name what it is of by *CONTACT PAIR")
-            if (reader%damping(i)%coefficient > 0.0_wp) call data_error(reader, data, "the surface " &
-               // "interaction " // quoted(name) // " has *CONTACT DAMPING, which is of pairs " // &
-               "only; name what it is of by *CONTACT PAIR")
+            if (reader%damping(i)%coefficient > 0.0_wp) call data_error(reader, data, "the " // &
+               "surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is of " // &
+               "pairs only; name what it is of by *CONTACT PAIR")
             if (reader%pad(i) > 0.0_wp) call data_error(reader, data, "the surface interaction " &
                // quoted(name) // " has a PAD THICKNESS, which has no meaning where surfaces may " &
                // "be in contact with themselves; name what it keeps apart by *CONTACT PAIR")

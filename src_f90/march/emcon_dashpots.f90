@@ -102,8 +102,8 @@ contains
       end associate
    end function comes_near
 
-   !> Without a clearance, is the gap of constraint `i` none but for round-off? It need not act: of a
-   !> rigid body a few nodes hold all.
+   !> Without a clearance, is the gap of constraint `i` none but for round-off? It need not act: of
+   !> a rigid body a few nodes hold all.
    pure logical function touches(contact, i)
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i

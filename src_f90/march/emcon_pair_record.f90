@@ -28,6 +28,11 @@ module emcon_pair_record
       real(wp), allocatable :: area(:)
    end type pair_record_t
 
+   !> Places in a list; none if the last is before the first.
+   type :: range_t
+      integer :: first = 1, last = 0
+   end type range_t
+
 contains
 
    !> A record for the pairs of `system` in which nothing has acted.
@@ -68,7 +73,8 @@ contains
                x, u, du, lag)
             if (system%contact(k)%of_pair < 0) call exchange_sides(total)
             if (last >= first .or. to >= from) then
-               call measure_nodes(self, system, k, set, [first, last], [from, to])
+               call measure_nodes(self, system, k, set, range_t(first, last), &
+                  range_t(from, to))
             else
                self%force(:, before + 1:n) = 0.0_wp
             end if
@@ -121,7 +127,8 @@ contains
       type(system_t), intent(in) :: system
       integer, intent(in) :: k
       type(constraint_set_t), intent(in) :: set
-      integer, intent(in) :: own(2), damped(2)   !! first and last of it in the set, of what is damped
+      type(range_t), intent(in) :: own           !! of it, in the set
+      type(range_t), intent(in) :: damped        !! and of what is damped
       real(wp) :: force(size(self%force, 1), size(system%space%body))
       integer :: j, i, first
 
@@ -132,10 +139,10 @@ contains
             force(:, node(i)) = 0.0_wp
             if (twin(i) > 0) force(:, twin(i)) = 0.0_wp
          end do
-         do j = own(1), own(2)
+         do j = own%first, own%last
             call add_forces(set%item(j), set%lam(j))
          end do
-         do j = damped(1), damped(2)
+         do j = damped%first, damped%last
             call add_forces(set%damped%item(j), set%damped%dashpot(j)%push)
          end do
          do i = 1, size(node)

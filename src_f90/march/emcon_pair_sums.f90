@@ -5,7 +5,7 @@
 module emcon_pair_sums
    use emcon_constraint, only : condition_drag, condition_force, condition_t
    use emcon_constraints, only : constraint_set_t
-   use emcon_damped, only : damped_work
+   use emcon_damped, only : damped_t, damped_work
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -33,6 +33,12 @@ module emcon_pair_sums
       !> (n_contact) the pair that each contact belongs to, negative: its slave side is the second
       integer, allocatable :: of_pair(:)
    end type pair_sums_t
+
+   !> What forces on a slave side are to a pair.
+   type :: side_t
+      logical :: is_first = .true.               !! they are on the first surface
+      logical :: masses_resist = .true.          !! forces are means over the motion, else its end
+   end type side_t
 
 contains
 
@@ -82,12 +88,10 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: masses_resist       !! forces are means over the motion, else its end
-      real(wp) :: part
       integer :: k, contact, p
 
       if (size(self%sum) == 0) return
       if (.not. masses_resist) call pair_sums_begin(self%sum)
-      part = merge(0.5_wp, 1.0_wp, masses_resist .and. .not. motion%pose%pushes_at_end)
       self%sum%span = self%sum%span + h
       self%sum%is_pressed = .false.
       contact = 1
@@ -97,58 +101,65 @@ contains
          end do
          p = abs(self%of_pair(contact))
          associate (item => set%item(k))
-            call add_forces(self%sum(p), item, set%lam(k), self%of_pair(contact) > 0)
+            call add_forces(self%sum(p), item, set%lam(k), motion, h, side_t( &
+               self%of_pair(contact) > 0, masses_resist))
             if (item%rubs) self%sum(p)%friction = self%sum(p)%friction &
                + condition_drag(item, set%lam(k))*item%slip
          end associate
          self%sum(p)%is_pressed = self%sum(p)%is_pressed .or. abs(set%lam(k)) > 0.0_wp
       end do
-      contact = 1
-      do k = 1, set%damped%n
-         do while (set%damped%id(k) > system%first_constraint(contact + 1))
-            contact = contact + 1
-         end do
-         p = abs(self%of_pair(contact))
-         call add_forces(self%sum(p), set%damped%item(k), set%damped%dashpot(k)%push, &
-            self%of_pair(contact) > 0)
-         self%sum(p)%damping = self%sum(p)%damping + damped_work(set%damped, k)
-      end do
+      call add_damped(self, system, set%damped, motion, h)
       if (.not. masses_resist) return
       where (self%sum%is_pressed) self%sum%duration = self%sum%duration + h
+   end subroutine pair_sums_add
 
-   contains
+   !> The same of what is damped, in a dynamic step.
+   pure subroutine add_damped(self, system, damped, motion, h)
+      type(pair_sums_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(damped_t), intent(in) :: damped
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: h
+      integer :: k, contact
 
-      !> Add the forces of a condition on its slave side.
-      pure subroutine add_forces(sum, item, lam, is_first)
-         type(pair_sum_t), intent(inout) :: sum
-         type(condition_t), intent(in) :: item
-         real(wp), intent(in) :: lam             !! its multiplier, or push [M L/T^2]
-         logical, intent(in) :: is_first         !! its slave side is the first surface
-         integer :: i
-
-         do i = 1, item%n_slave
-            call add(sum, h*condition_force(item, lam, i), motion%x(:, item%node(i)) &
-               + (motion%u0(:, item%node(i)) + part*motion%du(:, item%node(i))), is_first)
+      contact = 1
+      do k = 1, damped%n
+         do while (damped%id(k) > system%first_constraint(contact + 1))
+            contact = contact + 1
          end do
-      end subroutine add_forces
+         associate (sum => self%sum(abs(self%of_pair(contact))))
+            call add_forces(sum, damped%item(k), damped%dashpot(k)%push, motion, h, side_t( &
+               self%of_pair(contact) > 0, .true.))
+            sum%damping = sum%damping + damped_work(damped, k)
+         end associate
+      end do
+   end subroutine add_damped
 
-      !> Add `push` on a node at `place`.
-      pure subroutine add(sum, push, place, is_first)
-         type(pair_sum_t), intent(inout) :: sum
-         real(wp), intent(in) :: push(:), place(:)   !! (n_dim) [M L/T], [L]
-         logical, intent(in) :: is_first             !! it is on the first surface
-         real(wp) :: signed(size(push))
+   !> Add the forces of a condition on the nodes of its slave side, by the size `h` of the step.
+   pure subroutine add_forces(sum, item, lam, motion, h, side)
+      type(pair_sum_t), intent(inout) :: sum
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: lam                !! its multiplier, or push [M L/T^2]
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      type(side_t), intent(in) :: side
+      real(wp), dimension(size(motion%x, 1)) :: push, place, signed
+      real(wp) :: part
+      integer :: i
 
-         signed = merge(push, -push, is_first)
-         associate (n => size(push))
+      part = merge(0.5_wp, 1.0_wp, side%masses_resist .and. .not. motion%pose%pushes_at_end)
+      do i = 1, item%n_slave
+         push = h*condition_force(item, lam, i)
+         associate (node => item%node(i), n => size(push))
+            place = motion%x(:, node) + (motion%u0(:, node) + part*motion%du(:, node))
+            signed = merge(push, -push, side%is_first)
             sum%push(:n) = sum%push(:n) + signed
-            if (masses_resist) sum%impulse(:n) = sum%impulse(:n) + signed
+            if (side%masses_resist) sum%impulse(:n) = sum%impulse(:n) + signed
             sum%weight = sum%weight + sqrt(dot_product(push, push))
             sum%moment(:n) = sum%moment(:n) + sqrt(dot_product(push, push))*place
          end associate
-      end subroutine add
-
-   end subroutine pair_sums_add
+      end do
+   end subroutine add_forces
 
    !> Add what jumps of the velocities push at the end of a step.
    pure subroutine pair_sums_push(self, push)

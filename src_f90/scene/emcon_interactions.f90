@@ -33,7 +33,7 @@ module emcon_interactions
    type :: contact_damping_t
       real(wp) :: coefficient = 0.0_wp               !! pressure by velocity, >= 0 [M/(L^2 T)]
       real(wp) :: clearance = 0.0_wp                 !! from which on there is none, >= 0 [L]
-      real(wp) :: flat = 0.0_wp                      !! part of it up to which it is constant, 0 to 1
+      real(wp) :: flat = 0.0_wp                      !! part of it where it is constant, 0 to 1
       real(wp) :: tangent = 0.0_wp                   !! part of it along the surface, >= 0
    end type contact_damping_t
 

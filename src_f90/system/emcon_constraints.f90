@@ -403,7 +403,7 @@ contains
 
    end subroutine constraints_merge_pattern
 
-   !> The unknowns of what has a part in the tangent: constraints with curvature, and what is damped.
+   !> The unknowns of what is in the tangent: constraints with curvature, and what is damped.
    pure subroutine curved_rows(self, row_start, column)
       type(constraint_set_t), intent(in) :: self
       integer, allocatable, intent(out) :: row_start(:)    !! (rows + 1)
@@ -461,9 +461,9 @@ contains
    !> Add the forces lam_k g_k alone.
    pure subroutine constraints_add_forces(self, first, force, magnitude)
       type(constraint_set_t), intent(in) :: self
-      integer, intent(in) :: first
-      real(wp), intent(inout), contiguous :: force(:, :)
-      real(wp), intent(inout), contiguous, optional :: magnitude(:, :)
+      integer, intent(in) :: first               !! place in the set, from 1
+      real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
+      real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (n_dim, n_node)
       real(wp) :: part(size(force, 1))
       integer :: k, i, node
 
@@ -483,56 +483,43 @@ contains
       type(constraint_set_t), intent(in) :: self
       type(numbering_t), intent(in) :: numbering
       type(csr_t), intent(inout) :: merged
-      integer :: k, i, j, n_dim
+      integer :: k, n
 
       do k = self%n_linear + 1, self%n
          associate (item => self%item(k))
-            n_dim = size(item%g, 1)
-            if (item%rubs) call subtract_friction(item, condition_drag(item, self%lam(k)))
-            if (all(abs(item%h(:n_dim*item%n_node, :n_dim*item%n_node)) <= 0.0_wp)) cycle
-            do j = 1, n_dim*item%n_node
-               do i = 1, n_dim*item%n_node
-                  call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), &
-                     self%lam(k)*item%h(i, j))
-               end do
-            end do
+            n = size(item%g, 1)*item%n_node
+            ! Friction pushes against slip.
+            if (item%rubs) call subtract_sum(item, -condition_drag(item, self%lam(k)), &
+               item%ht(:n, :n), numbering, merged)
+            if (all(abs(item%h(:n, :n)) <= 0.0_wp)) cycle
+            call subtract_sum(item, self%lam(k), item%h(:n, :n), numbering, merged)
          end associate
       end do
       do k = 1, self%damped%n
-         call add_stiffness(self%damped%item(k), damped_stiffness(self%damped, k))
+         call subtract_sum(self%damped%item(k), -1.0_wp, damped_stiffness(self%damped, k), &
+            numbering, merged)
+      end do
+   end subroutine constraints_add_curvature
+
+   !> Subtract `factor` times the derivatives `h` by the freedoms of a condition, shared out over
+   !> their terms.
+   subroutine subtract_sum(item, factor, h, numbering, merged)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: h(:, :)            !! (n, n) coordinates node by node
+      type(numbering_t), intent(in) :: numbering
+      type(csr_t), intent(inout) :: merged
+      integer :: i, j
+
+      do j = 1, size(h, 2)
+         do i = 1, size(h, 1)
+            call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), factor*h(i, j))
+         end do
       end do
 
    contains
 
-      !> What forces fall by is added.
-      subroutine add_stiffness(item, stiffness)
-         type(condition_t), intent(in) :: item
-         real(wp), intent(in) :: stiffness(:, :)
-         integer :: i, j
-
-         do j = 1, size(stiffness, 2)
-            do i = 1, size(stiffness, 1)
-               call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), &
-                  -stiffness(i, j))
-            end do
-         end do
-      end subroutine add_stiffness
-
-      !> Friction pushes against slip: the same of -`tau` times it.
-      subroutine subtract_friction(item, tau)
-         type(condition_t), intent(in) :: item
-         real(wp), intent(in) :: tau
-         integer :: i, j
-
-         do j = 1, n_dim*item%n_node
-            do i = 1, n_dim*item%n_node
-               call subtract_terms(constraint_dof(item, i), constraint_dof(item, j), &
-                  -tau*item%ht(i, j))
-            end do
-         end do
-      end subroutine subtract_friction
-
-      !> Subtract `value` at the freedoms `row`, `column`, shared out over their terms.
+      !> Subtract `value` at the freedoms `row`, `column`.
       subroutine subtract_terms(row, column, value)
          integer, intent(in) :: row, column
          real(wp), intent(in) :: value
@@ -549,7 +536,7 @@ contains
          end do
       end subroutine subtract_terms
 
-   end subroutine constraints_add_curvature
+   end subroutine subtract_sum
 
    !> Degree of freedom of local coordinate `i` of a constraint.
    pure integer function constraint_dof(item, i)

@@ -49,7 +49,7 @@ contains
    pure real(wp) function dashpot_mean_slope(law, gap, way) result(slope)
       type(contact_damping_t), intent(in) :: law
       real(wp), intent(in) :: gap, way           !! [L]
-      real(wp) :: from, to, part(2)
+      real(wp) :: from, to, part_from, part_to
 
       slope = 0.0_wp
       if (.not. law%clearance > 0.0_wp) then
@@ -61,13 +61,14 @@ contains
          return
       end if
       if (.not. abs(way) > 0.0_wp) then
-         if (gap > law%flat*law%clearance .and. gap < law%clearance) slope = -0.5_wp*law%coefficient &
-            /((1.0_wp - law%flat)*law%clearance)
+         if (gap > law%flat*law%clearance .and. gap < law%clearance) slope = &
+            -0.5_wp*law%coefficient/((1.0_wp - law%flat)*law%clearance)
          return
       end if
       call falling_part(law, min(gap, gap + way), max(gap, gap + way), from, to)
-      part = min(1.0_wp, max(0.0_wp, ([from, to] - gap)/way))
-      slope = -0.5_wp*abs(part(2) - part(1))*(part(1) + part(2))*law%coefficient &
+      part_from = min(1.0_wp, max(0.0_wp, (from - gap)/way))
+      part_to = min(1.0_wp, max(0.0_wp, (to - gap)/way))
+      slope = -0.5_wp*abs(part_to - part_from)*(part_from + part_to)*law%coefficient &
          /((1.0_wp - law%flat)*law%clearance)
 
    contains

@@ -244,7 +244,7 @@ def everything() -> Model:
     model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))
     model.interaction("I", friction=0.0, friction_restitution=0.5, pad_thickness=0.0,
-                      restitution=0.5)
+                      restitution=0.5, damping=(0.0, 0.1, 0.5), tangent_fraction=0.5)
     model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO",
                        initiation="PERSISTENT")
     model.contact(interaction="I").contact("S1", ("S1", "S2"))
@@ -332,6 +332,11 @@ def test_keywords_of_every_deck_have_a_method(path: Path) -> None:
 def test_restitution_of_friction_goes_with_friction() -> None:
     with pytest.raises(errors.InputError, match="give friction too"):
         Model().interaction("I", friction_restitution=0.5)
+
+
+def test_a_part_of_damping_goes_with_damping() -> None:
+    with pytest.raises(errors.InputError, match="give damping too"):
+        Model().interaction("I", tangent_fraction=0.5)
 
 
 # --- messages ----------------------------------------------------------------------------------

@@ -168,7 +168,8 @@ def test_drift_of_a_start_from_rest_is_relative_to_the_largest_energy(run: Path)
     assert energy_drift(history)[1] == 0.0 and not energy_drift(history)[0].any()
 
 
-@pytest.mark.parametrize("name", ["friction_loss", "damping_loss", "restitution_loss"])
+@pytest.mark.parametrize("name", ["friction_loss", "damping_loss", "contact_damping_loss",
+                                  "restitution_loss"])
 def test_what_is_asked_for_is_no_drift(run: Path, name: str) -> None:
     history = read_history(locate(run))
     before = energy_drift(history)

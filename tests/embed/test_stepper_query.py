@@ -176,6 +176,19 @@ def test_friction_is_not_evaluated_from_outside(tmp_path: Path) -> None:
         assert ring.ledger["friction_loss"] > 0
 
 
+def test_damping_is_not_evaluated_from_outside(tmp_path: Path) -> None:
+    """What is near is told by increments alone; these go on."""
+    deck = tmp_path/"damped.inp"
+    deck.write_text(RING.read_text(encoding="utf-8").replace(
+        "*SURFACE BEHAVIOR", "*CONTACT DAMPING\n0.5, 0.1\n*SURFACE BEHAVIOR", 1))
+    with Stepper(deck, h=H) as ring:
+        with pytest.raises(InputError, match="CONTACT DAMPING is not evaluated from outside"):
+            ring.residual(ring.u, H)
+        ring.run(until=1.0)
+        assert ring.ledger["contact_damping_loss"] > 0
+        assert ring.energies()["contact_damping_loss"] == ring.ledger["contact_damping_loss"]
+
+
 # --- constraints -------------------------------------------------------------------------------
 
 def test_discrete_gradients_of_the_gaps(contact: Contact) -> None:

@@ -143,6 +143,26 @@ def test_friction(tmp_path, formulation):
     np.testing.assert_array_equal(np.ldexp(taken[1], -energy), taken[0])
 
 
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_contact_damping(tmp_path, formulation):
+    """A pressure by velocity, and a length."""
+    units = (-13, 7, 5)
+    parameters = {"h": 0.02, "t_end": 0.4, "frame": 0.2, "formulation": formulation}
+    runs = []
+    for exponents in ((0, 0, 0), units):
+        deck = in_units(*exponents, **parameters)
+        coefficient = float(np.ldexp(0.5, int(np.dot((-2, 1, -1), exponents))))
+        clearance = float(np.ldexp(0.125, exponents[0]))
+        deck.replace("NAME=FRICTIONLESS", "NAME=FRICTIONLESS\n*CONTACT DAMPING, TANGENT FRACTION"
+                     f"=0.75\n{coefficient!r}, {clearance!r}, 0.25")
+        runs.append(run_deck(deck, tmp_path/str(len(runs))))
+    assert runs[0].history["contact_damping_loss"][-1] > 0
+    assert_same_bits(runs[1], runs[0], units)
+    taken = [run.history["pair1_contact_damping_loss"] for run in runs]
+    energy = int(np.dot(DIMENSION["contact_damping_loss"], units))
+    np.testing.assert_array_equal(np.ldexp(taken[1], -energy), taken[0])
+
+
 FORMULATIONS = [
     {"formulation": "NODE TO SURFACE", "smoothing": "HERMITE"},
     {"formulation": "SEGMENT", "multiplier": "STANDARD"},

@@ -27,7 +27,7 @@ contains
       tests = [ &
          test_case_t("the mean by the way is what the impulse falls by", test_mean), &
          test_case_t("of ways one after the other impulses add up", test_sum), &
-         test_case_t("the mean of no way is the coefficient, never outside its bounds", test_small), &
+         test_case_t("the mean of no way is the coefficient, within its bounds", test_small), &
          test_case_t("its slope is its derivative", test_slope)]
    end subroutine collect_dashpot_law
 

@@ -211,7 +211,7 @@ def test_a_surface_of_nodes_has_a_force_by_velocity(tmp_path):
     """Five nodes without area: each takes coefficient times velocity."""
     deck = block_over_floor(0.02, 0.4, height=0.45, velocity=(0.0, -0.5))
     deck.replace("*SURFACE INTERACTION, NAME=SMOOTH", "*SURFACE, NAME=NODES, TYPE=NODE\n"
-                 "1\n2\n3\n4\n5\n*SURFACE INTERACTION, NAME=SMOOTH")
+                 "1\n4\n7\n10\n13\n*SURFACE INTERACTION, NAME=SMOOTH")
     deck.replace("BOTTOM, TOP", "NODES, TOP")
     run = run_deck(damped(deck, 0.2, 0.5, 1.0), tmp_path, **NODES)
     obeys(run)
