@@ -314,9 +314,9 @@ int emcon_is_done(emcon_model *model);
 int emcon_run(emcon_model *model, double time, emcon_progress progress, emcon_log log, void *user);
 
 /* Write results as a run of the program does, from the present state on: `base`.vtkhdf, .h5, .csv,
- * a row and what the deck asks for after each increment of whichever function; until it is ended,
- * which adds `base`.json, or the model is closed. Where they cannot be written any more, the record
- * ends and the increment tells so. */
+ * a row and what the deck asks for after each increment of whichever function, and `base`.log, with
+ * what failed; until it is ended, which adds `base`.json, or the model is closed. Where they cannot
+ * be written any more, the record ends and the increment tells so. */
 int emcon_record(emcon_model *model, const char *base);
 int emcon_end_record(emcon_model *model);
 

@@ -9,8 +9,7 @@ module emcon_model
    use emcon_c_types, only : sizes_c
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_input, err_none, error_t, raise
-   use emcon_kinds, only : dp
-   use emcon_recorder, only : recorder_t
+   use emcon_record, only : record_t
    use emcon_rotation, only : n_turn
    use emcon_stepper, only : stepper_t
    use emcon_stepper_query, only : query_follow, query_t
@@ -38,9 +37,7 @@ module emcon_model
       type(csr_t) :: matrix(6)                           !! asked for last, each kind in its place
       type(c_text_t) :: text(4)                          !! likewise
       real(c_double), allocatable :: c_field(:, :)       !! asked for last
-      type(recorder_t), allocatable :: recorder          !! of a run that is written down
-      character(len=:), allocatable :: base              !! of its files
-      real(dp) :: wall_start = 0.0_dp                    !! [s]
+      type(record_t), allocatable :: record              !! of a run that is written down
    end type model_t
 
 contains

@@ -5,12 +5,8 @@ module emcon_model_record
    use emcon_march, only : increment_t
    use emcon_model, only : model_t
    use emcon_quantities, only : quantity_of_field, quantity_variables
-   use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
-      recorder_write
+   use emcon_record, only : record_begin, record_end, record_failure, record_increment
    use emcon_text, only : nearest_word, string_t, to_upper
-   use emcon_timer, only : wall_seconds
-   use emcon_verdict, only : verdict_end, verdict_t
-   use emcon_verdict_file, only : verdict_write
    implicit none
    private
    public :: model_field, model_record, model_end_record, model_keep
@@ -48,60 +44,43 @@ contains
       type(model_t), intent(inout) :: model
       character(len=*), intent(in) :: base       !! of their names
       type(error_t), allocatable, intent(out) :: error
-      type(increment_t) :: nothing
 
-      if (allocated(model%recorder)) then
-         call raise(error, err_input, "the run is recorded already, into " // model%base // &
-            ".*: end that first")
+      if (allocated(model%record)) then
+         call raise(error, err_input, "the run is recorded already, into " // &
+            model%record%base // ".*: end that first")
       else if (size(model%stepper%scene%step) == 0) then
          call raise(error, err_input, "a model of a host has no run that could be recorded")
       end if
       if (allocated(error)) return
-      model%base = base
-      model%wall_start = wall_seconds()
-      allocate(model%recorder)
-      call recorder_open(model%recorder, model%stepper, base, error)
-      if (allocated(error)) then
-         deallocate(model%recorder)
-      else
-         call model_keep(model, nothing, error)
-      end if
+      allocate(model%record)
+      call record_begin(model%record, model%stepper, base, error)
+      if (allocated(error)) deallocate(model%record)
    end subroutine model_record
 
-   !> Record the present state after `increment`, if that is asked for. A failure ends the record.
+   !> Record the present state after `increment`, or why there was none, if that is asked for. A
+   !> failure to write ends the record.
    subroutine model_keep(model, increment, error)
       type(model_t), intent(inout) :: model
       type(increment_t), intent(in) :: increment
       type(error_t), allocatable, intent(inout) :: error
-      type(error_t), allocatable :: second
-      real(dp) :: cpu
 
-      if (allocated(error) .or. .not. allocated(model%recorder)) return
-      call cpu_time(cpu)
-      call recorder_write(model%recorder, model%stepper, increment, cpu, error)
-      if (.not. allocated(error)) call recorder_publish(model%recorder, .false., error)
-      if (.not. allocated(error)) return
-      call recorder_close(model%recorder, second)
-      deallocate(model%recorder)
+      if (.not. allocated(model%record)) return
+      if (allocated(error)) then
+         call record_failure(model%record, error%message)
+         return
+      end if
+      call record_increment(model%record, model%stepper, increment, error)
+      if (allocated(error)) deallocate(model%record)
    end subroutine model_keep
 
    !> Complete the files, and write the verdict on what led to this state.
    subroutine model_end_record(model, error)
       type(model_t), intent(inout) :: model
       type(error_t), allocatable, intent(out) :: error
-      type(error_t), allocatable :: second
-      type(verdict_t) :: verdict
 
-      if (.not. allocated(model%recorder)) return
-      call recorder_finish(model%recorder, wall_seconds() - model%wall_start, 0.0_dp, 0.0_dp, error)
-      call recorder_close(model%recorder, second)
-      deallocate(model%recorder)
-      if (.not. allocated(error)) call move_alloc(second, error)
-      if (allocated(error)) return
-      verdict = model%stepper%verdict
-      call verdict_end(verdict)
-      call verdict_write(verdict, model%stepper%march, model%base // ".json", &
-         '"recorded": true', error)
+      if (.not. allocated(model%record)) return
+      call record_end(model%record, model%stepper, error)
+      deallocate(model%record)
    end subroutine model_end_record
 
 end module emcon_model_record

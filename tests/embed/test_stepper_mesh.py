@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT/"pywrap"))
 
-from emcon import InputError, Results, Stepper, mesh  # noqa: E402
+from emcon import AnalysisError, InputError, Model, Results, Stepper, mesh  # noqa: E402
 
 DECK = ROOT/"input_decks"/"ring.inp"
 SETTINGS = {"h": 0.05, "t_end": 1.5}
@@ -46,6 +46,39 @@ def test_files_of_a_run_are_those_of_the_program(
         assert np.array_equal(mine.fields.times, theirs.fields.times)
         for name, field in theirs.fields.items():
             assert np.array_equal(mine.fields[name], field, equal_nan=True), name
+    log, of_program = (Path(f"{path}.log").read_text().splitlines()
+                       for path in (base, tmp_path/"ring"))
+    parts = next(k for k, line in enumerate(of_program) if line.startswith("phase "))
+    assert log == of_program[:parts] and log[-1].startswith("verdict: good")
+
+
+def test_a_log_tells_from_where_on_and_what_failed(tmp_path: Path) -> None:
+    """A step that is not made leaves its reason, and the record goes on behind it."""
+    block = mesh.block(cells=(2, 2))
+    model = Model.from_mesh(block)
+    model.material("RUBBER", coupled_neo_hooke=(100.0, 0.3)).section("RUBBER", "BLOCK")
+    model.boundary("BLOCK_BOTTOM")
+    model.step("STATIC", h=0.25, nlgeom=True).boundary("BLOCK_TOP", 2, -1.5)
+    with model.stepper() as stepper:
+        stepper.step()
+        (tmp_path/"run.json").write_text("of a run before")
+        with pytest.raises(AnalysisError) as caught:
+            stepper.run(output=tmp_path)
+        assert not (tmp_path/"run.json").read_text().startswith("of a run before")
+        log = (tmp_path/"run.log").read_text().splitlines()
+        made = [int(line.split()[0]) for line in log if line[:10].strip().isdigit()]
+    assert Path(__file__).name in log[0]
+    assert "recorded from increment 1 on, time 0.25" in log
+    assert str(caught.value) in log and made == [2]
+
+
+def test_a_name_is_recorded_into_by_one_at_a_time(tmp_path: Path) -> None:
+    with Stepper(DECK, **SETTINGS) as ring, Stepper(DECK, **SETTINGS) as other:
+        with pytest.raises(OSError, match="ring.log"):
+            ring.run(output=tmp_path/"ring", callback=lambda *_: other.run(output=tmp_path/"ring"))
+        assert other.run(until=0.1, output=tmp_path/"ring") == 2
+    with Results(tmp_path/"ring") as result:
+        assert len(result.history) == 3
 
 
 def test_fields_are_those_of_the_file(recorded: tuple[Stepper, Path]) -> None:
