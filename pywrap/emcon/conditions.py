@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -23,6 +25,8 @@ class Conditions:
 
     _handle: Handle
     n_dim: int
+    element_labels: np.ndarray
+    surface: Callable[[str], np.ndarray]
 
     def set_point_load(self, node: ArrayLike, dof: ArrayLike, value: ArrayLike) -> None:
         """Give the force on degree of freedom `dof` (1 to n_dim) of `node` a new value [M L/T^2].
@@ -37,6 +41,13 @@ class Conditions:
         The arguments are numbers or lists, and the deck has such a load in the present step.
         """
         self._set_loads(_core.EMCON_LOAD_PRESSURE, element, face, value)
+
+    def set_surface_pressure(self, surface: str, value: ArrayLike) -> None:
+        """Give the pressure on all faces of a surface, or on each, a new value [M/(L T^2)].
+
+        The deck has such a load on each face in the present step.
+        """
+        self.set_pressure(*self._faces(surface), value)
 
     def set_gravity(self, element: ArrayLike, value: ArrayLike) -> None:
         """Give the gravity on `element` a new value [L/T^2]; its direction stays.
@@ -59,6 +70,20 @@ class Conditions:
         As `add_point_load`.
         """
         self._add_loads(_core.EMCON_LOAD_PRESSURE, element, face, value)
+
+    def add_surface_pressure(self, surface: str, value: ArrayLike) -> None:
+        """Let a pressure [M/(L T^2)], > 0 inwards, act on all faces of a surface from now on.
+
+        As `add_point_load`; a list has a value for each face, in the order of `surface(name)`.
+        """
+        self.add_pressure(*self._faces(surface), value)
+
+    def _faces(self, surface: str) -> tuple[np.ndarray, np.ndarray]:
+        """Labels of elements and numbers of faces of a surface."""
+        row, face = self.surface(surface).T
+        if not row.size:
+            raise InputError(f"surface {surface} has no faces of elements")
+        return self.element_labels[row], face
 
     def add_gravity(self, element: ArrayLike, value: ArrayLike, direction: ArrayLike) -> None:
         """Let gravity [L/T^2] act on `element` from now on, along `direction`, n_dim numbers.

@@ -67,6 +67,15 @@ class Step(Cards):
             raise InputError(f"a face is 1 to 6, not {face!r}")
         return self._distributed(where, [f"P{int(face)}", value], op, amplitude, delay)
 
+    def surface_pressure(self, surface: str, value: Number, *, amplitude: str | None = None,
+                         delay: Number | None = None, op: Op | None = None) -> Step:
+        """`*DSLOAD`: pressure [M/(L T^2)], positive inwards, on all faces of a surface.
+
+        op      NEW: all pressures that earlier steps gave to surfaces go
+        """
+        return self._card("DSLOAD", {"OP": op, "AMPLITUDE": amplitude, "TIME DELAY": delay},
+                          [(surface, "P", value)])
+
     def gravity(self, where: Where, g: Number, direction: Sequence[Number] = (0.0, -1.0), *,
                 amplitude: str | None = None, delay: Number | None = None,
                 op: Op | None = None) -> Step:

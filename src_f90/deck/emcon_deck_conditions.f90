@@ -296,14 +296,14 @@ contains
       call move_alloc(grown_dropped, dropped)
    end subroutine grow_marks
 
-   !> Drop the loads of earlier steps: point loads, or those on elements.
-   subroutine drop_loads(self, on_nodes)
+   !> Drop the loads of earlier steps that one kind of card gave.
+   subroutine drop_loads(self, given)
       type(conditions_t), intent(inout) :: self
-      logical, intent(in) :: on_nodes
+      integer, intent(in) :: given                 !! one of `by_`
       integer :: i
 
       do i = 1, self%n_load
-         if (is_on_node(self%load(i)) .neqv. on_nodes) cycle
+         if (self%load(i)%given /= given) cycle
          if (self%load_step(i) == self%step) cycle
          self%load_dropped(i) = .true.
          self%load(i)%value = 0.0_wp

@@ -97,6 +97,8 @@ module emcon_deck_keywords
       keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER,!FOLLOWER," &
          // "!SECTOR"), &
       keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER"), &
+      keyword_t("DSLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER,!SUBMODEL," &
+         // "!FOLLOWER,!ORIENTATION,!CONSTANTRESULTANT"), &
       keyword_t("CONSTRAINT METHOD", in_step, "TYPE=,STIFFNESS=,FACTOR=,TOLERANCE=", &
          has_data=.false.), &
       keyword_t("CONTACT INITIATION", in_step, "TYPE=,GAPTOLERANCE=", has_data=.false.), &
@@ -164,7 +166,6 @@ module emcon_deck_keywords
       keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
       keyword_t("CHANGE FRICTION", in_step, "", "friction is that of its interaction"), &
       keyword_t("MODEL CHANGE", in_step, "", "pairs and elements stay for the whole run"), &
-      keyword_t("DSLOAD", in_step, "", "use *DLOAD with element faces"), &
       keyword_t("BASE MOTION", in_step, "", "use *BOUNDARY with an amplitude"), &
       keyword_t("CONTROLS", in_step, "", "use *NEWTON"), &
       keyword_t("FREQUENCY", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &

@@ -1,12 +1,11 @@
-!> *BOUNDARY, *CLOAD and *DLOAD: the cards. What their entries mean: `emcon_deck_conditions`.
+!> *BOUNDARY and *CLOAD: the cards. What their entries mean: `emcon_deck_conditions`.
 module emcon_deck_loads
    use emcon_deck_conditions, only : conditions_t, drop_loads, drop_prescribed, put_load, &
       put_prescribed
    use emcon_deck_dimension, only : freedoms_text, n_plane
-   use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, get_real, is_blank, next_line
-   use emcon_deck_named, only : get_elements, get_nodes
+   use emcon_deck_named, only : get_nodes
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
       refuse_option
    use emcon_deck_rigid, only : mark_rigid
@@ -14,13 +13,11 @@ module emcon_deck_loads
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_centrifugal, load_gravity, load_moment, load_point, &
-      load_pressure, load_t, &
-      prescribed_t
+   use emcon_steps, only : by_node, load_moment, load_point, load_t, prescribed_t
    use emcon_text, only : to_text
    implicit none
    private
-   public :: read_boundary, read_cload, read_dload
+   public :: read_boundary, read_cload, card_amplitude, is_new
 
    !> Degrees of freedom are numbered up to this one: 3 is out of the plane, 4 to 6 are rotations.
    integer, parameter :: last_freedom = 6
@@ -297,7 +294,7 @@ contains
       logical :: is_moment
       integer :: i
 
-      if (is_new(reader, card)) call drop_loads(self, on_nodes=.true.)
+      if (is_new(reader, card)) call drop_loads(self, by_node)
       new%origin = card%origin
       new%amplitude = card_amplitude(reader, card, scene)
       call data_open(data, card)
@@ -345,125 +342,5 @@ contains
             // " does not exist; known: " // freedoms_text(scene%n_dim))
       end if
    end subroutine check_force
-
-   !> *DLOAD: element or set, P1..P4, pressure; or GRAV, acceleration, direction; or CENTRIF, square
-   !> of the angular velocity, point and direction of the axis.
-   subroutine read_dload(reader, card, scene, self)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(scene_t), intent(in) :: scene
-      type(conditions_t), intent(inout) :: self
-      type(data_t) :: data
-      type(load_t) :: new
-      integer, allocatable :: item(:)
-      integer :: i
-
-      if (is_new(reader, card)) call drop_loads(self, on_nodes=.false.)
-      new%origin = card%origin
-      new%amplitude = card_amplitude(reader, card, scene)
-      call data_open(data, card)
-      do while (next_line(reader, data))
-         call check_count(reader, data, 2, 9, "element or element set, load type, magnitude")
-         if (data%ok) call read_load_type(reader, data, scene, new)
-         if (data%ok) call get_elements(reader, data, 1, scene, item)
-         if (data%ok) call check_faces(reader, data, scene, item, new%place)
-         if (.not. data%ok) cycle
-         do i = 1, size(item)
-            new%target = item(i)
-            call put_load(self, new)
-         end do
-      end do
-   end subroutine read_dload
-
-   subroutine check_faces(reader, data, scene, item, face)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: item(:)
-      integer, intent(in) :: face
-      logical :: has_not(size(item))
-
-      has_not = scene%kind(scene%element_kind(item))%n_face < face
-      if (any(has_not)) call data_error(reader, data, "element " &
-         // label_list(pack(scene%element_label(item), has_not)) // " has no face " &
-         // to_text(face))
-   end subroutine check_faces
-
-   !> Kind, place, value and direction of a load on elements, of up to `n_face` faces.
-   subroutine read_load_type(reader, data, scene, new)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      type(scene_t), intent(in) :: scene
-      type(load_t), intent(inout) :: new
-      character(len=:), allocatable :: name
-      integer :: n_face
-
-      n_face = maxval(scene%kind%n_face)
-      call get_name(reader, data, 2, "load type", name)
-      new%value = 0.0_wp
-      new%direction = 0.0_wp
-      new%point = 0.0_wp
-      call get_real(reader, data, 3, "magnitude", new%value)
-      if (.not. data%ok) return
-      new%place = face_number(name, "P", n_face)
-      if (new%place > 0) then
-         new%kind = load_pressure
-         call check_count(reader, data, 2, 3, "element or element set, load type, pressure")
-         return
-      end if
-      select case (name)
-      case ("GRAV")
-         new%kind = load_gravity
-         call check_count(reader, data, 2, 6, "element or element set, GRAV, g, nx, ny, nz")
-         call read_vector(reader, data, 4, "direction", new%direction)
-         if (.not. data%ok) then
-            return
-         else if (any(abs(new%direction(scene%n_dim + 1:)) > 0.0_wp)) then
-            call data_error(reader, data, "the model is plane: gravity has no third component")
-         end if
-         call make_unit(reader, data, "gravity needs a direction: set, GRAV, g, nx, ny", new)
-      case ("CENTRIF")
-         new%kind = load_centrifugal
-         new%place = -1                            ! it holds beside gravity
-         call read_vector(reader, data, 4, "point of the axis", new%point)
-         call read_vector(reader, data, 7, "direction of the axis", new%direction)
-         call make_unit(reader, data, "CENTRIF needs an axis: set, CENTRIF, omega**2, px, py, " &
-            // "pz, nx, ny, nz", new)
-      case ("CORIO", "BX", "BY", "BZ", "P1NU", "P2NU", "P3NU", "P4NU", "HP1", "NEWTON")
-         call data_error(reader, data, "load type " // name // " is known but not supported; " &
-            // "supported: " // face_names("P", n_face) // ", GRAV, CENTRIF")
-      case default
-         call data_error(reader, data, "unknown load type " // quoted(name) &
-            // "; known: " // face_names("P", n_face) // ", GRAV, CENTRIF")
-      end select
-   end subroutine read_load_type
-
-   !> Three numbers from field `first` on.
-   subroutine read_vector(reader, data, first, what, vector)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      integer, intent(in) :: first
-      character(len=*), intent(in) :: what
-      real(wp), intent(inout) :: vector(3)         !! what is left out stays
-      integer :: k
-
-      do k = 1, size(vector)
-         call get_real(reader, data, first - 1 + k, what, vector(k))
-      end do
-   end subroutine read_vector
-
-   !> The direction of a load to length 1.
-   subroutine make_unit(reader, data, missing, new)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      character(len=*), intent(in) :: missing      !! what is told where there is none
-      type(load_t), intent(inout) :: new
-      real(wp) :: length
-
-      if (.not. data%ok) return
-      length = norm2(new%direction)
-      if (length > 0.0_wp) new%direction = new%direction/length
-      if (.not. length > 0.0_wp) call data_error(reader, data, missing)
-   end subroutine make_unit
 
 end module emcon_deck_loads

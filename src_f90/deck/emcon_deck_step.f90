@@ -10,12 +10,13 @@ module emcon_deck_step
    use emcon_deck_contact_settings, only : check_massless, check_restitution, check_statics, &
       pairs_ask, read_controls, read_initiation, read_interference
    use emcon_deck_damping, only : check_damping
+   use emcon_deck_element_loads, only : read_dload, read_dsload
    use emcon_deck_explicit, only : check_explicit_cards, suit_explicit
    use emcon_deck_friction, only : check_friction
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
    use emcon_deck_increments, only : check_increments, read_events, read_tolerance
-   use emcon_deck_loads, only : read_boundary, read_cload, read_dload
+   use emcon_deck_loads, only : read_boundary, read_cload
    use emcon_deck_mortar, only : read_mortar, read_smoothing
    use emcon_deck_options, only : choose_option
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
@@ -366,6 +367,8 @@ contains
             call read_cload(reader, card, scene, conditions)
          case ("DLOAD")
             call read_dload(reader, card, scene, conditions)
+         case ("DSLOAD")
+            call read_dsload(reader, card, scene, conditions)
          case default
             if (is_output(card)) call read_output(reader, card, scene, requests)
          end select

@@ -40,7 +40,7 @@ contains
 
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
-            if (.not. (any(card%name == ["BOUNDARY", "CLOAD   ", "DLOAD   "]) &
+            if (.not. (any(card%name == ["BOUNDARY", "CLOAD   ", "DLOAD   ", "DSLOAD  "]) &
                .and. has_option(card, "TIMEDELAY"))) cycle
             call read_real(option_name(card, "TIMEDELAY"), delay, ok)
             if (.not. ok) then

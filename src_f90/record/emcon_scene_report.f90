@@ -151,7 +151,7 @@ contains
             "no *TIE, no *EQUATION, no *RIGID BODY")
          call choose("inertia", is_dynamic, "all steps are static")
          call choose("large displacements", any(scene%step%nlgeom), "no step has NLGEOM")
-         call choose("pressure and other loads", has_loads(scene), "no *CLOAD, no *DLOAD")
+         call choose("pressure and other loads", has_loads(scene), "no *CLOAD, *DLOAD, *DSLOAD")
          call choose("stabilization of loose bodies", any(scene%step%stabilizes), &
             "not asked for by *CONTACT CONTROLS")
       end associate

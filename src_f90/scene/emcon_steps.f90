@@ -10,6 +10,7 @@ module emcon_steps
    private
    public :: prescribed_t, turn_t, load_t, scheme_choice_t, softness_t, step_t
    public :: load_point, load_pressure, load_gravity, load_moment, load_centrifugal
+   public :: by_node, by_element, by_surface
    public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
       initiation_massless
    public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
@@ -19,6 +20,7 @@ module emcon_steps
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4, &
       load_centrifugal = 5
+   integer, parameter :: by_node = 1, by_element = 2, by_surface = 3
    integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
       initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2, method_penalty = 3, &
@@ -61,6 +63,7 @@ module emcon_steps
       real(wp) :: direction(3) = 0.0_wp              !! of gravity or an axis: unit vector
       real(wp) :: point(3) = 0.0_wp                  !! on that axis [L]
       integer :: amplitude = 0
+      integer :: given = by_node                     !! by which card: one of `by_`
    end type load_t
 
    !> The scheme of steps of its card, of this step and later ones.

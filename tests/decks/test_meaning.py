@@ -32,6 +32,8 @@ BAR = f"""\
 *DENSITY
 {DENSITY}
 *SOLID SECTION, ELSET=BAR, MATERIAL=M
+*SURFACE, NAME=UPPER
+BAR, S3
 *AMPLITUDE, NAME=LATE
 0., 0., 0.5, 0., 1., 1.
 *BOUNDARY
@@ -78,7 +80,10 @@ def assert_pulled(done, *forces):
     ("*DLOAD\nBAR, P3, -1.\nBAR, P3, -0.5\n", 1.5),
     ("*DLOAD\nBAR, P3, -1.\n*DLOAD, AMPLITUDE=LATE\n1, P3, -0.5\n", 1.5),
     ("*DLOAD\nBAR, P3, -1.\n*CLOAD\nEND, 2, 0.5\n", 2.0),
-], ids=["lines", "cards", "amplitude", "op-new", "pressure", "pressures", "both"])
+    ("*DSLOAD\nUPPER, P, -1.\n*DSLOAD, AMPLITUDE=LATE\nupper, p, -0.5\n", 1.5),
+    ("*DSLOAD\nUPPER, P, -1.\n*DLOAD, OP=NEW\nBAR, P3, -0.5\nUPPER, P, -0.25\n", 1.75),
+], ids=["lines", "cards", "amplitude", "op-new", "pressure", "pressures", "both", "surface",
+        "faces"])
 def test_loads_of_one_step_are_added(cards, force, tmp_path):
     assert_pulled(run(tmp_path, BAR + static(cards)), force)
 
@@ -93,6 +98,25 @@ def test_loads_of_one_step_are_added(cards, force, tmp_path):
 def test_loads_of_a_later_step_replace_all_of_an_earlier_one(second, forces, tmp_path):
     first = "*CLOAD\nEND, 2, 1.\nEND, 2, 0.5\n"
     assert_pulled(run(tmp_path, BAR + static(first, second)), *forces)
+
+
+@pytest.mark.parametrize("second, forces", [
+    ("*DSLOAD\nUPPER, P, -4.\n", (1.5, 4.0)),
+    ("*DLOAD\nBAR, P3, -4.\n", (1.5, 4.0)),
+    ("*DSLOAD, OP=NEW\n", (1.5, 0.0)),
+    ("*DLOAD, OP=NEW\n", (1.5, 1.5)),
+    ("", (1.5, 1.5)),
+], ids=["surface", "face", "new", "new-of-elements", "kept"])
+def test_a_face_has_the_pressure_of_the_last_step_that_gave_one(second, forces, tmp_path):
+    """By whichever card; OP=NEW drops what cards of its own kind gave."""
+    first = "*DSLOAD\nUPPER, P, -1.\nUPPER, P, -0.5\n"
+    assert_pulled(run(tmp_path, BAR + static(first, second)), *forces)
+
+
+def test_new_loads_on_elements_leave_those_on_surfaces(tmp_path):
+    first = "*DSLOAD\nUPPER, P, -1.\n*DLOAD\nBAR, P1, 2.\n"
+    kept = run(tmp_path, BAR + static(first, "*DLOAD, OP=NEW\n"))
+    assert ends(kept)[1] == pytest.approx(pulled(1.0)[0], abs=DIGITS*COMPLIANCE*LENGTH)
 
 
 def test_a_replaced_sum_is_left_along_a_ramp(tmp_path):

@@ -257,6 +257,7 @@ def everything() -> Model:
     step.boundary("N", 1, 0.5, amplitude="AMP", delay=0.25, fixed=True, op="NEW")
     step.load([2, "N"], 2, 0.5, amplitude="AMP", delay=0.25, op="MOD")
     step.pressure("E", 1, 0.5, amplitude="AMP", delay=0.25, op="NEW").gravity(0, 9.81, (0.0, -1.0))
+    step.surface_pressure("S1", 0.5, amplitude="AMP", delay=0.25, op="MOD")
     step.constraint_method("<method>")
     step.constraint_method("AUGMENTED LAGRANGE", stiffness=1e3, tolerance=1e-6)
     step.constraint_method("PENALTY", factor=2)

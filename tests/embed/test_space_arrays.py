@@ -149,6 +149,29 @@ def test_conditions(tmp_path: Path) -> None:
                 call()
 
 
+def test_pressure_on_a_surface(tmp_path: Path) -> None:
+    """On all of its faces, as on each: of a deck, changed, and added between steps."""
+    mesh = Block("C3D8", (2, 2, 1), (1, 1, 0.5))
+    head = "*BOUNDARY\n" + "".join(f"{k}, 1, 3\n" for k in mesh.on(2, 0))
+    head += "*SURFACE, NAME=UPPER\nALL, S2\n*SURFACE, NAME=LOOSE, TYPE=NODE\nNALL\n"
+    step = "*STEP, NLGEOM\n*DYNAMIC, DIRECT\n0.1, 1.\n{}*END STEP\n"
+    with Stepper(deck(tmp_path, mesh.deck(RUBBER, head + step.format("")))) as one:
+        one.add_surface_pressure("upper", 40.0)
+        one.step()
+        one.set_surface_pressure("UPPER", [10.0, 20.0, 30.0, 40.0])
+        one.step()
+        for name, what in (("NONE", "NONE"), ("LOOSE", "no faces"), (3, "surface")):
+            with pytest.raises(InputError, match=what):
+                one.set_surface_pressure(name, 1.0)
+        surface = one.u
+    loaded = head + step.format("*DSLOAD\nUPPER, P, 40.\n")
+    with Stepper(deck(tmp_path, mesh.deck(RUBBER, loaded))) as other:
+        other.step()
+        other.set_pressure([1, 2, 3, 4], 2, [10.0, 20.0, 30.0, 40.0])
+        other.step()
+        assert np.array_equal(surface, other.u) and np.abs(surface).max() > 1e-2
+
+
 def test_faces_and_cells(tmp_path: Path) -> None:
     with Stepper(deck(tmp_path, flight("C3D20"))) as block:
         assert block.surface("END").tolist() == [[0, 1]]
@@ -162,10 +185,10 @@ def test_a_model_of_arrays_is_that_of_the_deck(kind: str, tmp_path: Path) -> Non
     mesh = Block(kind, (2, 2, 2), (2, 1, 1))
     model = Model.from_arrays(mesh.x, {kind: np.array(mesh.element) - 1})
     model.material("M", neo_hooke=(20.0, 0.01), density=0.5).section("M")
-    model.surface("END", faces=[(0, 3)])
+    model.surface("END", faces=[(1, 4)])
     model.boundary(mesh.on(0, 0) - 1)
     step = model.step("STATIC", 0.5, 1.0, nlgeom=True)
-    step.pressure(1, 4, 0.3).gravity("ALL", 2.0, (0.3, -0.5, 0.8))
+    step.surface_pressure("END", 0.3).gravity("ALL", 2.0, (0.3, -0.5, 0.8))
     step.load(int(mesh.on(0, 1)[0]) - 1, (1, 3), (0.05, -0.02))
     held = "".join(f"{k}, 1, 3\n" for k in mesh.on(0, 0))
     text = mesh.deck(RUBBER, f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.5, 1.\n*DLOAD\n"

@@ -166,6 +166,7 @@ def test_everything_of_a_closed_stepper_says_so(one: Path) -> None:
         "restore": (saved,), "write_restart": ("closed.rst.h5",), "prescribe": (1, 1, 0.0),
         "element_set": ("ALL",), "surface": ("ALL",), "field": ("U",), "release": (1, 1),
         "set_point_load": (1, 1, 0.0), "set_pressure": (1, 1, 0.0),
+        "set_surface_pressure": ("ALL", 0.0), "add_surface_pressure": ("ALL", 0.0),
         "set_gravity": (1, 0.0), "add_point_load": (1, 1, 0.0), "add_pressure": (1, 1, 0.0),
         "add_gravity": (1, 0.0, (0.0, -1.0)), "set_threads": (1,), "node_set": ("ALL",)}
     free = {"close", "from_restart"}
