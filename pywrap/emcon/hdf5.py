@@ -20,6 +20,10 @@ class ResultError(Exception):
     """A result that is missing, foreign, broken or closed; the text is for the user."""
 
 
+class MissingResult(ResultError, FileNotFoundError):
+    """A result that is not there."""
+
+
 def open_file(path: Path) -> h5py.File:
     """Open for reading, without a lock: a run may still be writing."""
     if not path.is_file():

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fields import FieldFile, FieldSeries
-from .hdf5 import Array, ResultError, opened, read
+from .hdf5 import Array, MissingResult, ResultError, opened, read
 from .series import HistoryFile, Series
 
 __all__ = ["Array", "Bodies", "FieldFile", "FieldSeries", "HistoryFile", "Pairs", "ResultError",
@@ -96,8 +96,8 @@ def locate(result: str | os.PathLike[str]) -> ResultPaths:
     if base.name in ("", "..") or not any(
             p.is_file() for p in (paths.table, paths.history, paths.field)):
         hint = "; that is a folder, give FOLDER/NAME" if path.is_dir() else ""
-        raise ResultError(f"no result {base}: neither {paths.table.name} nor "
-                          f"{paths.history.name} nor {paths.field.name} is there{hint}")
+        raise MissingResult(f"no result {base}: neither {paths.table.name} nor "
+                            f"{paths.history.name} nor {paths.field.name} is there{hint}")
     return paths
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,9 @@ from .memory import structure, text
 from .meshes import Meshes
 from .model import Model
 from .queries import ConstraintReport, Evaluation, Queries, contact_arguments, of_all
+
+if TYPE_CHECKING:
+    from .results import Results
 
 __all__ = ["AnalysisError", "ConstraintReport", "Csr", "Evaluation", "Increment", "InputError",
            "PairTotal", "Snapshot", "Stepper"]
@@ -115,6 +118,7 @@ class Stepper(Queries, Conditions, Meshes):
     def _begin(self, build: Callable[[Handle], None]) -> None:
         """A library model, made by `build` in its handle."""
         self._handle = Handle()
+        self._base: str | None = None            # of the files of the last run with output=
         try:
             build(self._handle)
             sizes = self._sizes()
@@ -250,11 +254,23 @@ class Stepper(Queries, Conditions, Meshes):
         elif not os.path.isdir(os.path.dirname(base) or "."):
             raise FileNotFoundError(2, "no such folder", os.path.dirname(base))
         self._handle.call(_core.emcon_record, os.fsencode(base))
+        self._base = os.path.abspath(base)
         try:
             yield
         finally:
             if self._handle.address:             # a callback may have closed the stepper
                 self._handle.call(_core.emcon_end_record)
+
+    def results(self) -> Results:
+        """What the last `run` with `output=` has left, also of a stepper that is closed.
+
+        Fields are read from the files when they are asked for; close it, or use it by `with`.
+        """
+        if self._base is None:
+            raise InputError("nothing was recorded: give output= to run")
+        from .results import Results             # HDF5 takes long to load
+
+        return Results(self._base)
 
     @property
     def fraction(self) -> float:

@@ -13,7 +13,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT/"pywrap"))
 
-from emcon import AnalysisError, InputError, Model, Results, Stepper, mesh  # noqa: E402
+from emcon import (AnalysisError, InputError, Model, ResultError, Results, Stepper,  # noqa: E402
+                   mesh)
 
 DECK = ROOT/"input_decks"/"ring.inp"
 SETTINGS = {"h": 0.05, "t_end": 1.5}
@@ -156,10 +157,13 @@ def test_a_part_of_a_run_is_recorded_alone(tmp_path: Path) -> None:
         assert ring.t_end == 0.5 and ring.fraction == 0.0
         ring.run(until=0.2)
         assert ring.fraction == pytest.approx(0.4, rel=100*EPS)
+        with pytest.raises(InputError, match="output="):
+            ring.results()
         ring.run(until=0.3, output=tmp_path)
         ring.run()
         assert ring.fraction == 1.0
-    with Results(tmp_path/"run") as part:
+    with ring.results() as part:
+        assert str(tmp_path/"run") in repr(part)
         assert np.allclose(part.history["time"], [0.2, 0.25, 0.3])
         fields = part.fields
         assert "run.vtkhdf" in repr(fields)
@@ -203,6 +207,9 @@ def test_files_and_copies_that_cannot_be(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no such file") as caught:
         Stepper(tmp_path/"none.inp")
     assert isinstance(caught.value, InputError)
+    with pytest.raises(FileNotFoundError, match="no result") as missing:
+        Results(tmp_path/"none")
+    assert isinstance(missing.value, ResultError)
     with Stepper(DECK) as ring:
         with pytest.raises(FileNotFoundError):
             ring.run(output=tmp_path/"no"/"such")
