@@ -221,6 +221,17 @@ def test_the_source_archive_of_the_project(tmp_path: Path) -> None:
     assert "License-Expression: BSD-3-Clause" in metadata and archive.stat().st_size < 10e6
 
 
+def test_the_recipe_of_conda_says_what_the_project_says() -> None:
+    """Version, summary, and the bounds of what it needs; matplotlib goes by another name there."""
+    recipe = (ROOT/".ci"/"conda"/"recipe.yaml").read_text(encoding="utf-8")
+    assert f'version: "{VERSION}"' in recipe and f"summary: {PROJECT['description']}" in recipe
+    run_time = recipe.split("  run:\n")[1].split("\n\n")[0].replace("matplotlib-base", "matplotlib")
+    asked = sorted(line.removeprefix("    - ").replace(" ", "") for line in run_time.splitlines())
+    needed = [name.replace(" ", "").replace(">=2.0,", ">=2,") for name in PROJECT["dependencies"]]
+    assert asked == sorted([*needed, "python"])
+    assert PROJECT["requires-python"] == ">=3.11" and '"<3.11"' in recipe
+
+
 def test_the_program_of_an_unpacked_wheel(wheel: Path, tmp_path: Path) -> None:
     """The command `emcon` of a wheel runs, checks, draws and tells of what there is not."""
     folder = tmp_path/"unpacked"
