@@ -14,7 +14,7 @@ module emcon_run
    use emcon_recorder, only : recorder_close, recorder_finish, recorder_open, recorder_publish, &
       recorder_resume, recorder_t, recorder_write
    use emcon_restart, only : restart_read, restart_t, restart_write
-   use emcon_restart_data, only : restart_check, restart_exchange, restart_list
+   use emcon_restart_data, only : restart_check, restart_exchange, restart_list, restart_offers
    use emcon_pace, only : pace_begin, pace_end, pace_is_due, pace_t
    use emcon_phases, only : n_phase, phase_eliminate, phase_gaps, phase_judge, phase_search, &
       phases_seconds, phases_start
@@ -240,6 +240,11 @@ contains
       n_row = 0
       n_frame = 0
       call restart_read(restart, path, error)
+      if (.not. allocated(error)) then
+         if (.not. restart_offers(restart, "counts", .false.)) call raise(error, err_input, path &
+            // ": a stepper wrote this file, not a run; go on by Stepper.from_restart of Python " &
+            // "or emcon_load of C")
+      end if
       if (.not. allocated(error)) call stepper_load(run%stepper, restart, error, options%further)
       if (.not. allocated(error)) then
          call exchange_files(restart, n_row, n_frame, build)

@@ -292,6 +292,17 @@ def test_arrays_are_copied_once_at_most() -> None:
 
 # --- restart files -----------------------------------------------------------------------------
 
+def test_the_program_tells_a_file_of_a_stepper(tmp_path: Path) -> None:
+    """What was changed of its conditions is for a stepper: the program would go on without it."""
+    with Stepper(RING, h=0.05, t_end=0.2) as ring:
+        ring.step()
+        ring.write_restart(tmp_path/"ring.rst.h5")
+    done = subprocess.run([EMCON, "restart", tmp_path/"ring.rst.h5", "--output", tmp_path/"on"],
+                          capture_output=True, text=True)
+    assert done.returncode == 2 and "Stepper.from_restart" in done.stderr
+    assert not (tmp_path/"on").exists()
+
+
 def test_restart_file_goes_on_to_the_same_bits(block: Path, tmp_path: Path) -> None:
     with Stepper(block, force=0.75) as a:
         a.run(until=0.25)
