@@ -23,10 +23,10 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT/"pywrap"))
 
 import emcon  # noqa: E402
+from emcon.drawing import ColourScale, DrawnBodies, colour_scale, frame_view  # noqa: E402
 from emcon.mesh import block, strip  # noqa: E402
 from emcon.results import FieldFile, locate, read_history  # noqa: E402
-from emcon.scene import (BLACK, BLUE, GREY, ORANGE, STYLE, ColourScale, Scene,  # noqa: E402
-                         colour_scale, draw_bodies, frame_view, read_scene)
+from emcon.scene import BLACK, BLUE, GREY, ORANGE, STYLE, Scene, read_scene  # noqa: E402
 
 #: Word of decks, what it is called, its colour; the first two are shown as bodies.
 SCHEMES = (("ENERGY MOMENTUM", "energy-momentum", BLACK),
@@ -97,7 +97,7 @@ def _bodies(axes: Axes, shown: Run, time: float, scale: ColourScale, label: str)
     """The frame at a time; after the end of the run its last one, which says so."""
     scene = shown.scene
     frame = int(np.argmin(np.abs(np.array(scene.times) - time)))
-    draw_bodies(axes, scene, frame, VIEW, PANEL, scale)
+    DrawnBodies(axes, scene, frame, VIEW, PANEL, scale)
     frame_view(axes, scene, VIEW, PANEL, PANEL, is_first=False)
     axes.tick_params(labelbottom=False, length=0)
     axes.set_xlabel("")

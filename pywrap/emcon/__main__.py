@@ -79,6 +79,10 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
                        help="frames per second (default 20)")
     movie.add_argument("--field", metavar="NAME", default="von_mises",
                        help="point or cell field that gives the colours (default von_mises)")
+    movie.add_argument("--clim", metavar=("LOW", "HIGH"), type=float, nargs=2,
+                       help="values at the ends of the colours (default by the values)")
+    movie.add_argument("--frames", metavar=("FIRST", "LAST"), type=int, nargs=2,
+                       help="frames of the file that are shown; -1 is the last (default all)")
     two = commands.add_parser("compare", help=_COMMANDS["compare"])
     two.add_argument("one", metavar="A", help=_RESULT)
     two.add_argument("other", metavar="B", help="another result of the same model")
@@ -132,10 +136,11 @@ def _plot(options: argparse.Namespace) -> None:
 
 
 def _animate(options: argparse.Namespace) -> None:
-    from .animation import write_animation
+    from .animation import Film, write_animation
 
-    movie, notes = write_animation(locate(options.result), options.output, fps=options.fps,
-                                   field=options.field)
+    film = Film(options.field, tuple(options.clim) if options.clim else None,
+                tuple(options.frames) if options.frames else None)
+    movie, notes = write_animation(locate(options.result), options.output, options.fps, film)
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
     print(f"animation: {movie}")

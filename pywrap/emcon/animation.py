@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
@@ -11,9 +12,10 @@ import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.figure import Figure
 
+from .drawing import (DrawnBodies, ColourScale, colour_scale, draw_colour_bar, fixed_scale, frame_view,
+                      set_view, titles)
 from .results import FieldFile, ResultError, ResultPaths, locate
-from .scene import STYLE, Scene, colour_scale, draw_bodies, draw_colour_bar, read_scene
-from .scene import frame_view, number, set_view
+from .scene import STYLE, Scene, read_scene
 
 #: Sizes [inch].
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 8.0, 0.62, 0.95, 0.34, 0.48
@@ -26,7 +28,9 @@ _LARGEST_RATE = {".gif": 50.0, ".mp4": 240.0}      # a GIF counts in hundredths 
 
 
 def animate(result: str | os.PathLike[str], output: str | os.PathLike[str] | None = None, *,
-            fps: float = 20.0, field: str = "von_mises") -> Path:
+            fps: float = 20.0, field: str = "von_mises",
+            clim: tuple[float, float] | None = None,
+            frames: tuple[int, int] | None = None) -> Path:
     """Write an animation of a run; returns its path.
 
     result   base name of the run, or any one of its files
@@ -34,32 +38,58 @@ def animate(result: str | os.PathLike[str], output: str | os.PathLike[str] | Non
     fps      frames per second, above 0, at most 50 for GIF; of the run, frames are shown one by
              one, up to 300
     field    point or cell field that gives the colours; of a vector its length
+    clim     values at the ends of the colours; default from 0, or the lowest, to the highest
+    frames   the first and the last of the field file that are shown, from 0 on; -1 is the last
 
-    Raises `ResultError` for a result or a field that cannot be shown, for other formats, and for
-    MP4 where there is no program `ffmpeg`; `OSError` where the file cannot be written.
+    Raises `ResultError` for a result, a field or frames that cannot be shown, for other formats,
+    and for MP4 where there is no program `ffmpeg`; `OSError` where the file cannot be written.
     """
-    return write_animation(locate(result), None if output is None else Path(output), fps=fps,
-                           field=field)[0]
+    return write_animation(locate(result), None if output is None else Path(output), fps,
+                           Film(field, clim, frames))[0]
 
 
-def write_animation(paths: ResultPaths, output: Path | None = None, *, fps: float = 20.0,
-                    field: str = "von_mises") -> tuple[Path, list[str]]:
+@dataclass(frozen=True)
+class Film:
+    """What of a run an animation shows."""
+
+    field: str = "von_mises"
+    clim: tuple[float, float] | None = None       #: ends of the colours, default by the values
+    frames: tuple[int, int] | None = None         #: first and last, default all
+
+    def numbers(self, count: int) -> range:
+        """Numbers of the frames, of a file that has `count`."""
+        if self.frames is None:
+            return range(count)
+        for frame in self.frames:
+            if not -count <= frame < count:
+                raise ResultError(f"there is no frame {frame}; the file has {count}, from 0 on")
+        first, last = (frame % count for frame in self.frames)
+        if first > last:
+            raise ResultError(f"frames go from one to a later one, not from {self.frames[0]} to "
+                              f"{self.frames[1]}")
+        return range(first, last + 1)
+
+
+def write_animation(paths: ResultPaths, output: Path | None = None, fps: float = 20.0,
+                    film: Film = Film()) -> tuple[Path, list[str]]:
     """As `animate`; returns the path and notes on what is missing or left out."""
     output = paths.base.with_name(paths.base.name + ".gif") if output is None else output
     writer = _writer(output, fps)
     if not output.parent.is_dir():
         raise FileNotFoundError(2, "no such folder", str(output.parent))
     with FieldFile(paths.field) as file:
-        frames = _choose_frames(len(file.times))
-        scene = read_scene(file, frames, field)
+        asked = film.numbers(len(file.times))
+        frames = _choose_frames(asked)
+        scene = read_scene(file, frames, film.field)
         notes = list(scene.notes)
-        if len(frames) < len(file.times):
-            notes.append(f"{len(frames)} of {len(file.times)} frames are shown")
+        if len(frames) < len(asked):
+            notes.append(f"{len(frames)} of {len(asked)} frames are shown")
+    scale = colour_scale(scene) if film.clim is None else fixed_scale(scene, *film.clim)
     # a file that stands there is replaced by a whole one only
     part = output.with_name(f".{output.stem}.part{output.suffix}")
     try:
         with matplotlib.rc_context(STYLE):
-            _write(writer, scene, part)
+            _write(writer, scene, scale, part)
         part.replace(output)
     except (subprocess.CalledProcessError, BrokenPipeError) as problem:
         text = getattr(problem, "stderr", None) or ""
@@ -90,13 +120,13 @@ def _writer(output: Path, fps: float) -> AbstractMovieWriter:
                                     "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white"])
 
 
-def _choose_frames(count: int) -> list[int]:
-    if count <= MOST_FRAMES:
-        return list(range(count))
-    return [int(k) for k in np.unique(np.linspace(0, count - 1, MOST_FRAMES).round())]
+def _choose_frames(asked: range) -> list[int]:
+    if len(asked) <= MOST_FRAMES:
+        return list(asked)
+    return [asked[int(k)] for k in np.linspace(0, len(asked) - 1, MOST_FRAMES).round()]
 
 
-def _write(writer: AbstractMovieWriter, scene: Scene, output: Path) -> None:
+def _write(writer: AbstractMovieWriter, scene: Scene, scale: ColourScale, output: Path) -> None:
     """Draw frame by frame; the picture is made once and changed."""
     views = scene.views()
     width = WIDTH - LEFT - RIGHT
@@ -104,17 +134,14 @@ def _write(writer: AbstractMovieWriter, scene: Scene, output: Path) -> None:
     total = TOP + height + BOTTOM
     figure = Figure(figsize=(WIDTH, total))
     axes = figure.add_axes((LEFT/WIDTH, BOTTOM/total, width/WIDTH, height/total))
-    scale = colour_scale(scene)
-    elements = draw_bodies(axes, scene, 0, views[0], width, scale)
+    bodies = DrawnBodies(axes, scene, 0, views[0], width, scale)
     frame_view(axes, scene, views[0], width, height, is_first=True)
     if scene.values is not None:
         draw_colour_bar(figure, ((LEFT + width + 0.14)/WIDTH, BOTTOM/total, 0.11/WIDTH,
                                  height/total), scene, scale)
     with writer.saving(figure, str(output), RESOLUTION):
-        for k, view in enumerate(views):
-            elements.set_verts(scene.polygons(k))
-            if scene.values is not None:
-                elements.set_array(scene.colours(k))
+        for k, (view, title) in enumerate(zip(views, titles(scene.times), strict=True)):
+            bodies.show(k)
             set_view(axes, view, width, height)
-            axes.set_title(f"$t = {number(scene.times[k])}$", fontsize=10, pad=4)
+            axes.set_title(title, fontsize=10, pad=4)
             writer.grab_frame()

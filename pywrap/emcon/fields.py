@@ -17,14 +17,18 @@ from .hdf5 import Array, ResultError, guarded, open_file, read
 
 #: Cells of VTK files with a node in the middle of each side: of six and of eight nodes.
 QUADRATIC = (22, 23)
+#: Cells of VTK files that are lines of profiles, which stand behind the elements.
+LINE = 3
 
 
 class FieldFile:
     """Fields over time of one run (NAME.vtkhdf), read when asked for.
 
     Attributes: `times` (n_frame) [T], `points` (n_node, 3) reference positions [L], `cells` list
-    of node numbers (0-based) per element, `types` of these as VTK counts, `point_fields` and `cell_fields` names. Frames are
-    counted from 0; -1 is the last. `file[name]` is a field at all frames, a `FieldSeries`.
+    of node numbers (0-based) per element, `types` of these as VTK counts, `profiles` (n_line, 2)
+    ends of the lines of surfaces without elements, `point_fields` and `cell_fields` names. Frames
+    are counted from 0; -1 is the last. `file[name]` is a field at all frames, a `FieldSeries`; one
+    of cells has the elements alone.
 
     Raises `ResultError` for a file that is missing, foreign or damaged, for a field that it does
     not have, and for fields asked for after `close`.
@@ -60,9 +64,16 @@ class FieldFile:
                 or connectivity.min() < 0 or connectivity.max() >= n_node):
             raise ResultError(f"{self.path}: the mesh in it is broken")
         self.types: NDArray[np.int64] = read(root, "Types").astype(np.int64)
+        cells = np.split(connectivity, offsets[1:-1])
+        self._n_row = len(cells)
+        n_element = self._n_row - int((self.types == LINE).sum())
+        if (self.types[:n_element] == LINE).any():
+            raise ResultError(f"{self.path}: the mesh in it is broken")
+        self.profiles: NDArray[np.int64] = np.array(cells[n_element:], dtype=np.int64).reshape(
+            -1, 2)
+        self.types = self.types[:n_element]
         self.cells: list[NDArray[np.int64]] = [
-            _outline(cell, kind) for cell, kind
-            in zip(np.split(connectivity, offsets[1:-1]), self.types)]
+            _outline(cell, kind) for cell, kind in zip(cells[:n_element], self.types)]
         self.point_fields = self._names("PointData")
         self.cell_fields = self._names("CellData")
         if not len(self.times):
@@ -203,6 +214,7 @@ class FieldSeries:
         self.name = name
         self.times = file.times                                  #: (n_frame) [T]
         n = len(file.points) if group == "PointData" else len(file.cells)
+        self._n_row = n if group == "PointData" else file._n_row       # of a frame in the file
         self.shape: tuple[int, ...] = (len(self.times), n, *components)
         self.dtype = np.dtype(np.float64)
 
@@ -257,7 +269,7 @@ class FieldSeries:
             offsets = root["Steps"].get(f"{group}Offsets/{name}")
             data = root[group][name]
             # offsets may be missing: then each frame is written anew
-            start = frame*n if offsets is None else -1
+            start = frame*self._n_row if offsets is None else -1
             if offsets is not None and frame < len(offsets):
                 start = int(offsets[frame])
             if start < 0 or start + n > len(data):

@@ -20,13 +20,17 @@ DRIFT_FLOOR = 1e-17
 BAND = "#c4c4c4"
 #: A pause of the force ends a contact where it is longer than this part of the run.
 PAUSE = 0.05
-#: Below this part of the largest energy nothing is drawn of work from outside.
-SMALL = 1e-12
+#: A curve of energy that is nowhere more than this part of the largest is the axis itself.
+SMALL = 5e-3
 #: Along an axis with reactions below this part of the largest, or of what the work from outside
 #: asks for, there is no load.
 ROUND_OFF = 1e-9
 #: Increments whose convergence is shown at most; letters of a name in a legend.
 MOST_SOLVES, NAME_LENGTH = 7, 14
+#: Increments up to which each has its step in the curve of a force; parts of a run with more.
+MOST_STEPS, PARTS = 200, 100
+#: An angular momentum that changes by less than this part is kept.
+KEPT = 1e-6
 COLOURS = (BLACK, BLUE, ORANGE, "#3a7d44", "#7b4fa3")
 
 _NUMBER = r"[-+]?[\d.]+(?:[DE][-+]?\d+)?"
@@ -44,6 +48,7 @@ class Force:
     label: str = ""
     has_means: bool = False                                      #: values are means of increments
     is_sampled: bool = False                                     #: at frames, not increments
+    is_count: bool = False                                       #: numbers of constraints
     note: str = ""                                               #: empty: nothing meets
 
 
@@ -78,7 +83,8 @@ def read_force(paths: ResultPaths, file: FieldFile | None,
 
 
 def _force_of_pairs(paths: ResultPaths, history: NDArray[np.void]) -> Force:
-    """On the second surface of each pair, along the axis on which most is transmitted."""
+    """On the second surface of each pair, along the axis on which most is transmitted; with
+    friction along all."""
     columns = history.dtype.names or ()
     count = sum(re.fullmatch(r"pair\d+_active", name) is not None for name in columns)
     named = read_pairs(paths)
@@ -95,7 +101,7 @@ def _force_of_pairs(paths: ResultPaths, history: NDArray[np.void]) -> Force:
     if not alone:
         return Force(history["time"], {names[k]: history[f"pair{k + 1}_active"].astype(float)
                                        for k in range(count)},
-                     "active constraints")
+                     "active constraints", is_count=True)
     axes = [axis for axis in "xyz" if f"pair1_force_{axis}" in columns]
     size = {axis: sum(float(np.nansum(np.abs(history[f"pair{k + 1}_force_{axis}"])))
                       for k in alone) for axis in axes}
@@ -103,8 +109,14 @@ def _force_of_pairs(paths: ResultPaths, history: NDArray[np.void]) -> Force:
     curves: dict[str, Array] = {}
     for k in alone:
         name = names[k] if names[k] not in curves else f"{names[k]}, {k + 1}"
-        curves[name] = 0.0 - history[f"pair{k + 1}_force_{axis}"]
-    return Force(history["time"], curves, f"contact force, ${axis}$ {UNITS['force']}",
+        rubs = bool(np.any(history[f"pair{k + 1}_friction_loss"])) \
+            if f"pair{k + 1}_friction_loss" in columns else False
+        for along in [axis, *(other for other in axes if rubs and other != axis)]:
+            curves[f"{name}, ${along}$" if rubs else name] = \
+                0.0 - history[f"pair{k + 1}_force_{along}"]
+    is_along_one = len(curves) == len(alone)
+    return Force(history["time"], curves, "contact force"
+                 + (f", ${axis}$ " if is_along_one else " ") + UNITS["force"],
                  has_means=not is_static(history))
 
 
@@ -144,6 +156,13 @@ def means(times: Array, force: Array) -> list[tuple[float, float, float]]:
             impulse = np.sum(force[first + 1:last + 1]*np.diff(times[first:last + 1]))
             found.append((float(times[first]), float(times[last]), float(impulse/lasts)))
     return found
+
+
+def part_means(times: Array, force: Array) -> tuple[Array, Array]:
+    """Ends of equal parts of a run (n + 1) [T], and the mean in each (n), of means of increments."""
+    ends = np.linspace(times[0], times[-1], PARTS + 1)
+    impulse = np.concatenate([[0.0], np.cumsum(force[1:]*np.diff(times))])
+    return ends, np.diff(np.interp(ends, times, impulse))/np.diff(ends)
 
 
 def read_load(file: FieldFile, history: NDArray[np.void]) -> Load | None:
@@ -188,19 +207,20 @@ def _log(paths: ResultPaths) -> str:
 # --- drawing -----------------------------------------------------------------------------------
 
 def draw_energies(axes: Axes, history: NDArray[np.void]) -> None:
+    """Energies and the work from outside, which counts as taken: their sum is the total."""
     axes.plot(history["time"], history["total"], color=BAND, linewidth=4.0, label="total",
               solid_capstyle="butt")
-    largest = max(float(np.nanmax(np.abs(history[name]), initial=0.0))
-                  for name in ("kinetic", "strain"))
-    for name, label, colour, style in (
-            ("kinetic", "kinetic", BLUE, "-"), ("strain", "strain", ORANGE, "-"),
-            ("external_work", "external work", BLACK, "--")):
-        if name == "strain" or np.nanmax(np.abs(history[name]), initial=0.0) > SMALL*largest:
-            axes.plot(history["time"], history[name], style, color=colour, label=label)
+    curves = (("kinetic", history["kinetic"], BLUE, "-"), ("strain", history["strain"], ORANGE, "-"),
+              ("less external work", -history["external_work"], BLACK, "--"))
+    sizes = [float(np.nanmax(np.abs(values), initial=0.0)) for _, values, _, _ in curves]
+    for (label, values, colour, style), size in zip(curves, sizes, strict=True):
+        if size > SMALL*max(sizes):
+            axes.plot(history["time"], values, style, color=colour, label=label)
     taken = asked_losses(history)
     if np.any(taken > 0.0):
         axes.plot(history["time"], taken, ":", color=BLACK, label="losses")
     axes.set_ylabel(f"energy {UNITS['energy']}")
+    _show_zero(axes)
     _legend(axes)
 
 
@@ -213,49 +233,79 @@ def _legend(axes: Axes) -> None:
 def draw_drift(axes: Axes, history: NDArray[np.void]) -> None:
     drift, scale = energy_drift(history)
     at_start = abs(float(history["total"][0]))
-    axes.semilogy(history["time"], np.maximum(drift, DRIFT_FLOOR), color=BLACK, linewidth=0.8)
-    epsilon = float(np.finfo(np.float64).eps)
-    axes.axhline(epsilon, color=GREY, linewidth=0.6, linestyle="--", label="machine epsilon")
-    _legend(axes)
-    top = float(np.nanmax(drift, initial=0.0))
-    axes.set_ylim(DRIFT_FLOOR, max(1e-8, 30.0*top))
-    axes.yaxis.set_major_locator(LogLocator(10.0, numticks=7))
-    axes.yaxis.set_minor_locator(NullLocator())
+    _draw_round_off(axes, history["time"], drift)
     axes.set_ylabel(r"energy drift $|E - E_0|/|E_0|$" if scale == at_start and scale > 0.0
                     else r"energy drift $|E - E_0|/E_{\max}$")
 
 
+def _draw_round_off(axes: Axes, times: Array, change: Array) -> None:
+    """A relative change that is to be round-off, over powers of ten."""
+    axes.semilogy(times, np.maximum(change, DRIFT_FLOOR), color=BLACK, linewidth=0.8)
+    epsilon = float(np.finfo(np.float64).eps)
+    axes.axhline(epsilon, color=GREY, linewidth=0.6, linestyle="--", label="machine epsilon")
+    _legend(axes)
+    axes.set_ylim(DRIFT_FLOOR, max(1e-8, 30.0*float(np.nanmax(change, initial=0.0))))
+    axes.yaxis.set_major_locator(LogLocator(10.0, numticks=7))
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
 def draw_force(axes: Axes, force: Force) -> None:
-    """A curve per pair; a bar over each contact at the mean of its force."""
+    """A curve per pair; a bar over each contact at the mean of its force.
+
+    Of many increments the curve is the mean over parts of the run, before the values of each in a
+    pale tone.
+    """
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     has_mean = False
+    is_many = force.has_means and len(force.times) > MOST_STEPS + 1
     for (name, values), colour in zip(force.curves.items(), COLOURS*len(force.curves)):
         shown = name if len(name) <= NAME_LENGTH else f"{name[:NAME_LENGTH - 1]}…"
-        axes.plot(force.times, values, color=colour, linewidth=0.8, label=shown or None,
+        style = "steps-pre" if force.has_means or force.is_count else "default"
+        axes.plot(force.times, values, color=colour, linewidth=0.5 if is_many else 0.8,
                   marker="o" if force.is_sampled else "", markersize=1.8, markeredgewidth=0.0,
-                  drawstyle="steps-pre" if force.has_means else "default")
+                  alpha=0.3 if is_many else 1.0, label=None if is_many else shown or None,
+                  drawstyle=style)
+        if is_many:
+            ends, parts = part_means(force.times, values)
+            axes.stairs(parts, ends, baseline=None, color=colour, linewidth=0.9, label=shown)
         if force.has_means:
             is_alone = len(force.curves) == 1
             for k, (start, end, mean) in enumerate(means(force.times, values)):
                 axes.plot([start, end], [mean, mean], color=ORANGE if is_alone else colour,
-                          linewidth=2.2, alpha=0.75, solid_capstyle="butt",
+                          linewidth=2.2, solid_capstyle="butt", alpha=1.0 if is_alone else 0.6,
                           label="mean" if k == 0 and not has_mean else None)
                 has_mean = True
+    if force.is_count:
+        axes.yaxis.set_major_locator(MaxNLocator(6, integer=True))
     axes.set_ylabel(force.label)
     if any(force.curves):
         _legend(axes)
 
 
 def draw_momentum(axes: Axes, history: NDArray[np.void]) -> None:
-    """Angular momentum about the origin: of a run without contact."""
-    for name, colour, style in zip("xyz", COLOURS, ("-", "-", "--"), strict=False):
-        if f"l{name}" in (history.dtype.names or ()):
-            axes.plot(history["time"], history[f"l{name}"], style, color=colour,
-                      label=f"$L_{name}$")
-    low, high = axes.get_ylim()
-    axes.set_ylim(min(low, 0.0), max(high, 0.0))
+    """Angular momentum about the origin, of a run without contact; its change where it is kept."""
+    names = [name for name in "xyz" if f"l{name}" in (history.dtype.names or ())]
+    angular = np.array([history[f"l{name}"] for name in names])
+    size = float(np.linalg.norm(angular, axis=0).max(initial=0.0))
+    change = np.linalg.norm(angular - angular[:, :1], axis=0)
+    if size > 0.0 and change.max() < KEPT*size:
+        _draw_round_off(axes, history["time"], change/size)
+        axes.set_ylabel(r"momentum drift $|L - L_0|/|L|_{\max}$")
+        return
+    for name, values, colour in zip(names, angular, COLOURS[-len(names):] if len(names) > 1
+                                    else COLOURS, strict=False):
+        axes.plot(history["time"], values, color=colour, label=f"$L_{name}$")
+    _show_zero(axes)
     axes.set_ylabel(f"angular momentum {UNITS['action']}")
     _legend(axes)
+
+
+def _show_zero(axes: Axes) -> None:
+    """Zero and, around the curves, some room are within the axis."""
+    low, high = min(axes.dataLim.y0, 0.0), max(axes.dataLim.y1, 0.0)
+    room = 0.06*(high - low)
+    if room > 0.0:
+        axes.set_ylim(low - room, high + room)
 
 
 def draw_load(axes: Axes, load: Load) -> None:

@@ -11,19 +11,21 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from .drawing import (LABEL_OFFSET, DrawnBodies, colour_scale, draw_colour_bar, fixed_scale,
+                      frame_view, scale_axes, titles)
 from .panels import (Force, Load, draw_convergence, draw_drift, draw_energies, draw_force,
                      draw_load, draw_momentum, is_static, read_force, read_load, read_residuals,
                      say)
 from .results import Array, FieldFile, ResultError, ResultPaths, locate, read_history
-from .scene import (LABEL_OFFSET, STYLE, Scene, colour_scale, draw_bodies, draw_colour_bar,
-                    fixed_scale, frame_view, number, read_scene, scale_ticks)
+from .scene import STYLE, Scene, read_scene
 
 N_TIMES = 6
 #: Sizes on paper [inch].
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 11.0, 0.62, 1.0, 0.30, 0.48
+MARGIN = 0.25                  # at the right, where nothing stands
 SCENE_GAP, PANEL_GAP, ROW_GAP, PANEL_HEIGHT = 0.07, 0.72, 0.86, 1.85
 SCENE_HEIGHT = (1.0, 4.2)      # least, largest
 RESOLUTION = 200               # dots per inch
@@ -63,7 +65,8 @@ def _draw_scene(figure: Figure, scene: Scene, clim: tuple[float, float] | None) 
     """Draw the upper row, and give the figure the height that it takes."""
     views = scene.views()
     n = max(len(views), 1)
-    width = min((WIDTH - LEFT - RIGHT - SCENE_GAP*(n - 1))/n, SCENE_HEIGHT[1]*1.5)
+    right = RIGHT if scene.values is not None else MARGIN
+    width = min((WIDTH - LEFT - right - SCENE_GAP*(n - 1))/n, SCENE_HEIGHT[1]*1.5)
     height = float(np.clip(width*(views[0][3] - views[0][2])/(views[0][1] - views[0][0]),
                            *SCENE_HEIGHT))
     total = TOP + height + ROW_GAP + PANEL_HEIGHT + BOTTOM
@@ -71,12 +74,12 @@ def _draw_scene(figure: Figure, scene: Scene, clim: tuple[float, float] | None) 
     base = total - TOP - height
 
     scale = colour_scale(scene) if clim is None else fixed_scale(scene, *clim)
-    for k, view in enumerate(views):
+    for k, (view, title) in enumerate(zip(views, titles(scene.times), strict=True)):
         x = LEFT + k*(width + SCENE_GAP)
         axes = figure.add_axes((x/WIDTH, base/total, width/WIDTH, height/total))
-        draw_bodies(axes, scene, k, view, width, scale)
+        DrawnBodies(axes, scene, k, view, width, scale)
         frame_view(axes, scene, view, width, height, is_first=k == 0)
-        axes.set_title(f"$t = {number(scene.times[k])}$", fontsize=10, pad=4)
+        axes.set_title(title, fontsize=10, pad=4)
     if scene.values is not None:
         draw_colour_bar(figure, ((LEFT + n*width + (n - 1)*SCENE_GAP + 0.14)/WIDTH, base/total,
                                  0.11/WIDTH, height/total), scene, scale)
@@ -171,13 +174,11 @@ def _finish(axes: Axes, times: Array, marks: list[float]) -> None:
         axes.set_xlabel("time $t$ [T]", labelpad=1)
         for mark in marks:
             axes.axvline(mark, color="#e4e4e4", linewidth=0.6, zorder=0)
-    for axis in (axes.xaxis, axes.yaxis):
-        if axis.get_scale() == "linear" and not isinstance(axis.get_major_locator(), FixedLocator):
-            scale_ticks(axis)
+    scale_axes(axes)
 
 
 def _panel_width() -> float:
-    return (WIDTH - LEFT - 0.25 - 2*PANEL_GAP)/3.0
+    return (WIDTH - LEFT - MARGIN - 2*PANEL_GAP)/3.0
 
 
 def _add_panels(figure: Figure) -> list[Axes]:

@@ -1,4 +1,4 @@
-"""The deformed bodies at some frames, coloured by a field: read, and drawn into axes."""
+"""The deformed bodies at some frames, and the values of a field that gives their colours."""
 
 from __future__ import annotations
 
@@ -6,17 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import LinearSegmentedColormap, Normalize
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
 from numpy.typing import NDArray
 
-from .projection import SOLIDS, basis, far_first, outer_faces, project
+from .projection import SOLIDS, far_first, outer_faces, project
 from .results import Array, FieldFile, ResultError
 
 #: A body that moves less than this fraction of the largest displacement counts as support.
@@ -25,12 +18,8 @@ SUPPORT_FRACTION = 0.1
 MARGIN, SUPPORT_ROOM = 0.06, 0.30
 #: The view follows the bodies where their whole path is this much longer than they are.
 FOLLOW_RATIO = 1.25
-#: The colour scale ends where all but this fraction of the elements that move are below.
-COLOUR_CUT = 0.01
-#: Distance of the y labels from the axes at the left [inch].
-LABEL_OFFSET = 0.43
-#: Length of the axes that tell directions [inch].
-DIRECTION_LENGTH = 0.16
+#: Lengths below this part of the size of the scene are round-off.
+ROUND_OFF = 1e-12
 
 STYLE: dict[Any, Any] = {"font.family": "STIXGeneral", "mathtext.fontset": "stix", "font.size": 10,
          "axes.linewidth": 0.6, "axes.spines.top": False, "axes.spines.right": False,
@@ -47,8 +36,14 @@ UNITS = {"length": "[L]", "time": "[T]", "energy": "[M L$^2$/T$^2$]",
 #: Of the fields that the program writes.
 FIELD_UNITS = {"von_mises": "stress", "cauchy_stress": "stress", "contact_pressure": "stress",
                "contact_shear": "stress", "displacement": "length", "contact_gap": "length",
-               "contact_slip": "length", "velocity": "velocity", "strain_energy": "energy",
-               "contact_force": "force", "reaction_force": "force"}
+               "contact_slip": "length", "slip_path": "length", "velocity": "velocity",
+               "strain_energy": "energy", "contact_force": "force", "reaction_force": "force"}
+#: Fields that are 0 off some surfaces: of these bodies show the sides alone. A gap of 0 is one.
+OF_SIDES = ("contact_force", "contact_gap", "contact_pressure", "contact_shear", "contact_slip",
+            "contact_status", "contact_active", "slip_path", "reaction_force")
+#: Fields that number states, and what the numbers mean.
+STATES = {"contact_status": ("none", "sticks", "slides"),
+          "contact_active": ("not active", "active")}
 
 #: (x_min, x_max, y_min, y_max) [L]
 View = tuple[float, float, float, float]
@@ -56,7 +51,7 @@ View = tuple[float, float, float, float]
 
 @dataclass
 class Scene:
-    """Some frames: positions (n_node, 2) and colour values per polygon, and the views.
+    """Some frames: positions (n_node, 2), colour values per polygon or per half side, and the views.
 
     In the plane polygons are the elements, in three dimensions the outer faces, which lie in front
     of each other.
@@ -64,12 +59,18 @@ class Scene:
 
     times: list[float]
     position: list[Array]
-    values: list[Array] | None      #: each (n_polygon), units of the field
+    values: list[Array] | None      #: each (n_polygon) or (2, n_side), units of the field
     label: str                      #: what they are
     cells: list[NDArray[np.int64]]  #: nodes of the polygons
     is_support: NDArray[np.bool_]   #: per node
     #: Of three dimensions: numbers of the polygons, the farthest first, per frame.
     order: list[NDArray[np.int64]] | None = None
+    #: Where colours are those of sides: their ends (n_side, 2); values are NaN where none is.
+    sides: NDArray[np.int64] | None = None
+    states: tuple[str, ...] = ()    #: what the values 0, 1, 2 mean, if they number states
+    #: Ends of lines that bound what has no elements (n_line, 2).
+    profiles: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    floor: float = 0.0              #: differences of values below this are round-off
     notes: list[str] = field(default_factory=list)
 
     def views(self) -> list[View]:
@@ -79,7 +80,7 @@ class Scene:
         margin = MARGIN*(y_max - y_min)
         if self.is_support.any():
             room = SUPPORT_ROOM*float(np.max(boxes[:, 3] - boxes[:, 2]))
-            _, _, low, high = _extent(np.concatenate(self.position))
+            low, high = self._heights(margin)
             y_low, y_high = max(low, y_min - room), min(high, y_max + room)
         else:
             y_low, y_high = y_min, y_max
@@ -88,20 +89,49 @@ class Scene:
         y_high = y_high if y_high > y_max else y_max + margin
         return [(x0, x1, y_low, y_high) for x0, x1 in _windows(boxes[:, 0], boxes[:, 1])]
 
-    def moves(self) -> NDArray[np.bool_]:
-        """Per polygon: part of a body that moves."""
-        return np.array([not self.is_support[cell[0]] for cell in self.cells])
+    def _heights(self, margin: float) -> tuple[float, float]:
+        """The lowest and the highest place of all that is drawn, a margin beyond profiles [L]."""
+        drawn = np.unique(np.concatenate(self.cells))
+        heights = [(p[drawn, 1].min(), p[drawn, 1].max()) for p in self.position]
+        heights += [(p[self.profiles, 1].min() - margin, p[self.profiles, 1].max() + margin)
+                    for p in self.position if len(self.profiles)]
+        return float(min(low for low, _ in heights)), float(max(high for _, high in heights))
 
-    def polygons(self, frame: int) -> list[Array]:
-        """Corners (3 or more, 2) of each polygon [L], as they are drawn one over the other."""
-        order = range(len(self.cells)) if self.order is None else self.order[frame]
+    def moves(self) -> NDArray[np.bool_]:
+        """Per polygon, or per side: part of a body that moves."""
+        first = self.starts() if self.sides is None else self.sides[:, 0]
+        return ~self.is_support[first]
+
+    def starts(self) -> NDArray[np.int64]:
+        """The first node of each polygon."""
+        sizes = np.array([len(cell) for cell in self.cells])
+        return np.concatenate(self.cells)[np.cumsum(sizes) - sizes]
+
+    def polygons(self, frame: int) -> list[Array] | Array:
+        """Corners (3 or more, 2) of each polygon [L], as they are drawn one over the other; an
+        array where all have as many, which is faster."""
+        order = np.arange(len(self.cells)) if self.order is None else self.order[frame]
+        if len({len(cell) for cell in self.cells}) == 1:
+            corners: Array = self.position[frame][np.asarray(self.cells)[order]]
+            return corners
         return [self.position[frame][self.cells[k]] for k in order]
 
     def colours(self, frame: int) -> Array | None:
-        """Values of `polygons` (n_polygon), units of the field; None: there are none."""
-        if self.values is None or self.order is None:
-            return None if self.values is None else self.values[frame]
+        """Values of `polygons` (n_polygon), or of `halves`, units of the field; None: there are
+        none."""
+        if self.values is None:
+            return None
+        if self.order is None:
+            return self.values[frame].ravel()
         return self.values[frame][self.order[frame]]
+
+    def halves(self, frame: int) -> Array:
+        """Both halves of each side, (2 n_side, 2, 2) [L]: from its ends to its middle."""
+        if self.sides is None:
+            return np.empty((0, 2, 2))
+        first, last = (self.position[frame][self.sides[:, k]] for k in (0, 1))
+        middle = 0.5*(first + last)
+        return np.concatenate([np.stack([first, middle], axis=1), np.stack([last, middle], axis=1)])
 
 
 def _extent(points: Array) -> View:
@@ -138,19 +168,51 @@ def _von_mises(file: FieldFile, frame: int) -> Array | None:
     return np.sqrt(square)
 
 
+def _means(cells: Sequence[NDArray[np.int64]], nodal: Array) -> Array:
+    """Means of values of nodes over the nodes of each cell (n_cell)."""
+    sizes = np.array([len(cell) for cell in cells])
+    sums: Array = np.add.reduceat(nodal[np.concatenate(cells)], np.cumsum(sizes) - sizes)
+    return sums/sizes
+
+
+def _values(file: FieldFile, name: str, frame: int) -> Array | None:
+    """A field, of vectors the length; None: no stress is there."""
+    if name == "von_mises":
+        return _von_mises(file, frame)
+    values = file[name][frame]
+    return np.sqrt((values**2).sum(axis=1)) if values.ndim > 1 else values
+
+
 def _colour_values(file: FieldFile, name: str, frame: int) -> Array | None:
     """A field per element (n_element): mean over its nodes; of vectors the length."""
-    nodal = _von_mises(file, frame) if name == "von_mises" else None
-    if name == "von_mises" and nodal is None:
-        return None
-    if nodal is None:
-        values = file[name][frame]
-        if values.ndim > 1:
-            values = np.sqrt((values**2).sum(axis=1))
-        if name not in file.point_fields:
-            return values
-        nodal = values
-    return np.array([nodal[cell].mean() for cell in file.cells])
+    values = _values(file, name, frame)
+    if values is None or name in file.cell_fields and name not in file.point_fields:
+        return values
+    return _means(file.cells, values)
+
+
+def _side_values(file: FieldFile, name: str, frame: int, sides: NDArray[np.int64]) -> Array:
+    """A field at both ends of each side (2, n_side); NaN on sides where it is nothing, and on those
+    that begin at a slave surface and leave it."""
+    values = _values(file, name, frame)
+    assert values is not None
+    ends: Array = values[sides.T]
+    is_nothing = np.isnan(ends) if name == "contact_gap" else np.isnan(ends) | (ends == 0.0)
+    is_nothing = is_nothing.all(axis=0) | np.isnan(ends)
+    if "contact_gap" in file.point_fields:
+        is_slave = np.isfinite(file.point("contact_gap", frame))[sides.T]
+        is_nothing |= is_slave[0] != is_slave[1]
+    return np.where(is_nothing, np.nan, ends)
+
+
+def outer_sides(cells: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """Pairs of nodes (n_side, 2) along the outlines of bodies: those of one element alone."""
+    first = np.concatenate(cells)
+    last = np.concatenate([np.roll(cell, -1) for cell in cells])
+    _, place, count = np.unique(np.sort(np.column_stack([first, last]), axis=1), axis=0,
+                                return_index=True, return_counts=True)
+    alone = np.sort(place[count == 1])
+    return np.column_stack([first[alone], last[alone]])
 
 
 def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") -> Scene:
@@ -167,26 +229,41 @@ def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") 
                      "undeformed")
         frames = frames[:1]
         place = [file.points]
-    values = [v for v in (_colour_values(file, name, k) for k in frames) if v is not None]
+    in_space = bool(np.ptp(file.points[:, 2]) > 0.0)
+    sides = outer_sides(file.cells) if name in OF_SIDES and not in_space else None
+    if sides is None:
+        values = [v for v in (_colour_values(file, name, k) for k in frames) if v is not None]
+    else:
+        values = [_side_values(file, name, k, sides) for k in frames]
     if not values:
         notes.append("no stress in the result (asked for by *EL FILE, S): bodies shown in grey")
-
-    body = file.bodies()
-    travel = np.max([np.linalg.norm(p - file.points, axis=1) for p in place], axis=0)
-    most = np.array([np.max(travel[body == b], initial=0.0) for b in range(body.max() + 1)])
-    support = most < SUPPORT_FRACTION*most.max()
-    label = "von Mises stress" if name == "von_mises" else name.replace("_", " ")
-    if name in FIELD_UNITS:
-        label = f"{label}\n{UNITS[FIELD_UNITS[name]]}"
     scene = Scene(times=[float(file.times[k]) for k in frames], position=[p[:, :2] for p in place],
-                  values=values or None, label=label, cells=file.cells,
-                  is_support=(body < 0) | support[body], notes=notes)
-    if np.ptp(file.points[:, 2]) > 0.0:
+                  values=values or None, label=_label(name), cells=file.cells,
+                  is_support=_supports(file, place), sides=sides, profiles=file.profiles, states=STATES.get(name, ()),
+                  floor=ROUND_OFF*float(np.ptp(file.points)) if FIELD_UNITS.get(name) == "length"
+                  else 0.0, notes=notes)
+    if in_space:
         if not np.isin(file.types, SOLIDS).all():
             raise ResultError(f"{file.path} is three-dimensional, and not of tetrahedra and "
                               "hexahedra alone; open it in ParaView")
         _see(scene, place)
     return scene
+
+
+def _label(name: str) -> str:
+    """What a field is called, and its unit."""
+    label = "von Mises stress" if name == "von_mises" else name.replace("_", " ")
+    return f"{label}\n{UNITS[FIELD_UNITS[name]]}" if name in FIELD_UNITS else label
+
+
+def _supports(file: FieldFile, place: Sequence[Array]) -> NDArray[np.bool_]:
+    """Per node: it belongs to no body that moves; `place` has the nodes (n_node, 3) per frame [L]."""
+    body = file.bodies()
+    travel = np.max([np.linalg.norm(p - file.points, axis=1) for p in place], axis=0)
+    most = np.zeros(body.max() + 1)
+    np.maximum.at(most, body[body >= 0], travel[body >= 0])
+    support = most < SUPPORT_FRACTION*most.max()
+    return (body < 0) | support[body]
 
 
 def _see(scene: Scene, place: Sequence[Array]) -> None:
@@ -197,158 +274,3 @@ def _see(scene: Scene, place: Sequence[Array]) -> None:
     seen = [project(points) for points in place]
     scene.position = [on_paper for on_paper, _ in seen]
     scene.order = [far_first(scene.cells, near) for _, near in seen]
-
-
-# --- drawing -----------------------------------------------------------------------------------
-
-@dataclass
-class ColourScale:
-    """Colours of the values of a scene; `extend` says at which ends some are beyond."""
-
-    norm: Normalize
-    colours: LinearSegmentedColormap
-    extend: str
-
-
-def fixed_scale(scene: Scene, low: float, top: float) -> ColourScale:
-    """Between two values; raises `ResultError` where they are none."""
-    if not (np.isfinite([low, top]).all() and low < top):
-        raise ResultError(f"colours go from a value to a larger one, not from {low:g} to {top:g}")
-    every = np.concatenate(scene.values) if scene.values else np.zeros(1)
-    above, below = bool(np.nanmax(every) > top), bool(np.nanmin(every) < low)
-    extend = {(True, True): "both", (True, False): "max", (False, True): "min"}
-    return ColourScale(Normalize(low, top), _colours(), extend.get((above, below), "neither"))
-
-
-def _colours() -> LinearSegmentedColormap:
-    """Pale to dark, equal steps in lightness; pale enough that unloaded bodies recede."""
-    colours = matplotlib.colormaps["magma_r"](np.linspace(0.03, 0.86, 256))
-    colours[:48, :3] += (1.0 - np.linspace(0.0, 1.0, 48)[:, None])*(0.96 - colours[:48, :3])
-    return LinearSegmentedColormap.from_list("stress", colours)
-
-
-def colour_scale(scene: Scene) -> ColourScale:
-    """From zero, or the lowest, to the highest value in what moves, a few outliers aside."""
-    if scene.values is None:
-        return ColourScale(Normalize(0.0, 1.0), _colours(), "neither")
-    low, top = 0.0, 0.0
-    every = np.concatenate(scene.values)
-    moves = scene.moves()
-    chosen = np.concatenate([s[moves] for s in scene.values])
-    chosen = chosen[np.isfinite(chosen)]
-    if chosen.size:
-        top = float(np.quantile(chosen, 1.0 - COLOUR_CUT))
-        low = min(float(np.quantile(chosen, COLOUR_CUT)), 0.0)
-    highest, lowest = float(np.nanmax(every, initial=0.0)), float(np.nanmin(every, initial=0.0))
-    if not top > low:
-        top = low + 1.0
-        return ColourScale(Normalize(low, top), _colours(), "neither")
-    above = highest > top + 0.02*(top - low)
-    below = lowest < low - 0.02*(top - low)
-    extend = {(True, True): "both", (True, False): "max", (False, True): "min"}
-    return ColourScale(Normalize(low, top), _colours(), extend.get((above, below), "neither"))
-
-
-def draw_bodies(axes: Axes, scene: Scene, frame: int, view: View, width: float,
-                scale: ColourScale) -> PolyCollection:
-    """Draw the elements of one frame into axes of a width [inch]."""
-    elements = PolyCollection(scene.polygons(frame), edgecolors=(0.1, 0.1, 0.1, 0.55),
-                              linewidths=_edge_width(scene, view, width))
-    if scene.values is not None:
-        elements.set(array=scene.colours(frame), norm=scale.norm, cmap=scale.colours)
-    else:
-        elements.set_facecolor("#dddddd")
-    axes.add_collection(elements)
-    return elements
-
-
-def draw_colour_bar(figure: Figure, box: tuple[float, float, float, float], scene: Scene,
-                    scale: ColourScale) -> None:
-    """Draw the colour bar into a box (left, bottom, width, height) of the figure, 0 to 1."""
-    bar = figure.add_axes(box)
-    mappable = matplotlib.cm.ScalarMappable(scale.norm, scale.colours)
-    colour_bar = figure.colorbar(mappable, cax=bar, extend=scale.extend, extendfrac=0.04)
-    colour_bar.set_label(scene.label, labelpad=8, linespacing=0.95)
-    colour_bar.outline.set_linewidth(0.5)
-    bar.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-    bar.tick_params(direction="in", width=0.5)
-    scale_ticks(bar.yaxis)
-
-
-def number(value: float) -> str:
-    """A number of four digits in mathematical type."""
-    digits, _, power = f"{value:.4g}".partition("e")
-    return rf"{digits}\times10^{{{int(power)}}}" if power else digits
-
-
-def scale_ticks(axis: Axis) -> None:
-    """Numbers of an axis that are large or small by a power of ten, which its unit then has."""
-    largest = max(map(abs, axis.get_view_interval()))
-    power = int(np.floor(np.log10(largest))) if largest > 0.0 and np.isfinite(largest) else 0
-    power = 0 if -3 < power < 5 else 3*(power//3)
-    if power:
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value/10.0**power:.4g}"))
-        label = axis.get_label_text()
-        axis.set_label_text(label.replace("[", f"[10$^{{{power}}}$ ", 1) if "[" in label else
-                            f"{label} / 10$^{{{power}}}$")
-    elif isinstance(axis.get_major_formatter(), ScalarFormatter):
-        axis.get_major_formatter().set_useOffset(False)
-
-
-def _edge_width(scene: Scene, view: View, width: float) -> float:
-    """Line width [point]: thin against the smallest elements as printed."""
-    side = min(float(np.ptp(scene.position[0][cell], axis=0).max()) for cell in scene.cells)
-    return float(np.clip(0.04*side/(view[1] - view[0])*width*72.0, 0.05, 0.35))
-
-
-def set_view(axes: Axes, view: View, width: float, height: float) -> None:
-    """Limits, widened where the panel [inch] is larger than the view so that the scale is true."""
-    x_min, x_max, y_min, y_max = view
-    scale = max((x_max - x_min)/width, (y_max - y_min)/height)
-    x_pad, y_pad = 0.5*(scale*width - (x_max - x_min)), 0.5*(scale*height - (y_max - y_min))
-    axes.set_xlim(x_min - x_pad, x_max + x_pad)
-    axes.set_ylim(y_min - y_pad, y_max + y_pad)
-
-
-def frame_view(axes: Axes, scene: Scene, view: View, width: float, height: float,
-               is_first: bool) -> None:
-    """A frame with ticks around a view; the first of a row has labels at its left. In three
-    dimensions it has the directions of the axes instead."""
-    set_view(axes, view, width, height)
-    axes.set_aspect("equal", adjustable="box")
-    for spine in axes.spines.values():
-        spine.set(visible=True, linewidth=0.4, color=GREY)
-    if scene.order is not None:
-        axes.set(xticks=[], yticks=[])
-        if is_first:
-            _draw_directions(axes, scene.position[0], width, height)
-        return
-    axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10], prune="upper"))
-    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    axes.tick_params(width=0.4, length=2.5)
-    axes.set_xlabel("$x$ [L]", labelpad=1)
-    if is_first:
-        axes.set_ylabel("$y$ [L]")
-        axes.yaxis.set_label_coords(-LABEL_OFFSET/width, 0.5)
-    else:
-        axes.tick_params(labelleft=False)
-
-
-def _draw_directions(axes: Axes, position: Array, width: float, height: float) -> None:
-    """Where x, y and z go, in the corner of a panel [inch] with the fewest nodes (n_node, 2)."""
-    size, room = np.array([width, height]), 2.6*DIRECTION_LENGTH
-    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    at = (position - low)/(high - low)*size
-    corners = [(x, y) for y in (0.0, height) for x in (0.0, width)]
-    taken = [int(np.all(np.abs(at - corner) < room, axis=1).sum()) for corner in corners]
-    corner = np.array(corners[int(np.argmin(taken))])
-    middle = np.where(corner > 0.0, corner - 1.9*DIRECTION_LENGTH, 1.3*DIRECTION_LENGTH)
-    for name, way in zip("xyz", basis()[:2].T):
-        for part, text in ((1.0, ""), (1.3, f"${name}$")):
-            x, y = (middle[k] + part*DIRECTION_LENGTH*way[k] for k in (0, 1))
-            if text:
-                axes.text(x/width, y/height, text, transform=axes.transAxes, ha="center",
-                          va="center", fontsize=8, color=GREY)
-            else:
-                axes.plot([middle[0]/width, x/width], [middle[1]/height, y/height], color=GREY,
-                          linewidth=0.8, transform=axes.transAxes)

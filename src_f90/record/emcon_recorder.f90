@@ -49,6 +49,9 @@ module emcon_recorder
    !> The body that an element is part of, in the order of /sets/BODIES from 1 on; 0: of none.
    type(field_t), parameter :: body_field = field_t("body", is_cell=.true., is_sparse=.true.)
 
+   !> The cell of VTK files that is a line between two nodes.
+   integer, parameter :: vtk_line = 3, n_end = 2
+
    type :: recorder_t
       type(vtkhdf_t) :: fields
       type(history_t) :: history
@@ -107,22 +110,47 @@ contains
       end associate
    end subroutine list_columns
 
-   !> The elements as cells of the field file.
+   !> The elements as cells of the field file, and behind them the lines of profiles.
    pure subroutine find_cells(scene, node, vtk_type)
       type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(out) :: node(:, :)    !! (most, n_element), behind the last one 0
-      integer, allocatable, intent(out) :: vtk_type(:)   !! (n_element)
-      integer :: e
+      integer, allocatable, intent(out) :: node(:, :)    !! (most, n_cell), behind the last one 0
+      integer, allocatable, intent(out) :: vtk_type(:)   !! (n_cell)
+      integer, allocatable :: line(:, :)
+      integer :: e, n_element
 
-      allocate(node, source=scene%element_node)
-      allocate(vtk_type(size(node, 2)))
-      do e = 1, size(vtk_type)
+      call profile_lines(scene, line)
+      n_element = size(scene%element_node, 2)
+      allocate(node(max(n_end, size(scene%element_node, 1)), n_element + size(line, 2)), source=0)
+      allocate(vtk_type(size(node, 2)), source=vtk_line)
+      do e = 1, n_element
          associate (kind => scene%kind(scene%element_kind(e)))
-            node(kind%n_vtk + 1:, e) = 0
+            node(:kind%n_vtk, e) = scene%element_node(:kind%n_vtk, e)
             vtk_type(e) = kind%vtk_type
          end associate
       end do
+      node(:n_end, n_element + 1:) = line
    end subroutine find_cells
+
+   !> The edges of all profiles, which no element shows.
+   pure subroutine profile_lines(scene, line)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: line(:, :)    !! (n_end, n_line)
+      integer :: i, n
+
+      n = 0
+      do i = 1, size(scene%surface)
+         if (scene%surface(i)%is_profile) n = n + size(scene%surface(i)%edge)/n_end
+      end do
+      allocate(line(n_end, n))
+      n = 0
+      do i = 1, size(scene%surface)
+         if (.not. scene%surface(i)%is_profile) cycle
+         associate (edge => scene%surface(i)%edge)
+            line(:, n + 1:n + size(edge)/n_end) = edge
+            n = n + size(edge)/n_end
+         end associate
+      end do
+   end subroutine profile_lines
 
    !> Go on with the files of `base` after `n_row` rows and `n_frame` frames.
    subroutine recorder_resume(self, stepper, base, n_row, n_frame, error)
@@ -277,12 +305,14 @@ contains
       call vtkhdf_end_frame(self%fields, error)
    end subroutine write_fields
 
-   !> The body of each element, as `body_field`.
+   !> The body of each element and of each line of a profile, as `body_field`.
    pure function cell_bodies(stepper) result(body)
       type(stepper_t), intent(in) :: stepper
-      real(dp), allocatable :: body(:, :)        !! (1, n_element)
+      real(dp), allocatable :: body(:, :)        !! (1, n_cell)
+      integer, allocatable :: line(:, :)
 
-      associate (first => stepper%scene%element_node(1, :))
+      call profile_lines(stepper%scene, line)
+      associate (first => [stepper%scene%element_node(1, :), line(1, :)])
          allocate(body(1, size(first)))
          body(1, :) = real(stepper%march%system%space%body(first), dp)
       end associate
@@ -302,7 +332,8 @@ contains
       end associate
    end function default_frame
 
-   !> The fields that belong to one variable, e.g. stress and von Mises stress to S.
+   !> The fields that belong to one variable, e.g. stress and von Mises stress to S; what elements
+   !> have is 0 on lines of profiles.
    subroutine write_variable(self, stepper, variable, error)
       type(recorder_t), intent(inout) :: self
       type(stepper_t), intent(inout) :: stepper
@@ -310,13 +341,20 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(field_t), allocatable :: fields(:)
       real(dp), allocatable :: values(:, :), spread(:, :)
+      integer, allocatable :: line(:, :)
       integer :: i, first
 
+      call profile_lines(stepper%scene, line)
       allocate(fields, source=quantity_fields(variable, stepper%scene%n_dim))
       allocate(values, source=quantity_of_field(stepper, variable))
       first = 1
       do i = 1, size(fields)
-         spread = values(first:first + fields(i)%n_component - 1, :)
+         associate (n => fields(i)%n_component, n_line => merge(size(line, 2), 0, &
+            fields(i)%is_cell))
+            if (allocated(spread)) deallocate(spread)
+            allocate(spread(n, size(values, 2) + n_line), source=0.0_dp)
+            spread(:, :size(values, 2)) = values(first:first + n - 1, :)
+         end associate
          call vtkhdf_write(self%fields, trim(fields(i)%name), spread, error)
          if (allocated(error)) return
          first = first + fields(i)%n_component

@@ -69,6 +69,20 @@ def test_colours_are_those_of_the_field(fields: Path) -> None:
     assert not np.array_equal(stress, speed) and not np.array_equal(speed, energy)
 
 
+def test_ends_of_colours_and_frames(fields: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Frames 2 to the last but one; with the colours of a larger range these are paler."""
+    every = pictures(animate(fields))
+    some = pictures(animate(fields, frames=(2, -2)))
+    assert len(some) == len(every) - 3
+    assert main(["animate", str(fields), "--clim", "0", "100", "--frames", "2", "-2"]) == 0
+    paler = pictures(fields.with_name("box.gif"))
+    assert len(paler) == len(some) and paler[-1][300, 300].sum() > some[-1][300, 300].sum() + 100
+    for wrong, why in (({"frames": (0, 9)}, "no frame 9"), ({"frames": (3, 2)}, "later one"),
+                       ({"clim": (1.0, 1.0)}, "larger one"), ({"field": "heat"}, "no field heat")):
+        with pytest.raises(ResultError, match=why):
+            animate(fields, **wrong)
+
+
 def test_negative_values_are_within_the_scale(fields: Path) -> None:
     """The gap closes from 0.5 to 0; nodes without gap are blank."""
     assert len(pictures(animate(fields, field="contact_gap"))) == len(TIMES)

@@ -15,9 +15,10 @@ from matplotlib.figure import Figure
 sys.path.insert(0, str(ROOT/"pywrap"))
 
 from emcon import FieldFile, locate, read_history  # noqa: E402
-from emcon.panels import PAUSE, means  # noqa: E402
-from emcon.plotting import draw  # noqa: E402
-from emcon.scene import UNITS, number, scale_ticks  # noqa: E402
+from emcon.drawing import DIGIT_WIDTH, InnerLocator, scale_ticks, titles  # noqa: E402
+from emcon.panels import MOST_STEPS, PARTS, PAUSE, means, part_means  # noqa: E402
+from emcon.plotting import View, draw  # noqa: E402
+from emcon.scene import UNITS, outer_sides  # noqa: E402
 
 PROGRAM = ROOT/"build"/"release"/"emcon"
 
@@ -76,25 +77,146 @@ def test_load_is_along_an_axis_that_bears_something(tmp_path: Path) -> None:
 
 
 def test_dynamics_show_the_mean_over_a_contact_on_the_master(tmp_path: Path) -> None:
-    """The mean bar times its length is the impulse that the history tells, on the other side."""
+    """The mean bar times its length is the impulse that the history tells, on the other side; with
+    friction there is one for each direction."""
     (energy, _, force), base = panels(tmp_path, "sliding_block")
     history = read_history(locate(base))
     bars = [line for line in force.lines if line.get_linewidth() > 2.0]
-    impulse = sum(np.ptp(bar.get_xdata())*bar.get_ydata()[0] for bar in bars)
-    assert impulse == pytest.approx(-history["pair1_impulse_y"][-1], rel=1e-12)
+    impulses = sorted(np.ptp(bar.get_xdata())*bar.get_ydata()[0] for bar in bars)
+    told = sorted(-history[f"pair1_impulse_{axis}"][-1] for axis in "xy")
+    assert impulses == pytest.approx(told, rel=1e-12)
     total = next(line for line in energy.lines if line.get_label() == "total")
     others = [line for line in energy.lines if line is not total]
     assert total.get_linewidth() > 2.0*max(line.get_linewidth() for line in others)
     assert energy.lines[0] is total             # a band below all others
-    assert labels(force) == ("time $t$ [T]", f"contact force, $y$ {UNITS['force']}")
+    assert labels(force) == ("time $t$ [T]", f"contact force {UNITS['force']}")
 
 
-def test_runs_without_contact_show_angular_momentum(tmp_path: Path) -> None:
+def test_curves_of_energy_add_up_to_the_band_and_none_lies_on_the_axis(tmp_path: Path) -> None:
+    """A bar that falls: its kinetic energy is the work of gravity, which is drawn as taken."""
+    (energy, _, _), base = panels(tmp_path, "bouncing_bar", "--set", "t_end=1.5")
+    shown = {line.get_label(): np.asarray(line.get_ydata()) for line in energy.lines
+             if line.get_label()[0] != "_"}
+    total = shown.pop("total")
+    most = max(np.abs(values).max() for values in shown.values())
+    assert set(shown) == {"kinetic", "strain", "less external work"}
+    assert np.abs(sum(shown.values()) - total).max() < 1e-12*most
+    low, high = energy.get_ylim()
+    assert low < 0.0 < high
+    subprocess.run([PROGRAM, ROOT/"input_decks/rigid_bar.inp", "--quiet", "--output", tmp_path],
+                   check=True, timeout=100)
+    figure, notes = draw(locate(tmp_path/"rigid_bar"))
+    assert len(notes) == 1 and "no stress" in notes[0]
+    (still,) = (axes for axes in figure.axes if axes.get_ylabel() == f"energy {UNITS['energy']}")
+    assert [line.get_label() for line in still.lines if line.get_label()[0] != "_"] == [
+        "total", "kinetic"]
+
+
+def test_many_increments_are_shown_by_means_of_parts(tmp_path: Path) -> None:
+    """The curve in front has the impulse of the pale one behind it, part by part."""
+    (_, _, force), base = panels(tmp_path, "ring", "--set", "t_end=3")
+    history = read_history(locate(base))
+    assert len(history) > MOST_STEPS + 1
+    (curve,) = force.patches
+    values, ends, _ = curve.get_data()
+    assert len(values) == PARTS and ends[0] == 0.0 and ends[-1] == history["time"][-1]
+    assert np.sum(values*np.diff(ends)) == pytest.approx(-history["pair1_impulse_y"][-1], rel=1e-12)
+    pale = next(line for line in force.lines if len(line.get_ydata()) == len(history))
+    assert pale.get_alpha() < 0.5 and np.array_equal(pale.get_ydata(), -history["pair1_force_y"])
+    times = np.linspace(0.0, 1.0, 2*PARTS + 1)
+    force = np.tile([1.0, 5.0], PARTS)
+    assert part_means(times, np.append(7.0, force))[1] == pytest.approx(3.0*np.ones(PARTS))
+
+
+def test_runs_without_contact_show_that_angular_momentum_is_kept(tmp_path: Path) -> None:
     (_, _, momentum), base = panels(tmp_path, "tumbling_block", "--set", "t_end=0.5")
     history = read_history(locate(base))
+    vector = np.array([history[f"l{name}"] for name in "xyz"])
+    told = np.sqrt(((vector - vector[:, :1])**2).sum(axis=0)/(vector**2).sum(axis=0).max())
+    assert np.maximum(told, 1e-17) == pytest.approx(momentum.lines[0].get_ydata(), rel=1e-9)
+    assert momentum.get_yscale() == "log" and "$|L - L_0|" in momentum.get_ylabel()
+
+
+def test_angular_momentum_that_changes_is_a_curve_for_each_axis() -> None:
+    from emcon.panels import draw_momentum
+
+    history = np.zeros(3, dtype=[("time", float), ("lx", float), ("ly", float), ("lz", float)])
+    history["time"], history["ly"] = [0.0, 1.0, 2.0], [1.0, 2.0, 4.0]
+    axes = Figure().add_subplot()
+    draw_momentum(axes, history)
     for name in "xyz":
-        line = next(line for line in momentum.lines if line.get_label() == f"$L_{name}$")
+        line = next(line for line in axes.lines if line.get_label() == f"$L_{name}$")
         assert np.array_equal(line.get_ydata(), history[f"l{name}"])
+    assert axes.get_ylim()[0] < 0.0 and axes.get_ylim()[1] > 4.0
+
+
+def test_what_surfaces_have_is_shown_on_their_sides(tmp_path: Path) -> None:
+    """Each node has its own value on both halves beside it: the largest pressure is in the picture,
+    shear has two signs, states have words."""
+    _, base = panels(tmp_path, "sliding_block")
+    with FieldFile(base.with_suffix(".vtkhdf")) as file:
+        last = len(file.times) - 1
+        place = file.points + file.point("displacement", last)
+        for name in ("contact_pressure", "contact_shear", "contact_status"):
+            figure, _ = draw(locate(base), View(frame=-1, field=name))
+            (axes,) = (axes for axes in figure.axes if axes.get_title())
+            lines = next(part for part in axes.collections if part.get_array() is not None)
+            told = file.point(name, last)
+            on_slave = np.flatnonzero(np.isfinite(file.point("contact_gap", last)))
+            assert set(lines.get_array()) == set(told[on_slave]) != {0.0}
+            assert len(lines.get_segments()) == 2*(len(on_slave) - 1)
+            for (start, _), value in zip(lines.get_segments(), lines.get_array(), strict=True):
+                nearest = np.argmin(np.hypot(*(place[on_slave, :2] - start).T))
+                assert value == told[on_slave[nearest]]
+            low, top = lines.get_clim()
+            assert low == -top if name == "contact_shear" else low <= 0.0 < top
+        bar = figure.axes[1]
+        assert [text.get_text() for text in bar.get_yticklabels()] == ["none", "sticks", "slides"]
+
+
+def test_a_gap_of_round_off_has_no_colours(tmp_path: Path) -> None:
+    _, base = panels(tmp_path, "sliding_block")
+    figure, _ = draw(locate(base), View(frame=-1, field="contact_gap"))
+    (axes,) = (axes for axes in figure.axes if axes.get_title())
+    lines = next(part for part in axes.collections if part.get_array() is not None)
+    assert 0.0 < np.abs(lines.get_array()).max() < 1e-15 and lines.get_clim() == (0.0, 1.0)
+
+
+def test_walls_without_elements_are_drawn(tmp_path: Path) -> None:
+    """The profile of the wall goes through the picture, along y = 0, where the bar turns back."""
+    _, base = panels(tmp_path, "bar_on_wall")
+    figure, _ = draw(locate(base))
+    scenes = [axes for axes in figure.axes if axes.get_title()]
+    for axes in scenes:
+        ends = [segment for part in axes.collections[:1] for segment in part.get_segments()]
+        assert len(ends) == 1 and np.all(ends[0][:, 1] == 0.0)
+        assert axes.get_ylim()[0] < 0.0
+        assert ends[0][:, 0].min() < axes.get_xlim()[0] and ends[0][:, 0].max() > axes.get_xlim()[1]
+    with FieldFile(base.with_suffix(".vtkhdf")) as file:
+        assert len(file.profiles) == 1 and len(file.cells) == 40
+        assert file["strain_energy"].shape == (len(file.times), 40)
+        energy = np.array([file.cell("strain_energy", k).sum() for k in range(len(file.times))])
+        history = read_history(locate(base))
+        told = np.interp(file.times, history["time"], history["strain"])
+        assert energy == pytest.approx(told, rel=1e-9, abs=1e-9*told.max())
+
+
+def test_outer_sides_are_those_of_one_element() -> None:
+    cells = [np.array([0, 1, 2, 3]), np.array([1, 4, 2])]
+    assert {frozenset(map(int, side)) for side in outer_sides(cells)} == {
+        frozenset(pair) for pair in ((0, 1), (2, 3), (3, 0), (1, 4), (4, 2))}
+
+
+@pytest.mark.parametrize(("low", "high", "length"),
+                         [(0.0, 10.0, 1.5), (-14.0, 11.2, 1.5), (7.8, 14.2, 1.3), (-107.0, 107.0, 1.7),
+                          (-0.045, 0.055, 1.3), (-1.0, 1.0, 6.0)])
+def test_numbers_below_a_panel_stay_there_and_apart(low: float, high: float,
+                                                    length: float) -> None:
+    ticks = InnerLocator(length, 3, is_along=True).tick_values(low, high)
+    place = (ticks - low)/(high - low)*length
+    half = np.array([0.5*DIGIT_WIDTH*len(f"{tick:.4g}") for tick in ticks])
+    assert 1 <= len(ticks) <= 9 and (place >= half).all() and (place <= length - half).all()
+    assert (np.diff(place) > half[1:] + half[:-1]).all()
 
 
 @pytest.mark.parametrize(("largest", "power", "shown"),
@@ -110,7 +232,10 @@ def test_powers_of_ten_are_in_the_unit(largest: float, power: int, shown: str | 
     else:
         assert axes.get_xlabel() == f"time $t$ [10$^{{{power}}}$ T]"
         assert axes.xaxis.get_major_formatter()(20.0*10.0**power) == shown
+        assert axes.xaxis.get_major_formatter()(-20.0*10.0**power) == "\N{MINUS SIGN}20"
 
 
-def test_numbers_in_titles() -> None:
-    assert [number(value) for value in (0.0, 1.25, 3e-05)] == ["0", "1.25", r"3\times10^{-5}"]
+def test_titles_share_a_power_of_ten() -> None:
+    assert titles([0.0, 1.25]) == ["$t = 0$", "$t = 1.25$"]
+    assert titles([0.0, 3e-05, 1.3e-4]) == ["$t = 0$", r"$t = 30\times10^{-6}$",
+                                            r"$t = 130\times10^{-6}$"]
