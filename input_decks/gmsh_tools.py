@@ -58,10 +58,11 @@ def picture(base: Path, frames: Sequence[int], titles: Sequence[str], *,
     """
     import pyvista
 
+    pyvista.vtk_verbosity("off")        # it warns where there is no screen, which it does not need
     reader = pyvista.get_reader(f"{base}.vtkhdf").reader
     plotter = pyvista.Plotter(shape=(1, len(frames)), off_screen=True, border=False,
                               window_size=(700*len(frames), 700))
-    bar = {"title": f"von Mises [{unit}]", "color": "black", "vertical": True, "n_labels": 3,
+    bar = {"title": f"von Mises [{unit}]\n", "color": "black", "vertical": True, "n_labels": 3,
            "fmt": "%.3g", "position_x": 0.84, "position_y": 0.68, "height": 0.25}
     for column, (frame, title) in enumerate(zip(frames, titles, strict=True)):
         reader.SetStep(frame)

@@ -123,7 +123,7 @@ contains
       factor = 1.0_dp
       condition(3) = condition_scaled(a, inverse, factor)
       if (allocated(error)) return
-      write(output_unit, "(2a, i0, 5(a, es12.5), a, i0)") form, ",", size(a, 1), ",", &
+      write(output_unit, "(2a, i0, 5(a, es13.5e3), a, i0)") form, ",", size(a, 1), ",", &
          condition(1), ",", condition(2), ",", condition(3), ",", lambda(1), ",", &
          lambda(size(lambda)), ",", count(lambda < 0.0_dp)
    end subroutine print_line

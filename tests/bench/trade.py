@@ -19,7 +19,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "scenes")]
 
-from book.common import COLOURS, axes, save, size, table  # noqa: E402
+from book.common import BROAD, COLOURS, axes, common_legend, save, size, table  # noqa: E402
 from kept_runs import folder_of, name_of, run_once  # noqa: E402
 from plain_scenes import AUTO, Scene, below, bowl, gears  # noqa: E402
 from scene_tools import DECKS, PROGRAM, Deck  # noqa: E402
@@ -222,12 +222,12 @@ def draw(found, path):
     """Contact force of the ring on its foundations, massive and massless surfaces."""
     pictures = axes(2)
     for picture, surfaces in zip(pictures, SURFACES, strict=True):
-        for kind, colour in zip(DRAWN, COLOURS, strict=False):
+        for kind, colour, broad in zip(DRAWN, COLOURS, BROAD, strict=False):
             time, force = force_of(found[kind, surfaces].history)
-            picture.plot(time, np.abs(force[1]), color=colour, lw=0.8, label=kind)
+            picture.plot(time, np.abs(force[1]), color=colour, lw=broad, label=kind)
         picture.set(xlim=(0, 3), xlabel="time", title=f"{SURFACES[surfaces]} surfaces",
                     ylabel="contact force, mean of 5 increments")
-    pictures[1].legend(fontsize=7, frameon=False)
+    common_legend(pictures[0])
     save(path)
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from trade import NTS, PAGE, PROFILE, PROGRAM, ROOT, ball, bar, drawn, ring
 from trade_knobs import SINGLE, knobbed
 
-from book.common import COLOURS, axes, save, table  # isort: skip, `trade` says where
+from book.common import COLOURS, axes, common_legend, save, table  # isort: skip, `trade` says where
 from scene_tools import DECKS, Deck
 from timing import usage
 from verification import update
@@ -353,7 +353,7 @@ def adaptive_lines(jobs, figure=None, names=CASES, **short):
                           row["increments"], f"{float(row['cpu']):.2g}",
                           *(f"{error:.1e}" for error in figures(row)), row["verdict"]))
     if figure:
-        pictures[-1].legend(fontsize=6, frameon=False, loc="upper right")
+        common_legend(pictures[-1], 3)
         save(figure)
     return table(["scene", "first contact", "increments", "h or tolerance", "number", "CPU s",
                   *SHOWN.values(), "verdict"], lines)

@@ -10,7 +10,7 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..plotting import RESOLUTION
+from ..plotting import RESOLUTION, WIDTH
 from ..scene import GREY, STYLE
 from .accuracy import PROCESS, Run, fitted_order
 from .choice import pareto_front
@@ -45,7 +45,7 @@ def _write(study: Study, reference: Reference, names: Sequence[str],
            drawer: Callable[[Axes, Study, Reference, str], None], path: Path) -> None:
     rows = math.ceil(len(names)/_PER_ROW)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(10.5, 3.3*rows + 0.7), layout="constrained")
+        figure = Figure(figsize=(WIDTH, 3.3*rows + 0.7), layout="constrained")
         panels = figure.subplots(rows, _PER_ROW, squeeze=False).ravel()
         for axes, name in zip(panels, names):
             drawer(axes, study, reference, name)
@@ -53,8 +53,8 @@ def _write(study: Study, reference: Reference, names: Sequence[str],
             axes.set_axis_off()
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False,
-                      fontsize=7)
-        figure.suptitle(f"errors against {reference.kind}: {reference.title}", fontsize=9)
+                      fontsize=9)
+        figure.suptitle(f"errors against {reference.kind}: {reference.title}", fontsize=10)
         figure.savefig(path, dpi=RESOLUTION)
 
 

@@ -6,7 +6,8 @@ import math
 import numpy as np
 from scene_tools import DECKS, Deck
 
-from .common import COLOURS, Chapter, axes, mortar, node, save, size, table, with_print
+from .common import (BROAD, COLOURS, Chapter, axes, legend, mortar, node, save, size, table,
+                     with_print)
 
 PERIOD = 16/3
 #: Text of *CONTACT INITIATION.
@@ -128,25 +129,25 @@ def draw(bounces, path):
     about the middle of the period, so the force of the first one comes in reverse."""
     left, right = axes(2)
     begin, end = 11/3, 13/3
-    right.plot([3.5, begin, begin, end, end, 4.5], [0, 0, 500, 300, 0, 0], color="0.75", lw=4,
+    right.plot([3.5, begin, begin, end, end, 4.5], [0, 0, 500, 300, 0, 0], color="0.75", lw=7,
                label="closed form")
     width = round(0.1/0.005)
-    for (treatment, bounce), colour in zip(bounces.items(), COLOURS, strict=False):
+    for (treatment, bounce), colour, broad in zip(bounces.items(), COLOURS, BROAD, strict=False):
         label = treatment.replace("`", "").lower()
         near = (bounce.time > 3.5) & (bounce.time < 4.5)
         mean = np.convolve(bounce.force, np.ones(width)/width, mode="same")
         if treatment == "`PERSISTENT`":
             right.plot(bounce.time[near], bounce.force[near], color=colour, alpha=0.35, lw=0.6,
                        label="persistent, each increment")
-        left.plot(bounce.time, bounce.height - exact_height(bounce.time), color=colour, lw=0.9,
-                  label=label)
-        right.plot(bounce.time[near], mean[near], color=colour, lw=1.1, label=label)
+        left.plot(bounce.time, bounce.height - exact_height(bounce.time), color=colour,
+                  lw=0.6*broad, label=label)
+        right.plot(bounce.time[near], mean[near], color=colour, lw=broad, label=label)
     for start in (1, begin):
         left.axvspan(start, start + 2/3, color="0.92", zorder=0)
     left.set(xlabel="time (contact: grey)", ylabel="height of the lower end - closed form")
-    right.set(xlabel="time", ylabel="contact force, mean over 0.1", ylim=(-40, 1300))
-    left.legend(fontsize=6.5, frameon=False, loc="lower left")
-    right.legend(fontsize=6.5, frameon=False, ncols=2, loc="upper center")
+    right.set(xlabel="time", ylabel="contact force, mean over 0.1")
+    legend(left)
+    legend(right)
     save(path)
 
 

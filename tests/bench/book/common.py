@@ -8,10 +8,19 @@ import sys
 
 import matplotlib as mpl
 import numpy as np
-from scene_tools import DECKS, Deck, run_deck
+from scene_tools import DECKS, ROOT, Deck, run_deck
+
+sys.path.insert(0, str(ROOT / "pywrap"))
+
+from emcon.plotting import RESOLUTION, WIDTH  # noqa: E402
+from emcon.scene import STYLE  # noqa: E402
 
 TREATMENTS = ("PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE")
 COLOURS = ("#1f4e79", "#b5532a", "#4c8c4a", "#7b4a8c", "#b8962e")
+#: Widths of curves that may lie on each other: what comes later leaves the ones below in sight.
+BROAD = (3.6, 2.3, 1.4, 0.7)
+#: Sizes of marks, likewise.
+LARGE = (9, 6.5, 4.5, 3)
 
 
 def mortar(normal, multiplier, **more):
@@ -114,21 +123,31 @@ def size(value):
     return f"{value:.1e}"
 
 
-def axes(n, height=2.7, n_row=1, width=3.6):
-    """`n` small axes side by side, in `n_row` rows if more than one."""
+def axes(n, height=2.9, n_row=1):
+    """`n` axes side by side, in `n_row` rows if more than one; all pictures are equally wide."""
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    plt.rcParams.update({"font.size": 8, "axes.spines.top": False, "axes.spines.right": False})
-    _, grid = plt.subplots(
-        n_row, n, figsize=(width*n + 0.3, height*n_row), squeeze=False, sharex=n_row > 1
-    )
+    plt.rcParams.update({**STYLE, "savefig.dpi": RESOLUTION})
+    _, grid = plt.subplots(n_row, n, figsize=(WIDTH, height*n_row + 0.5), squeeze=False,
+                           sharex=n_row > 1, layout="constrained")
     return grid[0] if n_row == 1 else grid
+
+
+def legend(axis, n_column=2):
+    """What the curves of one panel are, above it, where no curve is."""
+    axis.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), ncols=n_column, handlelength=1.6,
+                columnspacing=1.0)
+
+
+def common_legend(axis, n_column=4):
+    """What the curves of all panels are, below them; `axis` has each of them."""
+    axis.figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center",
+                       ncols=n_column, handlelength=1.8)
 
 
 def save(path):
     from matplotlib import pyplot as plt
 
-    plt.tight_layout()
-    plt.savefig(path, dpi=110)
+    plt.savefig(path)
     plt.close()

@@ -4,7 +4,8 @@ import numpy as np
 from contact_sides import ALL, with_sides
 from scene_tools import DECKS, Deck, figures
 
-from .common import (COLOURS, MORTAR, Chapter, axes, mortar, node, save, segment, size, table)
+from .common import (COLOURS, LARGE, MORTAR, Chapter, axes, legend, mortar, node, save, segment,
+                     size, table)
 
 PRESSURE = 10.0
 #: Options of make_contact_patch.py.
@@ -105,13 +106,13 @@ def points(started, folder):
     rows = [(n, *(shown(done[(*kind, n)][1]) for kind in kinds)) for n in POINTS]
     if folder:
         (axis,) = axes(1)
-        for kind, colour in zip(kinds, COLOURS, strict=False):
+        for kind, colour, large in zip(kinds, COLOURS, LARGE[:2]*2, strict=False):
             axis.semilogy(POINTS, [100*done[(*kind, n)][1] for n in POINTS], "o-", color=colour,
-                          ms=4, lw=1, label=f"{kind[0]}, {kind[1].lower()}")
+                          ms=large, lw=0.4*large, label=f"{kind[0]}, {kind[1].lower()}")
         level = 100*errors(DECKS / "contact_patch.inp", node_run.result())[1]
         axis.axhline(level, color="0.5", ls="--", lw=1, label="node to surface, finer slave")
         axis.set(xlabel="Gauss points on a slave edge", ylabel="error of stress [%]")
-        axis.legend(fontsize=6.5, frameon=False)
+        legend(axis, 3)
         save(folder / "verification_patch.png")
     return table(["`POINTS`", *(f"{mesh}, `{multiplier}`" for mesh, multiplier in kinds)], rows)
 

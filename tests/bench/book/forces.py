@@ -8,7 +8,8 @@ from plain_scenes import Scene, add_grid
 from scene_tools import DECKS, Deck, number
 
 from . import bar
-from .common import COLOURS, Chapter, axes, drift, mortar, node, save, size, table, with_print
+from .common import (COLOURS, Chapter, axes, drift, legend, mortar, node, save, size, table,
+                     with_print)
 
 KINDS = ("PERSISTENT", "MASSLESS")
 CHOICES = {"`NODE TO SURFACE`": node(), "`MORTAR`": mortar("NODAL", "DUAL")}
@@ -48,15 +49,15 @@ def bars(futures, folder):
 
 
 def draw(bounces, folder):
-    (picture,) = axes(1, width=7.2)
+    (picture,) = axes(1)
     for (kind, bounce), colour in zip(bounces.items(), COLOURS[1::-1], strict=False):
         picture.plot(bounce.time, bounce.force, color=colour, lw=1.2 if kind == "MASSLESS" else 0.4,
                      label=kind.lower())
     picture.plot([0.9, 1, 1, 5/3, 5/3, 1.8], [0, 0, 300, 500, 0, 0], color="0.6", lw=3, zorder=0,
                  label="closed form")
-    picture.set(xlim=(0.9, 1.8), ylim=(-40, 900), xlabel="time",
+    picture.set(xlim=(0.9, 1.8), xlabel="time",
                 ylabel="contact force of each increment")
-    picture.legend(fontsize=7, frameon=False, loc="upper right")
+    legend(picture, 3)
     save(folder / "verification_forces.png")
 
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from scene_tools import figures
 
-from .common import (COLOURS, Chapter, axes, mortar, node, order, save, segment, size, table)
+from .common import COLOURS, Chapter, axes, legend, mortar, node, order, save, segment, size, table
 
 HALF_WIDTH, PEAK = 0.680778, 9.351351
 LEVELS = (4, 8, 16, 32)
@@ -122,9 +122,8 @@ def draw(done, path):
     right.minorticks_off()
     left.set(xlabel="x", ylabel="contact force / reference length", ylim=(0, None))
     right.set(xlabel="slave edges on the half-width", ylabel="rms error of the pressure [%]")
-    left.legend(fontsize=6.5, frameon=False, loc="lower left")
-    right.set_ylim(0.1, 9)
-    right.legend(fontsize=6, frameon=False, loc="lower left")
+    legend(left)
+    legend(right)
     save(path)
 
 

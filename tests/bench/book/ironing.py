@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from .common import COLOURS, Chapter, axes, mortar, node, save, table
+from .common import COLOURS, Chapter, axes, legend, mortar, node, save, table
 
 SWAPPED = {"slave": "BLOCK_TOP", "master": "DIE_FACE"}
 NODE = "`NODE TO SURFACE`"
@@ -77,7 +77,7 @@ def report(started, folder):
 
 
 def draw(curves, path):
-    upper, lower = axes(1, n_row=2, height=2.3, width=6.5)[:, 0]
+    upper, lower = axes(1, n_row=2, height=2.3)[:, 0]
     for (name, (time, force)), colour in zip(curves.items(), COLOURS, strict=False):
         drawn = time >= 1
         for axis, a in ((upper, 1), (lower, 0)):
@@ -85,7 +85,7 @@ def draw(curves, path):
                       label=name.replace("`", "").lower())
     upper.set(ylabel="vertical reaction / 1e8", ylim=(7.35, 7.85))
     lower.set(xlabel="path of the die", ylabel="horizontal reaction / 1e8", ylim=(-0.2, 0.2))
-    upper.legend(fontsize=6.5, frameon=False, ncols=2, loc="upper center")
+    legend(upper, 4)
     save(path)
 
 

@@ -4,8 +4,8 @@ import h5py
 import numpy as np
 from scene_tools import DECKS, Deck
 
-from .common import (COLOURS, FORMULATIONS, TREATMENTS, Chapter, axes, drift, save, size, table,
-                     with_print)
+from .common import (BROAD, COLOURS, FORMULATIONS, TREATMENTS, Chapter, axes, drift, legend,
+                     save, size, table, with_print)
 
 
 def rebound(run):
@@ -62,10 +62,11 @@ def treatments(started, figures):
 def draw(done, path):
     left, right = axes(2)
     for treatment, colour in zip(TREATMENTS, COLOURS, strict=False):
+        broad = BROAD[TREATMENTS.index(treatment)]
         for h, line in ((0.05, "--"), (0.01, "-")):
             history = done["64 x 4", treatment, h].history
             left.plot(history["time"], history["total"]/history["total"][0], line, color=colour,
-                      lw=1.2, label=f"{treatment.lower()}, h = {h:g}")
+                      lw=broad, label=f"{treatment.lower()}, h = {h:g}")
         keys = [key for key in done if key[:2] == ("64 x 4", treatment)]
         right.semilogx([k[2] for k in keys], [rebound(done[k])[1] for k in keys], "o-",
                        color=colour, ms=4, lw=1, label=f"64 x 4, {treatment.lower()}")
@@ -77,8 +78,8 @@ def draw(done, path):
     right.set(xlabel="h", ylabel="rebound velocity of the ring")
     right.set_xticks([0.005, 0.01, 0.02, 0.05], ["0.005", "0.01", "0.02", "0.05"])
     right.minorticks_off()
-    left.legend(fontsize=6.5, frameon=False, loc="right", bbox_to_anchor=(1.0, 0.42))
-    right.legend(fontsize=6.5, frameon=False)
+    legend(left)
+    legend(right)
     save(path)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 from scene_tools import DECKS, figures
 from tie_tools import BEAM, SMOOTH, error_norms
 
-from .common import COLOURS, Chapter, axes, drift, mortar, node, save, size, table
+from .common import (COLOURS, LARGE, Chapter, axes, common_legend, drift, mortar, node, save,
+                     size, table)
 from .ring import rebound
 
 MULTIPLIERS = ("DUAL", "STANDARD")
@@ -119,15 +120,15 @@ def order_row(done, name, ratio, multipliers):
 
 
 def draw_orders(done, path):
-    panels = axes(len(SMOOTH_INTERFACES), n_row=2, width=2.4, height=2.4)
+    panels = axes(len(SMOOTH_INTERFACES), n_row=2, height=2.4)
     for name, column in zip(SMOOTH_INTERFACES, panels.T, strict=True):
-        column[0].set_title(name, fontsize=8)
+        column[0].set_title(name, fontsize=10)
         for row, axis in enumerate(column):
             draw_errors(axis, done, name, row)
         column[1].set_xlabel("elements along half of the square")
     panels[0, 0].set_ylabel("error of displacement")
     panels[1, 0].set_ylabel("error of energy")
-    panels[0, -1].legend(fontsize=5.5, frameon=False)
+    common_legend(panels[0, -1])
     save(path)
 
 
@@ -138,10 +139,10 @@ def draw_errors(axis, done, name, kind):
     axis.loglog(levels, norm, "k-", lw=0.8, label="one piece")
     slope = [0.5*norm[0]*(levels[0]/level)**(2 - kind) for level in levels]
     axis.loglog(levels, slope, ":", color="0.5", lw=1, label=f"order {2 - kind}")
-    for ratio, colour in zip(LEVELS, COLOURS, strict=False):
+    for ratio, colour, large in zip(LEVELS, COLOURS, LARGE, strict=False):
         for multiplier, line in zip(MULTIPLIERS, ("o-", "x--"), strict=True):
             norm = [done[name, ratio, multiplier, level][kind] for level in LEVELS[ratio]]
-            axis.loglog(LEVELS[ratio], norm, line, color=colour, ms=4, lw=0.9,
+            axis.loglog(LEVELS[ratio], norm, line, color=colour, ms=large, lw=0.2*large,
                         label=f"1 : {ratio:g}, {multiplier.lower()}")
     axis.set_xticks(levels, [str(level) for level in levels])
     axis.minorticks_off()

@@ -5,7 +5,7 @@ import subprocess
 
 from scene_tools import PROGRAM, Deck, overrides
 
-from .common import COLOURS, Chapter, axes, save, size, table
+from .common import COLOURS, LARGE, Chapter, axes, common_legend, save, size, table
 from .tied_grid import DYNAMIC, STATIC, Grid
 
 CONDITION = PROGRAM.parent / "ties_condition"
@@ -94,7 +94,7 @@ def report(started, folder):
 
 
 def draw(done, path):
-    panels = axes(3, width=2.5)
+    panels = axes(3)
     for axis, kind, values, title in (
         (panels[0], "pieces", STEPS, "tied pieces"),
         (panels[1], "size", LEVELS, "tied pieces, static"),
@@ -105,9 +105,9 @@ def draw(done, path):
                  ("(6), one scale", [x[2] for x in saddle], "^-"),
                  ("(6), rows by length too", [x[3] for x in saddle], "o-"),
                  ("(7)", [x[3] for x in reduced], "x--"))
-        for (name, numbers, mark), colour in zip(lines, COLOURS, strict=False):
-            axis.loglog(values, numbers, mark, color=colour, ms=4, lw=0.9, label=name)
-        axis.set_title(title, fontsize=8)
+        for (name, numbers, mark), colour, large in zip(lines, COLOURS, LARGE, strict=False):
+            axis.loglog(values, numbers, mark, color=colour, ms=large, lw=0.2*large, label=name)
+        axis.set_title(title, fontsize=10)
         axis.set_xlabel("time step" if kind != "size" else "elements along a coarse piece")
         if kind == "size":
             axis.set_xticks(LEVELS, [str(n) for n in LEVELS])
@@ -115,7 +115,7 @@ def draw(done, path):
             axis.invert_xaxis()
         axis.minorticks_off()
     panels[0].set_ylabel("condition number")
-    panels[0].legend(fontsize=6, frameon=False)
+    common_legend(panels[0])
     save(path)
 
 
