@@ -387,7 +387,7 @@ class Model(Cards):
 
     # --- contact, ties, equations ----------------------------------------------------------
 
-    def interaction(self, name: str, *, friction: Number | None = None,
+    def interaction(self, name: str, *, friction: Number | Literal["ROUGH"] | None = None,
                     friction_restitution: Number | None = None,
                     pad_thickness: Number | None = None,
                     restitution: Number | None = None,
@@ -395,7 +395,7 @@ class Model(Cards):
                     tangent_fraction: Number | None = None) -> Model:
         """`*SURFACE INTERACTION` with hard contact.
 
-        friction        coefficient of Coulomb's law, 0 or more; default 0
+        friction        coefficient of Coulomb's law, 0 or more; "ROUGH": nothing slides; default 0
         friction_restitution   0 to 1: the part of the velocity along the surface of what sticks
                         that goes back; default 0
         pad_thickness   of a layer that keeps the surfaces apart, 0 or more [L]; a node with a pad
@@ -415,7 +415,9 @@ class Model(Cards):
                                             "RESTITUTION": restitution})
         text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})
         if friction is not None:
-            text += card("FRICTION", {"RESTITUTION": friction_restitution}, rows=[(friction,)])
+            is_rough = isinstance(friction, str) and friction.upper() == "ROUGH"
+            text += card("FRICTION", {"ROUGH": is_rough, "RESTITUTION": friction_restitution},
+                         rows=[] if is_rough else [(friction,)])
         if damping is not None:
             row = tuple(damping) if isinstance(damping, Sequence) else (damping,)
             text += card("CONTACT DAMPING", {"DEFINITION": "DAMPING COEFFICIENT",

@@ -7,7 +7,7 @@ module emcon_hermite_gap_first
       dg_t, difference, difference_t, operator(*), operator(+), operator(-), operator(/)
    use emcon_hermite, only : at_end, hermite_curve, hermite_curve_t, hermite_stencil_t, &
       hermite_weights, hermite_weights_t, joined_pieces
-   use emcon_hermite_gap_value, only : hermite_roots, hermite_stretch, slave
+   use emcon_hermite_gap_value, only : hermite_roots, hermite_lever, slave
    use emcon_kinds, only : wp
    implicit none
    private

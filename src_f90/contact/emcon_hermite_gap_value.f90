@@ -16,7 +16,7 @@ module emcon_hermite_gap_value
    use emcon_rounded, only : rounded_negative
    implicit none
    private
-   public :: hermite_begin, hermite_gap_value, hermite_roots, hermite_slip_value, hermite_stretch
+   public :: hermite_begin, hermite_gap_value, hermite_roots, hermite_slip_value, hermite_lever
    public :: slave
 
    !> Local numbers of the slave node and of the first node of the chosen edge.
@@ -157,23 +157,26 @@ contains
       curve = hermite_curve(stencil, joined_pieces)
       call hermite_roots(stencil, curve, x0, dx, s, root, is_found)
       if (.not. is_found) return
-      slip = hermite_stretch(stencil, curve, x0, root(0)) &
+      slip = hermite_lever(stencil, curve, x0, root(0)) &
          *(hermite_way(curve, root(1)) - hermite_way(curve, root(0)))
    end subroutine hermite_slip_value
 
-   !> Length of the curve at `s` by its reference length.
-   pure real(wp) function hermite_stretch(stencil, curve, x, s) result(stretch)
+   !> How far the slave node moves along the curve while the closest point, at `s`, moves by one of
+   !> the reference length: the stretch of the curve, less its curvature times a gap that is held.
+   !> Friction on the node is then as large as the law has it, at whatever distance.
+   pure real(wp) function hermite_lever(stencil, curve, x, s) result(lever)
       type(hermite_stencil_t), intent(in) :: stencil
       type(hermite_curve_t), intent(in) :: curve
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 7) as in `hermite_begin` [L]
       real(wp), intent(in) :: s                  !! place on the curve
       type(hermite_point_t) :: p
-      real(wp) :: edge(2, 5), b(2)
+      real(wp) :: edge(2, 5), b(2), stretch
 
       call gather(stencil, x, edge, b)
       p = hermite_point(curve, edge, s)
       stretch = sqrt(dot_product(p%tangent, p%tangent))
-   end function hermite_stretch
+      lever = stretch - dot_product(b - p%y, p%bend)/(p%length*stretch)
+   end function hermite_lever
 
    pure real(wp) function cross(a, b)
       real(wp), intent(in) :: a(2), b(2)

@@ -27,7 +27,7 @@ contains
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
-      integer :: i, n
+      integer :: i, n, rubs
 
       allocate(reader%interaction(size(reader%card)))
       allocate(reader%pad(size(reader%card)), reader%friction(size(reader%card)), source=0.0_wp)
@@ -35,6 +35,7 @@ contains
       allocate(reader%damping(size(reader%card)))
       allocate(reader%restitution(size(reader%card)), source=1.0_wp)
       n = 0
+      rubs = 0                                   ! the last interaction with *FRICTION
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
             select case (card%name)
@@ -54,6 +55,9 @@ contains
                   call read_contact_damping(reader, card, reader%damping(max(1, n)))
                   if (n == 0) reader%damping(1) = contact_damping_t()
                else if (card%name == "FRICTION") then
+                  if (n > 0 .and. n == rubs) call card_error(reader, card, &
+                     "the surface interaction has *FRICTION already")
+                  rubs = n
                   call read_friction(reader, card, reader%friction(max(1, n)))
                   call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                      // "left of the velocity along the surface of what sticks", &

@@ -1,7 +1,8 @@
 !> *FRICTION of surface interactions, and what it does not go with.
 module emcon_deck_friction
-   use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line
-   use emcon_deck_reader, only : card_error, card_t, reader_t
+   use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line, &
+      refuse_lines
+   use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_diagnostics, only : add_error, add_warning
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -12,10 +13,14 @@ module emcon_deck_friction
    private
    public :: read_friction, check_friction
 
+   !> The coefficient of what is rough.
+   real(wp), parameter :: rough = sqrt(huge(1.0_wp))
+
 contains
 
    !> The coefficient of Coulomb's law. A second value is a limit of shear stress or a slope of
    !> stick in other programs: here nothing but the coefficient bounds friction, and stick is exact.
+   !> What is rough does not slide: a coefficient that no force is above.
    subroutine read_friction(reader, card, coefficient)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -23,6 +28,11 @@ contains
       type(data_t) :: data
       integer :: n
 
+      if (has_option(card, "ROUGH")) then
+         coefficient = rough
+         call refuse_lines(reader, card)
+         return
+      end if
       call data_open(data, card)
       n = 0
       do while (next_line(reader, data))
@@ -35,22 +45,26 @@ contains
             coefficient = 0.0_wp
          end if
          if (data%n > 1) call data_error(reader, data, "only the coefficient is read: what " // &
-            "sticks does not move, so that there is no slope of stick, and nothing else " // &
-            "bounds friction; leave out what stands behind it")
-         if (n == 2) call data_error(reader, data, "only one data line is read")
+            "sticks does not move, so that there is no slope of stick, nothing else bounds " // &
+            "friction, and it depends on no rate, pressure or temperature; leave out what " // &
+            "stands behind it")
+         if (n == 2) call data_error(reader, data, "only one data line is read: the " // &
+            "coefficient is one for all rates, pressures and temperatures")
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
    end subroutine read_friction
 
    !> Friction is in steps whose scheme has its forces along discrete gradients or which are static,
    !> and which hold contact exactly.
-   subroutine check_friction(reader, pair, step)
+   subroutine check_friction(reader, pair, step, on_nodes)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair(:)
       type(step_t), intent(in) :: step(:)
+      logical, intent(in) :: on_nodes(:)         !! (surfaces) it is made of nodes
       integer :: i, k
 
       do i = 1, size(pair)
+         call check_other_way(reader, pair(:i))
          if (.not. pair(i)%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
          if (pair(i)%restitution < 1.0_wp) call refuse(reader, pair(i), &
             "RESTITUTION below 1: velocities would " &
@@ -58,12 +72,31 @@ contains
          do k = 1, size(step)
             call check_step(reader, pair(i), step(k), k)
          end do
+         if (pair(i)%offset > 0.0_wp .and. on_nodes(pair(i)%slave)) call add_warning(reader%log, &
+            pair(i)%origin, "*CONTACT PAIR: its surface interaction has *FRICTION and a PAD " &
+            // "THICKNESS: friction acts at the nodes, so that discs slide, but do not roll")
          if (any(step%initiation == initiation_massless .and. step%scheme%masses_resist)) then
             call add_warning(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
                // "has *FRICTION: both surfaces keep their mass, and hold gaps as PERSISTENT does")
          end if
       end do
    end subroutine check_friction
+
+   !> Two surfaces that are named in both orders rub in the same way in both.
+   subroutine check_other_way(reader, pair)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair(:)    !! the last one is looked at
+      integer :: j
+
+      associate (new => pair(size(pair)))
+         j = findloc(pair%slave == new%master .and. pair%master == new%slave, .true., 1)
+         if (j == 0 .or. j == size(pair)) return
+         if (abs(pair(j)%friction - new%friction) <= 0.0_wp .and. &
+            abs(pair(j)%rebound - new%rebound) <= 0.0_wp) return
+         call add_error(reader%log, new%origin, "*CONTACT PAIR: the surfaces are a pair in the " &
+            // "other order too, with another *FRICTION: give both the same interaction")
+      end associate
+   end subroutine check_other_way
 
    !> What a step of the deck does not go with.
    subroutine check_step(reader, pair, step, k)

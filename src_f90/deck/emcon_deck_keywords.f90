@@ -71,8 +71,9 @@ module emcon_deck_keywords
          has_data=.false.), &
       keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,DIRECT,!NOSEPARATION," &
          // "!PENALTY,!AUGMENTEDLAGRANGE"), &
-      keyword_t("FRICTION", in_model, "RESTITUTION=,~SLIPTOLERANCE,!ROUGH,!LAGRANGE," &
-         // "!DEPENDENCIES:0"), &
+      keyword_t("FRICTION", in_model, "RESTITUTION=,ROUGH,~SLIPTOLERANCE,~ELASTICSLIP," &
+         // "~LAGRANGE,!TAUMAX,!SHEARTRACTIONSLOPE,!EXPONENTIALDECAY,!TESTDATA,!ANISOTROPIC," &
+         // "!USER,!DEPVAR:0,!PROPERTIES:0,!DEPENDENCIES:0"), &
       keyword_t("CONTACT DAMPING", in_model, "DEFINITION=,TANGENTFRACTION="), &
       keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,SIDES=,GUARD=," &
          // "ADJUST=,INITIATION=,!SMALLSLIDING,!TIED"), &
@@ -164,7 +165,7 @@ module emcon_deck_keywords
       keyword_t("CONTACT EXCLUSIONS", in_both, "", "list what touches by *CONTACT INCLUSIONS"), &
       keyword_t("CONTACT FORMULATION", in_both, "", "all with all holds the nodes of both sides"), &
       keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
-      keyword_t("CHANGE FRICTION", in_step, "", "friction is that of its interaction"), &
+      keyword_t("CHANGE FRICTION", in_step, "", "coefficients hold for the whole run"), &
       keyword_t("MODEL CHANGE", in_step, "", "pairs and elements stay for the whole run"), &
       keyword_t("BASE MOTION", in_step, "", "use *BOUNDARY with an amplitude"), &
       keyword_t("CONTROLS", in_step, "", "use *NEWTON"), &
@@ -281,6 +282,12 @@ contains
          reason = " (use *TIE)"
       case ("CYCLICSYMMETRY", "MULTISTAGE")
          reason = " (sectors of a model are not repeated; couple their edges by *EQUATION)"
+      case ("TAUMAX")
+         reason = " (nothing but the coefficient bounds friction)"
+      case ("SHEARTRACTIONSLOPE")
+         reason = " (what sticks does not move)"
+      case ("EXPONENTIALDECAY", "TESTDATA", "ANISOTROPIC")
+         reason = " (friction has one coefficient, for stick and slip, both ways and at any speed)"
       case ("TIEDNSET")
          reason = " (whole surfaces are tied)"
       case ("REMOVE", "REMOVEALL")

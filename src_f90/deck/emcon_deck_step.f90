@@ -89,7 +89,7 @@ contains
       call check_restitution(reader, scene%pair, scene%step)
       call check_softness(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
-      call check_friction(reader, scene%pair, scene%step)
+      call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)
       call check_contact_damping(reader, scene%pair, scene%step)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
