@@ -44,12 +44,14 @@ contains
                // " is negative")
             coefficient = 0.0_wp
          end if
-         if (data%n > 1) call data_error(reader, data, "only the coefficient is read: what " // &
-            "sticks does not move, so that there is no slope of stick, nothing else bounds " // &
-            "friction, and it depends on no rate, pressure or temperature; leave out what " // &
-            "stands behind it")
-         if (n == 2) call data_error(reader, data, "only one data line is read: the " // &
-            "coefficient is one for all rates, pressures and temperatures")
+         if (n == 2) then
+            call data_error(reader, data, "only one data line is read: the coefficient is one " &
+               // "for all rates, pressures and temperatures")
+         else if (n == 1 .and. data%n > 1) then
+            call data_error(reader, data, "only the coefficient is read: what sticks does not " &
+               // "move, so that there is no slope of stick, nothing else bounds friction, and " &
+               // "it depends on no rate, pressure or temperature; leave out what stands behind it")
+         end if
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
    end subroutine read_friction

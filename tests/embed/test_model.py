@@ -243,6 +243,7 @@ def everything() -> Model:
     model.rigid_body("E2", 3, profile="S5").rotating("N", 0.5, velocity=(1.0, 0.0), about=(0.5, 0.5))
     model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))
+    model.interaction("I2", friction="rough")
     model.interaction("I", friction=0.0, friction_restitution=0.5, pad_thickness=0.0,
                       restitution=0.5, damping=(0.0, 0.1, 0.5), tangent_fraction=0.5)
     model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO",

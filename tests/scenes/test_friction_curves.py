@@ -1,0 +1,44 @@
+"""`*FRICTION` on curves: the capstan's law of a bead on a track, the torque of a hub in a sleeve."""
+
+import numpy as np
+import pytest
+from friction_curves import BUSHES, bead, bead_error, bush, bush_torques
+from friction_scenes import NODES, balance
+from scene_tools import run_deck
+
+
+@pytest.mark.parametrize("pad", [0.05, 0.3])
+def test_a_bead_on_a_track(pad, tmp_path):
+    """Second order at least in increments and edges together, whatever the gap that its pad keeps:
+    friction on the node is mu times its push, not more by the curvature times the pad."""
+    error = []
+    for k, (h, edges) in enumerate([(0.04, 16), (0.02, 32), (0.01, 64)]):
+        run = run_deck(bead(h, edges, pad), tmp_path/str(k), **NODES)
+        assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+        assert balance(run.history) < 1e-12
+        assert run.history["cuts"].sum() == 0
+        error.append(bead_error(run, pad))
+    assert (np.log2(np.array(error[:-1])/error[1:]) > 2).all(), error
+    # Two bounds of the last: h/r turned in an increment, squared, and the dip of an edge.
+    assert error[-1] < (0.01/(1 - pad))**2 + (np.pi/64)**2/2
+
+
+@pytest.mark.parametrize(("smoothing", "more", "fit"),
+                         [("HERMITE", NODES, 0.02), ("NONE", NODES, 0.02),
+                          ("NONE", {"formulation": "SEGMENT"}, 0.02),
+                          ("NONE", {"formulation": "MORTAR"}, 0.005)])
+def test_a_hub_turned_in_a_sleeve(smoothing, more, fit, tmp_path):
+    """The torque is mu N times the radius, to the tilt of an edge, squared; over a smoothed hub
+    better than that order from mesh to mesh."""
+    cells = BUSHES[:2] if smoothing == "HERMITE" else BUSHES[1:2]
+    error = []
+    for around, edges in cells:
+        run = run_deck(bush((around, edges), smoothing, fit=fit), tmp_path/str(edges), **more)
+        assert run.verdict["law_violation"] <= 1e-9
+        assert run.history["cuts"].sum() == 0
+        torque = bush_torques(run)
+        assert len(torque) >= 8
+        error.append(np.abs(torque - 1).max())
+        assert error[-1] < (np.pi/edges)**2*2
+    if len(error) > 1:
+        assert np.log2(error[0]/error[1]) > 3
