@@ -25,6 +25,7 @@ from friction_scenes import (
     way,
 )
 from plain_scenes import BOTH, ONE, Scene
+from plate_alone import displacements
 from scene_tools import DECKS, Deck, run_deck, run_one_sided
 from test_contact_output import restart
 from test_segments import with_profile
@@ -286,6 +287,19 @@ def test_a_plate_pressed_sideways(steps, tmp_path):
     assert history["pair1_force_y"][-1] == pytest.approx(2e6, rel=0.03)
 
 
+def test_a_plate_as_it_is_outside_the_program(tmp_path):
+    """The same of a linear plate and by one in numpy, which knows nothing of the program: to what
+    rounding does to the matrix of a plate, whose condition is some ten times the square of twice
+    its elements along a side."""
+    n, places = 32, (0, 0.00125, 0.005, 0.0075, 0.01125)
+    deck, place = pressed_sideways(n)
+    deck.replace("ELSET=PLATE, MATERIAL=PLATE", "ELSET=PLATE, MATERIAL=PLATE, KINEMATICS=LINEAR")
+    run = run_deck(deck, tmp_path, **NODES)
+    u = run.fields()["displacement"][-1, :len(place), 0]
+    seen = [u[(abs(place[:, 0] - x) < 1e-9) & (place[:, 1] < 1e-9)].item()*1e6 for x in places]
+    assert seen == pytest.approx(displacements(n, False, places), rel=10*(2*n)**2*EPS)
+
+
 def test_partial_slip(tmp_path):
     """Cattaneo and Mindlin: a strip sticks whose width by that in contact is sqrt(1 - Q/(mu P)), to
     one distance of nodes, until all slides."""
@@ -298,6 +312,22 @@ def test_partial_slip(tmp_path):
     assert part.sum() >= 7 and width[part].min() < 0.2
     assert (np.abs(width - np.sqrt(1 - force))[part] < strip[part]).all()
     assert (width[~part] == 0).all() and force[~part] == pytest.approx(1, abs=0.01)
+
+
+def test_what_is_rough_does_not_slide(tmp_path):
+    """Pushed along by more than any coefficient of use would hold: no node slides, and none moves on
+    the floor, as with a very large one."""
+    runs = []
+    for card in ("*FRICTION, ROUGH", "*FRICTION\n1e3"):
+        deck = pressed(0.05, 0.5)
+        deck.replace("*FRICTION\n0.5", card)
+        deck.replace("CDIS, CSTR, CF", "CSTR, CSHEAR, CSLIP")
+        runs.append(run_deck(deck, tmp_path/str(len(runs)), **NODES))
+        fields = runs[-1].fields()
+        assert (fields["contact_status"] == 1).any() and not (fields["contact_status"] == 2).any()
+        assert fields["slip_path"].max() < 16*EPS*0.05*10
+        assert runs[-1].verdict["verdict"] == "good"
+    assert runs[0].digits() == runs[1].digits()
 
 
 # ---- the ring -----------------------------------------------------------------------------------

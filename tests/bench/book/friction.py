@@ -7,6 +7,7 @@ import subprocess
 
 import numpy as np
 from flutter import RISE, fastest, fluttering, rate_of
+from friction_curves import BUSHES, bead, bead_error, bush, bush_torques
 from friction_scenes import (
     NODES,
     arch,
@@ -25,6 +26,7 @@ from friction_scenes import (
     way,
 )
 from plain_scenes import BOTH, ONE
+from plate_alone import displacements
 from scene_tools import PROGRAM
 
 from .common import Chapter, drift, size, table
@@ -74,6 +76,8 @@ def report_rest(started, _):
 
 #: Elements of the plate along its side.
 PLATES = (32, 64)
+#: Where they are watched.
+PLACES = (0, 0.00125, 0.005, 0.0075, 0.01125)
 #: So far sideways that 0.92 of the force slides.
 BACK = 0.546
 
@@ -97,6 +101,7 @@ def start_known(runs):
         **{("rolls", inner): runs.start(rolling(inner, 2.5e-4, 4e-3, 0.3, 0.02), **NODES)
            for inner in (0.95, 0.05)},
         **{("plate", n): runs.start(pressed_sideways(n)[0], **NODES) for n in PLATES},
+        "plate alone": runs.pool.submit(displacements, 32, True, PLACES),
         "to and fro": runs.start(pressed_round(96, back=BACK)[0], **NODES),
         **{("belt", h): runs.start(None, on_belt(h)) for h in (0.02, 0.01, 0.005)},
         "pulled": runs.start(None, pulled),
@@ -108,7 +113,7 @@ def plate(run, n):
     place = pressed_sideways(n)[1]
     u = run.fields()["displacement"][-1, :len(place), 0]
     return [u[(abs(place[:, 0] - x) < 1e-9) & (place[:, 1] < 1e-9)].item()*1e6
-            for x in (0, 0.00125, 0.005, 0.0075, 0.01125)]
+            for x in PLACES]
 
 
 def report_known(started, _):
@@ -140,6 +145,8 @@ def report_known(started, _):
     rows += [(f"SSNV128, plate pressed sideways, {n} x {n}: displacements at the floor, 1e-6",
               "28.6, 27.2, 22.8, 19.8, 15.0",
               ", ".join(f"{u:.2f}" for u in plate(done["plate", n], n))) for n in PLATES]
+    rows.append(("the same outside the program, linear, elements of eight nodes, 32 x 32",
+                 "28.6, 27.2, 22.8, 19.8, 15.0", ", ".join(f"{u:.2f}" for u in done["plate alone"])))
     force, width, strip = partial_slip(done["to and fro"], pressed_round(96, back=BACK)[1]).T
     turn = np.argmax(force)
     for k in (*range(3, turn, 4), turn, *range(turn + 2, len(force), 3)):
@@ -149,6 +156,41 @@ def report_known(started, _):
                      f"strip that sticks by that in contact, nodes {strip[k]:.2f} apart",
                      f"{math.sqrt(1 - share):.3f}", f"{width[k]:.3f}"))
     return table(["scene", "known", "here"], rows)
+
+
+# ---- curves -------------------------------------------------------------------------------------
+
+#: Increments and edges of the track.
+TRACKS = ((0.04, 16), (0.02, 32), (0.01, 64))
+PADS = (0.05, 0.3)
+#: Smoothing, formulation, overclosure.
+HUBS = (("HERMITE", "NODE TO SURFACE", 0.02), ("NONE", "NODE TO SURFACE", 0.02),
+        ("NONE", "SEGMENT", 0.02), ("NONE", "MORTAR", 0.005))
+
+
+def start_curves(runs):
+    return {**{("bead", pad, *track): runs.start(bead(*track, pad), **NODES)
+               for pad in PADS for track in TRACKS},
+            **{("hub", *hub, cells): runs.start(bush(cells, hub[0], fit=hub[2]), formulation=hub[1])
+               for hub in HUBS for cells in BUSHES[0 if hub[0] == "HERMITE" else 1:]}}
+
+
+def report_curves(started, _):
+    rows = []
+    for pad in PADS:
+        runs = [started["bead", pad, *track].result() for track in TRACKS]
+        rows.append((f"bead on a track of {', '.join(str(n) for _, n in TRACKS)} edges, pad of {pad:g}, "
+                     f"h = {', '.join(f'{h:g}' for h, _ in TRACKS)}: velocity", "`HERMITE`",
+                     "`NODE TO SURFACE`", ", ".join(size(bead_error(run, pad)) for run in runs),
+                     max(int(run.history["newton"].max()) for run in runs), law(runs[-1])))
+    for hub in HUBS:
+        cells = BUSHES[0 if hub[0] == "HERMITE" else 1:]
+        runs = [started["hub", *hub, one].result() for one in cells]
+        rows.append((f"hub of {', '.join(str(n) for _, n in cells)} edges in a sleeve: torque",
+                     f"`{hub[0]}`", f"`{hub[1]}`",
+                     ", ".join(size(np.abs(bush_torques(run) - 1).max()) for run in runs),
+                     max(int(run.history["newton"].max()) for run in runs), law(runs[-1])))
+    return table(["scene", "smoothing", "type", "largest error", "Newton, at most", "law"], rows)
 
 
 # ---- flutter -----------------------------------------------------------------------------------
@@ -259,6 +301,7 @@ def report_ring(started, _):
 
 CHAPTERS = [Chapter("friction_rest", start_rest, report_rest),
             Chapter("friction_known", start_known, report_known),
+            Chapter("friction_curves", start_curves, report_curves),
             Chapter("friction_flutter", start_flutter, report_flutter),
             Chapter("friction_held", start_held, report_held),
             Chapter("friction_random", start_random, report_random),
