@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,13 +59,24 @@ class PairTotal:
     """What a contact pair transmits: sums over one side, and what is in contact.
 
     `slave` and `master` are fx, fy and the moment about the origin on that side, opposite to each
-    other to round-off.
+    other to round-off. `friction_loss` is the energy that friction has taken since the start; of a
+    pair that holds both sides all of it, and 0 at its reverse.
     """
 
     slave: NDArray[np.float64]
     master: NDArray[np.float64]
     length: float
     active: int
+    friction_loss: float = 0.0
+
+
+class Friction(NamedTuple):
+    """Contacts that rub, all 0 without `*FRICTION`: CSHEAR and CSLIP of the deck."""
+
+    shear: NDArray[np.float64]     #: traction against slip [M/(L T^2)]
+    status: NDArray[np.int32]      #: 1 where it sticks, 2 where it slides
+    slip: NDArray[np.float64]      #: along the surface so far [L]
+    path: NDArray[np.float64]      #: the length of that way [L]
 
 
 class Snapshot:
@@ -435,8 +446,13 @@ class Stepper(Queries, Conditions, Meshes):
         A pair that holds both sides counts twice: behind it stands its reverse.
         """
         total, active = self._handle.call(_core.emcon_get_pairs, self.n_pair)
-        return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n))
-                for row, n in zip(total, active)]
+        loss = self._handle.call(_core.emcon_get_pair_friction, self.n_pair)
+        return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n), float(taken))
+                for row, n, taken in zip(total, active, loss)]
+
+    def friction(self) -> Friction:
+        """How each contact rubs, arrays of shape (n_constraint,) as those of `contact`."""
+        return Friction(*self._handle.call(_core.emcon_get_friction, self.n_constraint))
 
     def verdict(self) -> dict[str, Any]:
         """The verdict on the increments that led to this state: `NAME.json` of a run of the deck.

@@ -432,6 +432,17 @@ int emcon_get_contact(emcon_model *model, int n_contact, double *lam /* n_contac
 int emcon_get_pressures(emcon_model *model, int n_contact, double *pressure /* n_contact */,
                         double *gap /* n_contact */);
 
+/* Of each possible contact, 0 without *FRICTION: its traction against slip, 1 where it sticks and 2
+ * where it slides, its slip along the surface so far, and the length of that way: CSHEAR and CSLIP
+ * of the deck. */
+int emcon_get_friction(emcon_model *model, int n_contact, double *shear /* n_contact */,
+                       int *way /* n_contact */, double *slip /* n_contact */,
+                       double *path /* n_contact */);
+
+/* Of each pair: the energy that friction has taken since the start, >= 0; of one that holds both
+ * sides all of it, and 0 at its reverse. Their sum is `friction_loss` of the ledger. */
+int emcon_get_pair_friction(emcon_model *model, int n_pair, double *loss /* n_pair */);
+
 /* Of each pair: 7 numbers, force and moment about the origin on the slave side (fx, fy, m), the
  * same on the master side, length in contact; and the number of active contacts. */
 int emcon_get_pairs(emcon_model *model, int n_pair, double *total /* n_pair x 7 */,

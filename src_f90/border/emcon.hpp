@@ -84,10 +84,11 @@ struct Verdict {
    std::string json;
 };
 
-// Of each possible contact; NaN is the gap where no surface is near.
+// Of each possible contact; NaN is the gap where no surface is near. With *FRICTION its traction,
+// slip and the length of that way; `way` is 1 where it sticks, 2 where it slides.
 struct Contact {
-   std::vector<double> lam, pressure, gap;
-   std::vector<int> is_active, label, pair;
+   std::vector<double> lam, pressure, gap, shear, slip, path;
+   std::vector<int> is_active, label, pair, way;
 };
 
 // A model: moved, not copied; closed at its end.
@@ -273,13 +274,16 @@ public:
       const int n = sizes().n_contact;
       const std::size_t size = static_cast<std::size_t>(n);
       Contact found;
-      for (std::vector<double> *array : {&found.lam, &found.pressure, &found.gap})
+      for (std::vector<double> *array : {&found.lam, &found.pressure, &found.gap, &found.shear,
+                                         &found.slip, &found.path})
          array->resize(size);
-      for (std::vector<int> *array : {&found.is_active, &found.label, &found.pair})
+      for (std::vector<int> *array : {&found.is_active, &found.label, &found.pair, &found.way})
          array->resize(size);
       call(emcon_get_contact, n, found.lam.data(), found.is_active.data(), found.label.data(),
            found.pair.data());
       call(emcon_get_pressures, n, found.pressure.data(), found.gap.data());
+      call(emcon_get_friction, n, found.shear.data(), found.way.data(), found.slip.data(),
+           found.path.data());
       return found;
    }
 

@@ -15,7 +15,8 @@ module emcon_model_state
    private
    public :: model_time, model_progress, model_ledger, model_verdict, model_notes, model_report
    public :: model_find_nodes, model_labels, model_positions
-   public :: model_state, model_get_multipliers, model_contact, model_pressures, model_pairs
+   public :: model_state, model_get_multipliers, model_contact, model_pressures, model_pairs, &
+      model_friction, model_pair_friction
 
 contains
 
@@ -190,6 +191,37 @@ contains
       end subroutine pick
 
    end subroutine model_pressures
+
+   subroutine model_friction(model, shear, way, slip, path)
+      type(model_t), intent(inout) :: model
+      real(wp), allocatable, intent(out) :: shear(:), slip(:), path(:)   !! (n_contact)
+      integer, allocatable, intent(out) :: way(:)                        !! (n_contact)
+      real(dp), allocatable :: rubs(:, :), slid(:, :)
+      integer :: first
+
+      allocate(rubs, source=contact_quantity(model%stepper, "CSHEAR"))
+      allocate(slid, source=contact_quantity(model%stepper, "CSLIP"))
+      first = model%stepper%march%system%first_constraint(1) + 1
+      shear = real(rubs(1, first:), wp)
+      way = nint(rubs(size(rubs, 1), first:))
+      slip = real(slid(1, first:), wp)
+      path = real(slid(size(slid, 1), first:), wp)
+   end subroutine model_friction
+
+   !> Pairs that are one in the sums have it at the first of them.
+   pure subroutine model_pair_friction(model, loss)
+      type(model_t), intent(in) :: model
+      real(wp), allocatable, intent(out) :: loss(:)          !! (n_pair)
+      integer :: k
+
+      associate (sums => model%stepper%march%state%sums)
+         allocate(loss(model%stepper%march%system%n_pair), source=0.0_wp)
+         do k = 1, size(loss)
+            if (any(abs(sums%of_pair(:k - 1)) == abs(sums%of_pair(k)))) cycle
+            loss(k) = sums%sum(abs(sums%of_pair(k)))%friction
+         end do
+      end associate
+   end subroutine model_pair_friction
 
    pure subroutine model_pairs(model, total, n_active)
       type(model_t), intent(in) :: model

@@ -76,6 +76,8 @@ static void without_model(void)
    TELL(emcon_get_multipliers(m, 1, x, i));
    TELL(emcon_get_contact(m, 1, x, i, i, i));
    TELL(emcon_get_pressures(m, 1, x, x));
+   TELL(emcon_get_friction(m, 1, x, NULL, x, x));
+   TELL(emcon_get_pair_friction(m, 1, x));
    TELL(emcon_get_pairs(m, 1, x, i));
    TELL(emcon_get_momenta(m, 1, x));
    TELL(emcon_find_load(m, EMCON_LOAD_POINT, 1, 1, i));

@@ -91,6 +91,9 @@ static void ask(void)
    WORKS(emcon_get_pressures(m, n, pressure, gap));
    WORKS(emcon_get_pressures(m, n, NULL, gap));
    REFUSED(emcon_get_pressures(m, n + 1, pressure, gap));
+   WORKS(emcon_get_friction(m, n, pressure, NULL, gap, NULL));
+   REFUSED(emcon_get_friction(m, n - 1, pressure, NULL, gap, NULL));
+   WORKS(emcon_get_pair_friction(m, sizes.n_pair, NULL));
    REFUSED(emcon_find_nodes(m, "no such set", sizes.n_node, is_in));
    need(strstr(emcon_message(m), "no such set") != NULL, "the message names the set");
    REFUSED(emcon_find_nodes(m, "FLOOR", sizes.n_node - 1, is_in));

@@ -1,13 +1,19 @@
 """`*FRICTION`: what is written about it, looked at from outside: work node by node, laws."""
 
+import sys
+
 import h5py
 import numpy as np
 import pytest
 from friction_curves import bush
 from friction_scenes import NODES, block_on_floor, pressed, ring, rubbing
 from plain_scenes import Scene
-from scene_tools import DECKS, Deck, run_deck
+from scene_tools import DECKS, ROOT, Deck, run_deck
 from test_segments import with_profile
+
+sys.path.insert(0, str(ROOT/"pywrap"))
+
+from emcon import Stepper  # noqa: E402
 
 EPS = np.finfo(float).eps
 
@@ -102,3 +108,24 @@ def test_the_sum_of_nodes_is_the_ledger(tmp_path):
         @ area
     assert lost == pytest.approx(np.diff(run.history["friction_loss"]), rel=1e-9)
     assert lost == pytest.approx(np.diff(run.history["pair1_friction_loss"]), rel=1e-9)
+
+
+@pytest.mark.parametrize("sides", ["ONE", "BOTH"])
+def test_friction_of_a_stepper(sides, tmp_path):
+    """What a stepper says of contacts and pairs is what the run writes, to the bit."""
+    path = with_books(ring(0.5)).write(tmp_path/"ring.inp")
+    more = {"formulation": "NODE TO SURFACE", "h": 0.02, "sides": sides}
+    run = run_deck(path, tmp_path/"run", **more, t_end=0.3)
+    with Stepper(path, **more, t_end=0.3) as stepper:
+        while not stepper.is_done:
+            stepper.step()
+        rubs, pairs = stepper.friction(), stepper.pairs()
+        lost, n = stepper.ledger["friction_loss"], len(stepper.contact()[2])
+    pressure, *written = (values[-1] for values in books(run))
+    m = len(pressure)
+    for seen, wanted in zip(rubs, written, strict=True):
+        assert seen.shape == (n,) and np.array_equal(seen[:m], wanted)
+    assert (rubs.status == 2).any() and rubs.status.dtype.kind == "i"
+    assert len(pairs) == (2 if sides == "BOTH" else 1)
+    assert [pair.friction_loss for pair in pairs] == [lost, 0.0][:len(pairs)]
+    assert lost == run.history["pair1_friction_loss"][-1] > 0
