@@ -455,7 +455,7 @@ contains
 
       call vector_zero(size(force), force)
       if (first <= self%n) call constraints_add_forces(self, first, force, magnitude)
-      call damped_add_forces(self%damped, force, magnitude)
+      if (self%damped%n > 0) call damped_add_forces(self%damped, force, magnitude)
    end subroutine constraints_force
 
    !> Add the forces lam_k g_k alone.
