@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 from contact_damping_scenes import MASS, balance, block_over_floor, damped, ring
-from friction_scenes import NODES, rubbing
-from plain_scenes import BOTH, ONE
+from friction_scenes import NODES, make_rigid, rubbing
+from plain_scenes import BOTH, ONE, Scene
 from scene_tools import DECKS, Deck, run_deck, run_one_sided
 from test_contact_output import restart
+from test_segments import with_profile
 
 EPS = np.finfo(float).eps
 KINDS = [{"formulation": "NODE TO SURFACE"}, {"formulation": "SEGMENT"},
@@ -100,6 +101,43 @@ def test_a_rigid_block_slides_ever_slower(more, clearance, tmp_path):
     assert np.abs(velocity - np.exp(-b*n)).max() < b**3*n[-1]/12
 
 
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_a_belt_takes_a_block_along(formulation, tmp_path):
+    """A floor that is driven at 1: what the block lacks of that falls as above; the drive works."""
+    h, b = 0.04, 0.5*0.6*0.04
+    scene = Scene(h, 0.8, gravity=10.0)
+    scene.block("BLOCK", (0, 0), (2, 1), (4, 2), stiffness=2e4)
+    scene.block("FLOOR", (-2, -1), (8, 1), (7, 1), stiffness=2e4, velocity=(1.0, 0.0))
+    scene.hold("FLOOR", lambda x, y: True, "2, 2")
+    scene.hold("FLOOR", lambda x, y: True, "1, 1", 0.8)
+    scene.side("BOTTOM", "BLOCK", lambda x, y: y < 1e-9)
+    scene.side("TOP", "FLOOR", lambda x, y: y > -1e-9)
+    scene.pairs = [("BOTTOM", "TOP")]
+    make_rigid(scene, "BLOCK", (1, 0.5))
+    run = run_deck(damped(scene.deck(ONE), 0.6, 0.1, tangent=0.5), tmp_path,
+                   formulation=formulation)
+    obeys(run)
+    velocity, n = run.history["pair1_impulse_x"]/MASS, np.arange(len(run.history))
+    assert np.abs(1 - velocity - ((1 - b/2)/(1 + b/2))**n).max() < 1e-12
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_a_block_slides_ever_slower_on_a_profile(formulation, tmp_path):
+    """A rigid surface of lines; three of them, so that nodes pass from one to the next."""
+    h, b = 0.04, 0.5*0.6*0.04
+    scene = Scene(h, 0.8, gravity=10.0)
+    scene.block("BODY", (0, 0), (2, 1), (4, 2), stiffness=2e4, velocity=(2.0, 0))
+    scene.side("BOTTOM", "BODY", lambda x, y: y < 1e-9)
+    make_rigid(scene, "BODY", (1, 0.5), (2.0, 0.0))
+    deck = with_profile(scene, "START, -3., 0.\nLINE, 0.7, 0.\nLINE, 2.2, 0.\nLINE, 6., 0.",
+                        slave="BOTTOM")
+    deck = damped(deck, 0.6, 0.1, tangent=0.5)
+    run = run_deck(deck, tmp_path, formulation=formulation)
+    obeys(run)
+    velocity, n = run.history["px"]/MASS, np.arange(len(run.history))
+    assert np.abs(velocity - 2.0*((1 - b/2)/(1 + b/2))**n).max() < 1e-12
+
+
 def test_no_slip_is_damped_above_the_clearance(tmp_path):
     """What flies along the floor above it keeps its velocity, bit by bit of the loss."""
     deck = damped(block_over_floor(0.04, 0.4, height=0.2, velocity=(1.0, 0.0)), 0.6, 0.1,
@@ -112,7 +150,8 @@ def test_no_slip_is_damped_above_the_clearance(tmp_path):
 @pytest.mark.parametrize("more", KINDS[:3])
 def test_an_oscillator_on_a_penalty(more, tmp_path):
     """Let go where the floor bears nothing, a rigid block swings about the depth at which it is
-    borne: M y'' + A mu y' + A k y = -M g, with the ratio mu/2 sqrt(A/(M k)) of critical damping."""
+    borne: M y'' + A mu y' + A k y = -M g, with the ratio mu/2 sqrt(A/(M k)) of critical damping. The
+    middle of the step is late by (w h)^2/12 of the phase."""
     k, mu, g = 1000.0, 12.0, 10.0
     w, d = math.sqrt(k), mu/2
     wd = math.sqrt(w*w - d*d)
@@ -122,12 +161,13 @@ def test_an_oscillator_on_a_penalty(more, tmp_path):
         deck.replace("*CONSTRAINT METHOD, TYPE=<method>",
                      f"*CONSTRAINT METHOD, TYPE=PENALTY, STIFFNESS={k!r}")
         run = run_deck(deck, tmp_path/f"{h}", **more)
-        assert balance(run.history, MASS*g*g/k) < 1e-10
+        assert balance(run.history, MASS*g*g/k) < 1e-12
         assert (np.diff(run.history["contact_damping_loss"]) >= 0).all()
         t = run.history["time"]
         exact = -g/k*(1 - np.exp(-d*t)*(np.cos(wd*t) + d/wd*np.sin(wd*t)))
         error.append(np.abs(height(run, 0.0) - exact).max()/(g/k))
-    assert error[1] < 0.3*error[0] and error[2] < 0.3*error[1] and error[2] < 1e-3
+    assert error[1] < 0.3*error[0] and error[2] < 0.3*error[1]
+    assert error[2] < (w*0.001)**2/12*w*0.6
 
 
 # ---- the ring -----------------------------------------------------------------------------------
