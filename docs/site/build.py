@@ -81,13 +81,15 @@ def put_together(pages: Path) -> None:
     gallery.build(pages, SITE/"runs")
 
 
-def formulas(python: str, pages: Path) -> None:
-    """MathJax of the tools, the one file that makes pictures of formulas, beside the pages."""
+def static_files(python: str, pages: Path) -> None:
+    """Beside the pages: MathJax of the tools, the one file that makes pictures of formulas, and what
+    the theme is changed by."""
     find = "import importlib.util as u; print(u.find_spec('mathjax').submodule_search_locations[0])"
     found = subprocess.run([python, "-c", find], capture_output=True, text=True, check=True)
     static = pages/"_static"
     static.mkdir()
     shutil.copy(Path(found.stdout.strip())/"static/mathjax/es5/tex-svg.js", static)
+    shutil.copy(HERE/"site.css", static)
 
 
 def main() -> None:
@@ -99,7 +101,7 @@ def main() -> None:
     options = parser.parse_args()
     pages, html = SITE/"pages", SITE/"html"
     put_together(pages)
-    formulas(options.sphinx, pages)
+    static_files(options.sphinx, pages)
     shutil.rmtree(html, ignore_errors=True)
     subprocess.run([options.sphinx, "-m", "sphinx", "-q", "-W", "--keep-going", "-j", "auto",
                     "-d", SITE/"doctrees", "-c", HERE, pages, html], check=True)

@@ -21,6 +21,7 @@ mathjax_path = "tex-svg.js"
 html_theme = "furo"
 html_title = f"EMCON {version}"
 html_static_path = [str(HERE.parents[1]/"build/site/pages/_static")]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_copyright = False
 pygments_style = "friendly"

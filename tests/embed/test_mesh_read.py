@@ -307,3 +307,15 @@ def test_other_formats(tmp_path: Path) -> None:
     assert mesh.elements["CPE3"].tolist() == [[1, 2, 3], [1, 3, 4]]
     with pytest.raises(MeshError, match="cannot read it"):
         read(write(tmp_path/"a.unknown", GMSH_22))
+
+
+@pytest.mark.parametrize(("begins", "why"), [
+    ("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n0\n$ENDELM\n", "format 1 .*Mesh.MshFileVersion"),
+    ("$MeshFormat\n4 0 8\n$EndMeshFormat\n", r"format 4\.0 .*Mesh.MshFileVersion"),
+    ("hello\n", "does not begin with"), ("", "does not begin with"),
+    ("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 9 1", "cut off")])
+def test_what_is_no_mesh_of_gmsh_is_said(tmp_path: Path, begins: str, why: str) -> None:
+    path = tmp_path/"some.msh"
+    path.write_text(begins)
+    with pytest.raises(MeshError, match=why):
+        read(path)

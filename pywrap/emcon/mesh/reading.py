@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -57,11 +58,14 @@ def read(path: str | os.PathLike[str]) -> Mesh:
     """
     path = Path(path)
     with path.open("rb") as file:
+        first = file.read(64).lstrip()
         end = file.seek(0, os.SEEK_END)
         file.seek(max(end - 64, 0))
         last = file.read().strip().splitlines()[-1:]
     if path.suffix.lower() == ".inp":
         return read_abaqus(path)
+    if path.suffix.lower() == ".msh":
+        _check_gmsh(path, first)
     if path.suffix.lower() == ".msh" and not (last and last[0].startswith(b"$End")):
         raise MeshError(f"{path} was cut off: it does not end with $End...")
     try:
@@ -76,6 +80,19 @@ def read(path: str | os.PathLike[str]) -> Mesh:
     if not len(found.points):
         raise MeshError(f"{path} has no nodes")
     return _build(str(path), _raw(str(path), found))
+
+
+def _check_gmsh(path: Path, first: bytes) -> None:
+    """Does a file begin as a mesh of Gmsh that is read here does?"""
+    advice = "Gmsh writes 4.1 or 2.2 with Mesh.MshFileVersion, or --format msh41"
+    if first.startswith(b"$NOD"):
+        raise MeshError(f"{path} is of the format 1 of Gmsh, which is not read; {advice}")
+    version = re.match(rb"\$MeshFormat\s+(\S+)", first)
+    if first.startswith(b"$") and not (version and version[1] in (b"4", b"4.0")):
+        return
+    if version:
+        raise MeshError(f"{path} is of the format 4.0 of Gmsh, which is not read; {advice}")
+    raise MeshError(f"{path} is no mesh of Gmsh: it does not begin with $MeshFormat")
 
 
 def _reason(problem: BaseException) -> str:
