@@ -293,7 +293,8 @@ contains
       integer, intent(inout) :: status           !! `newton_early` if so
       logical :: changes
 
-      if (.not. self%looks_early .or. size > early_enough) return
+      ! Before any correction the multipliers are those of a guess: where that flies, round-off.
+      if (.not. self%looks_early .or. size > early_enough .or. self%n_solve == 0) return
       self%looks_early = .false.
       call early_look(system, set, motion, changes)
       if (changes) status = newton_early
