@@ -8,8 +8,8 @@ module emcon_friction
    use emcon_constraint, only : condition_drag, condition_t
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
    use emcon_csr, only : csr_find
-   use emcon_friction_law, only : friction_trial, friction_violation, touch_open, touch_rests, &
-      touch_sticks, touch_t
+   use emcon_friction_law, only : friction_trial, friction_violation, slip_rounding, touch_open, &
+      touch_rests, touch_sticks, touch_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : pose_is_equilibrium, pose_way
@@ -190,12 +190,12 @@ contains
       tie = tied*maxval(abs(set%lam(set%n_held + 1:set%n)))
       associate (id => set%id(k), item => set%item(k), lam => set%lam)
          at = touch_t(max(0.0_wp, lam(k)), condition_drag(item, lam(k)), 0.0_wp, item%slip, &
-            self%lead(id))
+            self%lead(id), slip_rounding*item%size)
          ! Where slip is held the solution has no other, but for round-off.
          if (holds(self, id)) at%slip = slip_held(self, id)
          if (self%is_idle(id) .and. .not. self%is_needed(id)) then
             ! Others do not hold it: it does so itself before it may slide.
-            turns = stiffness*abs(at%slip - slip_held(self, id)) > tie
+            turns = stiffness*(abs(at%slip - slip_held(self, id)) - at%rounding) > tie
             self%is_needed(id) = turns
             return
          end if
@@ -273,7 +273,7 @@ contains
          associate (item => set%item(k))
             if (.not. item%rubs) cycle
             at = touch_t(set%lam(k), condition_drag(item, set%lam(k)), set%defect(k), item%slip, &
-               self%lead(set%id(k)))
+               self%lead(set%id(k)), slip_rounding*item%size)
             missed = max(missed, friction_violation(at, self%mu(set%id(k)), &
                stiffness_at(system, item))/largest)
          end associate

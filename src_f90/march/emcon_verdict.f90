@@ -4,6 +4,7 @@
 !> within the tolerance. Warnings stand beside that: they do not make a run bad.
 module emcon_verdict
    use emcon_bent_bodies, only : bent_body_find, bent_body_t
+   use emcon_friction_law, only : slip_rounding
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
@@ -29,9 +30,6 @@ module emcon_verdict
    character(len=*), parameter :: closing_digits(3) = [character(len=11) :: "four", "ten", &
       "twenty-five"]
    real(wp), parameter :: energy_bar = closing(this_precision)
-   !> Slip is made of a dozen products of lengths of an edge: what friction takes in an increment is
-   !> uncertain by so many roundings of push times edge, those of increments by themselves.
-   real(wp), parameter :: slip_rounding = 16.0_wp*epsilon(1.0_wp)
    !> Largest relative residual that is accepted where rounding ends Newton's method early: half of
    !> the digits are left.
    real(wp), parameter :: half_digits = sqrt(epsilon(1.0_wp))
@@ -314,6 +312,8 @@ contains
       if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
          "loads do work on motions that nothing holds: stabilization bears " // &
          to_text(self%stabilization, 3))
+      ! What friction takes in an increment is uncertain by what its slip is rounded to, that of each
+      ! by itself.
       if (self%dynamic_drift > energy_bar*self%largest_energy + slip_rounding*self%grip) then
          call note_add(self%reasons, &
             "the energy balance does NOT close to " // trim(closing_digits(this_precision)) // &

@@ -11,7 +11,10 @@ module emcon_friction_law
    implicit none
    private
    public :: touch_t, friction_trial, friction_violation
-   public :: touch_open, touch_sticks, touch_free, touch_rests
+   public :: touch_open, touch_sticks, touch_free, touch_rests, slip_rounding
+
+   !> Slip is made of a dozen products of lengths of an edge: by so much of it slip is uncertain.
+   real(wp), parameter :: slip_rounding = 16.0_wp*epsilon(1.0_wp)
 
    !> Ways in which the law holds; where it slides the way is the sign of slip, -1 or 1. It sticks
    !> at the slip that is led to; it is free before that, or rests where it was at the start.
@@ -24,18 +27,20 @@ module emcon_friction_law
       real(wp) :: gap = 0.0_wp                   !! g, above the one to hold [L]
       real(wp) :: slip = 0.0_wp                  !! s [L]
       real(wp) :: lead = 0.0_wp                  !! a [L]
+      real(wp) :: rounding = 0.0_wp              !! of slip, >= 0 [L]
    end type touch_t
 
 contains
 
-   !> The way in which the law is to hold next. What is undecided by less than `tie` stays as it is.
+   !> The way in which the law is to hold next. What is undecided by less than `tie`, or than slip
+   !> is rounded to, stays as it is: in short steps c makes much of that.
    pure integer function friction_trial(was, at, mu, stiffness, tie) result(next)
       integer, intent(in) :: was                 !! `touch_` or a sign: the way so far
       type(touch_t), intent(in) :: at
       real(wp), intent(in) :: mu                 !! >= 0
       real(wp), intent(in) :: stiffness          !! c > 0 [M/T^2]
       real(wp), intent(in) :: tie                !! >= 0 [M L/T^2]
-      real(wp) :: push, drag, most
+      real(wp) :: push, drag, most, unsure
       integer :: way
 
       next = touch_open
@@ -47,14 +52,16 @@ contains
       end if
       drag = at%tau + stiffness*at%slip
       most = mu*max(0.0_wp, push)
+      unsure = tie + stiffness*at%rounding
       if (abs(at%lead) > 0.0_wp) then
-         next = lead_trial(was, drag, most, stiffness*at%lead, tie)
+         next = lead_trial(was, drag, most, stiffness*at%lead, unsure)
          return
       end if
       next = touch_sticks
       way = merge(1, -1, drag > 0.0_wp)
       if (abs(drag) > most) next = way
-      if (abs(abs(drag) - most) <= tie .and. (was == touch_sticks .or. was == way)) next = was
+      if (was == touch_sticks .and. abs(abs(drag) - most) <= unsure) next = was
+      if (abs(was) == 1 .and. abs(drag - was*most) <= unsure) next = was
    end function friction_trial
 
    !> The same of what is led to a slip: five ways in a row, from slide to slide. What does not hold
@@ -82,7 +89,7 @@ contains
       end do
    end function lead_trial
 
-   !> How far the law is missed, as a force.
+   !> How far the law is missed, as a force, by more than slip is rounded to.
    pure real(wp) function friction_violation(at, mu, stiffness) result(missed)
       type(touch_t), intent(in) :: at
       real(wp), intent(in) :: mu, stiffness      !! as in `friction_trial`
@@ -93,7 +100,7 @@ contains
       drag = max(0.0_wp, min(most, along - stiffness*abs(at%lead))) &
          + min(0.0_wp, max(-most, along))
       missed = max(abs(at%lam - max(0.0_wp, at%lam - stiffness*at%gap)), &
-         abs(at%tau - sign(1.0_wp, at%lead)*drag))
+         abs(at%tau - sign(1.0_wp, at%lead)*drag) - stiffness*at%rounding)
    end function friction_violation
 
 end module emcon_friction_law

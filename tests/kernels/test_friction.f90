@@ -42,7 +42,7 @@ contains
    subroutine test_trial(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp
-      integer :: next(8)
+      integer :: next(9)
 
       next = [friction_trial(touch_open, touch_t(gap=1.0_wp), mu, c, 0.0_wp), &
          friction_trial(touch_open, touch_t(gap=-1.0_wp, slip=0.4_wp), mu, c, 0.0_wp), &
@@ -51,9 +51,10 @@ contains
          friction_trial(touch_sticks, touch_t(2.0_wp, 1.1_wp), mu, c, 0.2_wp), &
          friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.4_wp), mu, c, 0.0_wp), &
          friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.6_wp), mu, c, 0.0_wp), &
-         friction_trial(-1, touch_t(-0.1_wp, -0.05_wp, slip=-0.6_wp), mu, c, 0.0_wp)]
+         friction_trial(-1, touch_t(-0.1_wp, -0.05_wp, slip=-0.6_wp), mu, c, 0.0_wp), &
+         friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.4_wp, rounding=0.5_wp), mu, c, 0.0_wp)]
       call check_equal(error, next, [touch_open, touch_sticks, -1, 1, touch_sticks, touch_sticks, &
-         -1, touch_open], "ways")
+         -1, touch_open, 1], "ways")
    end subroutine test_trial
 
    subroutine test_violation(error)
@@ -62,8 +63,9 @@ contains
       call check_near(error, [friction_violation(touch_t(2.0_wp, 1.0_wp, slip=3.0_wp), 0.5_wp, &
          1.0_wp), friction_violation(touch_t(2.0_wp, 1.0_wp, slip=-3.0_wp), 0.5_wp, 1.0_wp), &
          friction_violation(touch_t(2.0_wp, 1.5_wp), 0.5_wp, 1.0_wp), &
-         friction_violation(touch_t(gap=-0.25_wp), 0.5_wp, 2.0_wp)], &
-         [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp], tol, 1.0_wp, "missed")
+         friction_violation(touch_t(gap=-0.25_wp), 0.5_wp, 2.0_wp), &
+         friction_violation(touch_t(2.0_wp, 1.0_wp, slip=-3.0_wp, rounding=0.5_wp), 0.5_wp, &
+         1.0_wp)], [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp, 1.5_wp], tol, 1.0_wp, "missed")
    end subroutine test_violation
 
    !> Each way, and where it leads to next; what slides or is free holds its slip on the way. The
