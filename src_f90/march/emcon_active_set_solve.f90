@@ -12,9 +12,10 @@ module emcon_active_set_solve
    use emcon_active_set, only : active_set_drop, active_set_let_go, active_set_put_off, &
       active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_loose, &
       step_not_held
-   use emcon_active_set_update, only : active_set_advance, active_set_leave, most_early
+   use emcon_active_set_update, only : active_set_advance, active_set_grips, active_set_leave, &
+      most_early
    use emcon_errors, only : error_t
-   use emcon_friction, only : friction_idle, friction_keep
+   use emcon_friction, only : friction_holds, friction_idle, friction_keep
    use emcon_gaps, only : pair_search
    use emcon_holding, only : holding_complete, holding_find_free
    use emcon_kinds, only : wp
@@ -84,6 +85,7 @@ contains
          call active_set_advance(self, system, motion, is_done, status)
          is_measured = status /= step_cycling
          if (is_done .and. status == step_done .and. self%holding%is_needed) then
+            call active_set_grips(self, system)
             call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
             if (.not. is_held) status = step_not_held
          end if
@@ -187,6 +189,7 @@ contains
       integer :: pair
 
       motion%du = motion%du - driven
+      if (self%friction%is_on) self%holding%grips = friction_holds(self%friction)
       call holding_complete(self%holding, system, scene, motion, self%is_active)
       motion%du = motion%du + driven
       do pair = 1, size(system%contact)

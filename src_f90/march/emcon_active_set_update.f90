@@ -3,16 +3,16 @@
 module emcon_active_set_update
    use emcon_active_set, only : active_set_look, active_set_pass, active_set_t, most_sets, &
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
-   use emcon_constraints, only : constraints_gives_back
+   use emcon_constraints, only : constraint_place, constraints_gives_back
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
    use emcon_dashpots, only : dashpots_idle, dashpots_look
-   use emcon_friction, only : friction_close, friction_turn
+   use emcon_friction, only : friction_close, friction_holds, friction_turn
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
    implicit none
    private
-   public :: active_set_advance, active_set_leave
+   public :: active_set_advance, active_set_leave, active_set_grips
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -209,16 +209,41 @@ contains
       type(system_t), intent(in) :: system
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i, k
-      real(wp) :: noise
 
       is_let_go = .false.
       if (constraints_gives_back(self%set, k)) return
-      noise = force_noise*sum(system%response%magnitude(:, contact%node(i)))
-      if (.not. self%masses_resist) noise = noise + force_noise &
-         *sum(system%response%rounding(:, contact%node(i)))
       is_let_go = contact%state(i)%is_leaving .or. &
-         .not. (self%only_adds .or. self%set%lam(k) >= -noise)
+         .not. (self%only_adds .or. self%set%lam(k) >= -noise_at(self, system, contact%node(i)))
    end function is_let_go
+
+   !> A push at a slave node below which it is round-off.
+   pure real(wp) function noise_at(self, system, node) result(noise)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: node                !! of the scene
+
+      noise = force_noise*sum(system%response%magnitude(:, node))
+      if (.not. self%masses_resist) noise = noise + force_noise &
+         *sum(system%response%rounding(:, node))
+   end function noise_at
+
+   !> Contacts that hold along the surface as well, where the step is solved: without a push
+   !> friction holds nothing.
+   pure subroutine active_set_grips(self, system)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      integer :: k, pair, i
+
+      if (.not. self%friction%is_on) return
+      self%holding%grips = friction_holds(self%friction)
+      do k = self%set%n_held + 1, self%set%n
+         associate (id => self%set%id(k))
+            call constraint_place(system, id, pair, i)
+            self%holding%grips(id) = self%holding%grips(id) .and. self%set%lam(k) > &
+               noise_at(self, system, system%contact(pair)%contact%node(i))
+         end associate
+      end do
+   end subroutine active_set_grips
 
    !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact
    !> that was left out and closes all the same does not follow from others: it had lost its

@@ -18,7 +18,7 @@ module emcon_friction
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_idle, &
       friction_keep, friction_turn, friction_close, friction_work, friction_missed, friction_grip, &
-      friction_slides
+      friction_slides, friction_holds
 
    !> Forces that differ by less than this part of the largest push are one.
    real(wp), parameter :: tied = 5.0e4_wp*epsilon(1.0_wp)
@@ -138,6 +138,14 @@ contains
       way = self%way(id)
       if (abs(way) /= 1) way = 0
    end function friction_slides
+
+   !> The contacts that friction lets hold along the surface: those that rub and do not slide.
+   pure function friction_holds(self) result(grips)
+      type(friction_t), intent(in) :: self
+      logical :: grips(size(self%mu))            !! (n_constraint)
+
+      grips = self%mu > 0.0_wp .and. abs(self%way) /= 1
+   end function friction_holds
 
    !> Does contact `id` hold its slip by itself?
    pure logical function holds(self, id)

@@ -36,6 +36,8 @@ module emcon_holding
       logical :: is_pushed = .false.             !! a load works on what `text` tells of
       character(len=:), allocatable :: text      !! what nothing holds; not allocated: all is held
       character(len=:), allocatable :: told      !! whose motion the user has been told of
+      !> (n_constraint) contacts that hold along the surface as well, by friction
+      logical, allocatable :: grips(:)
       !> (n_constraint) this step has let them go as they pulled: what they prevent no load needs
       logical, allocatable :: has_pulled(:)
       !> (n_constraint) [L] gaps that were closed though no load closes them, and of which bodies
@@ -77,7 +79,8 @@ contains
          call mechanism_rows_find(system, step%prescribed, self%supports)
       end associate
       allocate(self%is_loose(system%space%n_body), source=.false.)
-      allocate(self%has_pulled(system%n_constraint), source=.false.)
+      allocate(self%has_pulled(system%n_constraint), self%grips(system%n_constraint), &
+         source=.false.)
       allocate(self%brought(system%n_constraint), source=0.0_wp)
       if (size(system%contact) == 0) return
       call take_look(self, system, scene, u, look)
@@ -208,8 +211,8 @@ contains
       type(constraint_set_t) :: set
 
       call take_look(self, system, scene, motion%u0 + motion%du, look)
-      call gaps_evaluate(system, motion, is_active, set)
-      call mechanism_rows_append(look%rows, set%item)
+      call gaps_evaluate(system, motion, is_active, set, self%grips)
+      call mechanism_rows_append(look%rows, set%item, set%item%rubs)
    end subroutine look_at_contacts
 
    !> The assemblies that can move.

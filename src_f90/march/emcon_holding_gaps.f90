@@ -33,12 +33,14 @@ contains
       end do
    end subroutine gaps_measure
 
-   !> The contacts that `is_meant` marks, over a motion that is placed.
-   subroutine gaps_evaluate(system, motion, is_meant, set)
+   !> The contacts that `is_meant` marks, over a motion that is placed; of those that `grips` marks
+   !> also their slips.
+   subroutine gaps_evaluate(system, motion, is_meant, set, grips)
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(in) :: is_meant(:)         !! (n_constraint)
       type(constraint_set_t), intent(out) :: set
+      logical, intent(in), optional :: grips(:)  !! (n_constraint)
       integer :: k, pair, i, id
 
       call constraints_select(set, pack([(k, k = 1, size(is_meant))], &
@@ -47,6 +49,7 @@ contains
          id = set%id(k)
          call constraint_place(system, id, pair, i)
          set%target(k) = system%contact(pair)%contact%state(i)%gap1
+         if (present(grips)) set%item(k)%rubs = grips(id)
       end do
       call constraints_evaluate(set, system, motion)
    end subroutine gaps_evaluate

@@ -4,6 +4,7 @@ module emcon_march_parts
       step_loose, step_overlaps, step_passes_event, step_refused, step_rough, step_singular, &
       step_stands_off, step_strikes, step_too_far, step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_friction, only : friction_holds
    use emcon_kinds, only : wp
    use emcon_locking, only : strainless_element
    use emcon_march_begin, only : march_renumber
@@ -173,6 +174,15 @@ contains
          (self%active%n_newton == 0 .or. .not. self%active%holding%is_pushed)
    end function is_hopeless
 
+   !> Does some contact of the step that failed slide?
+   pure logical function slides(self)
+      type(march_t), intent(in) :: self
+
+      slides = self%active%friction%is_on
+      if (slides) slides = any(self%active%is_active .and. self%active%friction%mu > 0.0_wp .and. &
+         .not. friction_holds(self%active%friction))
+   end function slides
+
    !> A singular system; elements with few points keep motions without strain that neighbours on
    !> two sides would stop.
    pure subroutine singular_text(solid, scene, text)
@@ -220,6 +230,7 @@ contains
       case (step_not_held)
          text = "nothing holds what moves without resistance: " // self%active%holding%text
          if (.not. self%active%holding%is_pushed) text = text // ", on which no load does work"
+         if (slides(self)) text = text // ", where friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
          if (.not. self%active%holding%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"

@@ -59,32 +59,48 @@ contains
       end do
    end subroutine mechanism_rows_find
 
-   !> Append the rows of contact: the gradients of gaps at the end.
-   subroutine mechanism_rows_append(rows, item)
+   !> Append the rows of contact: the gradients of gaps at the end, and of what `grips` the surface
+   !> also those of slips.
+   subroutine mechanism_rows_append(rows, item, grips)
       type(mechanism_rows_t), intent(inout) :: rows
       type(condition_t), intent(in) :: item(:)
-      integer :: k, i, a, n, n_dim
-      real(wp) :: total
+      logical, intent(in) :: grips(:)            !! (size(item)) these rub
+      integer :: k, n, m, n_dim
 
       if (size(item) == 0) return
       n_dim = size(item(1)%c, 1)
       rows%noise = contact_noise
       n = rows%start(rows%n + 1)
-      rows%start = [rows%start, (n + n_dim*sum(item(:k)%n_node), k = 1, size(item))]
-      rows%dof = [rows%dof, spread(0, 1, n_dim*sum(item%n_node))]
-      rows%weight = [rows%weight, spread(0.0_wp, 1, n_dim*sum(item%n_node))]
-      rows%n = rows%n + size(item)
+      m = n_dim*(sum(item%n_node) + sum(item%n_node, mask=grips))
+      rows%dof = [rows%dof, spread(0, 1, m)]
+      rows%weight = [rows%weight, spread(0.0_wp, 1, m)]
       do k = 1, size(item)
-         total = sum(abs(item(k)%c(:, :item(k)%n_node)))
+         call append(item(k), item(k)%c)
+         if (grips(k)) call append(item(k), item(k)%t1)
+      end do
+
+   contains
+
+      !> One row, of the derivatives `part` by the nodes of a condition.
+      subroutine append(item, part)
+         type(condition_t), intent(in) :: item
+         real(wp), intent(in) :: part(:, :)      !! (n_dim, >= n_node)
+         real(wp) :: total
+         integer :: i, a
+
+         total = sum(abs(part(:, :item%n_node)))
          if (.not. total > 0.0_wp) total = 1.0_wp
-         do i = 1, item(k)%n_node
+         do i = 1, item%n_node
             do a = 1, n_dim
                n = n + 1
-               rows%dof(n) = n_dim*(item(k)%node(i) - 1) + a
-               rows%weight(n) = item(k)%c(a, i)/total
+               rows%dof(n) = n_dim*(item%node(i) - 1) + a
+               rows%weight(n) = part(a, i)/total
             end do
          end do
-      end do
+         rows%n = rows%n + 1
+         rows%start = [rows%start, n]
+      end subroutine append
+
    end subroutine mechanism_rows_append
 
 end module emcon_mechanism_rows
