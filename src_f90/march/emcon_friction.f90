@@ -8,8 +8,8 @@ module emcon_friction
    use emcon_constraint, only : condition_drag, condition_t
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
    use emcon_csr, only : csr_find
-   use emcon_friction_law, only : friction_trial, friction_violation, slip_rounding, touch_open, &
-      touch_rests, touch_sticks, touch_t
+   use emcon_friction_law, only : friction_trial, friction_violation, slip_rounding, touch_free, &
+      touch_open, touch_rests, touch_sticks, touch_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_pose, only : pose_is_equilibrium, pose_way
@@ -197,7 +197,7 @@ contains
       stiffness = stiffness_at(system, set%item(k))
       tie = tied*maxval(abs(set%lam(set%n_held + 1:set%n)))
       associate (id => set%id(k), item => set%item(k), lam => set%lam)
-         at = touch_t(max(0.0_wp, lam(k)), condition_drag(item, lam(k)), 0.0_wp, item%slip, &
+         at = touch_t(lam(k), condition_drag(item, lam(k)), 0.0_wp, item%slip, &
             self%lead(id), slip_rounding*item%size)
          ! Where slip is held the solution has no other, but for round-off.
          if (holds(self, id)) at%slip = slip_held(self, id)
@@ -208,7 +208,8 @@ contains
             return
          end if
          next = friction_trial(self%way(id), at, self%mu(id), stiffness, tie)
-         if (next == touch_open) next = self%way(id)
+         ! What pulls and is held closed all the same has no friction: it would make energy.
+         if (next == touch_open) next = touch_free
          ! What turns twice would turn again and again: it sticks in between.
          if (next*self%way(id) == -1) then
             if (self%has_turned(id)) next = touch_sticks
