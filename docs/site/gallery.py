@@ -26,6 +26,8 @@ CHAPTERS = {
     "Ties": "tied_ring tied_spin tied_rotation tied_cantilever tied_patch tied_smooth",
     "Bodies alone": "spinning_ring tumbling_block cantilever",
 }
+#: Decks of which a second picture shows another field.
+FIELDS = {"sliding_block": "contact_shear", "hertz": "contact_pressure"}
 #: Rows of a block of data that are shown.
 SHOWN_ROWS = 4
 
@@ -71,14 +73,19 @@ def excerpt(deck: str) -> str:
 def run(name: str, runs: Path) -> Path:
     """The picture of the run of a deck."""
     deck, picture = DECKS/f"{name}.inp", runs/f"{name}.png"
-    if picture.exists() and picture.stat().st_mtime > max(
+    made = [picture, *([runs/f"{name}_field.png"] if name in FIELDS else [])]
+    if all(path.exists() for path in made) and min(path.stat().st_mtime for path in made) > max(
             path.stat().st_mtime for path in (deck, PROGRAM)):
         return picture
     done = subprocess.run([PROGRAM, deck, "--output", runs], capture_output=True, text=True)
     if done.returncode not in (0, 3):
         raise SystemExit(f"{deck}: {done.stdout}{done.stderr}")
-    subprocess.run([sys.executable, "-m", "emcon", "plot", runs/name, "--output", picture],
-                   check=True, capture_output=True, cwd=ROOT/"pywrap")
+    pictures = [["--output", picture]]
+    if name in FIELDS:
+        pictures.insert(0, ["--output", runs/f"{name}_field.png", "--field", FIELDS[name]])
+    for options in pictures:
+        subprocess.run([sys.executable, "-m", "emcon", "plot", runs/name, *options],
+                       check=True, capture_output=True, cwd=ROOT/"pywrap")
     return picture
 
 
@@ -88,6 +95,8 @@ def page(name: str) -> str:
     title, more = heading(text)
     made = [f"# {name}", escape(title), f"![{title}]({name}.png)",
             f"    emcon input_decks/{name}.inp --output run\n    emcon plot run/{name}",
+            *([f"    emcon plot run/{name} --field {FIELDS[name]}",
+               f"![{FIELDS[name].replace('_', ' ')}]({name}_field.png)"] if name in FIELDS else []),
             f"```text\n{more}\n```" if more else "",
             f"The deck, without most of its mesh ([all of it](../input_decks/{name}.inp)):",
             f"```text\n{excerpt(text)}\n```"]
@@ -110,6 +119,8 @@ def build(pages: Path, runs: Path) -> None:
         made.append(f"## {title}")
         for name in names:
             shutil.copy(run(name, runs), folder/f"{name}.png")
+            if name in FIELDS:
+                shutil.copy(runs/f"{name}_field.png", folder)
             (folder/f"{name}.md").write_text(page(name), encoding="utf-8")
             first, _ = heading((DECKS/f"{name}.inp").read_text(encoding="utf-8"))
             made.append(f"### [{name}]({name}.md)\n\n{escape(first)}\n\n"
