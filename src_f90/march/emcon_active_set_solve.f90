@@ -192,6 +192,8 @@ contains
       if (self%friction%is_on) self%holding%grips = friction_holds(self%friction)
       call holding_complete(self%holding, system, scene, motion, self%is_active)
       motion%du = motion%du + driven
+      ! What follows from others holds no more than these, and would be dropped again for ever.
+      self%is_active = self%is_active .and. .not. self%is_dropped
       do pair = 1, size(system%contact)
          call pair_search(system, pair, motion)
       end do

@@ -1,11 +1,13 @@
 """`*FRICTION`: bodies that nothing else holds, slaves that are held, and partial slip to and fro."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from friction_scenes import (
     NODES,
+    WEIGHT,
     arch,
     arch_needs,
     balance,
@@ -78,6 +80,65 @@ def test_a_stack_on_a_slope(mu, sides, formulation, tmp_path):
     assert seen == pytest.approx(exact, abs=0.02)
     if mu > 0.2:
         assert np.ptp(gone[time > 0.2]) < 1e-4
+
+
+FORMULATIONS = [(ONE, "NODE TO SURFACE"), (BOTH, "NODE TO SURFACE"), (ONE, "SEGMENT"),
+                (ONE, "MORTAR")]
+
+
+@pytest.mark.parametrize(("sides", "formulation"), FORMULATIONS)
+@pytest.mark.parametrize("cells", [(1, 1), (2, 1), (4, 2)])
+def test_a_rigid_block_rests_and_slides_slowly(cells, sides, formulation, tmp_path):
+    """Of nodes that hold the same body any may act. In small increments a first guess, which flies,
+    meets gaps and forces nearly; slips of a body at rest are round-off. No increment is cut."""
+    for v0, h in itertools.product((0.0, 0.01, 0.1, 0.3), (0.005, 0.0025, 0.001)):
+        deck = block_on_floor(h, 60*h, 0.3, v0=v0, rigid=True, cells=cells, sides=sides)
+        run = run_deck(deck, tmp_path/f"{v0} {h}", formulation=formulation)
+        assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+        assert run.history["cuts"].sum() == 0
+        # Whole increments lose mu g h; in the last one the velocity ends. It hops by 3 h at most.
+        n = min(60, math.floor(v0/(3.0*h) + 1e-9))
+        exact = n*h*(v0 - 0.5*n*3.0*h) + (0.5*h*(v0 - n*3.0*h) if n < 60 else 0.0)
+        gone = way(run, (cells[0] + 1)*(cells[1] + 1))
+        assert gone[-1] == pytest.approx(exact, abs=1.5*h*h)
+
+
+def static(deck, nlgeom=True):
+    deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    if not nlgeom:
+        deck.replace("*STEP, NLGEOM", "*STEP")
+    return deck
+
+
+@pytest.mark.parametrize(("sides", "formulation"), FORMULATIONS)
+@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
+@pytest.mark.parametrize(("slope", "nlgeom"), [(0.0, True), (0.4, False), (0.4, True),
+                                               (0.4995, True)])
+def test_a_block_lies_by_friction_alone(slope, nlgeom, method, sides, formulation, tmp_path):
+    """Nothing but friction holds it along the floor; this bears its weight, across and along."""
+    deck = static(block_on_floor(0.5, 1.0, 0.5, slope=-math.atan(slope), sides=sides), nlgeom)
+    run = run_deck(deck, tmp_path, formulation=formulation, method=method)
+    assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+    assert run.history["cuts"].sum() == 0 and (np.diff(run.history["friction_loss"]) >= -1e-18).all()
+    force = sum(np.array([run.history[f"pair{k}_force_{axis}"][-1] for axis in "xy"])
+                for k in range(1, 3) if f"pair{k}_force_x" in run.history.dtype.names)
+    assert np.abs(force - [0.0, WEIGHT]).max() < 1e-9*WEIGHT
+
+
+@pytest.mark.parametrize(("sides", "formulation"), FORMULATIONS)
+def test_a_block_slides_off_in_statics(sides, formulation, tmp_path):
+    """A thousandth above the limit no state of rest is there, and the message says so."""
+    deck = static(block_on_floor(0.5, 1.0, 0.5, slope=-math.atan(0.5005), sides=sides))
+    run = run_deck(deck, tmp_path, code=3, formulation=formulation)
+    assert "is free to move along" in run.errors and "friction is at its limit" in run.errors
+
+
+def test_friction_without_a_push_holds_nothing(tmp_path):
+    """The block touches the floor, and nothing presses it down."""
+    deck = static(block_on_floor(0.5, 1.0, 0.5))
+    deck.replace("GRAV, 10.0", "GRAV, 0.0")
+    run = run_deck(deck, tmp_path, code=3, **NODES)
+    assert "nothing holds what moves without resistance" in run.errors
 
 
 def test_partial_slip_to_and_fro(tmp_path):
