@@ -41,7 +41,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_done, is_held, is_measured
+      logical :: is_done, is_measured
       integer :: left
 
       self%first = motion%du
@@ -84,16 +84,27 @@ contains
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_advance(self, system, motion, is_done, status)
          is_measured = status /= step_cycling
-         if (is_done .and. status == step_done .and. self%holding%is_needed) then
-            call active_set_grips(self, system)
-            call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
-            if (.not. is_held) status = step_not_held
-         end if
+         if (is_done .and. status == step_done .and. self%holding%is_needed) &
+            call look_for_free(self, system, scene, motion, status)
          call phase_leave(system%phases, left)
          if (status == step_cycling) call begin_sharp(self, system, newton, motion, is_done)
          if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> Is a body free to move with the set that solves the step?
+   subroutine look_for_free(self, system, scene, motion, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
+      integer, intent(inout) :: status           !! `step_not_held` if so
+      logical :: is_held
+
+      call active_set_grips(self, system)
+      call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
+      if (.not. is_held) status = step_not_held
+   end subroutine look_for_free
 
    !> Keep the multipliers of the set by the numbers of its constraints, without copies.
    pure subroutine keep_multipliers(self)

@@ -312,8 +312,7 @@ contains
       if (abs(self%stabilization) > half_digits*self%largest_energy) call note_add(self%reasons, &
          "loads do work on motions that nothing holds: stabilization bears " // &
          to_text(self%stabilization, 3))
-      ! What friction takes in an increment is uncertain by what its slip is rounded to, that of each
-      ! by itself.
+      ! What friction takes in an increment is uncertain by what its slip is rounded to.
       if (self%dynamic_drift > energy_bar*self%largest_energy + slip_rounding*self%grip) then
          call note_add(self%reasons, &
             "the energy balance does NOT close to " // trim(closing_digits(this_precision)) // &
