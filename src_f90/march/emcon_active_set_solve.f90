@@ -12,8 +12,7 @@ module emcon_active_set_solve
    use emcon_active_set, only : active_set_drop, active_set_let_go, active_set_put_off, &
       active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_loose, &
       step_not_held
-   use emcon_active_set_update, only : active_set_advance, active_set_grips, active_set_leave, &
-      most_early
+   use emcon_active_set_update, only : active_set_advance, active_set_leave, most_early
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_holds, friction_idle, friction_keep
    use emcon_gaps, only : pair_search
@@ -101,7 +100,6 @@ contains
       integer, intent(inout) :: status           !! `step_not_held` if so
       logical :: is_held
 
-      call active_set_grips(self, system)
       call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
       if (.not. is_held) status = step_not_held
    end subroutine look_for_free

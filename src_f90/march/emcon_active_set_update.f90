@@ -12,7 +12,7 @@ module emcon_active_set_update
    use emcon_system, only : system_t
    implicit none
    private
-   public :: active_set_advance, active_set_leave, active_set_grips
+   public :: active_set_advance, active_set_leave
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -56,6 +56,7 @@ contains
          self%friction%is_idle = .false.
       end if
       is_done = status /= step_done .or. .not. has_changed
+      if (self%holding%is_needed) call find_grips(self, system)
       if (is_done) return
       ! What is damped only grows within a step: the same contacts beside more of it are no cycle.
       if (has_more) self%n_tried = 0
@@ -229,7 +230,7 @@ contains
 
    !> Contacts that hold along the surface as well, where the step is solved: without a push
    !> friction holds nothing.
-   pure subroutine active_set_grips(self, system)
+   pure subroutine find_grips(self, system)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       integer :: k, pair, i
@@ -243,7 +244,7 @@ contains
                noise_at(self, system, system%contact(pair)%contact%node(i))
          end associate
       end do
-   end subroutine active_set_grips
+   end subroutine find_grips
 
    !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact
    !> that was left out and closes all the same does not follow from others: it had lost its

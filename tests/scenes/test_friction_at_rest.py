@@ -133,6 +133,15 @@ def test_a_block_slides_off_in_statics(sides, formulation, tmp_path):
     assert "is free to move along" in run.errors and "friction is at its limit" in run.errors
 
 
+@pytest.mark.parametrize(("sides", "formulation"), [(ONE, "MORTAR"), (BOTH, "NODE TO SURFACE")])
+def test_a_stack_lies_by_friction_alone(sides, formulation, tmp_path):
+    """Four blocks on a slope of 1 in 5, each held by nothing but its neighbours and friction."""
+    deck = static(stack_on_slope(0.25, -math.atan(0.2), sides=sides, h=0.5, t_end=1.0))
+    run = run_deck(deck, tmp_path, formulation=formulation)
+    assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+    assert run.history["cuts"].sum() == 0 and (np.diff(run.history["friction_loss"]) >= -1e-18).all()
+
+
 def test_friction_without_a_push_holds_nothing(tmp_path):
     """The block touches the floor, and nothing presses it down."""
     deck = static(block_on_floor(0.5, 1.0, 0.5))
