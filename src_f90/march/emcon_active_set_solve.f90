@@ -15,6 +15,7 @@ module emcon_active_set_solve
    use emcon_active_set_update, only : active_set_advance, active_set_leave, most_early
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_holds, friction_idle, friction_keep
+   use emcon_friction_referee, only : friction_referee
    use emcon_gaps, only : pair_search
    use emcon_holding, only : holding_complete, holding_find_free
    use emcon_kinds, only : wp
@@ -83,8 +84,9 @@ contains
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_advance(self, system, motion, is_done, status)
          is_measured = status /= step_cycling
-         if (is_done .and. status == step_done .and. self%holding%is_needed) &
-            call look_for_free(self, system, scene, motion, status)
+         call friction_referee(self, system, motion, newton%correction, is_done, status, error)
+         if (allocated(error)) return
+         if (is_done) call look_for_free(self, system, scene, motion, status)
          call phase_leave(system%phases, left)
          if (status == step_cycling) call begin_sharp(self, system, newton, motion, is_done)
          if (is_done) return
@@ -100,6 +102,7 @@ contains
       integer, intent(inout) :: status           !! `step_not_held` if so
       logical :: is_held
 
+      if (status /= step_done .or. .not. self%holding%is_needed) return
       call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
       if (.not. is_held) status = step_not_held
    end subroutine look_for_free

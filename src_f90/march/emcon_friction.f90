@@ -7,6 +7,7 @@
 module emcon_friction
    use emcon_constraint, only : condition_drag, condition_t
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
+   use emcon_contact, only : contact_t
    use emcon_csr, only : csr_find
    use emcon_friction_law, only : friction_trial, friction_violation, slip_rounding, touch_free, &
       touch_open, touch_rests, touch_sticks, touch_t
@@ -37,6 +38,7 @@ module emcon_friction
       logical, allocatable :: has_turned(:)      !! (n_constraint) from one slide to the other
       logical, allocatable :: knows_limit(:)     !! (n_constraint) of mu: see emcon_friction_limit
       integer, allocatable :: tried(:, :)        !! (n_constraint, sets) ways of the sets tried
+      integer :: n_asked = 0                     !! times that the referee has set all of it
    end type friction_t
 
 contains
@@ -81,6 +83,7 @@ contains
       self%is_idle = .false.
       self%is_needed = .false.
       self%has_turned = .false.
+      self%n_asked = 0
       self%lead = 0.0_wp
       if (.not. pose_is_equilibrium(motion%pose)) call find_leads(self, system, motion, was_active)
    end subroutine friction_begin
@@ -99,12 +102,23 @@ contains
          associate (contact => system%contact(pair)%contact, first => system%first_constraint(pair))
             if (.not. contact%friction > 0.0_wp) cycle
             do i = 1, contact%n_constraint
-               if (was_active(first + i)) self%lead(first + i) = (1.0_wp - contact%rebound) &
-                  *contact%slip(i, motion%x, motion%u0, du)
+               if (was_active(first + i)) self%lead(first + i) = lead_of(contact, i, motion, du)
             end do
          end associate
       end do
    end subroutine find_leads
+
+   !> The slip with which contact `i` of a pair ends its velocity along the surface, less what a
+   !> restitution gives back; what slip is rounded to leads nowhere.
+   pure real(wp) function lead_of(contact, i, motion, du) result(lead)
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: du(:, :)           !! (n_dim, n_node) the way to that end [L]
+
+      lead = (1.0_wp - contact%rebound)*contact%slip(i, motion%x, motion%u0, du)
+      if (abs(lead) <= slip_rounding*contact%state(i)%size) lead = 0.0_wp
+   end function lead_of
 
    !> Tell the conditions of `set`, just selected, how they rub.
    pure subroutine friction_select(self, set, n_tried)
@@ -232,10 +246,8 @@ contains
 
       associate (id => system%first_constraint(pair) + i, contact => system%contact(pair)%contact)
          if (.not. self%mu(id) > 0.0_wp) return
-         if (.not. (self%is_candidate(id) .or. pose_is_equilibrium(motion%pose))) then
-            self%lead(id) = (1.0_wp - contact%rebound)*contact%slip(i, motion%x, motion%u0, &
-               pose_way(motion%pose, motion%v0, 0.0_wp))
-         end if
+         if (.not. (self%is_candidate(id) .or. pose_is_equilibrium(motion%pose))) self%lead(id) &
+            = lead_of(contact, i, motion, pose_way(motion%pose, motion%v0, 0.0_wp))
          self%is_candidate(id) = .true.
          at%gap = min(gap, -tiny(gap))
          at%slip = contact%slip(i, motion%x, motion%u0, motion%du)

@@ -4,17 +4,14 @@
 !> lam (Wnn - mu sigma Wnt), with the flexibility W of the step without contacts: from
 !> mu = Wnn/|Wnt| on it is closed by being pushed open. Source: docs/theory.md, eq. (14l).
 module emcon_friction_limit
-   use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_place, constraint_set_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : dp, wp
-   use emcon_lapack, only : dense_solve
+   use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_move, &
+      flexibility_row, flexibility_t
+   use emcon_kinds, only : wp
    use emcon_march_types, only : increment_t, march_t
-   use emcon_numbering, only : numbering_t
    use emcon_pose, only : pose_is_equilibrium
    use emcon_scene, only : scene_t
-   use emcon_solver_registry, only : solver_create
-   use emcon_sparse_solver, only : matrix_general, sparse_solver_t
    use emcon_system, only : system_t
    use emcon_text, only : note_add, to_text
    implicit none
@@ -35,18 +32,18 @@ contains
       type(scene_t), intent(in) :: scene
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
-      class(sparse_solver_t), allocatable :: solver
+      type(flexibility_t) :: flexibility
       real(wp) :: limit(most_contacts)
       integer :: list(most_contacts), n, worst, pair, i
 
       if (.not. march%active%friction%is_on .or. pose_is_equilibrium(march%motion%pose)) return
       call choose(march, list, n)
       if (n == 0) return
-      associate (correction => march%newton%correction)
-         call solver_create(correction%choice, matrix_general, solver, correction%given)
-      end associate
-      call friction_limit_find(march%system, march%active%set, list(:n), solver, limit(:n), error)
-      call solver%free()
+      call flexibility_make(flexibility, march%system, march%active%set, &
+         march%newton%correction, error)
+      if (.not. allocated(error)) call friction_limit_find(march%system, march%active%set, &
+         list(:n), flexibility, limit(:n), error)
+      call flexibility_free(flexibility)
       if (allocated(error)) return
       associate (id => march%active%set%id(list(:n)), mu => march%active%friction%mu)
          worst = maxloc(mu(id)/limit(:n), 1)
@@ -88,35 +85,27 @@ contains
 
    !> The limits of contacts that rub, each by itself with what always holds; where nothing moves
    !> without contacts there are none.
-   subroutine friction_limit_find(system, set, list, solver, limit, error)
+   subroutine friction_limit_find(system, set, list, flexibility, limit, error)
       type(system_t), intent(in) :: system       !! with the matrix of the step
       type(constraint_set_t), intent(in) :: set  !! of the step
       integer, intent(in) :: list(:)             !! (n) places in the set
-      class(sparse_solver_t), intent(inout) :: solver   !! of general matrices
+      type(flexibility_t), intent(inout) :: flexibility   !! of the step
       real(wp), intent(out) :: limit(:)          !! (n) huge: none
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: held(system%space%numbering%n_unknown, set%n_held)
       real(wp), dimension(system%space%numbering%n_unknown) :: normal, along, row
       integer :: k
 
       limit = huge(limit)
-      call solver%analyse(system%matrix, error)
-      if (.not. allocated(error)) call solver%factorise(system%matrix%value, error)
-      if (allocated(error) .or. solver%is_singular) return
+      if (flexibility%is_singular) return
       associate (numbering => system%space%numbering)
-         do k = 1, set%n_held
-            call solver%solve(on_unknowns(numbering, set%item(k), set%item(k)%g), held(:, k), error)
-            if (allocated(error)) return
-         end do
          do k = 1, size(list)
             associate (item => set%item(list(k)))
-               call solver%solve(on_unknowns(numbering, item, item%g), normal, error)
-               if (.not. allocated(error)) call solver%solve(on_unknowns(numbering, item, item%t), &
-                  along, error)
+               call flexibility_move(flexibility, flexibility_row(numbering, item, item%g), &
+                  normal, error)
+               if (.not. allocated(error)) call flexibility_move(flexibility, &
+                  flexibility_row(numbering, item, item%t), along, error)
                if (allocated(error)) return
-               call hold(numbering, set, held, normal)
-               call hold(numbering, set, held, along)
-               row = on_unknowns(numbering, item, item%c)
+               row = flexibility_row(numbering, item, item%c)
                associate (wnn => dot_product(row, normal), wnt => abs(dot_product(row, along)))
                   if (wnn > 0.0_wp .and. wnt > depends*wnn) limit(k) = wnn/wnt
                end associate
@@ -124,48 +113,5 @@ contains
          end do
       end associate
    end subroutine friction_limit_find
-
-   !> What moves under a force by `way` does so with what always holds.
-   subroutine hold(numbering, set, held, way)
-      type(numbering_t), intent(in) :: numbering
-      type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in) :: held(:, :)         !! (n_unknown, n_held) under the forces of these
-      real(wp), intent(inout) :: way(:)          !! (n_unknown)
-      real(dp) :: matrix(set%n_held, set%n_held), rate(set%n_held, 1), force(set%n_held, 1)
-      logical :: is_singular
-      integer :: k
-
-      if (set%n_held == 0) return
-      do k = 1, set%n_held
-         associate (row => on_unknowns(numbering, set%item(k), set%item(k)%c))
-            matrix(k, :) = real(matmul(row, held), dp)
-            rate(k, 1) = real(dot_product(row, way), dp)
-         end associate
-      end do
-      call dense_solve(matrix, rate, force, is_singular)
-      way = way - matmul(held, real(force(:, 1), wp))
-   end subroutine hold
-
-   !> Derivatives by the nodes of a condition as those by the unknowns.
-   pure function on_unknowns(numbering, item, part) result(row)
-      type(numbering_t), intent(in) :: numbering
-      type(condition_t), intent(in) :: item
-      real(wp), intent(in) :: part(:, :)         !! (n_dim, >= n_node)
-      real(wp) :: row(numbering%n_unknown)
-      integer :: i, a, t
-
-      row = 0.0_wp
-      do i = 1, item%n_node
-         do a = 1, size(part, 1)
-            associate (dof => size(part, 1)*(item%node(i) - 1) + a)
-               do t = numbering%start(dof) + 1, numbering%start(dof + 1)
-                  associate (column => numbering%column(t))
-                     if (column > 0) row(column) = row(column) + numbering%weight(t)*part(a, i)
-                  end associate
-               end do
-            end associate
-         end do
-      end do
-   end function on_unknowns
 
 end module emcon_friction_limit

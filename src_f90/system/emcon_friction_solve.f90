@@ -1,11 +1,11 @@
 !> Contact with friction of few places whose slips and gaps are linear in the forces.
 !>
-!> [g; -s] = [d; -r] + W [lam; tau]: by trials of the law at all places at once, which is Newton's
-!> method for it, and where these go round in a circle by the method of Lemke for
-!> (lam, tau+, tau-, rest of the cone), whose matrix is copositive: where W is positive definite it
-!> ends in a solution for any coefficient. Source: docs/theory.md, eq. (14h).
+!> [g; -s] = [d; -r] + W [lam; tau], with slips that lead to a: by trials of the law at all places
+!> at once, which is Newton's method for it, and where these go round in a circle by the method of
+!> Lemke for (lam, tau+, tau-, rest of the cone), whose matrix is copositive: where W is positive
+!> definite it ends in a solution for any coefficient. Source: docs/theory.md, eq. (14i).
 module emcon_friction_solve
-   use emcon_friction_law, only : friction_trial, touch_open, touch_sticks, touch_t
+   use emcon_friction_law, only : friction_trial, touch_open, touch_rests, touch_sticks, touch_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_lemke, only : lemke_solve
@@ -21,6 +21,7 @@ module emcon_friction_solve
    type :: friction_problem_t
       real(wp), allocatable :: w(:, :)               !! (2 n, 2 n) W [T^2/M]
       real(wp), allocatable :: gap(:), slip(:)       !! (n) d, r: without forces [L]
+      real(wp), allocatable :: lead(:)               !! (n) a, from which slip counts [L]
       real(wp), allocatable :: mu(:)                 !! (n)
    end type friction_problem_t
 
@@ -62,9 +63,10 @@ contains
       b(:, 1) = real([-problem%gap, problem%slip], dp)
       do i = 1, n
          if (way(i) == touch_open) call put(i, 0.0_dp)
-         if (way(i) == touch_sticks) cycle
+         if (way(i) == touch_sticks) b(n + i, 1) = b(n + i, 1) - real(problem%lead(i), dp)
+         if (any(way(i) == [touch_sticks, touch_rests])) cycle
          call put(n + i, 0.0_dp)
-         if (way(i) /= touch_open) matrix(n + i, i) = -real(problem%mu(i)*way(i), dp)
+         if (abs(way(i)) == 1) matrix(n + i, i) = -real(problem%mu(i)*way(i), dp)
       end do
       call dense_solve(matrix, b, x, is_singular)
       is_solved = .not. is_singular
@@ -89,9 +91,11 @@ contains
       type(friction_problem_t), intent(in) :: problem
       real(wp), intent(in) :: lam(:), tau(:)
       type(touch_t), intent(out) :: at(:)
-      real(wp) :: moved(2*size(lam))
+      real(wp), dimension(2*size(lam)) :: force, moved
 
-      moved = matmul(problem%w, [lam, tau])
+      force(:size(lam)) = lam
+      force(size(lam) + 1:) = tau
+      moved = matmul(problem%w, force)
       at%lam = lam
       at%tau = tau
       at%gap = problem%gap + moved(:size(lam))
@@ -113,16 +117,19 @@ contains
       stands = .true.
       do i = 1, n
          place = at(i)
+         place%lead = problem%lead(i)
          stiffness = 2.0_wp/(problem%w(i, i) + problem%w(n + i, n + i))
          if (way(i) /= touch_open) place%gap = 0.0_wp
-         if (way(i) == touch_sticks) place%slip = 0.0_wp
+         if (way(i) == touch_sticks) place%slip = place%lead
+         if (way(i) == touch_rests) place%slip = 0.0_wp
          next = friction_trial(way(i), place, problem%mu(i), stiffness, tie)
          stands = stands .and. next == way(i)
          way(i) = next
       end do
    end subroutine try
 
-   !> By complementary pivoting over (lam, tau+, tau-, mu lam - |tau|).
+   !> By complementary pivoting over (lam, tau+, tau-, mu lam - |tau|), with slips from a: what is
+   !> free before that, or rests, is for others to find.
    subroutine solve_by_lemke(problem, way, at, is_solved)
       type(friction_problem_t), intent(in) :: problem
       integer, intent(out) :: way(:)
@@ -147,8 +154,9 @@ contains
          m(3*n + i, i) = problem%mu(i)
          m(3*n + i, [n + i, 2*n + i]) = -1.0_wp
       end do
-      call lemke_solve(m, [problem%gap, -problem%slip, problem%slip, 0.0_wp*problem%gap]/force, z, &
-         is_solved, n_pivot)
+      associate (slip => problem%slip - problem%lead)
+         call lemke_solve(m, [problem%gap, -slip, slip, 0.0_wp*slip]/force, z, is_solved, n_pivot)
+      end associate
       if (.not. is_solved) return
       z = (force/length)*z
       call take(problem, z(:n), z(n + 1:2*n) - z(2*n + 1:3*n), at)

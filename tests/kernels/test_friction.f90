@@ -36,7 +36,8 @@ contains
          test_case_t("mean slip of points of an edge", test_points), &
          test_case_t("slip along an edge, and of the force", test_along), &
          test_case_t("Lemke: a problem by hand, and one without solution", test_lemke), &
-         test_case_t("random small problems are always solved", test_random)]
+         test_case_t("random small problems are always solved", test_random), &
+         test_case_t("random small problems with leads", test_leads)]
    end subroutine collect_friction
 
    subroutine test_trial(error)
@@ -343,6 +344,45 @@ contains
          "law")
    end subroutine test_random
 
+   !> Slips that lead to some: where trials end the law with leads is met, which takes energy at
+   !> each place; what Lemke's method finds sticks there, also where it would have to push.
+   subroutine test_leads(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_case = 2000
+      type(friction_problem_t) :: problem
+      type(touch_t) :: at(4)
+      integer :: way(4), i, k, n, n_back
+      logical :: is_solved, fell_back
+      real(wp) :: scale, bound, u(4)
+
+      n_back = 0
+      bound = 1.0e6_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+      do i = 1, n_case
+         n = 1 + mod(i, 4)
+         call make_problem(problem, n)
+         call draw_random(u)
+         problem%lead = u(:n) - 0.5_wp
+         way = touch_open
+         call friction_solve(problem, way(:n), at(:n), is_solved, fell_back)
+         call check_true(error, is_solved, "solved: case " // to_text(i))
+         if (allocated(error)) return
+         scale = max(maxval(abs(at(:n)%lam)), maxval(abs(problem%gap)), maxval(abs(problem%slip)))
+         if (fell_back) n_back = n_back + 1
+         do k = 1, n
+            if (fell_back) at(k)%slip = at(k)%slip - problem%lead(k)
+            if (.not. fell_back) at(k)%lead = problem%lead(k)
+            call check_true(error, friction_violation(at(k), problem%mu(k), 1.0_wp) < bound*scale, &
+               "law: case " // to_text(i))
+            if (.not. fell_back) call check_true(error, at(k)%tau*at(k)%slip >= -bound*scale**2, &
+               "dissipation: case " // to_text(i))
+            if (allocated(error)) return
+         end do
+      end do
+      write(output_unit, "(a)") "   " // to_text(n_case) // " problems with leads, " // &
+         to_text(n_back) // " not by trials alone"
+      call check_true(error, n_back < n_case/4, "trials end in most")
+   end subroutine test_leads
+
    !> W = B A^-1 B' with A definite, by independent random rows, and a skew part of A.
    subroutine make_problem(problem, n)
       type(friction_problem_t), intent(out) :: problem
@@ -363,6 +403,7 @@ contains
       problem%slip = 2.0_wp*u - 1.0_wp
       call draw_random(u)
       problem%mu = 0.1_wp + 3.0_wp*u
+      problem%lead = 0.0_wp*u
    end subroutine make_problem
 
 end module test_friction
