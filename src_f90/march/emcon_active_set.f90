@@ -63,9 +63,12 @@ module emcon_active_set
       logical :: is_stale = .false.              !! stencils were chosen for another motion
       integer :: n_stale = 0                     !! so often in this step
       logical :: only_adds = .false.             !! nothing is let go any more in this step
+      logical :: has_cycled = .false.            !! candidates close below their gaps of the start
       logical :: one_by_one = .false.            !! one contact a time is taken in or let go
       integer :: n_early = 0                     !! sets left before they were solved, in this step
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
+      logical, allocatable :: is_candidate(:)    !! (n_constraint) acted at the start of the step,
+                                                 !! or has closed in it
       logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
       logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
       logical, allocatable :: is_put_off(:)      !! (n_constraint) nearly so: they waited once
@@ -94,11 +97,12 @@ contains
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
          self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure, &
-         self%closes, self%outlook)
+         self%closes, self%outlook, self%is_candidate)
       allocate(self%closes(system%n_constraint), source=.false.)
       allocate(self%outlook(size(system%contact)))
       allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
+      allocate(self%is_candidate(system%n_constraint), source=.false.)
       allocate(self%comes_and_goes(system%n_constraint), source=.false.)
       allocate(self%is_dropped(system%n_constraint), source=.false.)
       allocate(self%is_put_off(system%n_constraint), source=.false.)
@@ -174,6 +178,8 @@ contains
       self%softness%n_augmentation = 0
       call dashpots_restart(self%dashpots)
       self%only_adds = .false.
+      self%has_cycled = .false.
+      self%is_candidate = self%was_active
       self%one_by_one = .false.
       self%comes_and_goes = .false.
       self%is_dropped = .false.

@@ -131,7 +131,8 @@ contains
                   if (changes .and. begins_unseen(self, contact, i, motion)) status = step_too_far
                   if (changes .and. self%friction%is_on) call friction_close(self%friction, &
                      system, pair, i, motion, contact%state(i)%gap1 - gap_to_hold(self, &
-                     contact%state(i), id))
+                     contact%state(i), id), .not. self%is_candidate(id))
+                  self%is_candidate(id) = self%is_candidate(id) .or. changes
                end if
                has_changed = has_changed .or. changes
                if (changes .and. self%one_by_one .and. .not. contact%state(i)%is_leaving) then
@@ -275,10 +276,8 @@ contains
             < -contact%deepest_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, contact%gives_way) &
                *gap%size
-            if (contact%friction > 0.0_wp .and. self%holds_gap) then
-               if (self%friction%is_candidate(id)) closes = gap%gap1 - gap%gap0 &
-                  < -gap_noise*gap%size
-            end if
+            if (self%holds_gap .and. self%is_candidate(id) .and. (self%has_cycled &
+               .or. contact%friction > 0.0_wp)) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
          end if
       end associate
    end subroutine look_at_open
@@ -318,8 +317,9 @@ contains
       first_tried = 0
    end function first_tried
 
-   !> The sets since the first coming of the present one are a cycle: end it by their union, from
-   !> which nothing is let go any more, or by a cut.
+   !> The sets since the first coming of the present one are a cycle: end it by a cut; or, where
+   !> gaps of the start are held, by closing candidates below those from now on, and if one comes
+   !> back then too by the union, from which nothing is let go any more.
    pure subroutine end_cycle(self, status)
       type(active_set_t), intent(inout) :: self
       integer, intent(inout) :: status
@@ -333,10 +333,22 @@ contains
       if (self%only_adds .or. (self%may_cut .and. (any(self%closes) &
          .or. .not. self%holds_gap .or. self%friction%is_on))) then
          status = step_cycling
+      else if (keeps_gaps(self) .and. .not. (self%has_cycled .or. self%friction%is_on)) then
+         self%has_cycled = .true.
+         self%comes_and_goes = .false.
+         self%n_tried = 0
       else
          self%only_adds = .true.
          self%n_tried = 0
       end if
    end subroutine end_cycle
+
+   !> Do all contacts hold the gap of the step's start?
+   pure logical function keeps_gaps(self)
+      type(active_set_t), intent(in) :: self
+
+      keeps_gaps = self%holds_gap .and. .not. any(self%closes) .and. &
+         (.not. self%softness%is_on .or. self%softness%augments)
+   end function keeps_gaps
 
 end module emcon_active_set_update

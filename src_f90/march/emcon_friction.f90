@@ -32,7 +32,6 @@ module emcon_friction
       integer, allocatable :: way0(:)            !! (n_constraint) at the end of the step before
       real(wp), allocatable :: tau(:), tau0(:)   !! (n_constraint) friction, to start from
       real(wp), allocatable :: lead(:)           !! (n_constraint) a, from which slip counts [L]
-      logical, allocatable :: is_candidate(:)    !! (n_constraint)
       logical, allocatable :: is_idle(:)         !! (n_constraint) others hold its slip
       logical, allocatable :: is_needed(:)       !! (n_constraint) others hold its slip but nearly
       logical, allocatable :: has_turned(:)      !! (n_constraint) from one slide to the other
@@ -57,8 +56,8 @@ contains
       n = merge(system%n_constraint, 0, self%is_on)
       allocate(self%mu(n), self%tau(n), self%tau0(n), self%lead(n), source=0.0_wp)
       allocate(self%way(n), self%way0(n), source=touch_sticks)
-      allocate(self%is_candidate(n), self%is_idle(n), self%is_needed(n), self%has_turned(n), &
-         self%knows_limit(n), source=.false.)
+      allocate(self%is_idle(n), self%is_needed(n), self%has_turned(n), self%knows_limit(n), &
+         source=.false.)
       allocate(self%tried(n, merge(n_set, 0, self%is_on)), source=0)
       if (.not. self%is_on) return
       do i = 1, size(system%contact)
@@ -79,7 +78,6 @@ contains
       if (.not. self%is_on) return
       self%way = self%way0
       self%tau = self%tau0
-      self%is_candidate = was_active
       self%is_idle = .false.
       self%is_needed = .false.
       self%has_turned = .false.
@@ -234,21 +232,22 @@ contains
       end associate
    end subroutine friction_turn
 
-   !> Contact `i` of a pair closes from the motion, by `gap` below the one that it will hold: it is
-   !> a candidate from here on, and begins in the way that its slip tells.
-   pure subroutine friction_close(self, system, pair, i, motion, gap)
+   !> Contact `i` of a pair closes from the motion, by `gap` below the one that it will hold, and
+   !> begins in the way that its slip tells.
+   pure subroutine friction_close(self, system, pair, i, motion, gap, is_new)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       integer, intent(in) :: pair, i             !! number of the contact, and within it
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: gap                !! < 0 [L]
+      logical, intent(in) :: is_new              !! it was no candidate
       type(touch_t) :: at
 
       associate (id => system%first_constraint(pair) + i, contact => system%contact(pair)%contact)
          if (.not. self%mu(id) > 0.0_wp) return
-         if (.not. (self%is_candidate(id) .or. pose_is_equilibrium(motion%pose))) self%lead(id) &
-            = lead_of(contact, i, motion, pose_way(motion%pose, motion%v0, 0.0_wp))
-         self%is_candidate(id) = .true.
+         if (is_new .and. .not. pose_is_equilibrium(motion%pose)) then
+            self%lead(id) = lead_of(contact, i, motion, pose_way(motion%pose, motion%v0, 0.0_wp))
+         end if
          at%gap = min(gap, -tiny(gap))
          at%slip = contact%slip(i, motion%x, motion%u0, motion%du)
          at%lead = self%lead(id)
