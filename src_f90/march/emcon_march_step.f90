@@ -77,6 +77,9 @@ contains
       if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
+      if (self%active%friction%n_asked > 0) call note_add(increment%notes, "contacts stick, " // &
+         "slide and open in turn: their laws were solved for the step linearised, times " // &
+         to_text(self%active%friction%n_asked))
       if (any(self%active%is_dropped)) then
          call nodes_text(self, scene, self%active%is_dropped, text)
          call note_add(increment%notes, "contact is left out, as it follows from that of other " &
