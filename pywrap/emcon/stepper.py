@@ -489,7 +489,8 @@ class Stepper(Queries, Conditions, Meshes):
 
         In space px, py, pz, lx, ly, lz.
         """
-        return dict(list(self.ledger.items())[12:])
+        return {name: value for name, value in self.ledger.items()
+                if name in ("px", "py", "pz", "lx", "ly", "lz")}
 
 
 def _text(address: int, function: Callable[..., Any]) -> tuple[int, str]:

@@ -48,23 +48,15 @@ contains
       end if
       allocate(diagnostic(0))
       if (allocated(stepper%diagnostic)) diagnostic = stepper%diagnostic
-      call log_start(self%log, stepper, diagnostic, deck_name(stepper))
+      associate (source => stepper%source)
+         call log_start(self%log, stepper, diagnostic, source%file_name(source%file(1))%text)
+      end associate
       associate (state => stepper%march%state)
          if (state%increment > 0) call log_line(self%log, "recorded from increment " // &
             to_text(state%increment) // " on, time " // to_text(state%time, 9))
       end associate
       call write_down(self, stepper, nothing, error)
    end subroutine record_begin
-
-   !> The file that the first line of the deck stands in.
-   pure function deck_name(stepper) result(name)
-      type(stepper_t), intent(in) :: stepper
-      character(len=:), allocatable :: name
-
-      associate (source => stepper%source)
-         name = source%file_name(source%file(1))%text
-      end associate
-   end function deck_name
 
    !> Record the present state after `increment`. A failure ends the record.
    subroutine record_increment(self, stepper, increment, error)
