@@ -1,6 +1,6 @@
 # EMCON. `make help` lists what can be made.
 #
-# MODE=release|debug|sanitize, PRECISION=single|double|quad (of the state; matrices are double),
+# MODE=release|debug|sanitize|coverage, PRECISION=single|double|quad (of the state; matrices are double),
 # LICENSE=permissive (without SuiteSparse, whose solvers are under the GPL): a folder for each.
 # V=1 shows commands, FFLAGS=... and CFLAGS=... are added to the flags below.
 # Compiler and libraries are looked up once, by .ci/setup, into build/config.mk.
@@ -11,8 +11,8 @@ LICENSE ?= gpl
 PREFIX ?= /usr/local
 BUILD := build/$(MODE)$(if $(filter-out double,$(PRECISION)),-$(PRECISION))$(if $(filter-out gpl,$(LICENSE)),-$(LICENSE))
 O := $(BUILD)/obj
-ifeq ($(filter $(MODE),release debug sanitize),)
-$(error MODE is release, debug or sanitize, not '$(MODE)')
+ifeq ($(filter $(MODE),release debug sanitize coverage),)
+$(error MODE is release, debug, sanitize or coverage, not '$(MODE)')
 endif
 WP := $(patsubst single,real32,$(patsubst double,real64,$(patsubst quad,real128,$(PRECISION))))
 ifeq ($(filter $(PRECISION),single double quad),)
@@ -33,7 +33,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize docs install uninstall status clean \
+.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize coverage mutants docs install uninstall status clean \
 	precisions help kernel_objects FORCE
 
 # ---- set-up -------------------------------------------------------------------------------------
@@ -128,6 +128,10 @@ FFLAGS_sanitize := -O0 -g1 $(SANITIZE) -fno-sanitize=signed-integer-overflow -fc
 CFLAGS_sanitize := -O0 -g1 $(SANITIZE)
 # A libubsan that is shared writes to no file but standard error.
 LDFLAGS_sanitize := $(SANITIZE) -static-libubsan
+# Programs write at their end which lines they have run; of several at a time no count is lost.
+FFLAGS_coverage := -O0 -g1 --coverage -fprofile-update=atomic
+CFLAGS_coverage := -O0 -g1 --coverage -fprofile-update=atomic
+LDFLAGS_coverage := --coverage
 FCOMPILE = $(FC) $(FFLAGS_ALL) $(FFLAGS_$(MODE)) $(HDF5_CFLAGS) $(if $(GPL),-DEMCON_PERMISSIVE) \
 	$(FFLAGS)
 CCOMPILE = $(CC) $(CFLAGS_ALL) $(CFLAGS_$(MODE)) $(UMFPACK_CFLAGS) $(MUMPS_CFLAGS) $(CFLAGS)
@@ -183,7 +187,7 @@ $(BUILD)/libemcon.a: $(LIB_OBJ)
 COMMA := ,
 SYMBOLS := $(BUILD)/made/symbols.map
 ifneq ($(MADE),)
-SHOWN := $(if $(filter-out sanitize,$(MODE)),-Wl$(COMMA)--version-script=$(SYMBOLS))
+SHOWN := $(if $(filter-out sanitize coverage,$(MODE)),-Wl$(COMMA)--version-script=$(SYMBOLS))
 endif
 $(SYMBOLS): src_f90/make_symbols.py src_f90/c_header.py $(BORDER)/emcon.h
 	@mkdir -p $(@D)
@@ -380,6 +384,15 @@ soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, ca
 sanitize: .venv/test.stamp  ## build and run under the address and undefined-behaviour sanitizers
 	$(BUILDING) MODE=sanitize PRECISION=double app lib kernels
 	@$(PY) tests/soak/sanitize.py
+
+coverage: .venv/test.stamp  ## print the lines of each folder that the kernel tests run, and which they do not
+	$(BUILDING) MODE=coverage PRECISION=double app kernels
+	@$(PY) tests/soak/kernel_coverage.py
+
+COUNT ?= 80
+mutants: .venv/test.stamp  ## change COUNT=80 lines of the numerics, one at a time: does a test notice?
+	$(BUILDING) MODE=release PRECISION=double app kernels
+	@$(PY) tests/soak/mutants.py --count $(COUNT)
 
 docs: .venv/run.stamp build/site/tools/docs.stamp  ## the site, build/site/html/index.html: gallery, references, all pages
 	$(BUILDING) MODE=release PRECISION=double app pywrap

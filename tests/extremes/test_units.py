@@ -111,6 +111,7 @@ def test_other_treatments_of_first_contact(tmp_path, reference, initiation):
     units = (-13, 7, 5)
     parameters = {"h": 0.02, "t_end": 0.6, "frame": 0.2, "initiation": initiation}
     run = run_deck(in_units(*units, **parameters), tmp_path)
+    assert run.history["active"].max() >= 2
     assert_same_bits(run, reference(**parameters), units)
 
 

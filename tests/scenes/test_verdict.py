@@ -37,11 +37,16 @@ def test_statics_have_a_verdict(tmp_path):
     assert "verdict: good: nothing penetrates" in run.log
 
 
-def test_failed_run_is_not_called_good(tmp_path):
+def ring_that_stops(folder):
+    """The ring with two corrections an increment at most, which cannot be cut."""
     deck = Deck.read(DECKS / "ring.inp")
     deck.replace("TOLERANCE=<tolerance>", "TOLERANCE=<tolerance>, MAXIMUM=2")
     deck.replace("<h>, <t_end>", "<h>, <t_end>, <h>")
-    path = deck.write(tmp_path / "ring.inp")
+    return deck.write(folder / "ring.inp")
+
+
+def test_failed_run_is_not_called_good(tmp_path):
+    path = ring_that_stops(tmp_path)
     done = emcon(path, "--output", tmp_path, "--set=h=0.05")
     assert done.returncode == 3
     run = run_deck(path, tmp_path, code=3, h=0.05)
@@ -52,10 +57,15 @@ def test_failed_run_is_not_called_good(tmp_path):
 
 
 def test_verdict_of_an_earlier_run_goes(tmp_path):
-    """Nothing that scripts read is left of another run, also where this one fails at once."""
-    run = run_deck(DECKS / "ring.inp", tmp_path, h=0.05, t_end=0.1)
-    run.file(".json").write_text("stale")
-    assert run_deck(DECKS / "ring.inp", tmp_path, h=0.05, t_end=0.1).verdict["verdict"] == "good"
+    """Nothing that scripts read is left of another run, also where this one fails at once; a deck
+    that is refused begins no run, and costs nothing of what was written."""
+    good = run_deck(DECKS / "ring.inp", tmp_path, h=0.05, t_end=0.1)
+    assert good.verdict["verdict"] == "good" and len(good.history) == 3
+    before = good.file(".json").read_bytes()
+    run_deck(DECKS / "ring.inp", tmp_path, code=2, h=-0.05)
+    assert good.file(".json").read_bytes() == before
+    run = run_deck(ring_that_stops(tmp_path), tmp_path, code=3, h=0.05)
+    assert run.verdict["verdict"] == "not completed" and len(run.history) == 1
 
 
 def test_option_strict_is_known_to_restart(ring):

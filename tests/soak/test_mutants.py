@@ -1,0 +1,44 @@
+"""Mutants of the numerics and coverage: what they do to a line, which lines they name."""
+
+import pytest
+from kernel_coverage import ranges
+from mutants import MISTAKES, code_of, last_version, mistakes
+
+
+@pytest.mark.parametrize(
+    "line, mutant",
+    [
+        ("      if (gap < 0.0_wp) n = n + 1", "      if (gap >= 0.0_wp) n = n + 1"),
+        ("      if (gap < 0.0_wp) n = n + 1", "      if (gap < 0.0_wp) n = n - 1"),
+        ("      f = a*b  ! force", "      f = a/b"),
+        ("      call add(self, f)", "      continue"),
+        ("      is_open = is_open .and. .not. acts", "      is_open = is_open .and. acts"),
+    ],
+)
+def test_a_line_with_a_mistake(line, mutant):
+    assert mutant in mistakes(line)
+
+
+@pytest.mark.parametrize("line", [
+    "      integer :: n = 0", "   end subroutine add", "      !> a < b", "      do i = 1, n",
+    '      message = "a < b"', "      use emcon_kinds, only : wp", ""])  # fmt: skip
+def test_a_line_without_numerics(line):
+    assert not mistakes(line)
+
+
+def test_every_mistake_changes_the_line():
+    for pattern, put in MISTAKES:
+        assert not pattern.search(put) or pattern.pattern in (r"\.not\. ?", r"\babs\("), pattern
+
+
+def test_comments_hold_no_mistakes():
+    assert code_of("   a = b   ! c < d") == "   a = b"
+
+
+def test_the_last_version_is_a_commit():
+    assert len(last_version()) in (0, 40)
+
+
+def test_ranges():
+    assert ranges([3, 4, 5, 9]) == "3-5 9"
+    assert ranges([]) == ""
