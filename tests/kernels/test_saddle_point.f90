@@ -24,6 +24,7 @@ contains
          test_case_t("blocks of the matrix", test_blocks), &
          test_case_t("same as null space", test_null_space), &
          test_case_t("dependent constraints are singular", test_singular), &
+         test_case_t("contacts that give way are springs", test_springs), &
          test_case_t("symmetric: as such, negative pivots counted", test_symmetric)]
    end subroutine collect_saddle_point
 
@@ -116,6 +117,40 @@ contains
       call check_true(error, is_singular, "it is singular")
       call saddle%solver%free()
    end subroutine test_singular
+
+   !> N dq - Gb^T dlam = -r, dlam = lack - slope (defect + G1 dq): by products of dense matrices. One
+   !> of the slopes is so large that the contact hardly gives way.
+   subroutine test_springs(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(saddle_point_t) :: saddle
+      real(wp), allocatable :: dq(:), dlam(:), force(:, :), gap(:, :), spring(:)
+      logical :: is_singular
+
+      call make_problem(problem)
+      associate (set => problem%set)
+         allocate(set%soft(set%n))
+         set%soft%slope = [0.5_wp, 2.0_wp, 3.0_wp, 40.0_wp, 1.0e6_wp, 0.1_wp]
+         set%soft%lack = [0.3_wp, -0.2_wp, 0.0_wp, 1.0_wp, 0.5_wp, -2.0_wp]
+         allocate(dq(size(problem%residual)), dlam(set%n))
+         call saddle_point_init(saddle, set, problem%matrix, error)
+         if (allocated(error)) return
+         call saddle_point_factorise(saddle, set, problem%matrix, is_singular, error)
+         if (allocated(error)) return
+         call check_true(error, .not. is_singular, "it is regular")
+         call saddle_point_solve(saddle, set, problem%residual, dq, dlam, error)
+         if (allocated(error)) return
+         force = real(dense_of(set%force_rows), wp)
+         gap = real(dense_of(set%gap_rows), wp)
+         spring = set%soft%lack - set%soft%slope*(set%defect + matmul(gap, dq))
+         call check_near(error, dlam/(1.0_wp + set%soft%slope), spring/(1.0_wp + set%soft%slope), &
+            tol_dp, 10.0_wp + maxval(abs(dq)), "springs")
+         call check_near(error, matmul(real(dense_of(problem%matrix), wp), dq) &
+            - matmul(transpose(force), dlam), -problem%residual, tol_dp, &
+            10.0_wp + maxval(abs(dlam)), "balance")
+      end associate
+      call saddle%solver%free()
+   end subroutine test_springs
 
    !> N + N^T + shift and equal gradients: LDL^T gives the correction of LU. A definite N has as
    !> many negative pivots as there are constraints, fewer where one is repeated; what is not

@@ -8,7 +8,7 @@ import pytest
 from plain_scenes import BOTH, ONE, SCENES, UNGUARDED, Scene, below
 from scene_tools import DECKS, attempt, run_deck
 from test_contact_output import data_sets, restart
-from test_explicit import bar, critical_step, stiffness_and_mass
+from test_explicit import EVERY, LINEAR, bar, block, critical_step, stiffness_and_mass
 from test_statics import E, FORCE, FORMULATIONS, NU, ROUNDED, displacement, tower
 
 METHOD = "*CONSTRAINT METHOD, TYPE=<method>"
@@ -296,6 +296,60 @@ def test_the_critical_step_with_a_penalty_is_that_of_the_closed_contact(tmp_path
         # The contact shakes the fastest vibration, whose energy may seem 1/(1 - 0.999^2) larger.
         assert (history["kinetic"] + history["strain"]).max() < 1e3*history["kinetic"][0]
         assert history["contact_energy"].max() > 0
+
+
+def coarse_on_fine(by_area):
+    """One element falls onto ten times finer ones, its corners onto nodes of theirs."""
+    model = f"""*NODE
+901, 0.1, 0.201
+902, 0.9, 0.201
+903, 0.9, 0.601
+904, 0.1, 0.601
+*NSET, NSET=UPPER
+901, 902, 903, 904
+*ELEMENT, TYPE=CPE4, ELSET=TOP
+901, 901, 902, 903, 904
+*SOLID SECTION, ELSET=TOP, MATERIAL=M, KINEMATICS=LINEAR
+1.
+*SURFACE, NAME=FOOT
+901, S1
+*SURFACE, NAME=HEAD
+{chr(10).join(f"{e}, S3" for e in range(11, 21))}
+*SURFACE INTERACTION, NAME=I
+*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE, SIDES=ONE
+FOOT, HEAD
+*INITIAL CONDITIONS, TYPE=VELOCITY
+UPPER, 2, -0.1
+*BOUNDARY
+{chr(10).join(f"{n}, 1, 2" for n in range(1, 12))}"""
+    deck = block((10, 2), (1.0, 0.2), nu=0.0, model=model, step=EVERY, **LINEAR)
+    deck.insert(f"*CONSTRAINT METHOD, TYPE=PENALTY, STIFFNESS={by_area}", before="*NODE PRINT")
+    return deck
+
+
+def test_contacts_that_stiffen_a_node_by_more_than_their_share_are_told(tmp_path):
+    """The corner of a coarse element pushes one node of a fine surface with the pressure of half its
+    side: the critical step is found anew when that closes, as numpy has it, and a run stops there."""
+    by_area = 1e4
+    lower = [2*n + a for n in range(11, 33) for a in (0, 1)]
+    stiffness, mass = np.zeros((52, 52)), np.zeros(52)
+    for freedom, kept, (k, m) in (
+            (range(44), lower, stiffness_and_mass((10, 2), (1.0, 0.2), 0.0)),
+            (range(44, 52), range(8), stiffness_and_mass((1, 1), (0.8, 0.4), 0.0))):
+        stiffness[np.ix_(freedom, freedom)], mass[list(freedom)] = k[np.ix_(kept, kept)], m[kept]
+    for slave, master in ((0, 12), (1, 20)):
+        gap = np.zeros(52)
+        gap[44 + 2*slave + 1], gap[2*master + 1] = 1.0, -1.0
+        stiffness += 0.4*by_area*np.outer(gap, gap)
+    root = np.sqrt(mass)
+    limit = 2/math.sqrt(np.linalg.eigvalsh(stiffness/np.outer(root, root)).max())
+    deck = coarse_on_fine(by_area)
+    done, _ = attempt(deck, tmp_path/"above", (), {"h": 1.01*limit, "t_end": 0.03})
+    assert done.returncode == 3
+    told = re.search(r"is larger than the critical step (\S+) with closed contacts", done.stderr)
+    assert float(told[1]) == pytest.approx(limit, rel=1e-4)
+    run = run_deck(deck, tmp_path/"below", h=0.99*limit, t_end=0.03)
+    assert run.history["contact_energy"].max() > 0
 
 
 @pytest.mark.parametrize(("formulation", "sides"), [
