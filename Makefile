@@ -341,10 +341,10 @@ run:  ## set up, build, run the ring impact, draw build/run/ring.png
 	@$(PY) -m emcon plot build/run/ring.vtkhdf
 	@$(PY) -m emcon summary build/run/ring
 
-test:  ## set up, build, run all tests
+test:  ## set up, build, run all tests; ORDER=17: in the order that this number draws
 	$(BUILDING) MODE=release PRECISION=double .venv/test.stamp app lib pywrap kernels
 	$(BUILDING) MODE=debug PRECISION=double kernels
-	@$(PY) -m pytest -n $(shell nproc) tests
+	@$(PY) -m pytest -n $(shell nproc) $(if $(ORDER),--order=$(ORDER)) tests
 
 precisions: .venv/test.stamp  ## build single and quad, run the kernel tests and decks of all three
 	$(BUILDING) MODE=release PRECISION=double app kernels

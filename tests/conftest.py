@@ -4,6 +4,7 @@ import concurrent.futures
 import functools
 import os
 import pathlib
+import random
 import re
 import signal
 
@@ -26,6 +27,21 @@ RING_RUNS = [
     ("ADMISSIBLE", 0.05),
     ("PERSISTENT", 0.05),
 ]
+
+
+def pytest_addoption(parser):
+    parser.addoption("--order", metavar="SEED", help="run the tests in an order drawn by chance: "
+                     "files, and the tests of a file")
+
+
+def pytest_collection_modifyitems(config, items):
+    """No test may need another one to have run before it."""
+    seed = config.getoption("--order")
+    if seed is None:
+        return
+    chance = random.Random(seed)
+    place = {path: chance.random() for path in dict.fromkeys(item.path for item in items)}
+    items.sort(key=lambda item: (place[item.path], chance.random()))
 
 
 @functools.cache
