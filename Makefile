@@ -33,7 +33,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize coverage mutants docs install uninstall status clean \
+.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize coverage mutants processors docs install uninstall status clean \
 	precisions help kernel_objects FORCE
 
 # ---- set-up -------------------------------------------------------------------------------------
@@ -345,6 +345,16 @@ test:  ## set up, build, run all tests; ORDER=17: in the order that this number 
 	$(BUILDING) MODE=release PRECISION=double .venv/test.stamp app lib pywrap kernels
 	$(BUILDING) MODE=debug PRECISION=double kernels
 	@$(PY) -m pytest -n $(shell nproc) $(if $(ORDER),--order=$(ORDER)) tests
+
+# OpenBLAS has kernels for each kind of processor, which round differently: their names, and what a
+# processor needs to run them.
+BLAS_KERNELS := Nehalem:sse4_2 Sandybridge:avx Haswell:avx2 Zen:avx2 SkylakeX:avx512f
+has = $(shell grep -m1 -o -w $(lastword $(subst :, ,$(1))) /proc/cpuinfo 2> /dev/null)
+processors: .venv/test.stamp  ## run the tests of scenes, hosts and decks with BLAS kernels of other processors
+	$(BUILDING) MODE=release PRECISION=double app lib pywrap kernels
+	@set -e; for kernel in $(foreach k,$(BLAS_KERNELS),$(if $(call has,$k),$(firstword $(subst :, ,$k)))); do \
+		echo "$$kernel"; OPENBLAS_CORETYPE=$$kernel $(PY) -m pytest -q -n $(shell nproc) \
+		tests/scenes tests/embed tests/decks; done
 
 precisions: .venv/test.stamp  ## build single and quad, run the kernel tests and decks of all three
 	$(BUILDING) MODE=release PRECISION=double app kernels
