@@ -1,14 +1,19 @@
 """Run the program on decks, read what it leaves, and edit decks: helpers of the tests of runs."""
 
+import contextlib
 import dataclasses
 import functools
+import importlib
+import io
 import json
 import os
 import pathlib
 import re
 import signal
 import subprocess
+import sys
 import time
+from unittest import mock
 
 import h5py
 import numpy as np
@@ -284,6 +289,24 @@ class Deck:
         data = self.data("*PARAMETER")
         k = next(k for k, line in enumerate(data) if line.split("=")[0].strip() == name)
         data[k] = f"{name} = {value}"
+
+
+@functools.cache
+def generated(name, *options):
+    """What the generator `name` of input_decks writes with these options, made once."""
+    if str(DECKS) not in sys.path:
+        sys.path.insert(0, str(DECKS))
+    text = io.StringIO()
+    with mock.patch("sys.argv", [name, *options]), contextlib.redirect_stdout(text):
+        importlib.import_module(name).main()
+    return text.getvalue()
+
+
+def made(scene, folder, *options):
+    """A deck of a generator with other options than those of the deck in the tree."""
+    deck = folder / f"{scene}.inp"
+    deck.write_text(generated(f"make_{scene}", *map(str, options)))
+    return deck
 
 
 def heading(deck):

@@ -1,9 +1,9 @@
 """Helpers of the tests of tied bodies: decks of the generators, errors against exact solutions."""
 
-import subprocess
 import sys
 
 import numpy as np
+import scene_tools
 from scene_tools import DECKS
 
 sys.path.insert(0, str(DECKS))
@@ -21,10 +21,7 @@ CORNER = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 def made(scene, folder, *options):
     """A deck of a generator with other options than those of the deck in the tree."""
-    deck = folder / f"tied_{scene}.inp"
-    command = [sys.executable, DECKS / f"make_tied_{scene}.py", "--output", deck, *options]
-    subprocess.run(list(map(str, command)), check=True, timeout=60)
-    return deck
+    return scene_tools.made(f"tied_{scene}", folder, *options)
 
 
 def error_norms(fields, exact):

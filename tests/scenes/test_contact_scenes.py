@@ -1,12 +1,9 @@
 """Scenes of contact in every formulation: patch test, Hertz, ironing, impact of free bodies."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from contact_sides import ALL, with_sides
-from scene_tools import DECKS, EPSILON, Deck, figures, run_deck, run_one_sided
+from scene_tools import DECKS, EPSILON, Deck, figures, made, run_deck, run_one_sided
 
 #: Names of what a step can choose; the rest of a choice is what the decks say.
 CHOICES = {
@@ -22,14 +19,6 @@ CHOICES = {
     "smooth": {"formulation": "MORTAR", "smoothing": "HERMITE", "normal": "EDGE"},
 }
 MORTAR = ["edge", "edge, dual", "nodal", "nodal, dual"]
-
-
-def made(scene, folder, *options):
-    """A deck of a generator with other options than those of the deck in the tree."""
-    deck = folder / f"{scene}.inp"
-    command = [sys.executable, DECKS / f"make_{scene}.py", "--output", deck, *options]
-    subprocess.run(list(map(str, command)), check=True, timeout=60)
-    return deck
 
 
 # ---- patch test ---------------------------------------------------------------------------------

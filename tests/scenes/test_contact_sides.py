@@ -1,15 +1,13 @@
 """The decks of input_decks/ with contact of both sides, and of everything with everything."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import overlap
 import pytest
 from contact_sides import ALL, BOTH, NODES, ONE, FileOutcome, FileScene, with_sides
 from plain_scenes import AUTO, Scene
-from scene_tools import DECKS, EPSILON, Deck, attempt, run_deck
+from scene_tools import DECKS, EPSILON, Deck, attempt, made, run_deck
 
 #: Decks with contact in short runs in which bodies meet; all of them, and whole: the book.
 SHORT = {
@@ -44,9 +42,7 @@ def test_nothing_is_in_another(tmp_path, name, sides):
 
 def test_bodies_of_one_surface_may_overlap_at_first(tmp_path):
     """A press fit of unlike meshes, whose edges cross: all exterior is one surface, of both."""
-    path = tmp_path / "press_fit.inp"
-    subprocess.run([sys.executable, DECKS / "make_press_fit.py", "--hub", "8x4", "--sleeve", "11x5",
-                    "--output", path], check=True)
+    path = made("press_fit", tmp_path, "--hub", "8x4", "--sleeve", "11x5")
     done = FileOutcome(FileScene(path), tmp_path / "run", ALL)
     assert done.code == 0 and done.run.history["active"].max() > 0
     assert done.overlap.by_edge <= rounding(done.fields)

@@ -7,7 +7,6 @@ import functools
 import math
 import pathlib
 import re
-import subprocess
 import sys
 import tempfile
 
@@ -15,7 +14,7 @@ import numpy as np
 import overlap
 import pytest
 from plain_scenes import Scene
-from scene_tools import DECKS, ROOT, Deck, figures, number, run_deck
+from scene_tools import DECKS, ROOT, Deck, figures, made, number, run_deck
 from test_statics import FORMULATIONS, ROUNDED, displacement, solve, tower
 
 sys.path.insert(0, str(ROOT / "pywrap"))
@@ -200,9 +199,7 @@ def hertz(level, is_free=False):
     `is_free`: no support of the upper cylinder either, which may roll on the lower one.
     """
     with tempfile.TemporaryDirectory() as folder:
-        path = pathlib.Path(folder) / "made.inp"
-        command = [sys.executable, DECKS / "make_hertz.py", "--level", str(level), "--output", path]
-        subprocess.run(list(map(str, command)), check=True)
+        path = made("hertz", pathlib.Path(folder), "--level", level)
         text, known = path.read_text(), figures(path, r"= (\S+), peak pressure 2 F/\(pi a\) = (\S+),")
     model, _, press = re.split(r"^\*STEP\n", text, flags=re.M)
     if is_free:

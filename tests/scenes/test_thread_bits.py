@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from emcon import InputError, Stepper
-from scene_tools import DECKS, emcon, run_deck
+from scene_tools import DECKS, emcon, made, run_deck
 
 SCENES = {
     "ring": {"h": 0.04, "t_end": 0.4, "frame": 0.4},
@@ -54,9 +54,8 @@ def test_bits_do_not_depend_on_threads(scene, tmp_path):
 
 def test_bits_of_large_bodies_do_not_depend_on_threads(tmp_path):
     """Both bodies have factors of dense blocks, made at a time."""
-    subprocess.run([sys.executable, DECKS/"make_ring.py", "--ring", "128x8", "--block", "120x10",
-                    "--output", tmp_path/"large.inp"], check=True)
-    found = [run_deck(tmp_path/"large.inp", tmp_path/f"{k}", options=["--threads", f"{n}"],
+    deck = made("ring", tmp_path, "--ring", "128x8", "--block", "120x10")
+    found = [run_deck(deck, tmp_path/f"{k}", options=["--threads", f"{n}"],
                       h=0.01, t_end=0.14, frame=1).digits() for k, n in enumerate((1, 2, 2, 3))]
     assert all(other == found[0] for other in found[1:])
 
