@@ -79,7 +79,11 @@ contains
       call update(self, system, motion, has_changed, status, has_more)
       self%n_tried = self%n_tried - 1
       self%n_early = self%n_early + 1
-      if (status == step_done .and. (has_changed .or. has_more)) return
+      if (status == step_done .and. (has_changed .or. has_more)) then
+         ! Another set has other slips for others to hold.
+         if (self%friction%is_on) self%friction%is_idle = .false.
+         return
+      end if
       self%is_active = before
       self%friction%way = way
       self%n_early = most_early

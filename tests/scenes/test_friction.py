@@ -21,6 +21,7 @@ from friction_scenes import (
     pressed_sideways,
     ring,
     rolling,
+    rolling_polygon,
     rubbing,
     way,
 )
@@ -171,6 +172,14 @@ def test_what_is_thrown_rolls(inner, tmp_path):
     turned = 1e-4
     assert v[slides] == pytest.approx(v0 - 10.0*mu*time[slides], rel=4*turned)
     assert v[-1]/v0 == pytest.approx(1/(1 + inertia/mass), rel=4*turned)
+
+
+@pytest.mark.parametrize(("sides", "turn"), [(12, 0.0), (16, 0.1), (24, 0.1)])
+def test_a_polygon_rolls_from_corner_to_corner(sides, turn, tmp_path):
+    """Two corners of a rigid body that stick depend on each other: the slip of one follows until the
+    set changes, also where the set is left before the step is solved with it."""
+    run = run_deck(rolling_polygon(sides, turn, 0.5), tmp_path)
+    obeys(run, law=1e-12)
 
 
 # ---- stick-slip ---------------------------------------------------------------------------------
