@@ -50,13 +50,13 @@ def velocity_of(chance, place, plain):
     return speed*math.cos(way), speed*math.sin(way)
 
 
-def add_body(scene, name, chance, plain):
-    """One body; its mesh, place, stiffness and motion by chance."""
+def add_body(scene, name, chance, plain, **extra):
+    """One body; its mesh, place, stiffness and motion by chance, `extra` as `Scene.add` takes it."""
     place = place_of(chance, plain)
     density = chance.choice([0.1, 1.0, 1.0, 10.0])
     more = {"stiffness": density*chance.choice([100.0, 300.0, 1000.0]), "density": density,
             "velocity": velocity_of(chance, place, plain),
-            "spin": 0.0 if plain else chance.choice([0.0, 0.0, 2.0, -5.0])}
+            "spin": 0.0 if plain else chance.choice([0.0, 0.0, 2.0, -5.0]), **extra}
     kind = chance.choice(["block", "block", "block", "disc", "ring"])
     if kind == "block":
         size = chance.choice(SIZES), chance.choice(SIZES)
