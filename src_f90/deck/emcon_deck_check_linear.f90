@@ -32,6 +32,7 @@ contains
       if (reader%doubt_nodes .or. reader%doubt_elements) return
       if (reader%doubt_names .or. reader%doubt_rigid) return
       if (any(scene%element_section == 0) .or. .not. allocated(scene%v0)) return
+      if (any(scene%element_node(1, :) == 0)) return           ! an element had errors
       is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear
       do b = 1, size(scene%rigid)
          is_linear(scene%rigid(b)%element) = .false.

@@ -66,6 +66,7 @@ contains
       integer :: i, k
 
       do i = 1, size(pair)
+         if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! its surface is unknown, and told
          call check_other_way(reader, pair(:i))
          if (.not. pair(i)%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
          if (pair(i)%restitution < 1.0_wp) call refuse(reader, pair(i), &

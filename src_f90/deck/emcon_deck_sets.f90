@@ -38,6 +38,7 @@ contains
       type(builder_t) :: nodes, elements
       type(named_set_t), allocatable :: set(:)
 
+      allocate(reader%line_set(0))
       elements%what = "element"
       elements%keyword = "ELSET"
       call build_sets(reader, elements, "ELEMENT", reader%element_map, reader%doubt_elements, scene)
@@ -235,7 +236,10 @@ contains
             else
                call get_name(reader, data, k, "name", name)
                other = find_set(builder%set(:builder%n), name)
-               if (other > 0) then
+               if (other == i_set) then
+                  if (data%ok) call data_error(reader, data, "the " // trim(builder%what) // &
+                     " set " // quoted(name) // " names itself; take the name out")
+               else if (other > 0) then
                   do j = 1, builder%list(other)%n
                      call append(builder%list(i_set), builder%list(other)%item(j))
                   end do

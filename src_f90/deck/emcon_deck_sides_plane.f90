@@ -162,6 +162,7 @@ contains
             if (kind%n_face_node /= 2) cycle
             do f = 1, kind%n_face
                associate (side => scene%element_node(kind%face(f), e))
+                  if (any(side == 0)) exit         ! the element had errors
                   do i = adjacency%first(side(1)), adjacency%first(side(1) + 1) - 1
                      other = adjacency%element(i)
                      g = bent_side(scene, other, side)
