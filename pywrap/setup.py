@@ -59,6 +59,7 @@ def make(objects: Path, package: Path) -> None:
     env = {name: value for name, value in os.environ.items()
            if name not in {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}}
     env.setdefault("PYTHON", sys.executable)
+    env["EMCON_SETUP_INSTALLS"] = "no"  # pip changes an environment of Python, never the system
     variables = {
         "PY": python,
         "PY_READY": "",

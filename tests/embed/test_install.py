@@ -50,6 +50,7 @@ print(json.dumps({"energies": energies, "files": [emcon.__file__, _core.__file__
 MAKEFILE = """.PHONY: pywrap
 pywrap:
 	test -z "$(PY_READY)$(THEIRS)"
+	test "$(EMCON_SETUP_INSTALLS)" = no
 	$(PY) -c 'import numpy'
 	echo made > $(PACKAGE)/_core$(EXT_SUFFIX)
 	mkdir -p $(PACKAGE)/bin $(PACKAGE)/include $(PACKAGE)/cmake
@@ -107,6 +108,34 @@ def tree(tmp_path: Path) -> Path:
         (package/name).write_text("stale\n")
     (package/"emcon.egg-info"/"SOURCES.txt").write_text("\n".join([*listed, *stale]))
     return tmp_path/"tree"
+
+
+@pytest.mark.parametrize("installs", [False, True])
+def test_system_packages(installs: bool, tmp_path: Path) -> None:
+    """Not by pip, which names the line to type; by make, which says before what it installs."""
+    (tmp_path/".ci").mkdir()
+    shutil.copy(ROOT/".ci"/"setup", tmp_path/".ci")
+    (tmp_path/"build").mkdir()
+    called = tmp_path/"called"
+    for name in ("apt-get", "sudo"):
+        (tmp_path/name).write_text(f'#!/bin/sh\necho "$@" >> {called}\n')
+        (tmp_path/name).chmod(0o755)
+    done = subprocess.run(["sh", ".ci/setup", "system"], cwd=tmp_path, capture_output=True, text=True,
+                          env=os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "FC": "no_such",
+                                            "CC": "no_such", "EMCON_SETUP_INSTALLS": "" if installs else "no"})
+    assert done.returncode != 0
+    assert called.exists() == installs
+    assert "apt-get install -y --no-install-recommends " in done.stderr and "gfortran" in done.stderr
+    assert ("installs them now: " in done.stderr) == installs
+
+
+def test_builds_use_pinned_versions() -> None:
+    """What pip builds with is what .ci/pins has."""
+    pins = (ROOT/".ci"/"pins"/"test.txt").read_text(encoding="utf-8")
+    needs = tomllib.loads((ROOT/"pyproject.toml").read_text(encoding="utf-8"))["build-system"]["requires"]
+    pinned = {line.rstrip(" \\").replace(" ", "") for line in pins.splitlines() if "==" in line and line[0].isalpha()}
+    assert {"setuptools", "numpy"} == {need.split("==")[0].strip() for need in needs}
+    assert all(need.replace(" ", "") in pinned for need in needs)
 
 
 def test_wheel_is_complete_and_for_this_interpreter(wheel: Path) -> None:
