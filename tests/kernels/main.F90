@@ -57,6 +57,7 @@ program main
    use test_links, only : collect_links
    use test_loads, only : collect_loads
    use test_march, only : collect_march
+   use test_march_contact, only : collect_march_contact
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
    use test_newton, only : collect_newton
@@ -198,6 +199,7 @@ program main
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("march", collect_march)
+   call run("march_contact", collect_march_contact)
    call run("ties", collect_ties)
    call run("links", collect_links)
    call run("tied_contact", collect_tied_contact)
