@@ -64,9 +64,13 @@ module emcon_contact
       !> (n_constraint) the other slave node at the same place of a surface of tied pieces; 0: none
       integer, allocatable :: twin(:)
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
+      !> (n_constraint) how far the arcs that edges stand for rise over them where a gap is measured
+      !> in the step, in the mean: counted off the gap. 0 unless `follow_arcs` says so [L]
+      real(wp), allocatable :: sagitta(:)
       type(gap_state_t), allocatable :: state(:)      !! (n_constraint) as last measured
    contains
       procedure :: suit_steps
+      procedure :: follow_arcs
       procedure :: linearise
       procedure :: has_looked
       procedure :: own_area
@@ -144,6 +148,17 @@ contains
       self%meets_statics = meets_statics
       self%rounding = merge(static_rounding, dynamic_rounding, meets_statics)
    end subroutine suit_steps
+
+   !> Measure gaps between the arcs that edges stand for, or between edges; after `configure`. A
+   !> formulation that knows of no arcs leaves gaps as they are.
+   pure subroutine follow_arcs(self, x, options, is_wanted)
+      class(contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options   !! as `configure` had them
+      logical, intent(in) :: is_wanted
+
+      if (allocated(self%sagitta)) self%sagitta = 0.0_wp
+   end subroutine follow_arcs
 
    !> A step has begun; see `clearance`.
    pure subroutine has_looked(self, clearance)

@@ -193,7 +193,8 @@ contains
             call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
                between(x, self%u, edge(1, other(k)), edge(2, other(k))))
          end do
-         if (nearest%square <= reach**2) call take_deeper(self, x, nearest, node, 0.0_wp, overlap)
+         if (nearest%square <= reach**2) call take_deeper(self, x, nearest, e, &
+            real(side - 1, wp), overlap)
       end associate
    end subroutine try_node
 
@@ -336,22 +337,22 @@ contains
                   + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
             end associate
          end do
-         call take_deeper(self, x, nearest, a(merge(1, 2, share < 0.5_wp)), &
-            outline_curves_behind(self%curves, e, share, x, self%u), overlap)
       end associate
+      call take_deeper(self, x, nearest, e, share, overlap)
    end subroutine try_place
 
    !> Keep what is behind the edge `nearest` if it is the deepest so far. At the end of an outline
    !> that is open there is no behind. Where edges stand for curves behind them, what is between an
-   !> edge and its curve is no overlap.
-   pure subroutine take_deeper(self, x, nearest, node, behind, overlap)
+   !> edge and its curve is no overlap. An edge of a profile is a small part of a line or an arc: it
+   !> counts as no shorter than the edge that is in it.
+   pure subroutine take_deeper(self, x, nearest, e, share, overlap)
       type(look_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       type(nearest_t), intent(in) :: nearest
-      integer, intent(in) :: node
-      real(wp), intent(in) :: behind             !! so far what is judged stands for a curve [L]
+      integer, intent(in) :: e                   !! the edge that is judged
+      real(wp), intent(in) :: share              !! place along it, 0 to 1
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: depth, length, next_along(2)
+      real(wp) :: depth, length, taken_off, next_along(2)
       integer :: next
 
       if (nearest%edge == 0) return
@@ -364,16 +365,18 @@ contains
          end if
          depth = nearest_depth(nearest, next_along)
          length = length_of(nearest%along)
-         if (self%curves%is_on) then
-            overlap%of_edges = max(overlap%of_edges, depth/length)
-            depth = depth - behind - outline_curves_behind(self%curves, nearest%edge, &
-               nearest%share, x, self%u)
-         end if
+         if (self%outline%is_profile(nearest%edge)) length = max(length, &
+            length_of(between(x, self%u, edge(1, e), edge(2, e))))
+         if (.not. depth > overlap%depth*length) return
+         taken_off = outline_curves_behind(self%curves, e, share, x, self%u) &
+            + outline_curves_behind(self%curves, nearest%edge, nearest%share, x, self%u)
+         if (taken_off > 0.0_wp) overlap%of_edges = max(overlap%of_edges, depth/length)
+         depth = depth - taken_off
          if (.not. depth > overlap%depth*length) return
          if (self%is_passing .and. depth < min(passing*length, &
             passing_thin*self%outline%thickness(nearest%edge))) return
          overlap%depth = depth/length
-         overlap%node = node
+         overlap%node = edge(merge(1, 2, share < 0.5_wp), e)
          overlap%edge = edge(:, nearest%edge)
       end associate
    end subroutine take_deeper

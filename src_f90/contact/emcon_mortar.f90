@@ -4,6 +4,7 @@
 !> Which edges make pairs is chosen once per step. Source: docs/theory.md, sections 4.5 and 4.6;
 !> paper eqs. (2) and (3).
 module emcon_mortar
+   use emcon_arcs_plane, only : arc_rise, arcs_find
    use emcon_chain, only : chain_corners, chain_distance, chain_shorter
    use emcon_edge_form, only : form_begin
    use emcon_errors, only : error_t
@@ -25,7 +26,7 @@ module emcon_mortar
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_scene, only : scene_t
    use emcon_slip_point, only : slip_list_t, slip_point, slip_point_t
-   use emcon_weighted, only : weighted_init, weighted_slips, weighted_t
+   use emcon_weighted, only : weighted_init, weighted_sagittas, weighted_slips, weighted_t
    implicit none
    private
    public :: mortar_t, mortar_init
@@ -40,6 +41,8 @@ module emcon_mortar
       type(near_list_t) :: near
       logical, allocatable :: slave_corner(:)         !! (n_edge) at the first node of each edge
       logical, allocatable :: master_corner(:)
+      !> (n_edge) of the arcs of slave and master if gaps are measured between these [1/L]
+      real(wp), allocatable :: slave_curvature(:), master_curvature(:)
       real(wp), allocatable :: point(:), weight(:)    !! quadrature on 0..1
       integer, allocatable :: start(:)                !! (n_edge + 1) pairs of each slave edge
       type(pair_stencil_t), allocatable :: pair(:)    !! (>= number of pairs)
@@ -48,6 +51,7 @@ module emcon_mortar
                                                       !! at a master node; 0: none
    contains
       procedure :: configure => mortar_configure
+      procedure :: follow_arcs => mortar_follow_arcs
       procedure :: begin_step => mortar_begin_step
       procedure :: choose_slip => mortar_choose_slip
       procedure :: measure_edges => mortar_measure_edges
@@ -96,6 +100,23 @@ contains
       allocate(self%seen(2, n, self%slave%n_edge), source=0)
    end subroutine mortar_configure
 
+   !> A smoothed master has its own curve in place of arcs.
+   pure subroutine mortar_follow_arcs(self, x, options, is_wanted)
+      class(mortar_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+      logical, intent(in) :: is_wanted
+
+      self%sagitta = 0.0_wp
+      if (allocated(self%slave_curvature)) deallocate(self%slave_curvature, self%master_curvature)
+      if (.not. is_wanted) return
+      allocate(self%slave_curvature(self%slave%n_edge))
+      allocate(self%master_curvature(self%master%n_edge), source=0.0_wp)
+      call arcs_find(self%slave, x, options%normal_angle, self%slave_curvature)
+      if (options%smoothing == smoothing_hermite) return
+      call arcs_find(self%master, x, options%smoothing_angle, self%master_curvature)
+   end subroutine mortar_follow_arcs
+
    !> Choose the pairs of edges for the step.
    pure subroutine mortar_begin_step(self, x, u0, du)
       class(mortar_t), intent(inout) :: self
@@ -113,7 +134,59 @@ contains
       end do
       self%start(e) = n + 1
       call weighted_slips(self, x, u0, du)
+      if (allocated(self%slave_curvature)) call choose_sagittas(self, x, u0, du)
    end subroutine mortar_begin_step
+
+   !> How far the arcs of both surfaces rise over what gaps are measured between.
+   pure subroutine choose_sagittas(self, x, u0, du)
+      type(mortar_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      type(frame_t) :: frame
+      real(wp) :: local(2, n_place), dlocal(2, n_place)
+      integer :: e, k, i
+
+      do e = 1, self%slave%n_edge
+         associate (value => self%form(e)%value)
+            value = 0.0_wp
+            do k = self%start(e), self%start(e + 1) - 1
+               call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
+               do i = 0, 1
+                  call frame_init(frame, self%pair(k), local + i*dlocal)
+                  value(:, i) = value(:, i) + rise_moments(self, e, k, frame)
+               end do
+            end do
+         end associate
+      end do
+      call weighted_sagittas(self)
+   end subroutine choose_sagittas
+
+   !> Moments of pair `k` of slave edge `e`, with the rise of the arcs in the place of the gap.
+   pure function rise_moments(self, e, k, frame) result(moment)
+      type(mortar_t), intent(in) :: self
+      integer, intent(in) :: e, k
+      type(frame_t), intent(in) :: frame
+      real(wp) :: moment(n_moment)
+      real(wp) :: low, high, part, xi, eta, gap, rise
+      integer :: i
+
+      moment = 0.0_wp
+      low = 0.0_wp
+      high = 1.0_wp
+      if (self%options%integration /= integration_elements) call frame_cover(frame, low, high)
+      if (.not. high > low) return
+      do i = 1, size(self%point)
+         part = (high - low)*self%weight(i)
+         if (self%options%integration == integration_elements) part = share(self, i, e, k)
+         if (.not. part > 0.0_wp) cycle
+         xi = low + (high - low)*self%point(i)
+         call frame_point(frame, self%pair(k), xi, eta, gap)
+         associate (m => self%pair(k)%edge)
+            rise = arc_rise(self%slave_curvature(e), self%slave%length(e), xi) &
+               + arc_rise(self%master_curvature(m), self%master%length(m), eta)
+         end associate
+         moment = moment + part*frame%length*[rise, rise*xi, 1.0_wp, xi, 1.0_wp/frame%length]
+      end do
+   end function rise_moments
 
    !> The points of quadrature of its gap, where they are as the step begins, or if it covers
    !> nothing there as it is expected to end, with the weights that they have in the gap.

@@ -3,6 +3,7 @@
 !> The master surface is a polygon, or smoothed. A surface may be in contact with itself.
 !> Source: docs/theory.md, section 4.
 module emcon_nts
+   use emcon_arcs_plane, only : arc_rise, arcs_find
    use emcon_chain, only : chain_corners, chain_tributary
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
@@ -40,11 +41,14 @@ module emcon_nts
       integer :: n_list = 0                           !! by which list of candidates,
       logical :: were_sharp = .false.                 !! with which corners,
       type(start_t), allocatable :: start(:)          !! (n_constraint) and gaps if not smoothed
+      real(wp), allocatable :: curvature(:)           !! (n_edge) of the arcs of the master if gaps
+                                                      !! are measured to these [1/L]
       logical, allocatable :: is_lost(:)              !! (n_constraint) no unique closest point when
                                                       !! last evaluated, since the last measurement
    contains
       procedure :: begin_step => nts_begin_step
       procedure :: configure => nts_configure
+      procedure :: follow_arcs => nts_follow_arcs
       procedure :: measure => nts_measure
       procedure :: evaluate => nts_evaluate
       procedure :: covers => nts_covers
@@ -68,6 +72,7 @@ contains
       call choice_init(self, scene, pair, error, has_twins)
       if (allocated(error)) return
       allocate(self%state(self%n_constraint), self%start(self%n_constraint))
+      allocate(self%sagitta(self%n_constraint), source=0.0_wp)
       self%deepest_start = touch_tol
       self%slack = pair%slack
       self%restitution = pair%restitution
@@ -95,6 +100,21 @@ contains
       call chain_corners(self%master, x, options%smoothing_angle, self%is_corner)
    end subroutine nts_configure
 
+   !> A smoothed master has its own curve in place of arcs.
+   pure subroutine nts_follow_arcs(self, x, options, is_wanted)
+      class(nts_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+      logical, intent(in) :: is_wanted
+
+      self%stance%is_known = .false.
+      self%sagitta = 0.0_wp
+      if (allocated(self%curvature)) deallocate(self%curvature)
+      if (.not. is_wanted .or. self%smoothing == smoothing_hermite) return
+      allocate(self%curvature(self%master%n_edge))
+      call arcs_find(self%master, x, options%smoothing_angle, self%curvature)
+   end subroutine nts_follow_arcs
+
    !> Choose for each slave node the nearest master edge at the start of the step. From the same
    !> start and the same candidates the choice is the same.
    pure subroutine nts_begin_step(self, x, u0, du)
@@ -111,9 +131,27 @@ contains
       self%were_sharp = self%is_sharp
       do i = 1, self%n_constraint
          call choice_make(self, i, x, u0)
+         if (allocated(self%curvature)) self%sagitta(i) = sagitta_under(self, i, x, u0)
          if (self%smoothing /= smoothing_hermite) self%start(i) = polygon_start(self, i, x, u0)
       end do
    end subroutine nts_begin_step
+
+   !> How far the arc of the master rises over its edge where node `i` stands.
+   pure real(wp) function sagitta_under(self, i, x, u0) result(sagitta)
+      type(nts_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
+      real(wp) :: local(2, 5), dlocal(2, 5), gap, xi
+
+      sagitta = 0.0_wp
+      if (self%edge(i) == 0) return
+      associate (stencil => self%polygon(1, i), e => self%edge(i))
+         call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
+         call nts_gap_value(local(:, :stencil%n), stencil%before, stencil%after, &
+            stencil%rounding, gap, xi, stencil%goes_around)
+         sagitta = arc_rise(self%curvature(e), self%master%length(e), xi)
+      end associate
+   end function sagitta_under
 
    pure subroutine nts_measure(self, x, u0, du)
       class(nts_t), intent(inout) :: self
@@ -179,7 +217,7 @@ contains
          call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
          call nts_gap_value(local(:, :stencil%n), stencil%before, stencil%after, &
             stencil%rounding, state%gap0, start%xi, stencil%goes_around)
-         state%gap0 = state%gap0 - self%offset
+         state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
          state%closed = -self%slack*min(state%size, self%own_size(i))
          state%is_near = .true.
@@ -240,7 +278,7 @@ contains
          end do
          call nts_gap_value(local(:, :n), stencil%before, stencil%after, stencil%rounding, gap, &
             xi, stencil%goes_around)
-         gap = gap - self%offset
+         gap = gap - self%offset - self%sagitta(i)
       end associate
    end subroutine polygon_end
 
@@ -329,7 +367,7 @@ contains
          ! One polygon, or two over a corner.
          associate (n => merge(2, 1, self%other(wanted(k)) > 0))
             call polygon_constraint(self%polygon(:n, wanted(k)), x, u0, du, &
-               target(k) + self%offset, item(k))
+               target(k) + self%offset + self%sagitta(wanted(k)), item(k))
          end associate
       end do
    end subroutine nts_evaluate

@@ -1,8 +1,10 @@
-!> The curves that edges of outlines stand for where masters of contact pairs are smoothed: how far
-!> they lie inside the body, behind the edge.
+!> The curves that edges of outlines stand for: how far they lie inside the body, behind the edge.
 !>
+!> Those of smoothed masters of contact pairs are what gaps are measured to; other edges are chords
+!> of arcs. In front of an edge nothing can be behind it that is not behind its curve.
 !> Source: docs/theory.md, sections 4.3 and 4.11.
 module emcon_outline_curves_plane
+   use emcon_arcs_plane, only : arc_curvature, arc_rise
    use emcon_chain, only : chain_corners, chain_init, chain_t
    use emcon_errors, only : error_t
    use emcon_hermite, only : hermite_curve, hermite_point, hermite_point_t, hermite_stencil_t, &
@@ -23,9 +25,10 @@ module emcon_outline_curves_plane
    end type piece_t
 
    type :: outline_curves_t
-      logical :: is_on = .false.                 !! is there any curve?
-      integer, allocatable :: number(:)          !! (n_edge) of its piece; 0: the edge is straight
+      integer, allocatable :: number(:)          !! (n_edge) of its smoothed piece; 0: an arc
       type(piece_t), allocatable :: piece(:)
+      !> (-1:4, n_edge) nodes along the outline, those of the edge at 1 and 2; 0 beyond a corner
+      integer, allocatable :: row(:, :)
    end type outline_curves_t
 
 contains
@@ -51,8 +54,52 @@ contains
                pair%master, chosen%smoothing_angle)
          end associate
       end do
-      self%is_on = size(self%piece) > 0
+      call find_rows(self, outline, scene, options%smoothing_angle)
    end subroutine outline_curves_init
+
+   !> The nodes that tell the arcs.
+   subroutine find_rows(self, outline, scene, angle)
+      type(outline_curves_t), intent(inout) :: self
+      type(outline_t), intent(in) :: outline
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: angle              !! sharper turns are corners [degrees]
+      integer :: beside(-2:2), e, i
+
+      allocate(self%row(-1:4, size(outline%edge, 2)), source=0)
+      do e = 1, size(outline%edge, 2)
+         beside = 0
+         beside(0) = e
+         do i = 1, 2
+            if (beside(1 - i) > 0) then
+               beside(-i) = outline%link(1, beside(1 - i))
+               if (turns(beside(-i), beside(1 - i))) beside(-i) = 0
+            end if
+            if (beside(i - 1) > 0) then
+               beside(i) = outline%link(2, beside(i - 1))
+               if (turns(beside(i - 1), beside(i))) beside(i) = 0
+            end if
+         end do
+         do i = -2, 2
+            if (beside(i) > 0) self%row(i + 1:i + 2, e) = outline%edge(:, beside(i))
+         end do
+      end do
+
+   contains
+
+      !> Is there a corner between edge `a` and the next one, `b`?
+      pure logical function turns(a, b)
+         integer, intent(in) :: a, b             !! 0: none
+         real(wp) :: one(2), other(2)
+
+         turns = .true.
+         if (a == 0 .or. b == 0) return
+         one = scene%x(:, outline%edge(2, a)) - scene%x(:, outline%edge(1, a))
+         other = scene%x(:, outline%edge(2, b)) - scene%x(:, outline%edge(1, b))
+         turns = atan2(abs(one(1)*other(2) - one(2)*other(1)), dot_product(one, other)) &
+            > angle*acos(-1.0_wp)/180.0_wp
+      end function turns
+
+   end subroutine find_rows
 
    !> Add the edges of surface `number` that have no curve yet.
    subroutine add_surface(self, outline, scene, number, angle)
@@ -104,36 +151,62 @@ contains
 
    end function piece_of
 
-   !> How far the curve lies behind its edge, 0 in front of it or where there is none [L].
+   !> How far the curve lies behind its edge, 0 in front of it or where it is straight [L].
    pure real(wp) function outline_curves_behind(self, e, share, x, u) result(behind)
       type(outline_curves_t), intent(in) :: self
       integer, intent(in) :: e                   !! edge of the outline
       real(wp), intent(in) :: share              !! place along it, 0 to 1
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+
+      if (self%number(e) > 0) then
+         behind = piece_behind(self%piece(self%number(e)), share, x, u)
+      else
+         behind = arc_behind(self%row(:, e), share, x, u)
+      end if
+   end function outline_curves_behind
+
+   !> How far the arc lies behind its edge.
+   pure real(wp) function arc_behind(row, share, x, u) result(behind)
+      integer, intent(in) :: row(-1:)            !! (-1:4) of nodes
+      real(wp), intent(in) :: share              !! 0 to 1
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp) :: way(2, -2:2)
+      integer :: i
+
+      way = 0.0_wp
+      do i = -2, 2
+         associate (a => row(i + 1), b => row(i + 2))
+            if (a > 0 .and. b > 0) way(:, i) = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
+         end associate
+      end do
+      behind = max(0.0_wp, -arc_rise(arc_curvature(way), &
+         sqrt(dot_product(way(:, 0), way(:, 0))), share))
+   end function arc_behind
+
+   !> How far the curve of a smoothed edge lies behind it.
+   pure real(wp) function piece_behind(piece, share, x, u) result(behind)
+      type(piece_t), intent(in) :: piece
+      real(wp), intent(in) :: share              !! 0 to 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
       type(hermite_stencil_t) :: stencil
       type(hermite_point_t) :: point
       real(wp) :: edge(2, 5), rise(2)
       integer :: i
 
-      behind = 0.0_wp
-      if (.not. self%is_on) return
-      if (self%number(e) == 0) return
       edge = 0.0_wp
-      associate (piece => self%piece(self%number(e)))
-         stencil%node(3:4) = piece%node(:, 0)
-         stencil%node(2) = piece%node(1, -1)
-         stencil%node(5) = piece%node(2, 1)
-         stencil%length(2:4) = piece%length
-         do i = -1, 1
-            associate (a => piece%node(1, i), b => piece%node(2, i))
-               if (a > 0) edge(:, 3 + i) = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
-            end associate
-         end do
-      end associate
+      stencil%node(3:4) = piece%node(:, 0)
+      stencil%node(2) = piece%node(1, -1)
+      stencil%node(5) = piece%node(2, 1)
+      stencil%length(2:4) = piece%length
+      do i = -1, 1
+         associate (a => piece%node(1, i), b => piece%node(2, i))
+            if (a > 0) edge(:, 3 + i) = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
+         end associate
+      end do
       point = hermite_point(hermite_curve(stencil, joined_pieces), edge, share)
       rise = point%y - share*edge(:, 3)
       behind = max(0.0_wp, (edge(1, 3)*rise(2) - edge(2, 3)*rise(1)) &
          /sqrt(dot_product(edge(:, 3), edge(:, 3))))
-   end function outline_curves_behind
+   end function piece_behind
 
 end module emcon_outline_curves_plane

@@ -35,6 +35,7 @@ module emcon_outline_plane
       logical, allocatable :: is_buried(:)       !! (n_node) under a tied piece
       !> (n_edge) shortest side of the element behind it, of an edge without one its length [L]
       real(wp), allocatable :: thickness(:)
+      logical, allocatable :: is_profile(:)      !! (n_edge) a part of a line or arc of a profile
       type(pieces_t), allocatable :: on(:)       !! (n_surface) pieces that it is on
       integer, allocatable :: pair(:, :)         !! (2, n_pair) surfaces that meet
    end type outline_t
@@ -73,7 +74,22 @@ contains
       call link_edges(self, size(scene%x, 2))
       call find_places(self, scene)
       call tied_ends_find(scene, self%edge, self%host, self%is_buried)
+      call find_profiles(self, scene)
    end subroutine outline_init
+
+   !> Nodes of profiles are of nothing else.
+   pure subroutine find_profiles(self, scene)
+      type(outline_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      logical :: is_of(size(scene%x, 2))
+      integer :: s
+
+      is_of = .false.
+      do s = 1, size(scene%surface)
+         if (scene%surface(s)%is_profile) is_of(scene%surface(s)%edge(1, :)) = .true.
+      end do
+      self%is_profile = is_of(self%edge(1, :))
+   end subroutine find_profiles
 
    !> Elements, and after them surfaces of edges, by their nodes.
    pure subroutine connect(scene, connected)

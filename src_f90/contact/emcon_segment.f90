@@ -27,6 +27,7 @@ module emcon_segment
       type(condition_t) :: nodal(2)                  !! of one edge
    contains
       procedure :: configure => segment_configure
+      procedure :: follow_arcs => segment_follow_arcs
       procedure :: begin_step => segment_begin_step
       procedure :: covers => segment_covers
       procedure :: choose_slip => segment_choose_slip
@@ -66,6 +67,16 @@ contains
       call self%nts%configure(x, options)
       self%may_sharpen = self%nts%may_sharpen
    end subroutine segment_configure
+
+   !> Slave nodes stand on their arcs: what rises is under the nodal gaps.
+   pure subroutine segment_follow_arcs(self, x, options, is_wanted)
+      class(segment_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+      logical, intent(in) :: is_wanted
+
+      call self%nts%follow_arcs(x, options, is_wanted)
+   end subroutine segment_follow_arcs
 
    pure subroutine segment_begin_step(self, x, u0, du)
       class(segment_t), intent(inout) :: self

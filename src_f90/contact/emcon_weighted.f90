@@ -17,7 +17,7 @@ module emcon_weighted
    use emcon_slip_point, only : slip_add, slip_list_t, slip_over, slip_point_t
    implicit none
    private
-   public :: weighted_t, weighted_init, weighted_slips
+   public :: weighted_t, weighted_init, weighted_slips, weighted_sagittas
 
    !> A slave node is let go where less than this fraction of its surface is covered: a smaller part
    !> says hardly more than the constraint of its neighbour.
@@ -114,8 +114,7 @@ contains
       allocate(self%state(n), self%form(self%slave%n_edge), self%slide(n))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
-      allocate(self%whole(n), self%scale(n), self%cover(n), &
-         source=0.0_wp)
+      allocate(self%whole(n), self%scale(n), self%cover(n), self%sagitta(n), source=0.0_wp)
       do i = 1, n
          do k = 1, 2
             associate (e => self%node_edge(k, i))
@@ -147,6 +146,30 @@ contains
          end associate
       end do
    end subroutine weighted_slips
+
+   !> Take the sagittas of the constraints from `form%value`, where the place of the gap has them:
+   !> where the step begins, or where it is expected to end of what is covered there first.
+   pure subroutine weighted_sagittas(self)
+      class(weighted_t), intent(inout) :: self
+      real(wp) :: rise(0:1), area(0:1), part_rise(0:1), part_area(0:1)
+      integer :: i, k
+
+      do i = 1, self%n_constraint
+         rise = 0.0_wp
+         area = 0.0_wp
+         do k = 1, 2
+            if (self%node_edge(k, i) == 0) cycle
+            call form_share(self%form(self%node_edge(k, i)), 3 - k, self%is_dual, part_rise, &
+               part_area)
+            rise = rise + part_rise
+            area = area + part_area
+         end do
+         self%sagitta(i) = 0.0_wp
+         do k = 1, 0, -1
+            if (area(k) >= least_cover*self%whole(i)) self%sagitta(i) = rise(k)/area(k)
+         end do
+      end do
+   end subroutine weighted_sagittas
 
    pure real(wp) function weighted_slip(self, i, x, u0, du) result(slip)
       class(weighted_t), intent(in) :: self
@@ -192,9 +215,10 @@ contains
             state%gap0 = 0.0_wp
             state%gap1 = 0.0_wp
             state%was_open = .true.
-            if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset
+            if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset &
+               - self%sagitta(i)
             if (state%is_arriving) state%was_open = is_open(self, i)
-            if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset
+            if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset - self%sagitta(i)
             self%cover(i) = area(1)
          end associate
       end do
@@ -235,7 +259,7 @@ contains
             end associate
          end do
          call form_constraint(self%form, weighted_gap_t(self%node(i), self%node_edge(:, i), &
-            self%is_dual, target(n) + self%offset, self%scale(i)), self%work, item(n))
+            self%is_dual, target(n) + self%offset + self%sagitta(i), self%scale(i)), self%work, item(n))
          item(n)%size = self%state(i)%size
          if (item(n)%rubs) call add_slip(self%slide(i)%point, x, u0, du, item(n))
       end do

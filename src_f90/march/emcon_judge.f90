@@ -57,6 +57,7 @@ contains
             self%least(scene%n_dim, n), self%most(scene%n_dim, n))
          allocate(self%thinnest(n), self%longest(n), self%other(n), self%excused(0))
       end associate
+      call judge_smooth(self, scene, contact_options_t())
    end subroutine judge_init
 
    !> Begin a step of `scene` with the options `options` of contact: what edges stand for.

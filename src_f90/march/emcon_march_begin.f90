@@ -2,6 +2,7 @@
 !> moves is held.
 module emcon_march_begin
    use emcon_active_set, only : active_set_overclosure, active_set_t
+   use emcon_contact, only : contact_t
    use emcon_correction, only : correction_reset
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit, only : explicit_prepare
@@ -24,7 +25,7 @@ module emcon_march_begin
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_newton, only : newton_init
    use emcon_numbering, only : spread_dependent
-   use emcon_overclosure, only : overclosure_check
+   use emcon_overclosure, only : overclosure_follow_arcs
    use emcon_pose, only : pose_at_end
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
    use emcon_scene, only : scene_t, where_text
@@ -191,6 +192,7 @@ contains
             associate (contact => self%system%contact(i)%contact)
                call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
                call contact%configure(scene%x, options_of(i))
+               if (scene%step(1)%resolves_overclosure) call follow_arcs(i, contact)
             end associate
          end do
          call softness_begin_step(self%active%softness, self%system, scene, step, error)
@@ -221,6 +223,22 @@ contains
          if (scene%pair(i)%has_options) options_of = scene%pair(i)%options
       end function options_of
 
+      !> What is closed as the analysis begins says whether gaps are those of arcs.
+      subroutine follow_arcs(i, contact)
+         integer, intent(in) :: i                !! number of the contact
+         class(contact_t), intent(inout) :: contact
+         real(wp) :: sagitta
+
+         call overclosure_follow_arcs(contact, scene%x, scene%u0, options_of(i), sagitta)
+         if (i > size(scene%pair) .or. .not. sagitta > 0.0_wp .or. self%state%i_step > 1) return
+         associate (pair => scene%pair(i))
+            call note_add(self%system%notes, "surfaces " // scene%surface(pair%slave)%name // &
+               " and " // scene%surface(pair%master)%name // ": gaps are measured between the " // &
+               "curves that edges are chords of, for *CONTACT INTERFERENCE; that changes them " // &
+               "by up to " // to_text(sagitta, 3))
+         end associate
+      end subroutine follow_arcs
+
    end subroutine prepare
 
    !> What is closed at the start, and what of it the step is to resolve.
@@ -238,7 +256,6 @@ contains
       if (.not. step%resolves_overclosure) return
       call judge_step(self%judge, scene%x, self%state%u_start, at_rest(self%state%u), overlap)
       self%meant_overlap = overlap%depth
-      call overclosure_check(self%system, scene, self%active%overclosure, self%warnings)
    end subroutine begin_overclosure
 
    !> The grid of the step, who controls sizes on it, and the time where it is taken up.

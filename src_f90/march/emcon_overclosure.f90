@@ -1,65 +1,58 @@
-!> Overclosure that a step resolves: is it that of the bodies, or of the edges that stand for arcs?
+!> Overclosure that a step resolves: that of the curves that were meshed, not of their chords.
+!>
+!> Where edges of two meshes do not match, gaps between chords differ from those between the curves
+!> by up to the sagitta of an edge, often more than an interference. Source: docs/theory.md,
+!> section 6.
 module emcon_overclosure
-   use emcon_arc_dip_plane, only : arc_dip
-   use emcon_interactions, only : formulation_nts, smoothing_hermite
+   use emcon_contact, only : contact_t
+   use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
-   use emcon_scene, only : scene_t
-   use emcon_surface_edges, only : surface_edges
-   use emcon_system, only : system_t
-   use emcon_text, only : note_add, notes_t, to_text
    implicit none
    private
-   public :: overclosure_check
+   public :: overclosure_follow_arcs
 
-   !> Edges may dip into their arcs by this part of the overclosure.
-   real(wp), parameter :: small_dip = 0.1_wp
+   !> What changes an overclosure by less than this part of it is left out: surfaces whose nodes
+   !> meet nodes, and flat ones, are measured as they are.
+   real(wp), parameter :: small_part = 0.01_wp
 
 contains
 
-   !> Warn of pairs whose overclosure `overclosure` is not much more than edges dip into arcs,
-   !> unless nodes meet nodes: there the gaps of all are the same. Gaps at the start have been
-   !> measured.
-   subroutine overclosure_check(system, scene, overclosure, warnings)
-      type(system_t), intent(in) :: system
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: overclosure(:)     !! (n_constraint) gaps that are closed, else 0 [L]
-      type(notes_t), intent(inout) :: warnings
-      real(wp) :: deepest, dip
-      logical :: is_smooth
-      integer :: i
+   !> Let a contact measure its gaps between arcs from now on, if that matters for what is closed at
+   !> x + u, by either measure.
+   subroutine overclosure_follow_arcs(contact, x, u, options, largest)
+      class(contact_t), intent(inout) :: contact !! configured
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) as the run begins [L]
+      type(contact_options_t), intent(in) :: options         !! it was configured with
+      real(wp), intent(out) :: largest           !! change of a gap that is closed; 0: none [L]
+      real(wp), dimension(contact%n_constraint) :: chords, arcs
+      logical :: is_closed(contact%n_constraint)
 
-      is_smooth = scene%step(system%i_step)%contact%smoothing == smoothing_hermite
-      do i = 1, system%n_pair
-         associate (contact => system%contact(i)%contact, pair => scene%pair(i), &
-               first => system%first_constraint(i) + 1, last => system%first_constraint(i + 1))
-            deepest = -minval(overclosure(first:last))
-            if (.not. deepest > 0.0_wp) cycle
-            if (is_smooth .and. pair%formulation == formulation_nts) cycle
-            dip = surface_dip(scene, pair%slave) + surface_dip(scene, pair%master)
-            if (dip <= small_dip*deepest) cycle
-            if (.not. is_smooth .and. .not. any(contact%state%is_near .and. contact%state%is_over &
-               .and. abs(contact%state%gap0 + deepest) > small_dip*deepest .and. &
-               contact%state%gap0 < dip)) cycle
-            call note_add(warnings, "the overclosure of surface " // &
-               scene%surface(pair%slave)%name // " on " // scene%surface(pair%master)%name // &
-               ", " // to_text(deepest, 3) // ", is not much more than their edges dip into " // &
-               "arcs, up to " // to_text(dip, 3) // ": pressures are off by that part; let " // &
-               "nodes meet nodes, take smaller edges, or TYPE=NODE TO SURFACE with " // &
-               "*SURFACE SMOOTHING, TYPE=HERMITE")
-         end associate
-      end do
-   end subroutine overclosure_check
+      call contact%follow_arcs(x, options, .false.)
+      call measure(chords)
+      call contact%follow_arcs(x, options, .true.)
+      call measure(arcs)
+      is_closed = contact%state%is_near .and. contact%state%is_over .and. min(chords, arcs) < 0.0_wp
+      largest = maxval(abs(arcs - chords), mask=is_closed)
+      if (any(is_closed)) then
+         if (largest > -small_part*minval(min(chords, arcs), mask=is_closed)) return
+      end if
+      largest = 0.0_wp
+      call contact%follow_arcs(x, options, .false.)
 
-   !> How far edges of surface `number` dip into arcs, without its corners [L].
-   real(wp) function surface_dip(scene, number) result(dip)
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: number              !! of the surface
-      integer, allocatable :: edge(:, :)
+   contains
 
-      dip = 0.0_wp
-      if (scene%surface(number)%is_nodal) return
-      call surface_edges(scene, scene%surface(number), edge)
-      dip = arc_dip(scene%x, edge, scene%step(1)%contact%normal_angle)
-   end function surface_dip
+      !> The gaps as nothing moves.
+      subroutine measure(gap)
+         real(wp), intent(out) :: gap(:)         !! (n_constraint) [L]
+         real(wp) :: rest(size(u, 1), size(u, 2))
+
+         rest = 0.0_wp
+         contact%reach = 0.0_wp
+         call contact%begin_step(x, u, rest)
+         call contact%measure(x, u, rest)
+         gap = contact%state%gap0
+      end subroutine measure
+
+   end subroutine overclosure_follow_arcs
 
 end module emcon_overclosure

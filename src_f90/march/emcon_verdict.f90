@@ -566,9 +566,9 @@ contains
          call note_add(lines, "penetration was looked for after every step, both ways, nodes and " &
             // "edges: " // to_text(outline%n_piece) // " bodies with " // &
             to_text(size(outline%edge, 2)) // " edges")
-         if (self%of_edges > touching) call note_add(lines, "edges stand for curves, by " // &
-            "*SURFACE SMOOTHING; as they are they overlap by up to " // &
-            to_text(self%of_edges, 3) // " of an edge")
+         if (self%of_edges > touching) call note_add(lines, "edges of curved surfaces " // &
+            "overlap by up to " // to_text(self%of_edges, 3) // &
+            " of their length, the curves that they are chords of do not")
       end associate
    end subroutine add_checked
 

@@ -97,4 +97,4 @@ def test_smoothed_bodies_are_their_curves(smooth_pile):
     assert deepest <= 1/(8*CHORDS**2)
     assert worst(fields).by_edge > 0.01
     assert smooth_pile.verdict["verdict"] == "good", smooth_pile.verdict["reasons"]
-    assert "edges stand for curves" in smooth_pile.log
+    assert "edges of curved surfaces overlap" in smooth_pile.log

@@ -1,0 +1,124 @@
+!> The arcs that edges of a surface stand for: an edge is a chord of the curve that was meshed.
+!>
+!> At each node the circle through it and its two neighbours has the curvature there. An edge has
+!> the harmonic mean of those at its ends, none where one of them is straight or they bend to
+!> different sides. Source: docs/theory.md, section 6.
+module emcon_arcs_plane
+   use emcon_chain, only : chain_corners, chain_t
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: arc_curvature, arc_rise, arcs_find
+
+contains
+
+   !> Curvature of the arc of an edge, > 0 where it bulges out of the body, 0 if there is none [1/L].
+   !> At a corner or an end the node after next takes the place of the one that is not there.
+   pure real(wp) function arc_curvature(way) result(curvature)
+      !> (2, -2:2) from node to node along the surface, the edge itself at 0; 0 beyond a corner or
+      !> an end [L]
+      real(wp), intent(in) :: way(2, -2:2)
+      real(wp) :: at(-1:2), one, other
+
+      at = [turn(-1), turn(0), turn(1), turn(2)]
+      one = at(0)
+      other = at(1)
+      if (.not. goes_on(-1)) one = at(2)
+      if (.not. goes_on(1)) other = at(-1)
+      curvature = 0.0_wp
+      if ((one > 0.0_wp .and. other > 0.0_wp) .or. (one < 0.0_wp .and. other < 0.0_wp)) &
+         curvature = 2.0_wp/(1.0_wp/one + 1.0_wp/other)
+
+   contains
+
+      pure logical function goes_on(i)
+         integer, intent(in) :: i
+
+         goes_on = any(abs(way(:, i)) > 0.0_wp)
+      end function goes_on
+
+      !> Curvature at the node before edge `i`, 0 if an edge is missing there.
+      pure real(wp) function turn(i)
+         integer, intent(in) :: i
+
+         turn = 0.0_wp
+         if (.not. (goes_on(i - 1) .and. goes_on(i))) return
+         associate (a => way(:, i - 1), b => way(:, i))
+            turn = 2.0_wp*(a(1)*b(2) - a(2)*b(1)) &
+               /sqrt(dot_product(a, a)*dot_product(b, b)*dot_product(a + b, a + b))
+         end associate
+      end function turn
+
+   end function arc_curvature
+
+   !> Height of an arc over its edge, > 0 out of the body [L].
+   elemental real(wp) function arc_rise(curvature, length, share) result(rise)
+      real(wp), intent(in) :: curvature          !! [1/L]
+      real(wp), intent(in) :: length             !! of the edge [L]
+      real(wp), intent(in) :: share              !! place along the edge, from 0 to 1
+      real(wp) :: inner
+
+      inner = max(0.0_wp, min(1.0_wp, share))
+      rise = curvature*length**2*inner*(1.0_wp - inner)/(height(inner - 0.5_wp) + height(0.5_wp))
+
+   contains
+
+      !> Of the circle over its centre at this part of the edge from its middle, by the radius.
+      pure real(wp) function height(part)
+         real(wp), intent(in) :: part
+
+         height = sqrt(max(epsilon(1.0_wp), 1.0_wp - (curvature*length*part)**2))
+      end function height
+
+   end function arc_rise
+
+   !> The arcs of all edges of a surface in the reference configuration.
+   pure subroutine arcs_find(chain, x, angle, curvature)
+      type(chain_t), intent(in) :: chain
+      real(wp), intent(in) :: x(:, :)            !! (2, n_node of the scene) [L]
+      real(wp), intent(in) :: angle              !! sharper turns are corners [degrees]
+      real(wp), intent(out) :: curvature(:)      !! (n_edge) [1/L]
+      logical :: is_corner(chain%n_edge)
+      real(wp) :: way(2, -2:2)
+      integer :: beside(-2:2), e, i
+
+      call chain_corners(chain, x, angle, is_corner)
+      do e = 1, chain%n_edge
+         beside = 0
+         beside(0) = e
+         do i = 1, 2
+            beside(-i) = before(beside(1 - i))
+            beside(i) = after(beside(i - 1))
+         end do
+         way = 0.0_wp
+         do i = -2, 2
+            if (beside(i) > 0) way(:, i) = x(:, chain%edge(2, beside(i))) &
+               - x(:, chain%edge(1, beside(i)))
+         end do
+         curvature(e) = arc_curvature(way)
+      end do
+
+   contains
+
+      !> The edge before edge `k` around no corner, 0 if there is none.
+      pure integer function before(k)
+         integer, intent(in) :: k
+
+         before = 0
+         if (k == 0) return
+         if (.not. is_corner(k)) before = chain%previous(k)
+      end function before
+
+      !> The edge after edge `k` around no corner.
+      pure integer function after(k)
+         integer, intent(in) :: k
+
+         after = 0
+         if (k > 0) after = chain%next(k)
+         if (after == 0) return
+         if (is_corner(after)) after = 0
+      end function after
+
+   end subroutine arcs_find
+
+end module emcon_arcs_plane
