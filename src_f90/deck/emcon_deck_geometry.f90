@@ -1,5 +1,6 @@
 !> The shape of elements, as far as it can be seen from their corners.
 module emcon_deck_geometry
+   use emcon_deck_jacobian, only : is_integrable, warn_of_corners
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, label_list
    use emcon_kinds, only : wp
@@ -12,7 +13,8 @@ module emcon_deck_geometry
    !> no area. Slender elements are far above; rounding of the coordinates of nodes on one line is
    !> below as long as these do not exceed 1e5 edges.
    real(wp), parameter :: least_corner = 1.0e-10_wp
-   integer, parameter :: shape_good = 0, shape_flat = 1, shape_clockwise = 2, shape_folded = 3
+   integer, parameter :: shape_good = 0, shape_flat = 1, shape_clockwise = 2, shape_folded = 3, &
+      shape_corner = 4
 
 contains
 
@@ -30,6 +32,7 @@ contains
       end do
       call tell(shape_flat, " has no area; check its nodes and their order")
       call tell(shape_clockwise, " is inverted: its nodes run clockwise")
+      call warn_of_corners(reader, scene, fault == shape_corner)
       call tell(shape_folded, " is folded: the angle at a corner is 180 degrees or more")
 
    contains
@@ -82,6 +85,14 @@ contains
          element_shape = shape_clockwise
       else if (any(corner(:n) <= least_corner)) then
          element_shape = shape_folded
+         associate (kind => scene%kind(scene%element_kind(element)))
+            if (.not. allocated(kind%shape)) return
+            if (kind%n_face_node > 2) then       ! judged with the nodes of its sides
+               element_shape = shape_good
+            else if (is_integrable(kind%shape, x(:, :n))) then
+               element_shape = shape_corner
+            end if
+         end associate
       else
          element_shape = shape_good
       end if

@@ -1,5 +1,6 @@
 !> The shape of elements of three dimensions, before anything is computed with them.
 module emcon_deck_shapes_space
+   use emcon_deck_jacobian, only : is_integrable, warn_of_corners
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_element_kind, only : element_kind_t
@@ -20,7 +21,8 @@ module emcon_deck_shapes_space
    real(wp), parameter :: half_circle = 0.5_wp
    !> Coordinates in decks are rounded.
    real(wp), parameter :: rounded = 1.0e-3_wp
-   integer, parameter :: is_flat = 1, is_mirrored = 2, is_folded = 3, is_off = 4, is_doubtful = 5
+   integer, parameter :: is_flat = 1, is_mirrored = 2, is_folded = 3, is_off = 4, is_doubtful = 5, &
+      is_corner = 6
 
 contains
 
@@ -39,6 +41,7 @@ contains
       call tell(is_mirrored, " is inverted: its nodes run as in a mirror, the first face has to " &
          // "run counter-clockwise seen from the other nodes")
       call tell(is_folded, " is folded: its volume is not positive everywhere")
+      call warn_of_corners(reader, scene, fault == is_corner)
       call tell(is_off, " has a node outside the middle half of its edge, where the element " &
          // "folds; put it into the middle")
       if (any(fault == is_doubtful)) call add_warning(reader%log, &
@@ -97,7 +100,7 @@ contains
          else if (abs(sum(det(:n))) <= real(n, wp)*least_volume) then
             fault = is_flat
          else if (any(det(:n) <= least_volume) .and. fault /= is_off) then
-            fault = is_folded
+            fault = merge(is_corner, is_folded, is_integrable(kind%shape, x(:, :n)))
          end if
       end associate
    end function fault_of

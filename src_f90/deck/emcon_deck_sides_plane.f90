@@ -1,11 +1,11 @@
 !> The sides of elements in the plane that have nodes between their corners.
 module emcon_deck_sides_plane
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t
+   use emcon_deck_jacobian, only : is_integrable, warn_of_corners
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_shape, only : shape_table_t, shape_tabulate
    use emcon_text, only : to_text
    implicit none
    private
@@ -26,7 +26,7 @@ contains
    subroutine check_sides(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, dimension(size(scene%element_label)) :: is_bent, is_off, is_folded
+      logical, dimension(size(scene%element_label)) :: is_bent, is_off, is_folded, is_corner
       real(wp) :: along, beside
       integer :: e
 
@@ -35,19 +35,21 @@ contains
       is_folded = .false.
       is_bent = .false.
       is_off = .false.
+      is_corner = .false.
       do e = 1, size(is_bent)
          if (scene%kind(scene%element_kind(e))%n_face_node < 3) cycle
          if (scene%element_node(1, e) == 0) cycle
          call find_furthest(scene, e, along, beside)
          is_bent(e) = along > 0.5_wp - quarter + rounded
-         is_folded(e) = .not. is_bent(e) .and. folds(scene, e)
-         is_off(e) = .not. (is_bent(e) .or. is_folded(e)) .and. (along > off_middle .or. &
-            beside > half_circle)
+         if (.not. is_bent(e)) call look_for_folds(scene, e, is_folded(e), is_corner(e))
+         is_off(e) = .not. (is_bent(e) .or. is_folded(e) .or. is_corner(e)) .and. &
+            (along > off_middle .or. beside > half_circle)
       end do
       if (any(is_bent)) call tell(is_bent, " has a node outside the middle half of its side, " &
          // "where the element folds; put it into the middle")
       if (any(is_folded)) call tell(is_folded, " is folded by the nodes of its sides: " &
          // "its area is not positive everywhere")
+      call warn_of_corners(reader, scene, is_corner)
       if (any(is_off)) call add_warning(reader%log, scene%element_origin(findloc(is_off, .true., &
          1)), "element " // label_list(pack(scene%element_label, is_off)) // " has a node " &
          // "far off the middle of its side: strains are less exact, and infinite at a corner " &
@@ -106,48 +108,30 @@ contains
       end associate
    end subroutine find_furthest
 
-   !> Is the area negative at a node or not positive at a point of the quadrature?
-   logical function folds(scene, e)
+   !> Is the area of an element not positive at a point of the quadrature, or negative at a node?
+   pure subroutine look_for_folds(scene, e, is_folded, is_corner)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e
-      type(shape_table_t) :: table
+      logical, intent(out) :: is_folded, is_corner   !! at a point; at a node only
       real(wp), allocatable :: place(:, :)
       real(wp) :: x(2, scene%kind(scene%element_kind(e))%n_node), value(size(x, 2))
-      real(wp) :: slope(2, size(x, 2)), least, most
+      real(wp) :: slope(2, size(x, 2)), area(size(x, 2)), jacobian(2, 2)
       integer :: i
 
       associate (kind => scene%kind(scene%element_kind(e)))
          x = scene%x(:, scene%element_node(:kind%n_node, e))
          x = x - spread(x(:, 1), 2, size(x, 2))
          x = x/maxval(abs(x))
-         call shape_tabulate(kind%shape, .true., table)
-         folds = .true.
-         most = 0.0_wp
-         do i = 1, table%n_gp
-            most = max(most, area_at(table%slope(:, :, i)))
-            if (.not. area_at(table%slope(:, :, i)) > 0.0_wp) return
-         end do
+         is_folded = .not. is_integrable(kind%shape, x)
          call kind%shape%places(place)
-         least = most
          do i = 1, size(place, 2)
             call kind%shape%values(place(:, i), value, slope)
-            least = min(least, area_at(slope))
+            jacobian = matmul(x, transpose(slope))
+            area(i) = jacobian(1, 1)*jacobian(2, 2) - jacobian(1, 2)*jacobian(2, 1)
          end do
-         folds = least < -4.0_wp*rounded*most
+         is_corner = .not. is_folded .and. minval(area) < -4.0_wp*rounded*maxval(area)
       end associate
-
-   contains
-
-      !> det dx/dxi.
-      pure real(wp) function area_at(slope)
-         real(wp), intent(in) :: slope(:, :)
-         real(wp) :: jacobian(2, 2)
-
-         jacobian = matmul(x, transpose(slope))
-         area_at = jacobian(1, 1)*jacobian(2, 2) - jacobian(1, 2)*jacobian(2, 1)
-      end function area_at
-
-   end function folds
+   end subroutine look_for_folds
 
    !> A side without a node between its corners beside one that has one: they would come apart.
    subroutine check_neighbours(reader, scene)

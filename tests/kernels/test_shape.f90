@@ -102,7 +102,8 @@ contains
          call kind(k)%shape%places(place)
          call check_equal(error, size(place, 2), kind(k)%n_node, "nodes")
          do i = 1, kind(k)%n_node
-            expected = 0.0_wp*value
+            if (allocated(expected)) deallocate(expected)
+            allocate(expected(kind(k)%n_node), source=0.0_wp)
             expected(i) = 1.0_wp
             call kind(k)%shape%values(place(:, i), value, slope)
             call check_near(error, value, expected, 0.0_wp, 1.0_wp, &

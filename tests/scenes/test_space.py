@@ -44,6 +44,30 @@ def test_patch(kind, nlgeom, tmp_path):
         assert np.abs(stress[0] - exact).max() <= 1e-12*100
 
 
+#: MacNeal and Harder (1985), inner nodes; the Jacobian of an element is negative at one of its corners.
+INNER = [[.249, .342, .192], [.826, .288, .288], [.85, .649, .263], [.273, .75, .23],
+         [.32, .186, .643], [.677, .305, .683], [.788, .693, .644], [.165, .745, .702]]
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D8I"])
+def test_patch_of_macneal_and_harder(kind, tmp_path):
+    """Stresses 2000 and 400 everywhere, with a warning of the corner."""
+    x = np.array([[i in (1, 2), i in (2, 3), k] for k in (0, 1) for i in range(4)] + INNER, dtype=float)
+    node = "".join(f"{k}, {a!r}, {b!r}, {c!r}\n" for k, (a, b, c) in enumerate(x.tolist(), 1))
+    u = x[:8] @ (np.ones((3, 3)) + np.eye(3))*5e-4
+    held = "".join(f"{k + 1}, {a + 1}, {a + 1}, {float(u[k, a])!r}\n" for k in range(8) for a in range(3))
+    result = run(f"*NODE\n{node}*ELEMENT, TYPE={kind}, ELSET=E\n"
+                 "1, 9, 10, 11, 12, 13, 14, 15, 16\n2, 1, 2, 3, 4, 9, 10, 11, 12\n"
+                 "3, 13, 14, 15, 16, 5, 6, 7, 8\n4, 1, 2, 10, 9, 5, 6, 14, 13\n"
+                 "5, 2, 3, 11, 10, 6, 7, 15, 14\n6, 3, 4, 12, 11, 7, 8, 16, 15\n"
+                 "7, 4, 1, 9, 12, 8, 5, 13, 16\n*MATERIAL, NAME=M\n*ELASTIC\n1e6, .25\n"
+                 "*SOLID SECTION, ELSET=E, MATERIAL=M\n*STEP\n*STATIC\n1., 1.\n"
+                 f"*BOUNDARY\n{held}*EL FILE\nS\n*END STEP\n", tmp_path)
+    stress = result.fields()["cauchy_stress"][-1]
+    assert np.abs(stress - [2000, 2000, 2000, 400, 400, 400]).max() < 1e-12*1e6
+    assert "element 4 is folded at a corner" in result.log
+
+
 def flies(kind, law, tmp_path):
     """A block that spins about no axis of its own, flies and vibrates, 1000 increments: energy and
     six momenta."""
