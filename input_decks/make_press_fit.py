@@ -33,10 +33,8 @@ Units: any consistent set (force F, length L; stress F/L^2, thickness 1 L).
 What to look at: one pressure all around, without a step that closes or loads anything.
 
 Expected at the end (Lame): pressure {PRESSURE:.6f}; radial displacement {AT_BORE:.6e} at the bore and
-          {AT_RIM:.6e} at the rim. Errors fall with the square of the element size where
-          nodes meet nodes. Elsewhere edges dip into arcs by up to a fourth of the squared edge
-          length over the radius, here more than the interference: the program warns, and
-          NODE TO SURFACE with HERMITE is the choice.
+          {AT_RIM:.6e} at the rim. Errors fall with the square of the element size, also where
+          nodes do not meet nodes: gaps are then counted between the arcs through the nodes.
 
 Made by make_press_fit.py. Change a parameter for one run: --set formulation=SEGMENT
 """

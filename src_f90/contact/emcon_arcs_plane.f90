@@ -51,25 +51,20 @@ contains
 
    end function arc_curvature
 
-   !> Height of an arc over its edge, > 0 out of the body [L].
-   elemental real(wp) function arc_rise(curvature, length, share) result(rise)
+   !> From an edge to its arc along a ray, > 0 out of the body [L]: the root of the equation of the
+   !> circle that is 0 on a straight edge. Source: docs/theory.md, eq. (20g).
+   elemental real(wp) function arc_rise(curvature, length, share, lean) result(rise)
       real(wp), intent(in) :: curvature          !! [1/L]
       real(wp), intent(in) :: length             !! of the edge [L]
-      real(wp), intent(in) :: share              !! place along the edge, from 0 to 1
-      real(wp) :: inner
+      real(wp), intent(in) :: share              !! where the ray starts, from 0 to 1 along the edge
+      real(wp), intent(in) :: lean               !! sine of its angle with the normal, > 0 forwards
+      real(wp) :: inner, half, along
 
       inner = max(0.0_wp, min(1.0_wp, share))
-      rise = curvature*length**2*inner*(1.0_wp - inner)/(height(inner - 0.5_wp) + height(0.5_wp))
-
-   contains
-
-      !> Of the circle over its centre at this part of the edge from its middle, by the radius.
-      pure real(wp) function height(part)
-         real(wp), intent(in) :: part
-
-         height = sqrt(max(epsilon(1.0_wp), 1.0_wp - (curvature*length*part)**2))
-      end function height
-
+      half = curvature*length**2*inner*(1.0_wp - inner)
+      along = curvature*length*(inner - 0.5_wp)*lean &
+         + sqrt(max(0.0_wp, (1.0_wp - 0.25_wp*(curvature*length)**2)*(1.0_wp - lean**2)))
+      rise = half/(along + sqrt(max(epsilon(1.0_wp), along**2 + curvature*half)))
    end function arc_rise
 
    !> The arcs of all edges of a surface in the reference configuration.

@@ -14,9 +14,9 @@ module emcon_mortar
    use emcon_kinds, only : wp
    use emcon_mortar_choice, only : pair_append, pair_comes_near, pair_cut_corners, pair_is_meant, &
       pairs_drop_far, pairs_seen
-   use emcon_mortar_frame, only : frame_cover, frame_hit, frame_init, frame_moments, frame_point, &
-      frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, &
-      n_place, pair_stencil_t, place_after, place_before, place_master
+   use emcon_mortar_frame, only : frame_cover, frame_hit, frame_init, frame_lean, frame_moments, &
+      frame_point, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, &
+      n_moment, n_place, pair_stencil_t, place_after, place_before, place_master
    use emcon_mortar_pair2, only : segment_add2 => segment_add
    use emcon_mortar_pair2_first, only : segment_add2_first => segment_add
    use emcon_mortar_pair4, only : point_add, segment_add4 => segment_add
@@ -166,7 +166,7 @@ contains
       integer, intent(in) :: e, k
       type(frame_t), intent(in) :: frame
       real(wp) :: moment(n_moment)
-      real(wp) :: low, high, part, xi, eta, gap, rise
+      real(wp) :: low, high, part, xi, eta, gap, rise, lean(2)
       integer :: i
 
       moment = 0.0_wp
@@ -180,9 +180,10 @@ contains
          if (.not. part > 0.0_wp) cycle
          xi = low + (high - low)*self%point(i)
          call frame_point(frame, self%pair(k), xi, eta, gap)
+         lean = frame_lean(frame, xi)
          associate (m => self%pair(k)%edge)
-            rise = arc_rise(self%slave_curvature(e), self%slave%length(e), xi) &
-               + arc_rise(self%master_curvature(m), self%master%length(m), eta)
+            rise = arc_rise(self%slave_curvature(e), self%slave%length(e), xi, lean(1)) &
+               + arc_rise(self%master_curvature(m), self%master%length(m), eta, lean(2))
          end associate
          moment = moment + part*frame%length*[rise, rise*xi, 1.0_wp, xi, 1.0_wp/frame%length]
       end do

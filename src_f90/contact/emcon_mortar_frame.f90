@@ -9,7 +9,7 @@ module emcon_mortar_frame
    implicit none
    private
    public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_meet, frame_hit, &
-      frame_point, frame_moments, frame_cover
+      frame_point, frame_moments, frame_cover, frame_lean
    public :: place_first, place_last, place_before, place_after, place_master
    public :: moment_gap, moment_gap_xi, moment_area, moment_area_xi, moment_cover, n_moment
    public :: n_place, end_rounding
@@ -163,6 +163,22 @@ contains
          gap = (above(1) + eta*(above(2) - above(1)))/norm
       end if
    end subroutine frame_hit
+
+   !> How the ray from the slave point `xi` leans over the normals of both edges, of the master one
+   !> as seen from there: sines, > 0 towards the last node.
+   pure function frame_lean(self, xi) result(lean)
+      type(frame_t), intent(in) :: self
+      real(wp), intent(in) :: xi                 !! on the slave edge, 0 to 1
+      real(wp) :: lean(2)                        !! slave, master
+      real(wp) :: along(4), above(4), norm, weight(2), a(2)
+
+      call look(self, xi, along, above, norm)
+      weight = [1.0_wp - xi, xi]
+      a = [dot_product(weight, self%edge_along), dot_product(weight, self%edge_above)]
+      lean(1) = a(2)/sqrt(dot_product(a, a))
+      a = [along(2) - along(1), above(2) - above(1)]
+      lean(2) = -a(2)/sqrt(dot_product(a, a))
+   end function frame_lean
 
    !> The gap at the slave point `xi` over the master edge and, on a polygon, over its neighbours
    !> where the point looks past its ends: docs/theory.md, eq. (15h).

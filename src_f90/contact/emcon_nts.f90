@@ -149,7 +149,7 @@ contains
          call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
          call nts_gap_value(local(:, :stencil%n), stencil%before, stencil%after, &
             stencil%rounding, gap, xi, stencil%goes_around)
-         sagitta = arc_rise(self%curvature(e), self%master%length(e), xi)
+         sagitta = arc_rise(self%curvature(e), self%master%length(e), xi, 0.0_wp)
       end associate
    end function sagitta_under
 

@@ -180,7 +180,7 @@ contains
          end associate
       end do
       behind = max(0.0_wp, -arc_rise(arc_curvature(way), &
-         sqrt(dot_product(way(:, 0), way(:, 0))), share))
+         sqrt(dot_product(way(:, 0), way(:, 0))), share, 0.0_wp))
    end function arc_behind
 
    !> How far the curve of a smoothed edge lies behind it.

@@ -259,7 +259,8 @@ contains
             end associate
          end do
          call form_constraint(self%form, weighted_gap_t(self%node(i), self%node_edge(:, i), &
-            self%is_dual, target(n) + self%offset + self%sagitta(i), self%scale(i)), self%work, item(n))
+            self%is_dual, target(n) + self%offset + self%sagitta(i), self%scale(i)), &
+            self%work, item(n))
          item(n)%size = self%state(i)%size
          if (item(n)%rubs) call add_slip(self%slide(i)%point, x, u0, du, item(n))
       end do

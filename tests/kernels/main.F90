@@ -7,6 +7,7 @@ program main
    use check, only : test_case_t
    use emcon_errors, only : error_t
    use test_active_set, only : collect_active_set
+   use test_arcs, only : collect_arcs
    use test_blas, only : collect_blas
    use test_band_blocks, only : collect_band_blocks
    use test_bodies, only : collect_bodies
@@ -178,6 +179,7 @@ program main
    call run("tie_balance", collect_tie_balance)
    call run("numbering", collect_numbering)
    call run("bodies", collect_bodies)
+   call run("arcs", collect_arcs)
    call run("linear_rows", collect_linear_rows)
    call run("loads", collect_loads)
    call run("rigid_motion", collect_rigid_motion)

@@ -7,9 +7,11 @@ module test_judge
       smoothing_hermite
    use emcon_judge, only : judge_init, judge_smooth, judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_t
    use emcon_ties, only : ties_prepare
+   use ring_scenes, only : make_rings
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, right, &
       scene_begin, top
    implicit none
@@ -34,6 +36,9 @@ contains
          test_case_t("a piece in itself past a crossing", test_self_past), &
          test_case_t("where a tie ends, pieces meet", test_joint), &
          test_case_t("what is between an edge and its curve", test_curve), &
+         test_case_t("chords of one circle, and a circle pushed in", test_circles), &
+         test_case_t("a dent is no arc", test_dent), &
+         test_case_t("an edge of a profile counts as what is in it", test_profile), &
          test_case_t("bodies without a pair are not looked at", test_no_pair)]
    end subroutine collect_judge
 
@@ -267,7 +272,7 @@ contains
       logical, parameter :: is_reversed(4) = [.false., .false., .true., .false.]
       type(scene_t) :: scene
       type(overlap_t) :: overlap
-      real(wp) :: share, of_edges, of_curve
+      real(wp) :: share, of_edges, of_curve, of_arc
       integer :: k
 
       do k = 1, size(bend)
@@ -277,15 +282,102 @@ contains
             of_edges = depth(k)/square
             of_curve = of_edges - max(0.0_wp, bend(k))*share*(1.0_wp - share)/square
          end associate
-         if (is_reversed(k)) of_curve = of_edges
+         of_arc = of_edges - max(0.0_wp, arc(bend(k), share))
+         if (is_reversed(k)) of_curve = of_arc
          call judged_smoothly(scene, overlap)
-         call check_near(error, overlap%of_edges, of_edges, 16.0_wp*eps, 1.0_wp, "of edges")
+         call check_near(error, overlap%of_edges, merge(of_edges, 0.0_wp, bend(k) > 0.0_wp), &
+            16.0_wp*eps, 1.0_wp, "of edges")
          call check_near(error, overlap%depth, max(0.0_wp, of_curve), 16.0_wp*eps, 1.0_wp, "curve")
          scene%pair%formulation = formulation_segment
          call judged_smoothly(scene, overlap)
-         call check_near(error, overlap%depth, of_edges, 16.0_wp*eps, 1.0_wp, "segments")
+         call check_near(error, overlap%depth, max(0.0_wp, of_arc), 16.0_wp*eps, 1.0_wp, "segments")
       end do
+
+   contains
+
+      !> How far the arc lies behind the edge from x = 2 to 3, per its length: its curvature is the
+      !> harmonic mean of those of the circles through three nodes of the parabola.
+      pure real(wp) function arc(b, s)
+         real(wp), intent(in) :: b               !! bend
+         real(wp), intent(in) :: s               !! share
+         real(wp) :: radius
+
+         associate (square => 1.0_wp + b**2)
+            radius = 0.5_wp*(0.5_wp*square/b + 0.5_wp*sqrt(square*(1.0_wp + 9.0_wp*b**2) &
+               *(1.0_wp + 4.0_wp*b**2))/b)
+            arc = sign(sqrt(radius**2 - (s - 0.5_wp)**2*square) &
+               - sqrt(radius**2 - 0.25_wp*square), b)/sqrt(square)
+         end associate
+      end function arc
+
    end subroutine test_curve
+
+   !> Nodes on one circle do not overlap, whatever their chords do; a hub that is larger by 1/50 does
+   !> by that, and chords of the sleeve are what it is in.
+   subroutine test_circles(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: more = 0.02_wp
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      real(wp), allocatable :: length(:)
+      integer :: k
+
+      do k = 1, 2
+         call make_rings(scene, [8, 11], 0.0_wp, k == 2)
+         call judged(scene, overlap)
+         call check_true(error, overlap%depth <= 16.0_wp*eps, "chords of one circle")
+         call check_true(error, overlap%of_edges > 0.01_wp, "edges overlap as they are")
+         call make_rings(scene, [8, 11], more, k == 2)
+         call judged(scene, overlap)
+         length = norm2(scene%x(:, 20:30) - scene%x(:, 19:29), 1)
+         ! Distances from chords are those from the arc by the cosine of a quarter of a turn.
+         call check_true(error, overlap%depth > 0.99_wp*more/maxval(length) .and. &
+            overlap%depth < 1.01_wp*more/minval(length), "pushed in")
+      end do
+   end subroutine test_circles
+
+   !> A single turn between flat sides is a valley: what is behind one of them is inside.
+   subroutine test_dent(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: bend = 0.25_wp, depth = 0.03125_wp
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_hollow(scene, bend, depth, .false.)
+      scene%u0(2, :10) = bend*abs(scene%x(1, :10) - 2.0_wp)
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, depth/(1.0_wp + bend**2), 16.0_wp*eps, 1.0_wp, "depth")
+   end subroutine test_dent
+
+   !> A corner 1/8 deep in a line of edges 1/16 long, by its own edges of 1/2.
+   subroutine test_profile(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 64
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      type(surface_t) :: line
+      type(block_t) :: slider
+      integer :: i
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [1, n - 1], [0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], slider)
+      ! The nodes of a block without its elements.
+      scene%x = reshape([(real(n - i, wp)/16.0_wp, 1.0_wp, i = 0, 2*n - 1)], [2, 2*n])
+      deallocate(scene%element_node, scene%element_kind, scene%element_section, &
+         scene%element_label, scene%element_origin)
+      allocate(scene%element_node(4, 0), scene%element_kind(0), scene%element_section(0), &
+         scene%element_label(0), scene%element_origin(0))
+      call add_block(scene, "CPE4", [1, 1], [1.3_wp, 0.875_wp], [0.5_wp, 0.5_wp], slider)
+      line%name = "LINE"
+      line%is_profile = .true.
+      line%edge = reshape([(i, i + 1, i = 1, n)], [2, n])
+      allocate(line%element(0), line%face(0))
+      scene%surface = [line]
+      call add_surface(scene, "SLIDER", slider, [bottom])
+      scene%pair = [contact_pair_t(slave=2, master=1)]
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
+   end subroutine test_profile
 
    !> The base bent, and in it a corner of the slider.
    subroutine make_hollow(scene, bend, depth, is_reversed)

@@ -1,0 +1,208 @@
+!> Arcs that edges are chords of: circles in closed form, what is no arc, and gaps between arcs.
+module test_arcs
+   use check, only : check_near, check_true, test_case_t
+   use emcon_arcs_plane, only : arc_rise, arcs_find
+   use emcon_chain, only : chain_init, chain_t
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : contact_t
+   use emcon_contact_registry, only : new_contact
+   use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
+      formulation_segment, integration_elements, integration_segments, multiplier_dual, &
+      multiplier_standard, normal_edge, normal_nodal
+   use emcon_kinds, only : wp
+   use emcon_overclosure, only : overclosure_follow_arcs
+   use emcon_scene, only : scene_t
+   use emcon_text, only : to_text
+   use ring_scenes, only : make_rings
+   use small_scenes, only : add_block, add_surface, block_t, make_two_blocks, scene_begin, top
+   implicit none
+   private
+   public :: collect_arcs
+
+   real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
+   integer, parameter :: unlike(2) = [7, 10]
+   !> The longest edges of these: angle, and sagitta on the radius of 2.
+   real(wp), parameter :: turn = acos(0.0_wp)/7.0_wp, sagitta = 2.0_wp*turn**2/8.0_wp
+
+contains
+
+   subroutine collect_arcs(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("the circle of the nodes", test_circle), &
+         test_case_t("flat sides, kinks and waves are no arcs", test_no_arc), &
+         test_case_t("gaps between chords of one circle are 0", test_gaps), &
+         test_case_t("interference of circles", test_interference), &
+         test_case_t("surfaces that are measured as they are", test_as_they_are)]
+   end subroutine collect_arcs
+
+   !> Chords of unequal lengths: their arcs lie on the circle, also beside the ends of the surface.
+   subroutine test_circle(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(chain_t) :: chain
+      real(wp), allocatable :: curvature(:)
+      real(wp) :: a(2), place(2), share
+      integer :: s, e, k
+
+      call make_rings(scene, unlike, 0.0_wp, .false.)
+      do s = 1, 2
+         call chain_init(chain, scene, scene%surface(s), error)
+         if (allocated(error)) return
+         allocate(curvature(chain%n_edge))
+         call arcs_find(chain, scene%x, 60.0_wp, curvature)
+         ! Three nodes on an arc tell its curvature to round-off by the square of its angle.
+         call check_near(error, curvature, spread(merge(0.5_wp, -0.5_wp, s == 1), 1, &
+            chain%n_edge), 16.0_wp*tol/turn**2, 1.0_wp, "curvature")
+         do e = 1, chain%n_edge
+            a = scene%x(:, chain%edge(2, e)) - scene%x(:, chain%edge(1, e))
+            do k = 0, 4
+               share = 0.25_wp*k
+               place = scene%x(:, chain%edge(1, e)) + share*a + [a(2), -a(1)]/norm2(a) &
+                  *arc_rise(curvature(e), chain%length(e), share, 0.0_wp)
+               call check_near(error, norm2(place), 2.0_wp, tol, 1.0_wp, "radius")
+            end do
+         end do
+         deallocate(curvature)
+      end do
+   end subroutine test_circle
+
+   !> Sides of four edges by the heights of their nodes.
+   subroutine test_no_arc(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: height(5, 4) = reshape([0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.25_wp, 0.5_wp, 0.0_wp, 0.25_wp, 0.25_wp, 0.25_wp, 0.0_wp, &
+         0.0_wp, 0.25_wp, 0.0_wp, 0.25_wp, 0.0_wp], [5, 4])
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(chain_t) :: chain
+      real(wp) :: curvature(4)
+      integer :: k
+
+      do k = 1, size(height, 2)
+         call scene_begin(scene)
+         call add_block(scene, "CPE4", [4, 1], [0.0_wp, 0.0_wp], [4.0_wp, 1.0_wp], block)
+         scene%x(2, 6:10) = 1.0_wp + height(:, k)
+         call add_surface(scene, "TOP", block, [top])
+         call chain_init(chain, scene, scene%surface(1), error)
+         if (allocated(error)) return
+         call arcs_find(chain, scene%x, 60.0_wp, curvature)
+         call check_near(error, curvature, spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, &
+            "side " // to_text(k))
+      end do
+   end subroutine test_no_arc
+
+   !> Formulation `k`, 1 to 6, and its options.
+   pure subroutine choose(k, formulation, options)
+      integer, intent(in) :: k
+      integer, intent(out) :: formulation
+      type(contact_options_t), intent(out) :: options
+
+      formulation = merge(formulation_mortar, merge(formulation_nts, formulation_segment, k == 1), &
+         k > 2)
+      options%multiplier = merge(multiplier_dual, multiplier_standard, mod(k, 2) == 0)
+      options%normal = merge(normal_edge, normal_nodal, k == 5)
+      options%integration = merge(integration_elements, integration_segments, k == 6)
+   end subroutine choose
+
+   !> The contact of two rings with the options `k`, at rest.
+   subroutine make(scene, k, has_arcs, contact, error, largest)
+      type(scene_t), intent(inout) :: scene
+      integer, intent(in) :: k
+      logical, intent(in) :: has_arcs            !! measure between arcs
+      class(contact_t), allocatable, intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(out), optional :: largest !! change of a gap by arcs, taken where it matters
+      type(contact_options_t) :: options
+
+      call choose(k, scene%pair(1)%formulation, options)
+      call new_contact(scene, scene%pair(1), contact, error)
+      if (allocated(error)) return
+      call contact%suit_steps(.true.)
+      call contact%configure(scene%x, options)
+      call contact%follow_arcs(scene%x, options, has_arcs)
+      if (present(largest)) call overclosure_follow_arcs(contact, scene%x, scene%u0, options, &
+         largest)
+      contact%reach = 0.0_wp
+      call contact%begin_step(scene%x, scene%u0, 0.0_wp*scene%u0)
+      call contact%measure(scene%x, scene%u0, 0.0_wp*scene%u0)
+   end subroutine make
+
+   !> Points on arcs of one circle have no gap, along whatever normal. A condition is that of the
+   !> measured gap.
+   subroutine test_gaps(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact, chords
+      type(condition_t) :: item(1)
+      integer :: k, side, i
+
+      do k = 1, 6
+         do side = 1, 2
+            call make_rings(scene, unlike, 0.0_wp, side == 2)
+            call make(scene, k, .true., contact, error)
+            if (.not. allocated(error)) call make(scene, k, .false., chords, error)
+            if (allocated(error)) return
+            associate (name => "combination " // to_text(k) // ", side " // to_text(side))
+               call check_true(error, all(contact%state%is_near .and. contact%state%is_over), name)
+               call check_true(error, maxval(abs(contact%state%gap0)) <= tol, &
+                  "gaps between arcs, " // name)
+               call check_true(error, maxval(abs(chords%state%gap0)) > 0.1_wp*sagitta, &
+                  "gaps between chords, " // name)
+               do i = 1, contact%n_constraint
+                  call contact%evaluate([i], scene%x, scene%u0, 0.0_wp*scene%u0, [0.125_wp], item)
+                  call check_near(error, item(1)%gap1, contact%state(i)%gap0 - 0.125_wp, tol, &
+                     1.0_wp, "condition, " // name)
+               end do
+            end associate
+         end do
+      end do
+   end subroutine test_gaps
+
+   !> A hub that is larger by a fifth of a sagitta: all gaps are that, but for the angle between the
+   !> normals of two edges.
+   subroutine test_interference(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: more = 0.2_wp*sagitta
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact
+      real(wp) :: largest
+      integer :: k, side
+
+      do k = 1, 6
+         do side = 1, 2
+            call make_rings(scene, unlike, more, side == 2)
+            call make(scene, k, .false., contact, error, largest)
+            if (allocated(error)) return
+            call check_true(error, maxval(abs(contact%state%gap0 + more)) <= more*turn**2, &
+               "combination " // to_text(k) // ", side " // to_text(side))
+            call check_true(error, largest > 0.1_wp*sagitta, "change")
+         end do
+      end do
+   end subroutine test_interference
+
+   !> Where nodes meet nodes, and on flat sides, gaps are those of edges to the last bit.
+   subroutine test_as_they_are(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      class(contact_t), allocatable :: contact, chords
+      real(wp) :: largest
+      integer :: k, side
+
+      do k = 1, 6
+         do side = 1, 2
+            if (side == 1) call make_rings(scene, [8, 8], 0.2_wp*sagitta, .false.)
+            if (side == 2) call make_two_blocks(scene, -0.1_wp, lower, upper)
+            call make(scene, k, .false., contact, error, largest)
+            if (.not. allocated(error)) call make(scene, k, .false., chords, error)
+            if (allocated(error)) return
+            call check_near(error, largest, 0.0_wp, 0.0_wp, 1.0_wp, "change")
+            call check_near(error, contact%state%gap0, chords%state%gap0, 0.0_wp, 1.0_wp, "gaps")
+         end do
+      end do
+   end subroutine test_as_they_are
+
+end module test_arcs
