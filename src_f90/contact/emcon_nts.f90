@@ -440,14 +440,14 @@ contains
 
    !> Gap at x + u of slave node `i` over the nearest master edge, searched among all edges.
    !> For checks before the first step only. `is_over`: not past an end of the surface.
-   pure subroutine nts_nearest(self, i, x, u, gap, is_over)
+   pure subroutine nts_nearest(self, i, x, u, still, gap, is_over)
       type(nts_t), intent(inout) :: self
       integer, intent(in) :: i                   !! slave node, index into `node`
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: still(:, :)        !! (2, n_node) zeros [L]
       real(wp), intent(out) :: gap               !! [L]
       logical, intent(out) :: is_over            !! .false. also if there is no edge
       real(wp) :: best
-      real(wp) :: zero(size(x, 1), size(x, 2))
       type(gap_state_t) :: state
       integer :: e
 
@@ -459,8 +459,7 @@ contains
       call choice_settle(self, i, x, u)
       self%stance%is_known = .false.
       self%start(i) = polygon_start(self, i, x, u)
-      zero = 0.0_wp
-      state = gap_state(self, i, x, u, zero)
+      state = gap_state(self, i, x, u, still)
       gap = state%gap0
       is_over = state%is_over
    end subroutine nts_nearest

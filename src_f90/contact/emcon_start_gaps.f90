@@ -26,6 +26,7 @@ module emcon_start_gaps
       integer, allocatable :: edge(:)            !! (n) nearest master edge; 0: none near
       type(gap_state_t), allocatable :: state(:) !! (n) as last measured
       type(nts_t), private :: nts
+      real(wp), allocatable, private :: still(:, :)  !! (2, n_node) no displacement [L]
    end type start_gaps_t
 
 contains
@@ -43,6 +44,7 @@ contains
       if (allocated(error)) return
       self%nts%every_face = .true.
       if (present(options)) call self%nts%configure(scene%x, options)
+      allocate(self%still(size(scene%x, 1), size(scene%x, 2)), source=0.0_wp)
       self%n = self%nts%n_constraint
       self%is_self = self%nts%is_self
       self%slave = self%nts%slave
@@ -62,7 +64,7 @@ contains
       real(wp), intent(out) :: gap               !! [L]
       logical, intent(out) :: is_over            !! not past an end of the surface
 
-      call nts_nearest(self%nts, i, scene%x, scene%u0, gap, is_over)
+      call nts_nearest(self%nts, i, scene%x, scene%u0, self%still, gap, is_over)
       self%edge(i) = self%nts%edge(i)
    end subroutine start_gaps_nearest
 
@@ -70,12 +72,10 @@ contains
    pure subroutine start_gaps_measure(self, scene)
       type(start_gaps_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2))
 
-      zero = 0.0_wp
       self%nts%reach = 0.0_wp
-      call self%nts%begin_step(scene%x, scene%u0, zero)
-      call self%nts%measure(scene%x, scene%u0, zero)
+      call self%nts%begin_step(scene%x, scene%u0, self%still)
+      call self%nts%measure(scene%x, scene%u0, self%still)
       self%edge = self%nts%edge
       self%state = self%nts%state
    end subroutine start_gaps_measure
@@ -89,10 +89,8 @@ contains
       real(wp), intent(out) :: way(:)            !! (n_dim) [L]
       logical, intent(out) :: is_last            !! it is round-off
       type(condition_t) :: item(1)
-      real(wp) :: zero(size(scene%x, 1), size(scene%x, 2))
 
-      zero = 0.0_wp
-      call self%nts%evaluate([i], scene%x, scene%u0, zero, [0.0_wp], item)
+      call self%nts%evaluate([i], scene%x, scene%u0, self%still, [0.0_wp], item)
       associate (normal => item(1)%c(:, 1))
          way = item(1)%gap1*normal/dot_product(normal, normal)
       end associate

@@ -9,6 +9,7 @@ module emcon_deck_check_contact
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
       formulation_segment, multiplier_standard
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : step_t
    use emcon_surface_edges, only : surface_edges
@@ -25,15 +26,16 @@ contains
       type(scene_t), intent(inout) :: scene
       type(contact_pair_t) :: other
       character(len=:), allocatable :: advice
-      logical :: is_bent
+      logical :: has_reverse(size(scene%pair)), is_bent
       integer :: i
 
       if (reader%doubt_shapes .or. reader%log%n_errors > 0) return
+      call find_reverses(scene%pair, has_reverse)
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
             if (.not. pair%may_choose .or. pair%slave == 0 .or. pair%master == 0) cycle
             if (pair%both_sides .or. pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0) cycle
-            if (pair%slave == pair%master .or. has_reverse(scene%pair, i)) cycle
+            if (pair%slave == pair%master .or. has_reverse(i)) cycle
             call find_advice(scene, pair, advice, is_bent)
             if (.not. is_bent) cycle
             other = exchanged(pair)
@@ -76,16 +78,17 @@ contains
    subroutine check_pairs(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical :: has_common
+      logical :: has_reverse(size(scene%pair)), has_common
       integer :: i
 
       if (reader%doubt_shapes) return
+      call find_reverses(scene%pair, has_reverse)
       do i = 1, size(scene%pair)
          if (scene%pair(i)%slave == 0 .or. scene%pair(i)%master == 0) cycle
          if (scene%pair(i)%is_reverse) cycle
          call check_common_nodes(reader, scene, scene%pair(i), has_common)
          call check_freedom(reader, scene, scene%pair(i))
-         if (has_common .or. has_reverse(scene%pair, i)) cycle
+         if (has_common .or. has_reverse(i)) cycle
          if (reader%log%n_errors == 0) call check_sides(reader, scene, scene%pair(i))
       end do
    end subroutine check_pairs
@@ -220,12 +223,20 @@ contains
       end if
    end function constraint_freedom
 
-   !> Whether the pair `i` is also listed with slave and master in turn.
-   pure logical function has_reverse(pair, i)
+   !> Whether each pair is also listed with slave and master in turn.
+   pure subroutine find_reverses(pair, has_reverse)
       type(contact_pair_t), intent(in) :: pair(:)
-      integer, intent(in) :: i
+      logical, intent(out) :: has_reverse(:)       !! (n_pair)
+      type(name_index_t) :: given
+      integer :: i
 
-      has_reverse = any(pair%slave == pair(i)%master .and. pair%master == pair(i)%slave)
-   end function has_reverse
+      do i = 1, size(pair)
+         call name_index_put(given, name_index_pair(pair(i)%slave, pair(i)%master), i)
+      end do
+      do i = 1, size(pair)
+         has_reverse(i) = name_index_find(given, &
+            name_index_pair(pair(i)%master, pair(i)%slave)) > 0
+      end do
+   end subroutine find_reverses
 
 end module emcon_deck_check_contact

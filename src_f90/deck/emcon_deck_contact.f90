@@ -4,7 +4,7 @@ module emcon_deck_contact
    use emcon_deck_contact_settings, only : read_pair_initiation
    use emcon_deck_fields, only : data_error, data_open, data_t, next_line, refuse_lines
    use emcon_deck_friction, only : read_friction
-   use emcon_deck_named, only : find_set, set_names
+   use emcon_deck_named, only : set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
@@ -12,6 +12,7 @@ module emcon_deck_contact
    use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_mortar, &
       formulation_nts, formulation_segment
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
@@ -43,6 +44,7 @@ contains
                call need_name(reader, card, "NAME", name)
                n = n + 1
                reader%interaction(n)%text = name
+               if (name /= "") call name_index_put(reader%interactions, name, n)
                call read_number(reader, card, "PAD THICKNESS", "a length of 0 or more: it keeps " &
                   // "surfaces apart; overlap at the start is resolved by *CONTACT INTERFERENCE", &
                   reader%pad(n))
@@ -125,6 +127,7 @@ contains
       type(origin_t), allocatable :: line(:)       !! of each pair
       type(data_t) :: data
       type(contact_pair_t) :: of_card
+      type(name_index_t) :: given                  !! pairs so far, by slave and master
       integer :: i, n, n_before, most
 
       most = 0
@@ -149,11 +152,11 @@ contains
             call get_surfaces(reader, data, scene, pair(n)%slave, pair(n)%master)
             call set_sides(scene, pair(n))
             call check_nodal(reader, data, scene, pair(n))
-            call check_repeated(reader, data, scene, pair(:n), line)
+            call check_repeated(reader, data, scene, pair(:n), line, given)
          end do
          call read_pair_options(reader, reader%card(i), scene, pair(n_before + 1:n))
       end do
-      call add_reverses(reader, pair(:n), line(:n), scene)
+      call add_reverses(reader, pair(:n), line(:n), given, scene)
    end subroutine read_pairs
 
    !> TYPE of a card; 0 if it is refused.
@@ -215,21 +218,23 @@ contains
 
    !> All pairs of the scene: behind each that holds both sides its reverse, unless lines of the
    !> deck say both. Then what they say together counts.
-   subroutine add_reverses(reader, pair, line, scene)
+   subroutine add_reverses(reader, pair, line, given, scene)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair(:)
       type(origin_t), intent(in) :: line(:)
+      type(name_index_t), intent(in) :: given      !! where in `pair` slave and master are
       type(scene_t), intent(inout) :: scene
-      type(contact_pair_t) :: all(2*size(pair))
+      type(contact_pair_t), allocatable :: all(:)
       integer :: i, j, n
 
+      allocate(all(2*size(pair)))
       n = 0
       do i = 1, size(pair)
          n = n + 1
          all(n) = pair(i)
          if (.not. pair(i)%both_sides .or. pair(i)%slave == pair(i)%master) cycle
          if (min(pair(i)%slave, pair(i)%master) == 0) cycle       ! unknown, and told
-         j = findloc(pair%slave == pair(i)%master .and. pair%master == pair(i)%slave, .true., 1)
+         j = name_index_find(given, name_index_pair(pair(i)%master, pair(i)%slave))
          if (j == 0) then
             n = n + 1
             all(n) = reversed(pair(i))
@@ -295,25 +300,27 @@ contains
    end subroutine check_nodal
 
    !> The last of `pair` must not be there already. Slave and master in turn is another pair.
-   subroutine check_repeated(reader, data, scene, pair, line)
+   subroutine check_repeated(reader, data, scene, pair, line, given)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(inout) :: pair(:)
       type(origin_t), intent(in) :: line(:)
+      type(name_index_t), intent(inout) :: given   !! where in `pair` slave and master are
       integer :: i, n
 
       n = size(pair)
       if (pair(n)%slave == 0 .or. pair(n)%master == 0) return
-      do i = 1, n - 1
-         if (pair(i)%slave /= pair(n)%slave .or. pair(i)%master /= pair(n)%master) cycle
-         call data_error(reader, data, "the pair of slave surface " &
-            // quoted(scene%surface(pair(n)%slave)%name) // " and master surface " &
-            // quoted(scene%surface(pair(n)%master)%name) // " is given twice; first at " &
-            // where_text(scene, line(i)))
-         pair(n)%master = 0
+      i = name_index_find(given, name_index_pair(pair(n)%slave, pair(n)%master))
+      if (i == 0) then
+         call name_index_put(given, name_index_pair(pair(n)%slave, pair(n)%master), n)
          return
-      end do
+      end if
+      call data_error(reader, data, "the pair of slave surface " &
+         // quoted(scene%surface(pair(n)%slave)%name) // " and master surface " &
+         // quoted(scene%surface(pair(n)%master)%name) // " is given twice; first at " &
+         // where_text(scene, line(i)))
+      pair(n)%master = 0
    end subroutine check_repeated
 
    !> What a card says of all its pairs.
@@ -350,21 +357,18 @@ contains
       type(contact_pair_t), intent(in) :: pair(:)
       type(contact_pair_t), intent(inout) :: of_card
       character(len=:), allocatable :: name
-      logical :: is_known
       integer :: i
 
       call need_name(reader, card, "INTERACTION", name)
-      is_known = name == "" .or. reader%doubt_names
-      do i = 1, size(reader%interaction)
-         if (reader%interaction(i)%text /= name) cycle
-         is_known = .true.
+      i = name_index_find(reader%interactions, name)
+      if (i > 0) then
          of_card%offset = reader%pad(i)
          of_card%restitution = reader%restitution(i)
          of_card%friction = reader%friction(i)
          of_card%rebound = reader%rebound(i)
          of_card%damping = reader%damping(i)
-      end do
-      if (.not. is_known) call card_error(reader, card, "unknown surface interaction " &
+      end if
+      if (.not. (i > 0 .or. name == "" .or. reader%doubt_names)) call card_error(reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))
       if (.not. of_card%offset > 0.0_wp) return
       if (any(pair%slave == pair%master .and. pair%slave > 0)) call card_error(reader, card, &
@@ -409,7 +413,7 @@ contains
       else if (is_number) then
          of_card%adjust_distance = distance
       else
-         of_card%adjust_set = find_set(scene%node_set, value)
+         of_card%adjust_set = name_index_find(reader%node_sets, value)
          if (of_card%adjust_set == 0 .and. .not. reader%doubt_names) then
             call card_error(reader, card, "ADJUST=" // quoted(value) // " is neither a number " &
                // "nor a node set" // suggestion(value, set_names(scene%node_set)))

@@ -4,10 +4,11 @@ module emcon_deck_contact_settings
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_name, &
       option_real, reader_t, refuse_option
-   use emcon_deck_tables, only : find_table, table_names
+   use emcon_deck_tables, only : table_names
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find
    use emcon_options, only : option_default
    use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, step_t
    use emcon_text, only : to_text
@@ -92,7 +93,7 @@ contains
       step%resolves_overclosure = .true.
       name = option_name(card, "AMPLITUDE")
       if (name == "") return
-      step%overclosure_amplitude = find_table(amplitude, name)
+      step%overclosure_amplitude = name_index_find(reader%amplitudes, name)
       if (step%overclosure_amplitude == 0 .and. .not. reader%doubt_names) call card_error(reader, &
          card, "unknown amplitude " // quoted(name) // suggestion(name, table_names(amplitude)))
    end subroutine read_interference

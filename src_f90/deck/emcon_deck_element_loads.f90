@@ -5,11 +5,12 @@ module emcon_deck_element_loads
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, get_real, &
       is_label, next_line
    use emcon_deck_loads, only : card_amplitude, is_new
-   use emcon_deck_named, only : find_set, get_elements
+   use emcon_deck_named, only : get_elements
    use emcon_deck_reader, only : card_t, reader_t
-   use emcon_deck_surfaces, only : find_surface, surface_names
+   use emcon_deck_surfaces, only : surface_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find
    use emcon_scene, only : scene_t
    use emcon_steps, only : by_element, by_surface, load_centrifugal, load_gravity, &
       load_pressure, load_t
@@ -132,7 +133,7 @@ contains
       end if
       call get_name(reader, data, 1, "surface", name)
       if (.not. data%ok) return
-      k = find_surface(scene%surface, name)
+      k = name_index_find(reader%surfaces, name)
       if (k > 0) then
          item = scene%surface(k)%element
          face = scene%surface(k)%face
@@ -140,7 +141,7 @@ contains
             "surface " // name // " has no faces of elements, on which a pressure could act")
       else if (reader%doubt_names) then
          data%ok = .false.
-      else if (find_set(scene%element_set, name) > 0) then
+      else if (name_index_find(reader%element_sets, name) > 0) then
          call data_error(reader, data, "P acts on the faces of a surface, and " // name // &
             " is an element set: name a *SURFACE, or faces by " // &
             face_names("P", maxval(scene%kind%n_face)) // " of *DLOAD")
@@ -160,8 +161,8 @@ contains
       if (is_label(data, 1)) return
       call get_name(reader, data, 1, "element label or set", name)
       if (.not. data%ok) return
-      if (find_set(scene%element_set, name) > 0) return
-      if (find_surface(scene%surface, name) > 0) call data_error(reader, data, name // &
+      if (name_index_find(reader%element_sets, name) > 0) return
+      if (name_index_find(reader%surfaces, name) > 0) call data_error(reader, data, name // &
          " is a surface: a pressure on all of its faces is " // name // ", P, pressure")
    end subroutine refuse_surface
 

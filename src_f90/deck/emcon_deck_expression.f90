@@ -5,6 +5,7 @@
 module emcon_deck_expression
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find, name_index_put, name_index_t
    use emcon_text, only : read_real, string_t, to_upper
    implicit none
    private
@@ -27,6 +28,7 @@ module emcon_deck_expression
    type :: parameter_table_t
       integer :: n = 0
       type(parameter_t), allocatable :: item(:)
+      type(name_index_t), private :: index_of      !! where in `item` a name is
    end type parameter_table_t
 
    !> An expression while it is read. A fault stops the reading.
@@ -56,6 +58,7 @@ contains
          end if
          self%n = self%n + 1
          i = self%n
+         call name_index_put(self%index_of, new%name, i)
       end if
       self%item(i) = new
    end subroutine store_parameter
@@ -64,12 +67,8 @@ contains
    pure integer function find_parameter(self, name)
       type(parameter_table_t), intent(in) :: self
       character(len=*), intent(in) :: name
-      integer :: i
 
-      find_parameter = 0
-      do i = 1, self%n
-         if (self%item(i)%name == name) find_parameter = i
-      end do
+      find_parameter = name_index_find(self%index_of, name)
    end function find_parameter
 
    !> All names, for suggestions.

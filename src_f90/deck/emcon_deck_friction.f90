@@ -6,6 +6,7 @@ module emcon_deck_friction
    use emcon_diagnostics, only : add_error, add_warning
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
       method_null_space, method_saddle_point, step_t
    use emcon_text, only : to_text
@@ -63,11 +64,12 @@ contains
       type(contact_pair_t), intent(in) :: pair(:)
       type(step_t), intent(in) :: step(:)
       logical, intent(in) :: on_nodes(:)         !! (surfaces) it is made of nodes
+      type(name_index_t) :: given                !! pairs so far, by slave and master
       integer :: i, k
 
       do i = 1, size(pair)
          if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! its surface is unknown, and told
-         call check_other_way(reader, pair(:i))
+         call check_other_way(reader, pair(:i), given)
          if (.not. pair(i)%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
          if (pair(i)%restitution < 1.0_wp) call refuse(reader, pair(i), &
             "RESTITUTION below 1: velocities would " &
@@ -86,14 +88,18 @@ contains
    end subroutine check_friction
 
    !> Two surfaces that are named in both orders rub in the same way in both.
-   subroutine check_other_way(reader, pair)
+   subroutine check_other_way(reader, pair, given)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair(:)    !! the last one is looked at
+      type(name_index_t), intent(inout) :: given     !! where in `pair` slave and master are
       integer :: j
 
       associate (new => pair(size(pair)))
-         j = findloc(pair%slave == new%master .and. pair%master == new%slave, .true., 1)
-         if (j == 0 .or. j == size(pair)) return
+         j = name_index_find(given, name_index_pair(new%master, new%slave))
+         if (name_index_find(given, name_index_pair(new%slave, new%master)) == 0) then
+            call name_index_put(given, name_index_pair(new%slave, new%master), size(pair))
+         end if
+         if (j == 0) return
          if (abs(pair(j)%friction - new%friction) <= 0.0_wp .and. &
             abs(pair(j)%rebound - new%rebound) <= 0.0_wp) return
          call add_error(reader%log, new%origin, "*CONTACT PAIR: the surfaces are a pair in the " &

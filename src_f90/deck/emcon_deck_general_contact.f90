@@ -8,11 +8,12 @@ module emcon_deck_general_contact
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
-   use emcon_deck_surfaces, only : find_surface, surface_names
+   use emcon_deck_surfaces, only : surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
+   use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
    implicit none
    private
@@ -100,7 +101,7 @@ contains
       data%ok = .true.
       call get_name(reader, data, side, "surface", name)
       if (.not. data%ok) return
-      surface = find_surface(scene%surface, name)
+      surface = name_index_find(reader%surfaces, name)
       if (surface == 0) then
          if (.not. reader%doubt_names) call data_error(reader, data, "unknown surface " &
             // quoted(name) // suggestion(name, surface_names(scene%surface)))
@@ -163,7 +164,7 @@ contains
             // "contact already at " // where_text(scene, scene%pair(1)%origin) // "; take it out")
          return
       end if
-      if (find_surface(scene%surface, exterior_name) > 0) then
+      if (name_index_find(reader%surfaces, exterior_name) > 0) then
          call card_error(reader, card, "ALL EXTERIOR defines a surface " // exterior_name &
             // "; give yours another name")
          return
@@ -176,6 +177,7 @@ contains
          return
       end if
       scene%surface = [scene%surface, surface]
+      call name_index_put(reader%surfaces, exterior_name, size(scene%surface))
       call append_pair(scene, card, size(scene%surface), size(scene%surface), is_reverse=.false.)
    end subroutine include_exterior
 
@@ -222,15 +224,14 @@ contains
             if (is_blank(data, side)) cycle
             call get_name(reader, data, side, "surface", name)
             if (.not. data%ok .or. reader%doubt_names .or. name == "GLOBAL") cycle
-            if (find_surface(scene%surface, name) == 0) call data_error(reader, data, &
+            if (name_index_find(reader%surfaces, name) == 0) call data_error(reader, data, &
                "unknown surface " // quoted(name) // suggestion(name, surface_names(scene%surface)))
          end do
          call get_name(reader, data, 3, "surface interaction", name)
          if (.not. data%ok) cycle
-         is_known = reader%doubt_names
-         do i = 1, size(reader%interaction)
-            if (reader%interaction(i)%text /= name) cycle
-            is_known = .true.
+         i = name_index_find(reader%interactions, name)
+         is_known = i > 0 .or. reader%doubt_names
+         if (i > 0) then
             if (reader%restitution(i) < 1.0_wp) call data_error(reader, data, "the surface " // &
                "interaction " // quoted(name) // " has a RESTITUTION, which is of pairs only; " // &
                "name what it is of by *CONTACT PAIR")
@@ -243,7 +244,7 @@ contains
             if (reader%pad(i) > 0.0_wp) call data_error(reader, data, "the surface interaction " &
                // quoted(name) // " has a PAD THICKNESS, which has no meaning where surfaces may " &
                // "be in contact with themselves; name what it keeps apart by *CONTACT PAIR")
-         end do
+         end if
          if (.not. is_known) call data_error(reader, data, "unknown surface interaction " &
             // quoted(name) // suggestion(name, reader%interaction))
       end do

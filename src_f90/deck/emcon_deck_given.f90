@@ -1,8 +1,9 @@
 !> *GIVEN FORCES: nodes whose forces and mass come from the program that reads the deck.
 module emcon_deck_given
-   use emcon_deck_named, only : find_set, set_names
+   use emcon_deck_named, only : set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
+   use emcon_name_index, only : name_index_find
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
    implicit none
@@ -43,7 +44,7 @@ contains
 
       if (has_option(card, "NSET")) then
          call need_name(reader, card, "NSET", name)
-         k = find_set(scene%node_set, name)
+         k = name_index_find(reader%node_sets, name)
          if (k > 0) then
             list = scene%node_set(k)%item
             return

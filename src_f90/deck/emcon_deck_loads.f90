@@ -9,9 +9,10 @@ module emcon_deck_loads
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
       refuse_option
    use emcon_deck_rigid, only : mark_rigid
-   use emcon_deck_tables, only : card_table_name, find_table, table_names
+   use emcon_deck_tables, only : card_table_name, table_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find
    use emcon_scene, only : scene_t
    use emcon_steps, only : by_node, load_moment, load_point, load_t, prescribed_t
    use emcon_text, only : to_text
@@ -50,7 +51,7 @@ contains
       call card_table_name(card, name)
       card_amplitude = 0
       if (name == "") return
-      card_amplitude = find_table(scene%amplitude, name)
+      card_amplitude = name_index_find(reader%amplitudes, name)
       name = option_name(card, "AMPLITUDE")
       if (card_amplitude == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
          "unknown amplitude " // quoted(name) // suggestion(name, table_names(scene%amplitude)))

@@ -4,7 +4,7 @@ module emcon_deck_materials
    use emcon_deck_dimension, only : n_plane
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, is_blank, next_line
-   use emcon_deck_named, only : find_set, hint_at_set, set_names
+   use emcon_deck_named, only : hint_at_set, set_names
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
       option_count, option_name, reader_t, refuse_option
@@ -14,6 +14,7 @@ module emcon_deck_materials
    use emcon_law, only : law_t
    use emcon_law_registry, only : find_law_row, law_create, law_given, law_rows, n_constant
    use emcon_materials, only : kinematics_nonlinear, material_t, section_t
+   use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
@@ -72,13 +73,14 @@ contains
       integer :: i_same
 
       call need_name(reader, card, "NAME", name)
-      i_same = find_material(scene%material(:n), name)
+      i_same = name_index_find(reader%materials, name)
       if (i_same > 0 .and. name /= "") then
          call card_error(reader, card, "material " // name // " is defined twice; first at " &
             // where_text(scene, scene%material(i_same)%origin))
       end if
       n = n + 1
       scene%material(n)%name = name
+      call name_index_put(reader%materials, name, n)
       scene%material(n)%origin = card%origin
       allocate(scene%material(n)%constant(0))
    end subroutine start_material
@@ -319,7 +321,7 @@ contains
          call need_name(reader, card, "ELSET", set_name)
          section%set = set_name
          call need_name(reader, card, "MATERIAL", name)
-         section%material = find_material(scene%material, name)
+         section%material = name_index_find(reader%materials, name)
          if (section%material == 0 .and. name /= "" .and. .not. reader%doubt_names) then
             allocate(known(size(scene%material)))
             do i = 1, size(known)
@@ -346,7 +348,7 @@ contains
             if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
          end if
       end associate
-      i = find_set(scene%element_set, set_name)
+      i = name_index_find(reader%element_sets, set_name)
       if (i > 0) then
          call assign_section(reader, card, scene, scene%element_set(i)%item, i_section)
       else if (set_name /= "" .and. .not. reader%doubt_names) then
@@ -354,7 +356,7 @@ contains
          call card_error(reader, card, "unknown element set " // quoted(set_name) // hint)
          reader%doubt_names = .true.
       end if
-      if (i > 0 .and. find_set(reader%line_set, set_name) > 0) call card_error(reader, card, &
+      if (i > 0 .and. name_index_find(reader%line_sets, set_name) > 0) call card_error(reader, card, &
          "element set " // quoted(set_name) // " holds lines too, which have no stiffness; give " &
          // "the section a set without them")
    end subroutine read_section
@@ -389,17 +391,5 @@ contains
          // label_list(scene%element_label(pack(item, has_one))) // " has a section already")
       scene%element_section(item) = i_section
    end subroutine assign_section
-
-   !> Index of the material called `name`, 0 if there is none.
-   pure integer function find_material(material, name)
-      type(material_t), intent(in) :: material(:)
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      find_material = 0
-      do i = 1, size(material)
-         if (material(i)%name == name) find_material = i
-      end do
-   end function find_material
 
 end module emcon_deck_materials

@@ -6,29 +6,14 @@ module emcon_deck_named
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_mesh, only : named_set_t
+   use emcon_name_index, only : name_index_find
    use emcon_scene, only : scene_t
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: find_set, set_names, hint_at_set, refuse_name, get_nodes, get_elements, get_lines
+   public :: set_names, hint_at_set, refuse_name, get_nodes, get_elements, get_lines
 
 contains
-
-   !> Index of the set called `name`, 0 if there is none.
-   pure integer function find_set(set, name)
-      type(named_set_t), intent(in) :: set(:)
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      do i = 1, size(set)
-         if (len(set(i)%name) /= len(name)) cycle
-         if (set(i)%name == name) then
-            find_set = i
-            return
-         end if
-      end do
-      find_set = 0
-   end function find_set
 
    pure function set_names(set) result(list)
       type(named_set_t), intent(in) :: set(:)
@@ -50,7 +35,7 @@ contains
 
       hint = suggestion(name, known)
       if (what /= "element set") return
-      if (find_set(reader%line_set, name) > 0) hint = &
+      if (name_index_find(reader%line_sets, name) > 0) hint = &
          ": it holds lines, which have no stiffness; only *SURFACE and *NSET may name it"
    end subroutine hint_at_set
 
@@ -107,7 +92,7 @@ contains
          if (i < 0) line = [-i]
       else
          call get_name(reader, data, k, "element label or set", name)
-         i = find_set(reader%line_set, name)
+         i = name_index_find(reader%line_sets, name)
          if (i > 0) line = reader%line_set(i)%item
       end if
    end subroutine get_lines
@@ -147,7 +132,11 @@ contains
       else
          call get_name(reader, data, k, what // " label or set", name)
          if (.not. data%ok) return
-         i = find_set(set, name)
+         if (what == "node") then
+            i = name_index_find(reader%node_sets, name)
+         else
+            i = name_index_find(reader%element_sets, name)
+         end if
          if (i > 0) then
             item = set(i)%item
          else

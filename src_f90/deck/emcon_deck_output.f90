@@ -3,12 +3,13 @@
 !> Requests carry over to later steps until a step has a request of the same kind.
 module emcon_deck_output
    use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, get_name, next_line
-   use emcon_deck_named, only : find_set, hint_at_set, set_names
+   use emcon_deck_named, only : hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, reader_t, refuse_option
-   use emcon_deck_tables, only : find_table, table_names
+   use emcon_deck_tables, only : table_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_mesh, only : named_set_t
+   use emcon_name_index, only : name_index_find, name_index_t
    use emcon_requests, only : output_contact_file, output_contact_print, output_element_file, &
       output_element_print, output_energy_print, output_node_file, output_node_print, output_t
    use emcon_scene, only : scene_t
@@ -196,21 +197,22 @@ contains
 
       select case (new%kind)
       case (output_node_file, output_node_print)
-         call look_up("NSET", "node set", scene%node_set)
+         call look_up("NSET", "node set", scene%node_set, reader%node_sets)
       case (output_element_file, output_element_print)
-         call look_up("ELSET", "element set", scene%element_set)
+         call look_up("ELSET", "element set", scene%element_set, reader%element_sets)
       end select
 
    contains
 
-      subroutine look_up(option, what, set)
+      subroutine look_up(option, what, set, index_of)
          character(len=*), intent(in) :: option, what
          type(named_set_t), intent(in) :: set(:)
+         type(name_index_t), intent(in) :: index_of
          character(len=:), allocatable :: name, hint
 
          name = option_name(card, option)
          if (name == "") return
-         new%set = find_set(set, name)
+         new%set = name_index_find(index_of, name)
          if (new%set == 0 .and. .not. reader%doubt_names) then
             call hint_at_set(reader, what, name, set_names(set), hint)
             call card_error(reader, card, "unknown set " // option // "=" // quoted(name) // hint)
@@ -235,7 +237,7 @@ contains
       if (has_option(card, "FREQUENCY")) then
          call card_error(reader, card, "FREQUENCY and TIME POINTS exclude each other")
       end if
-      i = find_table(reader%time_points, name)
+      i = name_index_find(reader%times, name)
       if (i > 0) then
          new%time = reader%time_points(i)%time
       else if (.not. reader%doubt_names) then

@@ -6,6 +6,7 @@ module emcon_deck_reader
    use emcon_interactions, only : contact_damping_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : named_set_t
+   use emcon_name_index, only : name_index_t
    use emcon_origin, only : origin_t
    use emcon_text, only : read_integer, read_real, squeezed, string_t, to_text
    implicit none
@@ -57,6 +58,8 @@ module emcon_deck_reader
       integer, allocatable :: line_label(:)              !! (n_line) elements that are edges only
       integer, allocatable :: line_node(:, :)            !! (2, n_line), 0: it had errors
       type(named_set_t), allocatable :: line_set(:)      !! the lines of element sets that have some
+      type(name_index_t) :: node_sets, element_sets, line_sets   !! where the sets are, by name
+      type(name_index_t) :: surfaces, materials, amplitudes, interactions, times
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
       real(wp), allocatable :: pad(:)                    !! PAD THICKNESS of each [L]
       real(wp), allocatable :: restitution(:)            !! RESTITUTION of each

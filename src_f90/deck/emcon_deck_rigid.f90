@@ -2,11 +2,12 @@
 module emcon_deck_rigid
    use emcon_deck_dimension, only : n_plane
    use emcon_deck_labels, only : find_label
-   use emcon_deck_named, only : find_set, hint_at_set, set_names
+   use emcon_deck_named, only : hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t
-   use emcon_deck_surfaces, only : find_surface, surface_names
+   use emcon_deck_surfaces, only : surface_names
    use emcon_diagnostics, only : add_error, label_list, quoted, suggestion
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find
    use emcon_origin, only : origin_t
    use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
    use emcon_scene, only : scene_t
@@ -81,7 +82,7 @@ contains
 
       call need_name(reader, card, "ELSET", new%name)
       if (new%name == "") return
-      i = find_set(scene%element_set, new%name)
+      i = name_index_find(reader%element_sets, new%name)
       if (i == 0) then
          call hint_at_set(reader, "element set", new%name, set_names(scene%element_set), hint)
          if (.not. reader%doubt_names) call card_error(reader, card, "unknown element set " // &
@@ -110,7 +111,7 @@ contains
       call need_name(reader, card, "ANALYTICALSURFACE", name)
       if (name == "") return
       if (.not. allocated(new%name)) new%name = name
-      i = find_surface(scene%surface, name)
+      i = name_index_find(reader%surfaces, name)
       if (i == 0) then
          if (.not. reader%doubt_names) call card_error(reader, card, "unknown surface " // &
             quoted(name) // suggestion(name, surface_names(scene%surface)))
@@ -144,7 +145,7 @@ contains
          if (node == 0 .and. .not. reader%doubt_nodes) call card_error(reader, card, &
             "the reference node " // name // " does not exist")
       else
-         i = find_set(scene%node_set, name)
+         i = name_index_find(reader%node_sets, name)
          if (i == 0) then
             if (.not. reader%doubt_names) call card_error(reader, card, "unknown node set " // &
                quoted(name) // suggestion(name, set_names(scene%node_set)))

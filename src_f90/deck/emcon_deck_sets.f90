@@ -3,10 +3,11 @@ module emcon_deck_sets
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_label, next_line
    use emcon_deck_labels, only : find_label, label_map_t, label_range
-   use emcon_deck_named, only : find_set, refuse_name, set_names
+   use emcon_deck_named, only : refuse_name, set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_mesh, only : named_set_t
+   use emcon_name_index, only : name_index_find, name_index_put, name_index_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
    use emcon_text, only : to_text
@@ -27,6 +28,7 @@ module emcon_deck_sets
       integer :: n = 0
       type(named_set_t), allocatable :: set(:)     !! names and origins
       type(growing_t), allocatable :: list(:)
+      type(name_index_t) :: index_of               !! where in `set` a name is
    end type builder_t
 
 contains
@@ -44,11 +46,24 @@ contains
       call build_sets(reader, elements, "ELEMENT", reader%element_map, reader%doubt_elements, scene)
       call finish(elements, set)
       call part_lines(set, scene%element_set, reader%line_set)
+      call index_sets(scene%element_set, reader%element_sets)
+      call index_sets(reader%line_set, reader%line_sets)
       nodes%what = "node"
       nodes%keyword = "NSET"
       call build_sets(reader, nodes, "NODE", reader%node_map, reader%doubt_nodes, scene)
       call finish(nodes, scene%node_set)
+      call index_sets(scene%node_set, reader%node_sets)
    end subroutine read_sets
+
+   pure subroutine index_sets(set, index_of)
+      type(named_set_t), intent(in) :: set(:)
+      type(name_index_t), intent(out) :: index_of
+      integer :: i
+
+      do i = 1, size(set)
+         call name_index_put(index_of, set(i)%name, i)
+      end do
+   end subroutine index_sets
 
    !> Lines count below 0: sets of elements keep what is above. A set of lines only is none of
    !> elements.
@@ -123,7 +138,7 @@ contains
       call need_name(reader, card, "ELSET", name)
       if (has_option(card, "GENERATE")) call card_error(reader, card, &
          "ELSET and GENERATE exclude each other")
-      i_set = find_set(scene%element_set, name)
+      i_set = name_index_find(reader%element_sets, name)
       if (i_set > 0) then
          associate (item => scene%element_set(i_set)%item)
             do i = 1, size(item)
@@ -135,7 +150,7 @@ contains
             end do
          end associate
       end if
-      i_lines = find_set(reader%line_set, name)
+      i_lines = name_index_find(reader%line_sets, name)
       if (i_lines > 0) then
          associate (item => reader%line_set(i_lines)%item)
             do i = 1, size(item)
@@ -160,19 +175,24 @@ contains
       type(growing_t), allocatable :: list(:)
       integer :: n
 
-      i_set = find_set(builder%set(:builder%n), name)
+      i_set = name_index_find(builder%index_of, name)
       if (i_set > 0) return
       n = builder%n
       if (n == size(builder%set)) then
          allocate(set(2*n), list(2*n))
-         set(:n) = builder%set
-         list(:n) = builder%list
+         do i_set = 1, n
+            call move_alloc(builder%set(i_set)%name, set(i_set)%name)
+            set(i_set)%origin = builder%set(i_set)%origin
+            list(i_set)%n = builder%list(i_set)%n
+            call move_alloc(builder%list(i_set)%item, list(i_set)%item)
+         end do
          call move_alloc(set, builder%set)
          call move_alloc(list, builder%list)
       end if
       i_set = n + 1
       builder%n = i_set
       builder%set(i_set)%name = name
+      call name_index_put(builder%index_of, name, i_set)
       builder%set(i_set)%origin = card%origin
       allocate(builder%list(i_set)%item(8))
    end subroutine find_or_add
@@ -235,7 +255,7 @@ contains
                end if
             else
                call get_name(reader, data, k, "name", name)
-               other = find_set(builder%set(:builder%n), name)
+               other = name_index_find(builder%index_of, name)
                if (other == i_set) then
                   if (data%ok) call data_error(reader, data, "the " // trim(builder%what) // &
                      " set " // quoted(name) // " names itself; take the name out")

@@ -13,11 +13,12 @@ module emcon_deck_surfaces
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
+   use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_surfaces, get_surfaces, find_surface, surface_names
+   public :: read_surfaces, get_surfaces, surface_names
 
    !> Faces of a surface while it grows.
    type :: faces_t
@@ -50,7 +51,7 @@ contains
          if (reader%card(i)%name /= "SURFACE") cycle
          call need_name(reader, reader%card(i), "NAME", name)
          if (name == "") cycle
-         i_same = find_surface(scene%surface(:n), name)
+         i_same = name_index_find(reader%surfaces, name)
          if (i_same > 0) then
             call card_error(reader, reader%card(i), "surface " // name &
                // " is defined twice; first at " // where_text(scene, scene%surface(i_same)%origin))
@@ -61,6 +62,7 @@ contains
          surface%origin = reader%card(i)%origin
          n = n + 1
          scene%surface(n) = surface
+         call name_index_put(reader%surfaces, name, n)
       end do
       scene%surface = scene%surface(:n)
    end subroutine read_surfaces
@@ -359,18 +361,6 @@ contains
       faces%n = n
    end subroutine drop_repeated
 
-   !> Index of the surface called `name`, 0 if there is none.
-   pure integer function find_surface(surface, name)
-      type(surface_t), intent(in) :: surface(:)
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      find_surface = 0
-      do i = 1, size(surface)
-         if (surface(i)%name == name) find_surface = i
-      end do
-   end function find_surface
-
    !> Data line: slave surface, master surface. One that is unknown becomes 0.
    subroutine get_surfaces(reader, data, scene, slave, master)
       type(reader_t), intent(inout) :: reader
@@ -390,7 +380,7 @@ contains
          data%ok = .true.
          call get_name(reader, data, side, trim(role(side)) // " surface", name)
          if (.not. data%ok) cycle
-         i_surface(side) = find_surface(scene%surface, name)
+         i_surface(side) = name_index_find(reader%surfaces, name)
          if (i_surface(side) == 0 .and. .not. reader%doubt_names) then
             call data_error(reader, data, "unknown " // trim(role(side)) // " surface " &
                // quoted(name) // suggestion(name, surface_names(scene%surface)))

@@ -6,12 +6,13 @@ module emcon_deck_tables
       refuse_option
    use emcon_diagnostics, only : quoted
    use emcon_kinds, only : wp
+   use emcon_name_index, only : name_index_find, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : read_real, string_t, to_text
    implicit none
    private
    public :: read_amplitudes, read_time_points
-   public :: find_table, table_names, card_table_name
+   public :: table_names, card_table_name
 
    !> More output times than this are a slip of the pen.
    integer, parameter :: max_times = 1000000
@@ -24,7 +25,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
 
-      call read_tables(reader, scene, "AMPLITUDE", scene%amplitude)
+      call read_tables(reader, scene, "AMPLITUDE", scene%amplitude, reader%amplitudes)
       call delay_tables(reader, scene%amplitude)
    end subroutine read_amplitudes
 
@@ -32,16 +33,20 @@ contains
    subroutine delay_tables(reader, table)
       type(reader_t), intent(inout) :: reader
       type(amplitude_t), allocatable, intent(inout) :: table(:)
-      type(amplitude_t) :: later
+      type(amplitude_t), allocatable :: all(:)
       character(len=:), allocatable :: name
       real(wp) :: delay
-      integer :: i, k
+      integer :: i, k, n
       logical :: ok
 
+      n = size(table)
+      k = count([(is_delayed(reader%card(i)), i = 1, size(reader%card))])
+      if (k == 0) return
+      allocate(all(n + k))
+      all(:n) = table
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
-            if (.not. (any(card%name == ["BOUNDARY", "CLOAD   ", "DLOAD   ", "DSLOAD  "]) &
-               .and. has_option(card, "TIMEDELAY"))) cycle
+            if (.not. is_delayed(card)) cycle
             call read_real(option_name(card, "TIMEDELAY"), delay, ok)
             if (.not. ok) then
                call card_error(reader, card, "TIME DELAY=" &
@@ -53,16 +58,26 @@ contains
                   // "amplitude; name one by AMPLITUDE=")
                cycle
             end if
-            k = find_table(table, option_name(card, "AMPLITUDE"))
+            k = name_index_find(reader%amplitudes, option_name(card, "AMPLITUDE"))
             call card_table_name(card, name)
-            if (k == 0 .or. find_table(table, name) > 0) cycle
-            later = table(k)
-            later%name = name
-            later%time = later%time + delay
-            table = [table, later]
+            if (k == 0 .or. name_index_find(reader%amplitudes, name) > 0) cycle
+            n = n + 1
+            all(n) = all(k)
+            all(n)%name = name
+            all(n)%time = all(n)%time + delay
+            call name_index_put(reader%amplitudes, name, n)
          end associate
       end do
+      table = all(:n)
    end subroutine delay_tables
+
+   !> Does a card act by an amplitude, later than that says?
+   pure logical function is_delayed(card)
+      type(card_t), intent(in) :: card
+
+      is_delayed = any(card%name == ["BOUNDARY", "CLOAD   ", "DLOAD   ", "DSLOAD  "])
+      if (is_delayed) is_delayed = has_option(card, "TIMEDELAY")
+   end function is_delayed
 
    !> Name of the amplitude that a card names, with its delay; empty: none.
    subroutine card_table_name(card, name)
@@ -80,16 +95,17 @@ contains
       type(scene_t), intent(in) :: scene
       type(amplitude_t), allocatable :: table(:)
 
-      call read_tables(reader, scene, "TIMEPOINTS", table)
+      call read_tables(reader, scene, "TIMEPOINTS", table, reader%times)
       call move_alloc(table, reader%time_points)
    end subroutine read_time_points
 
    !> All tables of one keyword. A table with errors keeps its name.
-   subroutine read_tables(reader, scene, keyword, table)
+   subroutine read_tables(reader, scene, keyword, table, index_of)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       character(len=*), intent(in) :: keyword
       type(amplitude_t), allocatable, intent(out) :: table(:)
+      type(name_index_t), intent(inout) :: index_of    !! where in `table` a name is
       character(len=:), allocatable :: name
       integer :: i, n, i_same
 
@@ -103,7 +119,7 @@ contains
          if (reader%card(i)%name /= keyword) cycle
          call need_name(reader, reader%card(i), "NAME", name)
          if (name == "") cycle
-         i_same = find_table(table(:n), name)
+         i_same = name_index_find(index_of, name)
          if (i_same > 0) then
             call card_error(reader, reader%card(i), name // " is defined twice; first at " &
                // where_text(scene, table(i_same)%origin))
@@ -111,6 +127,7 @@ contains
          end if
          n = n + 1
          table(n)%name = name
+         call name_index_put(index_of, name, n)
          table(n)%origin = reader%card(i)%origin
          if (keyword == "AMPLITUDE") then
             call read_amplitude(reader, reader%card(i), table(n))
@@ -244,18 +261,6 @@ contains
       end do
       number = number(:n)
    end subroutine read_numbers
-
-   !> Index of the table called `name`, 0 if there is none.
-   pure integer function find_table(table, name)
-      type(amplitude_t), intent(in) :: table(:)
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      find_table = 0
-      do i = 1, size(table)
-         if (table(i)%name == name) find_table = i
-      end do
-   end function find_table
 
    pure function table_names(table) result(list)
       type(amplitude_t), intent(in) :: table(:)

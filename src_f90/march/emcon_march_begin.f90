@@ -13,7 +13,7 @@ module emcon_march_begin
    use emcon_host_scheme, only : host_scheme_find
    use emcon_interactions, only : contact_options_t
    use emcon_judge, only : judge_excuse, judge_smooth, judge_step, overlap_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_march_accuracy, only : accuracy_begin
@@ -172,16 +172,19 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      real(dp) :: deadline
       integer :: i
 
       associate (step => scene%step(self%state%i_step), state => self%state)
          call choose_scheme(self, step)
          call check_tolerance(self, scene, error)
          if (allocated(error)) return
+         deadline = self%newton%deadline
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
             scene%x, step%newton_tolerance, step%newton_maximum)
          self%newton%convergence%polishes = step%polishes
          self%newton%is_interrupted => self%is_interrupted
+         self%newton%deadline = deadline
          call choose_solver(self, step)
          state%base = factor_base_t()
          self%newton%keeping%is_wanted = step%newton == newton_kept

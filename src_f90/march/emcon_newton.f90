@@ -17,7 +17,7 @@ module emcon_newton
    use emcon_keeping, only : keeping_begin, keeping_break_off, keeping_correct, keeping_give_up, &
       keeping_looks, keeping_make, keeping_renew, keeping_t
    use emcon_kept_factor, only : kept_factor_has_room, kept_factor_serves
-   use emcon_kinds, only : int64, wp
+   use emcon_kinds, only : dp, int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
    use emcon_motion, only : motion_place, motion_t
@@ -27,6 +27,7 @@ module emcon_newton
    use emcon_pose, only : pose_is_equilibrium
    use emcon_system, only : system_respond, system_tangent_times, system_t
    use emcon_term, only : role_external, role_inertia
+   use emcon_timer, only : cpu_seconds
    use emcon_vectors, only : vector_sum, vector_zero
    implicit none
    private
@@ -69,6 +70,7 @@ module emcon_newton
       !> (n_dim, n_node) prescribed motion that the first correction meets by its tangent; 0: none
       real(wp), allocatable :: driven(:, :)
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
+      real(dp) :: deadline = huge(1.0_dp)        !! CPU time of the process at which it gives up [s]
       type(correction_t) :: correction           !! how linear systems are solved
       real(wp) :: work = 0.0_wp                  !! of the correction at its start; 0: no search
       type(line_search_t) :: line
@@ -331,7 +333,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       status = newton_diverged
-      if (.not. associated(self%is_interrupted)) return
+      if (self%deadline < huge(self%deadline)) then
+         if (cpu_seconds() > self%deadline) call raise(error, err_interrupt, &
+            "given up after the time that an increment may take")
+      end if
+      if (allocated(error) .or. .not. associated(self%is_interrupted)) return
       if (self%is_interrupted()) call raise(error, err_interrupt, "interrupted in an increment")
    end subroutine check_interrupt
 

@@ -48,9 +48,11 @@ contains
       type(start_gaps_t) :: contact
       logical :: is_checked(size(scene%surface))
       logical :: is_meant                        !! overclosure is
+      real(wp) :: noise
       integer :: i
 
       is_meant = .false.
+      noise = coordinate_noise(scene)
       if (size(scene%step) > 0) then
          options = scene%step(1)%contact
          is_meant = scene%step(1)%resolves_overclosure
@@ -64,24 +66,30 @@ contains
                call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
                if (.not. allocated(error)) call check_crossing(scene, pair%master, &
                   contact%master, is_checked, error)
-               if (.not. allocated(error)) call check_sides(scene, pair, contact, "master", error)
-               if (.not. allocated(error)) call check_slave_sides(scene, pair, error)
+               if (.not. allocated(error)) call check_sides(scene, pair, contact, &
+                  noise, "master", error)
+               if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, &
+                  error)
                if (allocated(error)) return
             end if
-            call adjust_pair(scene, pair, contact, notes)
+            if (pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0) then
+               call adjust_pair(scene, pair, contact, notes)
+               noise = coordinate_noise(scene)
+            end if
             ! Bodies of one surface may cross each other where their overlap is to be resolved.
             if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) then
               call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
             end if
             if (is_meant .and. .not. allocated(error)) cycle
             if (allocated(error)) return
-            call check_penetration(scene, pair, contact, error)
+            call check_penetration(scene, pair, contact, noise, error)
             if (allocated(error) .and. pair%is_reverse .and. pair%may_choose) then
                deallocate(error)                     ! `check_corners` has let the nodes pass
                call become_guard(scene, pair, notes)
                cycle
             end if
-            if (.not. allocated(error)) call check_corners(scene, pair, options, error)
+            if (.not. allocated(error)) call check_corners(scene, pair, options, &
+               noise, error)
             if (allocated(error)) return
          end associate
       end do
@@ -153,23 +161,25 @@ contains
    end function reversed
 
    !> Master nodes are all behind the slave surface.
-   subroutine check_slave_sides(scene, pair, error)
+   subroutine check_slave_sides(scene, pair, noise, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
+      real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
       type(start_gaps_t) :: contact
 
       if (scene%surface(pair%slave)%is_nodal) return
       call start_gaps_init(contact, scene, reversed(pair), error)
       if (allocated(error)) return
-      call check_sides(scene, reversed(pair), contact, "slave", error)
+      call check_sides(scene, reversed(pair), contact, noise, "slave", error)
    end subroutine check_slave_sides
 
    !> Slave nodes are all behind the master surface: its normals point away from them.
-   subroutine check_sides(scene, pair, contact, title, error)
+   subroutine check_sides(scene, pair, contact, noise, title, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(start_gaps_t), intent(inout) :: contact
+      real(wp), intent(in) :: noise              !! of coordinates [L]
       character(len=*), intent(in) :: title      !! what the deck calls the master of `pair`
       type(error_t), allocatable, intent(out) :: error
       integer :: i, stride, n_over, n_behind
@@ -183,7 +193,7 @@ contains
          call start_gaps_nearest(contact, i, scene, gap, is_over)
          if (.not. is_over) cycle
          n_over = n_over + 1
-         if (is_behind(scene, contact, i, gap)) n_behind = n_behind + 1
+         if (is_behind(scene, contact, i, gap, noise)) n_behind = n_behind + 1
       end do
       if (n_over > 0 .and. n_behind == n_over) then
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
@@ -193,25 +203,26 @@ contains
    end subroutine check_sides
 
    !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
-   pure logical function is_behind(scene, contact, i, gap)
+   pure logical function is_behind(scene, contact, i, gap, noise)
       type(scene_t), intent(in) :: scene
       type(start_gaps_t), intent(in) :: contact
       integer, intent(in) :: i
       real(wp), intent(in) :: gap                !! over contact%edge(i) [L]
+      real(wp), intent(in) :: noise              !! of coordinates [L]
 
       associate (master => contact%master, e => contact%edge(i))
          is_behind = gap < -deepest_overlap*master%length(e)
-         if (is_behind .or. gap >= -noise(scene) .or. contact%slave%n_edge == 0) return
+         if (is_behind .or. gap >= -noise .or. contact%slave%n_edge == 0) return
          is_behind = .not. chain_faces(contact%slave, i, master%edge(:, e), scene%x, scene%u0)
       end associate
    end function is_behind
 
    !> What the coordinates are uncertain by.
-   pure real(wp) function noise(scene)
+   pure real(wp) function coordinate_noise(scene)
       type(scene_t), intent(in) :: scene
 
-      noise = rounding*maxval(abs(scene%x))
-   end function noise
+      coordinate_noise = rounding*maxval(abs(scene%x))
+   end function coordinate_noise
 
    !> Put the slave nodes within ADJUST= of the surface, and those behind it, onto it, free of
    !> stress: along the normal, in the reference configuration. Of two nodes at one place of a
@@ -226,7 +237,6 @@ contains
       logical :: is_meant, is_last
       integer :: i, k, n_moved
 
-      if (pair%adjust_distance < 0.0_wp .and. pair%adjust_set == 0) return
       call start_gaps_measure(contact, scene)
       largest = 0.0_wp
       n_moved = 0
@@ -253,17 +263,18 @@ contains
    end subroutine adjust_pair
 
    !> Slave nodes behind the master surface.
-   subroutine check_penetration(scene, pair, contact, error)
+   subroutine check_penetration(scene, pair, contact, noise, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(start_gaps_t), intent(inout) :: contact
+      real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: limit(contact%n)
       integer :: i, n, own
       character(len=:), allocatable :: found
 
       call start_gaps_measure(contact, scene)
-      limit = noise(scene)
+      limit = noise
       if (contact%is_self) then
          associate (chain => contact%slave, state => contact%state)
             do i = 1, contact%n
@@ -285,10 +296,11 @@ contains
 
    !> Master nodes behind the slave surface, as a corner between two slave nodes: an integrated gap
    !> sees it, but ADJUST= cannot mend it.
-   subroutine check_corners(scene, pair, options, error)
+   subroutine check_corners(scene, pair, options, noise, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(contact_options_t), intent(in) :: options
+      real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
       type(start_gaps_t) :: contact
       logical, allocatable :: is_corner(:)
@@ -304,7 +316,7 @@ contains
       if (allocated(error)) return
       call start_gaps_measure(contact, scene)
       allocate(is_corner(contact%slave%n_edge))
-      allocate(limit(contact%n), source=noise(scene))
+      allocate(limit(contact%n), source=noise)
       call chain_corners(contact%slave, scene%x, options%smoothing_angle, is_corner)
       do k = 1, contact%n
          if (contact%edge(k) == 0) cycle

@@ -8,6 +8,7 @@ module emcon_guards
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
+   use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    implicit none
    private
    public :: guards_find, guard_slack
@@ -23,22 +24,32 @@ contains
       type(contact_pair_t), intent(in) :: pair(:)
       type(surface_t), intent(in) :: surface(:)
       type(contact_pair_t), allocatable, intent(out) :: guard(:)     !! in the order of `pair`
-      integer :: i
+      type(contact_pair_t), allocatable :: all(:)
+      type(name_index_t) :: known                  !! which side's nodes are held or guarded, by pair
+      integer :: i, n
 
-      allocate(guard(0))
+      do i = 1, size(pair)
+         if (holds_nodes(pair(i))) call name_index_put(known, &
+            name_index_pair(pair(i)%slave, pair(i)%master), i)
+      end do
+      allocate(all(2*count(pair%is_guarded)))
+      n = 0
       do i = 1, size(pair)
          if (.not. pair(i)%is_guarded .or. pair(i)%slave == 0 .or. pair(i)%master == 0) cycle
-         call watch(pair, i, .false., guard)
-         if (.not. surface(pair(i)%slave)%is_nodal) call watch(pair, i, .true., guard)
+         call watch(pair, i, .false., known, all, n)
+         if (.not. surface(pair(i)%slave)%is_nodal) call watch(pair, i, .true., known, all, n)
       end do
+      guard = all(:n)
    end subroutine guards_find
 
    !> Append the guard of pair `i`, or of it with its sides exchanged, unless there is one.
-   pure subroutine watch(pair, i, is_reverse, guard)
+   pure subroutine watch(pair, i, is_reverse, known, guard, n)
       type(contact_pair_t), intent(in) :: pair(:)
       integer, intent(in) :: i
       logical, intent(in) :: is_reverse
-      type(contact_pair_t), allocatable, intent(inout) :: guard(:)
+      type(name_index_t), intent(inout) :: known
+      type(contact_pair_t), intent(inout) :: guard(:)
+      integer, intent(inout) :: n                  !! guards so far
       type(contact_pair_t) :: new
 
       new = pair(i)
@@ -46,23 +57,23 @@ contains
          new%slave = pair(i)%master
          new%master = pair(i)%slave
       end if
-      if (any(holds_nodes(pair, new%slave, new%master)) .or. &
-         any(guard%slave == new%slave .and. guard%master == new%master)) return
+      if (name_index_find(known, name_index_pair(new%slave, new%master)) > 0) return
+      call name_index_put(known, name_index_pair(new%slave, new%master), i)
       new%formulation = formulation_nts
       new%both_sides = .true.
       new%is_reverse = is_reverse
       new%slack = guard_slack
       new%of_pair = i
-      guard = [guard, new]
+      n = n + 1
+      guard(n) = new
    end subroutine watch
 
-   !> Does a pair hold each node of `slave` in front of `master`?
-   elemental logical function holds_nodes(pair, slave, master)
+   !> Does a pair hold each node of its slave in front of its master?
+   elemental logical function holds_nodes(pair)
       type(contact_pair_t), intent(in) :: pair
-      integer, intent(in) :: slave, master
 
-      holds_nodes = pair%formulation == formulation_nts .and. pair%slave == slave &
-         .and. pair%master == master .and. (slave /= master .or. pair%both_sides)
+      holds_nodes = pair%formulation == formulation_nts .and. &
+         (pair%slave /= pair%master .or. pair%both_sides)
    end function holds_nodes
 
 end module emcon_guards

@@ -245,7 +245,7 @@ contains
          end do
          call nts%begin_step(scene%x, u, du)
          do i = 1, nts%n_constraint
-            call nts_nearest(all, i, scene%x, u, gap, is_over)
+            call nts_nearest(all, i, scene%x, u, 0.0_wp*u, gap, is_over)
             if (distance(all%node(i), all%master%edge(:, all%edge(i))) > 2.0_wp*length_of(du)) cycle
             n_near = n_near + 1
             if (nts%edge(i) /= all%edge(i)) call check_near(error, &
@@ -568,7 +568,7 @@ contains
             node = block_node(block, i, side)
             k = findloc(nts%node, node, 1)
             s = scene%x(1, node)
-            call nts_nearest(all, k, scene%x, u, gap, is_over)
+            call nts_nearest(all, k, scene%x, u, 0.0_wp*u, gap, is_over)
             call check_equal(error, nts%edge(k), all%edge(k), "edge among the candidates")
             if (side == 1 .and. s > leg + pi*radius + 1.0_wp) then
                call check_near(error, gap, 2.0_wp*(radius - thickness), tol, 10.0_wp, &
