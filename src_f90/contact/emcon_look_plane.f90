@@ -26,6 +26,7 @@ module emcon_look_plane
    !> The deepest overlap that was found.
    type :: overlap_t
       real(wp) :: depth = 0.0_wp                 !! per length of the edge; 0: none
+      real(wp) :: length = 0.0_wp                !! of the edge [L]
       integer :: node = 0                        !! that is behind, or the nearest on its edge
       integer :: edge(2) = 0                     !! the nodes of the edge that it is behind
       !> The deepest one of edges as they are, where they stand for curves.
@@ -89,7 +90,7 @@ contains
       overlap_names = node == self%node .or. any(node == self%edge)
    end function overlap_names
 
-   !> The bodies and nodes of an overlap.
+   !> The bodies and nodes of an overlap, and how deep it is as a length.
    subroutine overlap_text(self, label, body, text)
       type(overlap_t), intent(in) :: self
       integer, intent(in) :: label(:), body(:)   !! (n_node) the user's numbers, bodies from 1
@@ -97,7 +98,8 @@ contains
 
       associate (edge => self%edge)
          text = "node " // to_text(label(self%node)) // " of body " // &
-            to_text(body(self%node)) // " behind the edge from node " // &
+            to_text(body(self%node)) // " is " // to_text(self%depth*self%length, 3) // &
+            " behind the edge from node " // &
             to_text(label(edge(1))) // " to " // to_text(label(edge(2))) // " of body " // &
             to_text(body(edge(1)))
       end associate
@@ -377,6 +379,7 @@ contains
             passing_thin*self%outline%thickness(nearest%edge))) return
          overlap%depth = depth/length
          overlap%node = edge(merge(1, 2, share < 0.5_wp), e)
+         overlap%length = length
          overlap%edge = edge(:, nearest%edge)
       end associate
    end subroutine take_deeper

@@ -18,7 +18,7 @@ module emcon_friction
    implicit none
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_idle, &
-      friction_keep, friction_turn, friction_close, friction_work, friction_missed, friction_grip, &
+      friction_keep, friction_turn, friction_close, friction_work, friction_missed, &
       friction_slides, friction_holds
 
    !> Forces that differ by less than this part of the largest push are one.
@@ -265,40 +265,29 @@ contains
       if (set%item(k)%rubs) work = condition_drag(set%item(k), set%lam(k))*set%item(k)%slip
    end function friction_work
 
-   !> The pushes of conditions that rub times their edges: an energy also where nothing moves.
-   pure real(wp) function friction_grip(set) result(grip)
-      type(constraint_set_t), intent(in) :: set
-      integer :: k
-
-      grip = 0.0_wp
-      do k = set%n_held + 1, set%n
-         if (set%item(k)%rubs) grip = grip + abs(set%lam(k))*set%item(k)%size
-      end do
-   end function friction_grip
-
-   !> How far the laws of contact and friction are missed at worst, relative to the largest push.
-   pure real(wp) function friction_missed(self, system, set) result(missed)
+   !> How far the laws of contact and friction are missed at worst, and the largest push.
+   pure subroutine friction_missed(self, system, set, missed, largest)
       type(friction_t), intent(in) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set  !! of the step, solved
+      real(wp), intent(out) :: missed, largest   !! 0 without friction [M L/T^2]
       type(touch_t) :: at
-      real(wp) :: largest
       integer :: k
 
       missed = 0.0_wp
+      largest = 0.0_wp
       if (.not. self%is_on .or. set%n == set%n_held) return
       largest = maxval(abs(set%lam(set%n_held + 1:set%n)))
-      if (.not. largest > 0.0_wp) return
       do k = set%n_held + 1, set%n
          associate (item => set%item(k))
             if (.not. item%rubs) cycle
             at = touch_t(set%lam(k), condition_drag(item, set%lam(k)), set%defect(k), item%slip, &
                self%lead(set%id(k)), slip_rounding*item%size)
             missed = max(missed, friction_violation(at, self%mu(set%id(k)), &
-               stiffness_at(system, item))/largest)
+               stiffness_at(system, item)))
          end associate
       end do
-   end function friction_missed
+   end subroutine friction_missed
 
    !> The mean stiffness of the system at the slave node of a condition: of its unknowns, or those
    !> that it follows. Where it is held and has none, that at the next node of the condition.

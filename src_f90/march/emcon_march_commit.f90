@@ -6,7 +6,7 @@ module emcon_march_commit
    use emcon_dashpots, only : dashpots_work
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
-   use emcon_friction, only : friction_grip, friction_missed, friction_slides, friction_work
+   use emcon_friction, only : friction_missed, friction_slides, friction_work
    use emcon_friction_limit, only : friction_limit_tell
    use emcon_holding, only : holding_t
    use emcon_keeping, only : keeping_commit
@@ -133,6 +133,7 @@ contains
       type(march_t), intent(in) :: self
       real(wp), intent(in) :: h                  !! > 0 [T]
       type(increment_t), intent(inout) :: increment
+      real(wp) :: missed, largest
 
       call stand_off_add(increment%stand_off, self%system, self%active%set, h)
       increment%give = max(increment%give, softness_depth(self%active%softness, &
@@ -141,10 +142,23 @@ contains
          softness_depth(self%active%softness, self%explicit%soft(self%explicit%i_start)))
       increment%n_augmentation = max(increment%n_augmentation, &
          self%active%softness%n_augmentation)
-      increment%law_missed = max(increment%law_missed, &
-         friction_missed(self%active%friction, self%system, self%active%set))
-      increment%grip = max(increment%grip, friction_grip(self%active%set))
+      call friction_missed(self%active%friction, self%system, self%active%set, missed, largest)
+      increment%law_missed = max(increment%law_missed, missed)
+      increment%largest_push = max(increment%largest_push, largest)
+      increment%work_scale = hypot(increment%work_scale, work_scale(self))
    end subroutine tell_gaps
+
+   !> The forces on nodes times the largest coordinate: works are rounded by a part of that, also
+   !> where nothing moves [M L^2/T^2].
+   pure real(wp) function work_scale(self)
+      type(march_t), intent(in) :: self
+
+      associate (motion => self%motion)
+         work_scale = (norm2(self%system%response%part(role_external)%force) &
+            + norm2(self%state%reaction) + norm2(self%newton%contact)) &
+            *(maxval(abs(motion%x)) + maxval(abs(self%state%u)) + maxval(abs(motion%du)))
+      end associate
+   end function work_scale
 
    !> The velocities at the end, and no reaction where they are unknown.
    subroutine find_velocities(self)

@@ -38,8 +38,9 @@ module emcon_march_types
       real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
       !> Largest relative residual above Newton's tolerance that was accepted; 0: there is none.
       real(wp) :: unconverged = 0.0_wp
-      real(wp) :: law_missed = 0.0_wp            !! of contact and friction, by the largest push
-      real(wp) :: grip = 0.0_wp                  !! pushes of contacts that rub, times their edges
+      real(wp) :: law_missed = 0.0_wp            !! of contact and friction, at most [M L/T^2]
+      real(wp) :: largest_push = 0.0_wp          !! of contacts where there is friction [M L/T^2]
+      real(wp) :: work_scale = 0.0_wp            !! nodal forces times coordinates [M L^2/T^2]
       type(notes_t) :: notes                     !! for the log
       type(notes_t) :: warnings                  !! for the log, the user and the verdict
    end type increment_t

@@ -76,7 +76,7 @@ contains
       type(bent_body_t) :: found
       type(report_row_t) :: row
 
-      call bent_body_find(stepper%march, stepper%scene, stepper%verdict%largest_energy, found)
+      call bent_body_find(stepper%march, stepper%scene, stepper%verdict%energy%largest, found)
       if (found%body == 0) return
       call row_begin(row, "advice", "body")
       call row_put(row, "body", found%body, " #")

@@ -11,8 +11,9 @@ module emcon_record
    use emcon_stepper, only : stepper_t
    use emcon_text, only : notes_t, string_t, to_text
    use emcon_timer, only : wall_seconds
-   use emcon_verdict, only : verdict_balance_lines, verdict_end, verdict_t
+   use emcon_verdict, only : verdict_end, verdict_t
    use emcon_verdict_file, only : verdict_write
+   use emcon_verdict_lines, only : verdict_balance_lines
    implicit none
    private
    public :: record_t, record_begin, record_increment, record_failure, record_end, record_drop

@@ -29,9 +29,9 @@ module emcon_run
    use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_text, only : note_add, notes_t, string_t, to_text
    use emcon_timer, only : wall_seconds
-   use emcon_verdict, only : verdict_balance_lines, verdict_end, verdict_is_failure, &
-      verdict_is_good, verdict_line
+   use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good
    use emcon_verdict_file, only : verdict_write
+   use emcon_verdict_lines, only : verdict_balance_lines, verdict_line
    implicit none
    private
    public :: run_options_t, run_report_t, interrupt_interface

@@ -1,7 +1,9 @@
 !> The verdict for scripts, as JSON, and its running figures in a restart file.
 module emcon_verdict_file
+   use emcon_energy_watch, only : energy_watch_t
    use emcon_errors, only : error_t
    use emcon_files, only : file_close, file_open, file_put, file_remove, file_rename, file_t
+   use emcon_force_scatter, only : force_scatter_t, scatter_of
    use emcon_json, only : json_number, json_text, json_texts
    use emcon_kinds, only : wp
    use emcon_march, only : march_t
@@ -9,7 +11,7 @@ module emcon_verdict_file
    use emcon_stand_off, only : stand_off_mean
    use emcon_step_control, only : control_sizes, n_why, step_control_t, why_text
    use emcon_text, only : notes_t, string_t
-   use emcon_verdict, only : verdict_end, verdict_is_good, verdict_t
+   use emcon_verdict, only : verdict_end, verdict_is_good, verdict_law_violation, verdict_t
    use emcon_version, only : precision_names, this_precision
    implicit none
    private
@@ -89,9 +91,9 @@ contains
          call json_number(line, "contact_energy", ledger%contact_energy)
          call json_number(line, "total", ledger%total)
       end associate
-      call json_number(line, "total_at_start", self%total0)
-      call json_number(line, "largest_energy", self%largest_energy)
-      call json_number(line, "largest_energy_error", self%largest_drift)
+      call json_number(line, "total_at_start", self%energy%at_start)
+      call json_number(line, "largest_energy", self%energy%largest)
+      call json_number(line, "largest_energy_error", self%energy%largest_error)
       call json_number(line, "penetration", self%deepest)
       call json_number(line, "penetration_time", self%deepest_time)
       call json_text(line, "penetration_place", self%place)
@@ -99,11 +101,14 @@ contains
          call json_number(line, "give", self%give)
          call json_number(line, "give_time", self%give_time)
       end if
-      if (march%active%friction%is_on) call json_number(line, "law_violation", self%law_missed)
+      if (march%active%friction%is_on) call json_number(line, "law_violation", &
+         verdict_law_violation(self))
       if (self%most_augmentations > 0) call json_number(line, "augmentations", &
          real(self%most_augmentations, wp))
       call json_number(line, "stand_off", self%stand_off%largest)
       call json_number(line, "mean_stand_off", stand_off_mean(self%stand_off))
+      if (size(self%scatter) > 0) call json_number(line, "force_scatter", &
+         maxval(scatter_of(self%scatter)))
       call json_number(line, "unconverged", self%unconverged)
       if (size(self%small%section) > 0) then
          call json_number(line, "linear_rotation", maxval(self%small%rotation))
@@ -135,13 +140,7 @@ contains
       type(verdict_t), intent(inout) :: self
       type(restart_t), intent(inout) :: restart
 
-      call restart_exchange(restart, "verdict", self%total0)
-      call restart_exchange(restart, "verdict", self%largest_energy)
-      call restart_exchange(restart, "verdict", self%largest_drift)
-      call restart_exchange(restart, "verdict", self%reference)
-      call restart_exchange(restart, "verdict", self%dynamic_drift)
-      call restart_exchange(restart, "verdict", self%shown_reference)
-      call restart_exchange(restart, "verdict", self%shown_drift)
+      call exchange_energy(self%energy, restart)
       call restart_exchange(restart, "verdict", self%deepest)
       call restart_exchange(restart, "verdict", self%deepest_time)
       call restart_exchange(restart, "verdict", self%unconverged)
@@ -152,7 +151,6 @@ contains
       call restart_exchange(restart, "effort", self%n_newton)
       call restart_exchange(restart, "effort", self%n_cut)
       call restart_exchange(restart, "effort", self%n_warning)
-      call restart_exchange(restart, "effort", self%has_dynamics)
       call restart_exchange(restart, "effort", self%n_guarded)
       call restart_exchange(restart, "effort", self%n_held)
       call restart_exchange(restart, "effort", self%most_held)
@@ -166,18 +164,55 @@ contains
          call restart_exchange(restart, "give", self%give_time)
          call restart_exchange(restart, "augmentations", self%most_augmentations)
       end if
-      if (restart_offers(restart, "contact_made", max(self%contact_made, self%contact_kept, &
-         abs(self%contact_reference)) > 0.0_wp)) then
-         call restart_exchange(restart, "contact_made", self%contact_reference)
-         call restart_exchange(restart, "contact_made", self%contact_made)
-         call restart_exchange(restart, "contact_made", self%contact_kept)
-      end if
-      if (restart_offers(restart, "law_missed", self%grip > 0.0_wp)) then
+      if (restart_offers(restart, "law_missed", self%largest_push > 0.0_wp)) then
          call restart_exchange(restart, "law_missed", self%law_missed)
-         call restart_exchange(restart, "law_missed", self%grip)
+         call restart_exchange(restart, "law_missed", self%largest_push)
       end if
+      call exchange_scatter(self%scatter, restart)
       call exchange_texts(self, restart)
    end subroutine verdict_exchange
+
+   !> The figures of the energy balance.
+   subroutine exchange_energy(energy, restart)
+      type(energy_watch_t), intent(inout) :: energy
+      type(restart_t), intent(inout) :: restart
+
+      call restart_exchange(restart, "verdict", energy%at_start)
+      call restart_exchange(restart, "verdict", energy%largest)
+      call restart_exchange(restart, "verdict", energy%largest_error)
+      call restart_exchange(restart, "verdict", energy%reference)
+      call restart_exchange(restart, "verdict", energy%dynamic_error)
+      call restart_exchange(restart, "verdict", energy%shown_reference)
+      call restart_exchange(restart, "verdict", energy%shown_error)
+      call restart_exchange(restart, "verdict", energy%contact_reference)
+      call restart_exchange(restart, "verdict", energy%contact_made)
+      call restart_exchange(restart, "verdict", energy%contact_kept)
+      call restart_exchange(restart, "verdict", energy%contact_before)
+      call restart_exchange(restart, "verdict", energy%contact_sum)
+      call restart_exchange(restart, "verdict", energy%contact_taken)
+      call restart_exchange(restart, "verdict", energy%stabilization)
+      call restart_exchange(restart, "verdict", energy%scale)
+      call restart_exchange(restart, "effort", energy%has_dynamics)
+      call restart_exchange(restart, "effort", energy%is_explicit)
+   end subroutine exchange_energy
+
+   !> How the force of each pair scatters.
+   subroutine exchange_scatter(scatter, restart)
+      type(force_scatter_t), intent(inout) :: scatter(:)   !! (pairs)
+      type(restart_t), intent(inout) :: restart
+      integer :: p
+
+      do p = 1, size(scatter)
+         call restart_exchange(restart, "force_scatter", scatter(p)%last)
+         call restart_exchange(restart, "force_scatter", scatter(p)%before)
+         call restart_exchange(restart, "force_scatter", scatter(p)%force)
+         call restart_exchange(restart, "force_scatter", scatter(p)%off)
+         call restart_exchange(restart, "force_counts", scatter(p)%n_force)
+         call restart_exchange(restart, "force_counts", scatter(p)%n_dip)
+         call restart_exchange(restart, "force_counts", scatter(p)%n_open)
+         call restart_exchange(restart, "force_counts", scatter(p)%is_falling)
+      end do
+   end subroutine exchange_scatter
 
    !> Place and warnings, which are in the file only if there are some.
    subroutine exchange_texts(self, restart)

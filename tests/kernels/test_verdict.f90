@@ -1,11 +1,16 @@
 !> The verdict from running figures.
 module test_verdict
-   use check, only : check_equal, check_true, test_case_t
+   use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_segment
+   use emcon_energy_watch, only : energy_rounding
+   use emcon_far_nodes, only : far_element_find
+   use emcon_force_scatter, only : force_scatter_t, scatter_follow, scatter_is_comb, scatter_of
    use emcon_kinds, only : wp
-   use emcon_verdict, only : guard_advice, verdict_end, verdict_is_failure, verdict_is_good, &
-      verdict_line, verdict_t
+   use emcon_pair_sums, only : pair_sum_t
+   use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good, &
+      verdict_t
+   use emcon_verdict_lines, only : guard_advice, verdict_line
    implicit none
    private
    public :: collect_verdict
@@ -19,6 +24,13 @@ contains
          test_case_t("a clean run is good", test_good), &
          test_case_t("what is bad is named", test_bad), &
          test_case_t("a tenth of an edge is a failure", test_deep), &
+         test_case_t("a balance that is wrong in six digits is a failure", test_balance), &
+         test_case_t("round-off of works is no error of the balance", test_rounding), &
+         test_case_t("air across which forces act is told, or bad", test_air), &
+         test_case_t("linear sections that turn are bad", test_turned), &
+         test_case_t("what impacts take is told, of explicit steps bad", test_taken), &
+         test_case_t("elements far from the origin keep few digits", test_far), &
+         test_case_t("scatter of a comb, of a smooth force, of one push", test_scatter), &
          test_case_t("a run that failed is not good", test_failed), &
          test_case_t("what pairs can do to need no guards", test_advice)]
    end subroutine collect_verdict
@@ -27,9 +39,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(verdict_t) :: verdict
 
-      verdict%largest_energy = 2.0_wp
-      verdict%dynamic_drift = energy_bar()
-      verdict%largest_drift = 1.0_wp             ! of statics: shown, not judged
+      verdict%energy%largest = 2.0_wp
+      verdict%energy%dynamic_error = energy_bar()
+      verdict%energy%largest_error = 1.0_wp             ! of statics: shown, not judged
       verdict%n_warning = 3
       call verdict_end(verdict)
       call check_true(error, verdict_is_good(verdict), "good")
@@ -41,11 +53,12 @@ contains
       type(verdict_t) :: verdict
       character(len=:), allocatable :: line
 
-      verdict%largest_energy = 2.0_wp
-      verdict%dynamic_drift = 3.0_wp*energy_bar()
+      verdict%energy%largest = 2.0_wp
+      verdict%energy%dynamic_error = 3.0_wp*energy_bar()
       verdict%unconverged = 1.0e-3_wp
       verdict%deepest = 1.0e-2_wp
-      verdict%law_missed = 0.5_wp
+      verdict%law_missed = 1.5_wp
+      verdict%largest_push = 3.0_wp
       call verdict_end(verdict)
       call check_equal(error, verdict%reasons%n, 4, "reasons")
       call verdict_line(verdict, line)
@@ -73,12 +86,153 @@ contains
       call check_true(error, verdict_is_failure(verdict, .false.), "a failure")
    end subroutine test_deep
 
+   !> One part in a million: nothing to do with round-off in double and more.
+   subroutine test_balance(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+      real(wp) :: failing
+
+      failing = 1.0e-6_wp
+      if (precision(1.0_wp) < 15) failing = 1.0e-2_wp
+      verdict%energy%largest = 2.0_wp
+      verdict%energy%dynamic_error = 1.9_wp*failing
+      call verdict_end(verdict)
+      call check_true(error, .not. verdict_is_good(verdict), "bad")
+      call check_true(error, .not. verdict_is_failure(verdict, .false.), "no failure")
+      verdict%energy%dynamic_error = 2.1_wp*failing
+      call check_true(error, verdict_is_failure(verdict, .false.), "a failure")
+   end subroutine test_balance
+
+   !> At rest there is no energy, and forces have done no work but round-off.
+   subroutine test_rounding(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+
+      verdict%energy%scale = 3.0_wp
+      verdict%energy%largest = tiny(1.0_wp)
+      verdict%energy%dynamic_error = 0.9_wp*energy_rounding(verdict%energy)
+      verdict%energy%stabilization = verdict%energy%dynamic_error
+      call verdict_end(verdict)
+      call check_true(error, verdict_is_good(verdict), "good")
+      call check_true(error, energy_rounding(verdict%energy) <= 100.0_wp*epsilon(1.0_wp), "small")
+      verdict%energy%dynamic_error = 1.1_wp*energy_rounding(verdict%energy)
+      call verdict_end(verdict)
+      call check_true(error, verdict_is_failure(verdict, .false.), "all of the energy")
+   end subroutine test_rounding
+
+   subroutine test_air(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+      character(len=:), allocatable :: line
+      real(wp), parameter :: gap(3) = [0.09_wp, 0.3_wp, 0.51_wp]
+      integer, parameter :: n_warning(3) = [0, 1, 0], n_reason(3) = [0, 0, 1]
+      integer :: k
+
+      do k = 1, size(gap)
+         verdict = verdict_t()
+         verdict%stand_off%largest = 10.0_wp     ! of one touch that gives little impulse
+         verdict%stand_off%impulse = 4.0_wp
+         verdict%stand_off%impulse_gap = 4.0_wp*gap(k)
+         call verdict_end(verdict)
+         call check_equal(error, verdict%n_warning, n_warning(k), "warnings")
+         call check_equal(error, verdict%reasons%n, n_reason(k), "reasons")
+      end do
+      call verdict_line(verdict, line)
+      call check_true(error, index(line, "MASSLESS") > 0, line)
+   end subroutine test_air
+
+   subroutine test_turned(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+
+      verdict%small%section = [1]
+      verdict%small%rotation = [0.19_wp]
+      verdict%small%strain = [0.0_wp]
+      call verdict_end(verdict)
+      call check_true(error, verdict_is_good(verdict), "good")
+      verdict%small%rotation = 0.21_wp
+      call verdict_end(verdict)
+      call check_true(error, .not. verdict_is_good(verdict), "bad")
+   end subroutine test_turned
+
+   subroutine test_taken(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(verdict_t) :: verdict
+      real(wp), parameter :: taken(3) = [0.009_wp, 0.04_wp, 0.09_wp]
+      integer :: k
+
+      do k = 1, size(taken)
+         verdict = verdict_t()
+         verdict%energy%largest = 2.0_wp
+         verdict%energy%contact_taken = 2.0_wp*taken(k)
+         call verdict_end(verdict)
+         call check_true(error, verdict_is_good(verdict), "asked for")
+         call check_equal(error, verdict%n_warning, merge(0, 1, k == 1), "told")
+         verdict%energy%is_explicit = .true.
+         verdict%n_warning = 0
+         call verdict_end(verdict)
+         call check_true(error, verdict_is_good(verdict) .neqv. k == 3, "explicit")
+         call check_equal(error, verdict%n_warning, merge(1, 0, k == 2), "told of explicit steps")
+      end do
+   end subroutine test_taken
+
+   !> Of two triangles the second has an edge of 1/16, of which 1.2 digits fewer are left.
+   subroutine test_far(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: x(2, 4), u(2, 4), away
+      integer :: element, digits
+      integer, parameter :: node(4, 2) = reshape([1, 2, 3, 0, 2, 4, 3, 0], [4, 2])
+
+      x = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 0.0625_wp], [2, 4])
+      u = 0.0_wp
+      call far_element_find(x, u, node, element, digits)
+      call check_equal(error, element, 0, "at the origin")
+      ! A tenth of the digits that are allowed to be lost, for an edge of 1.
+      away = 0.1_wp*(10.0_wp**(-least_digits()))/epsilon(1.0_wp)
+      u(2, :) = -away
+      call far_element_find(x, u, node, element, digits)
+      call check_equal(error, element, 2, "the short edge")
+      call check_equal(error, digits, least_digits() - 1, "digits")
+   end subroutine test_far
+
+   !> Of distances, in the precision of the build.
+   pure integer function least_digits()
+      least_digits = 8
+      if (precision(1.0_wp) < 15) least_digits = 3
+      if (precision(1.0_wp) > 15) least_digits = 16
+   end function least_digits
+
+   !> Of forces 2, 0, 2, 0 each is 2 off its neighbours, by a root mean square of sqrt(2). A static
+   !> step in between, a rest, a single push and a slow wave are no comb.
+   subroutine test_scatter(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(force_scatter_t) :: comb, wave, push
+      integer, parameter :: n = 4000
+      integer :: k
+
+      do k = 1, n
+         call scatter_follow(comb, pair_sum_t(weight=merge(1.0_wp, 0.0_wp, mod(k, 2) == 1), &
+            span=0.5_wp), .true.)
+         call scatter_follow(wave, pair_sum_t(weight=1.0_wp + sin(1.2_wp*k), span=1.0_wp), .true.)
+         call scatter_follow(push, pair_sum_t(weight=merge(1.0_wp, 0.0_wp, mod(k, 20) == 0), &
+            span=1.0_wp), .true.)
+      end do
+      call check_near(error, scatter_of(comb), sqrt(2.0_wp), 1.0_wp/n, 1.0_wp, "2, 0, 2, 0")
+      call check_true(error, scatter_is_comb(comb), "a comb")
+      call check_near(error, scatter_of(wave), (1.0_wp - cos(1.2_wp))/sqrt(3.0_wp), 4.0_wp/n, &
+         1.0_wp, "a wave of five increments")
+      call check_true(error, .not. scatter_is_comb(wave), "no comb")
+      call check_true(error, .not. scatter_is_comb(push), "impacts")
+      call scatter_follow(push, pair_sum_t(weight=1.0_wp, span=1.0_wp), .false.)
+      call check_equal(error, push%n_force, n/20, "statics")
+   end subroutine test_scatter
+
    subroutine test_failed(error)
       type(error_t), allocatable, intent(out) :: error
       type(verdict_t) :: verdict
       character(len=:), allocatable :: line
 
-      verdict%has_dynamics = .true.
+      verdict%energy%has_dynamics = .true.
       call verdict_end(verdict, "the analysis stops")
       call check_true(error, .not. verdict_is_good(verdict), "not good")
       call verdict_line(verdict, line)

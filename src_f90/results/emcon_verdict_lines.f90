@@ -1,0 +1,277 @@
+!> The closing balance of a run and its verdict, as lines for the user.
+module emcon_verdict_lines
+   use emcon_energy_watch, only : closing_text, energy_bar, energy_rounding
+   use emcon_force_scatter, only : scatter_is_comb, scatter_of
+   use emcon_interactions, only : contact_pair_t, formulation_nts
+   use emcon_kinds, only : wp
+   use emcon_ledger, only : ledger_t
+   use emcon_march, only : march_t
+   use emcon_scene, only : scene_t
+   use emcon_small_range, only : small_limit, small_range_t
+   use emcon_stand_off, only : stand_off_mean
+   use emcon_step_control, only : control_sizes, n_why, why_text
+   use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   use emcon_verdict, only : touching, verdict_has_stray, verdict_law_violation, verdict_t
+   implicit none
+   private
+   public :: verdict_balance_lines, verdict_line, guard_advice
+
+   !> Stand-offs below that part of an edge are round-off.
+   real(wp), parameter :: rounding = sqrt(epsilon(1.0_wp))
+
+contains
+
+   !> The verdict in a line.
+   subroutine verdict_line(self, line)
+      type(verdict_t), intent(in) :: self
+      character(len=:), allocatable, intent(out) :: line   !! "verdict: good ..." or what is bad
+      integer :: i
+
+      if (.not. self%is_complete) then
+         line = "verdict: NOT COMPLETED"
+      else if (self%reasons%n > 0) then
+         line = "verdict: BAD"
+      else
+         call good_line(self, line)
+      end if
+      do i = 1, self%reasons%n
+         line = line // merge(": ", "; ", i == 1) // self%reasons%item(i)%text
+      end do
+      if (self%n_warning > 0) line = line // "; warnings: " // to_text(self%n_warning)
+   end subroutine verdict_line
+
+   !> What a good run is good for.
+   subroutine good_line(self, line)
+      type(verdict_t), intent(in) :: self
+      character(len=:), allocatable, intent(out) :: line
+      character(len=:), allocatable :: digits
+
+      line = "verdict: good: "
+      associate (energy => self%energy)
+         if (energy%has_dynamics) then
+            call closing_text(digits)
+            line = line // "the energy balance closes to " // digits // " digits or better, "
+         end if
+         if (energy%shown_error > energy_bar*energy%largest + energy_rounding(energy)) line = line &
+            // "the scheme does not keep energy: the balance is off by " // &
+            to_text(energy%shown_error/energy%largest, 3) // " of the largest energy (shown, " // &
+            "not judged), "
+      end associate
+      if (allocated(self%largest_force)) then
+         if (self%give > 0.0_wp) then
+            line = line // "contact gives way by up to " // to_text(self%give, 3) // &
+               " of an edge and no more penetrates, "
+         else if (size(self%largest_force) > 0) then
+            line = line // "nothing penetrates" // trim(merge(" where contact pairs are", &
+               repeat(" ", 24), verdict_has_stray(self))) // ", "
+         end if
+      end if
+      line = line // "all residuals are within the tolerance"
+   end subroutine good_line
+
+   !> The closing balance, the warnings and the verdict.
+   subroutine verdict_balance_lines(self, scene, march, lines)
+      type(verdict_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(notes_t), intent(out) :: lines
+      character(len=:), allocatable :: text
+
+      if (march%state%increment > 0) then
+         call note_add(lines, "increments " // to_text(march%state%increment) // ", time " // &
+            to_text(march%state%time, 9) // ", Newton iterations " // to_text(self%n_newton) // &
+            ", cuts " // to_text(self%n_cut))
+         call add_energies(self, march%ledger, lines)
+         call add_checked(self, march, lines)
+         if (self%n_guarded > 0) then
+            call guard_advice(scene%pair, text)
+            call note_add(lines, "guards hold nodes in " // to_text(self%n_guarded) // &
+               " increments; to need none: " // text)
+         end if
+         if (self%n_held > 0) call note_add(lines, "contacts that kept opening and closing " // &
+            "were held closed in " // to_text(self%n_held) // " increments, at most " // &
+            to_text(self%most_held) // " of them in one")
+         if (self%stand_off%largest > rounding) call note_add(lines, &
+            "largest stand-off (gap across which contact forces act) " // &
+            to_text(self%stand_off%largest, 3) // " of an element, mean over the impulse " // &
+            to_text(stand_off_mean(self%stand_off), 3))
+         call add_small(self%small, scene, lines)
+         call add_sizes(march, lines)
+         call add_pairs(self, scene, march, lines)
+      end if
+      call verdict_line(self, text)
+      call note_add(lines, text)
+   end subroutine verdict_balance_lines
+
+   !> Energies, what was taken of them, and how the balance closes.
+   subroutine add_energies(self, ledger, lines)
+      type(verdict_t), intent(in) :: self
+      type(ledger_t), intent(in) :: ledger
+      type(notes_t), intent(inout) :: lines
+      character(len=:), allocatable :: text
+
+      call note_add(lines, "energy: kinetic " // to_text(ledger%kinetic, 9) // &
+         ", strain " // to_text(ledger%strain, 9) // ", external work " // &
+         to_text(ledger%external_work, 9) // ", contact work " // to_text(ledger%contact_work, 9))
+      call add_losses(self, ledger, lines)
+      associate (energy => self%energy)
+         call note_add(lines, "total at start " // to_text(energy%at_start, 12) // ", at end " // &
+            to_text(ledger%total, 12))
+         text = "largest error of the energy balance "
+         if (energy%largest_error > energy_rounding(energy) .or. &
+            energy%largest_error <= energy_bar*energy%largest) then
+            text = text // to_text(energy%largest_error/max(energy%largest, tiny(1.0_wp)), 3) // &
+               " of the largest energy"
+         else
+            text = text // to_text(energy%largest_error, 3) // ", round-off of the forces"
+         end if
+         call note_add(lines, text)
+         if (abs(energy%stabilization) > 0.0_wp) call note_add(lines, &
+            "work of what stabilization bears " // to_text(energy%stabilization &
+            /max(energy%largest, tiny(1.0_wp)), 3) // " of the largest energy")
+      end associate
+   end subroutine add_energies
+
+   !> What was taken besides, and what contact gave way by.
+   subroutine add_losses(self, ledger, lines)
+      type(verdict_t), intent(in) :: self
+      type(ledger_t), intent(in) :: ledger
+      type(notes_t), intent(inout) :: lines
+
+      if (ledger%restitution > 0.0_wp) call note_add(lines, "impacts with RESTITUTION below 1 " // &
+         "took " // to_text(ledger%restitution, 9) // ", part of contact work")
+      if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "SCHEME=ENERGY DECAYING took " // &
+         to_text(ledger%decay, 9))
+      if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "material damping took " // &
+         to_text(ledger%damping, 9))
+      if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction took " // &
+         to_text(ledger%friction, 9) // "; friction law satisfied to " // &
+         to_text(verdict_law_violation(self), 2) // " of the largest force")
+      if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping took " // &
+         to_text(ledger%contact_damping, 9))
+      if (self%give > 0.0_wp) call note_add(lines, "contact gave way by at most " // &
+         to_text(self%give, 3) // " of an edge, at time " // to_text(self%give_time, 9) // &
+         "; stored at the end " // to_text(ledger%contact_energy, 9))
+      if (self%most_augmentations > 0) call note_add(lines, "augmentations " // &
+         to_text(self%most_augmentations) // " at most in a solve")
+   end subroutine add_losses
+
+   !> Whether overlap was looked for, and the deepest.
+   subroutine add_checked(self, march, lines)
+      type(verdict_t), intent(in) :: self
+      type(march_t), intent(in) :: march
+      type(notes_t), intent(inout) :: lines
+
+      associate (outline => march%judge%look%outline)
+         if (outline%n_piece == 0) then
+            call note_add(lines, "overlap not checked: no *CONTACT PAIR or *CONTACT names " // &
+               "a surface")
+            return
+         end if
+         call note_add(lines, "overlap checked: " // to_text(outline%n_piece) // " bodies, " // &
+            to_text(size(outline%edge, 2)) // " edges; deepest penetration " // &
+            to_text(self%deepest, 3) // " of an element")
+         if (self%of_edges > touching) call note_add(lines, "edges of curved surfaces " // &
+            "overlap by up to " // to_text(self%of_edges, 3) // &
+            " of their length, the curves that they are chords of do not")
+      end associate
+   end subroutine add_checked
+
+   !> What linear sections have met.
+   subroutine add_small(small, scene, lines)
+      type(small_range_t), intent(in) :: small
+      type(scene_t), intent(in) :: scene
+      type(notes_t), intent(inout) :: lines
+      integer :: i
+
+      do i = 1, size(small%section)
+         call note_add(lines, "linear section " // scene%section(small%section(i))%set // &
+            ": rotation up to " // to_text(small%rotation(i), 3) // " rad, strain up to " // &
+            to_text(small%strain(i), 3) // trim(merge("            ", ": NOT small ", &
+            max(small%rotation(i), small%strain(i)) <= small_limit)))
+      end do
+   end subroutine add_small
+
+   !> Which sizes increments had that chose them, and what made them smaller.
+   subroutine add_sizes(march, lines)
+      type(march_t), intent(in) :: march
+      type(notes_t), intent(inout) :: lines
+      type(notes_t) :: sizes
+      type(string_t) :: why(n_why)
+      integer :: k
+
+      associate (control => march%state%control)
+         call control_sizes(control, sizes)
+         if (sizes%n == 0) return
+         do k = 1, n_why
+            why(k)%text = trim(why_text(k)) // " " // to_text(control%n_less(k))
+         end do
+         call note_add(lines, "increments by size (powers of two): " // &
+            joined(sizes%item(:sizes%n), ", ", sizes%n))
+         call note_add(lines, "made smaller because of: " // joined(why, ", ", n_why) // &
+            "; error above TOLERANCE at the smallest size: " // to_text(control%n_over) // &
+            "; events located: " // to_text(control%n_event))
+      end associate
+   end subroutine add_sizes
+
+   !> What pairs have transmitted, and those whose force is a comb.
+   subroutine add_pairs(self, scene, march, lines)
+      type(verdict_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(notes_t), intent(inout) :: lines
+      character(len=:), allocatable :: text
+      integer :: k, p
+
+      do k = 1, size(self%largest_force)
+         call pair_text(scene, k, text)
+         call note_add(lines, text // ": " // to_text(march%state%pairs%total(k)%n_active) // &
+            " active at end, largest force " // to_text(self%largest_force(k), 9))
+      end do
+      do p = 1, size(self%scatter)
+         if (.not. scatter_is_comb(self%scatter(p)) .or. march%active%softness%is_on) cycle
+         k = abs(march%system%contact(findloc(abs(march%state%sums%of_pair), p, 1))%of_pair)
+         call pair_text(scene, k, text)
+         text = "the force of " // text // " jumps up and down from increment to increment " // &
+            "(scatter " // to_text(100.0_wp*scatter_of(self%scatter(p)), 2) // &
+            " %); only its mean over several is meaningful: "
+         if (march%layer%is_on) then
+            call note_add(lines, text // "smaller increments make it smooth")
+         else
+            call note_add(lines, text // "*CONTACT INITIATION, TYPE=MASSLESS makes it smooth " // &
+               "on bodies at least two elements thick")
+         end if
+      end do
+   end subroutine add_pairs
+
+   !> "contact ... on ..." of pair `k`.
+   pure subroutine pair_text(scene, k, text)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: k                   !! of the scene, from 1
+      character(len=:), allocatable, intent(out) :: text
+
+      text = "contact " // scene%surface(scene%pair(k)%slave)%name // " on " // &
+         scene%surface(scene%pair(k)%master)%name
+   end subroutine pair_text
+
+   !> What these pairs can do to need no guards.
+   pure subroutine guard_advice(pair, advice)
+      type(contact_pair_t), intent(in) :: pair(:)   !! (any) of the scene
+      character(len=:), allocatable, intent(out) :: advice   !! a list, ends without a full stop
+      logical :: is_nodes(size(pair)), is_one_sided, is_integrated
+
+      is_nodes = pair%formulation == formulation_nts
+      is_one_sided = any(pair%is_guarded .and. is_nodes .and. .not. pair%both_sides)
+      is_integrated = any(pair%is_guarded .and. .not. is_nodes)
+      advice = "a finer mesh there"
+      if (is_one_sided .or. is_integrated) advice = "the other surface as slave or " // advice
+      if (is_integrated .and. is_one_sided) then
+         advice = "TYPE=NODE TO SURFACE with SIDES=BOTH, " // advice
+      else if (is_integrated) then
+         advice = "TYPE=NODE TO SURFACE, " // advice
+      else if (is_one_sided) then
+         advice = "SIDES=BOTH, " // advice
+      end if
+   end subroutine guard_advice
+
+end module emcon_verdict_lines
